@@ -1,0 +1,40 @@
+"""The error tree.  Each message names the thing, its value, what was expected and the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class LagfmuError(Exception):
+    """Base of every error that lagfmu raises on purpose."""
+
+
+class ModelError(LagfmuError):
+    """A model that cannot be accepted; `problems` lists everything that is wrong with it at once."""
+
+    def __init__(self, name: str, problems: Sequence[str]) -> None:
+        self.name = name
+        self.problems = tuple(problems)
+        lines = "\n".join(f"  - {problem}" for problem in self.problems)
+        count = "1 problem" if len(self.problems) == 1 else f"{len(self.problems)} problems"
+        super().__init__(f"model {name!r} has {count}:\n{lines}")
+
+
+class UnitError(LagfmuError):
+    """A unit that cannot be read, or is not coherent SI."""
+
+
+class DerivationError(LagfmuError):
+    """Equations of motion that cannot be derived in the form that was asked for."""
+
+
+class BuildError(LagfmuError):
+    """An FMU, a plot or a report that cannot be built or written."""
+
+
+class VerificationError(LagfmuError):
+    """A file that cannot be verified, because it is corrupt or no FMU of lagfmu."""
+
+
+class SimulationError(LagfmuError):
+    """A simulation that cannot go on; the message names the physical or numerical cause."""

@@ -1,0 +1,300 @@
+"""From one communication point to the next: steps, projection after each, and contact events.
+
+Within a leg the contact modes are fixed and the index-1 equations
+
+    q' = v ,   v' = vdot(t, q, v)   with   M vdot = F + G^T lambda ,  G vdot = gamma
+
+are integrated; every accepted step is projected onto f = 0 and G v = nu (Hairer & Wanner II, sect.
+VII.2).  lambda of a closed contact and f of an open one are watched.  Where one changes its sign the
+time is bracketed to rounding, each trial being an integration from the last accepted point, so that
+the event does not depend on the communication step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from .contacts import complementary_modes, impact
+from .failure import StepFailureError
+from .methods import stepper
+from .motion import EPS, evaluate, motion, project, residual
+from .state import Departure, Settings, State
+from .system import System, Vector
+
+LOOKS = (0.25, 0.5, 0.75)  # where a step is looked into for a contact that opens and closes in it
+PATIENCE = 200  # steps after which a communication step is judged by its average step
+STEP_LIMIT = 1e7  # internal steps that a communication step may need
+FEWEST_STEPS = 100  # rk4's steps in one natural time of the motion, unless solver.step is set
+
+
+def advance(
+    system: System,
+    settings: Settings,
+    state: State,
+    u: Sequence[float],
+    p: Sequence[float],
+    t_end: float,
+) -> State:
+    """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was."""
+    begun, first = state.t, state.steps
+    if not np.isfinite(t_end) or t_end <= state.t:
+        raise StepFailureError(
+            f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
+        )
+    with np.errstate(all="ignore"):
+        while state.t < t_end:
+            leg = _Leg(system, settings, state, u, p, begun)
+            state = _travel(leg, state, t_end, begun, first)
+    return state
+
+
+@dataclass
+class _Leg:
+    """A stretch of time over which the contact modes do not change."""
+
+    system: System
+    settings: Settings
+    state: State
+    u: Sequence[float]
+    p: Sequence[float]
+    begun: float
+
+    def __post_init__(self) -> None:
+        self.rows = self.system.active(self.state.closed)
+        self.offset = np.array(self.state.offset)
+        self.scale = np.array(self.state.scale)
+        self.cause = ""
+
+    def inputs(self, t: float) -> list[float]:
+        return self.system.inputs_at(self.u, t - self.begun)
+
+    def split(self, y: Vector) -> tuple[Vector, Vector]:
+        return y[: self.system.n], y[self.system.n :]
+
+    def rate(self, t: float, y: Vector) -> Vector:
+        """y' (2 n); not a number where the equations cannot be evaluated: the step is cut there."""
+        q, v = self.split(y)
+        try:
+            now = motion(self.system, t, q, v, self.inputs(t), self.p, self.rows)
+        except StepFailureError as error:
+            self.cause = str(error)
+            return np.full_like(y, np.nan)
+        return np.concatenate([v, now.vdot])
+
+    def project(self, t: float, y: Vector) -> Vector:
+        q, v = self.split(y)
+        return np.concatenate(
+            project(self.system, t, q, v, self.inputs(t), self.p, self.rows, self.offset)
+        )
+
+    def indicators(self, t: float, y: Vector) -> Vector:
+        """One a contact: lambda while closed, f while open."""
+        q, v = self.split(y)
+        w = self.inputs(t)
+        contacts = list(self.system.contacts)
+        values = residual(self.system, t, q, w, self.p)[contacts]
+        if any(self.state.closed):
+            lam = motion(self.system, t, q, v, w, self.p, self.rows).lam[contacts]
+            values = np.where(self.state.closed, lam, values)
+        return values
+
+    def stepper(self, t: float, y: Vector, t_bound: float, first_step: float | None) -> Any:
+        if self.settings.method == "rk4" and not self.settings.step:
+            first_step = 1 / (FEWEST_STEPS * self.state.rate)
+        elif self.settings.method == "rk4":
+            first_step = self.settings.step
+        return stepper(self.settings, self.rate, t, y, t_bound, self.scale, first_step)
+
+    def step(self, solver: Any) -> None:
+        """One accepted step, or the reason why there is none."""
+        try:
+            message = solver.step()
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+            raise self.failure(solver.t, str(error)) from error
+        if solver.status == "failed" or not np.isfinite(solver.y).all():
+            raise self.failure(solver.t, message or "the state is not finite")
+
+    def failure(self, t: float, message: str) -> StepFailureError:
+        if "step size" in message:
+            message = "step size underflow"
+        cause = f": {self.cause}" if self.cause else ""
+        return StepFailureError(f"the integration stops at t = {t!r} s, {message}{cause}")
+
+    def reach(self, t: float, y: Vector, t1: float) -> Vector:
+        """The state at t1, integrated from (t, y) and projected."""
+        if t1 <= t:
+            return y
+        solver = self.stepper(t, y, t1, t1 - t)
+        while solver.status == "running":
+            self.step(solver)
+        return self.project(t1, solver.y)
+
+
+def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> State:
+    """Integrate until t_end or the first event, whichever comes first; at an event, switch modes."""
+    y = np.array(state.q + state.v)
+    f0 = leg.rate(state.t, y)
+    if not np.isfinite(f0).all():
+        raise StepFailureError(leg.cause)
+    solver = leg.stepper(state.t, y, t_end, state.step or None)
+    armed = list(state.armed)
+    proposed, steps = state.step, state.steps
+    watch = bool(leg.system.contacts)
+    before = leg.indicators(state.t, y) if watch else None
+    while True:
+        t0, y0 = solver.t, solver.y
+        offered = solver.h_abs
+        leg.step(solver)
+        steps += 1
+        y1 = leg.project(solver.t, solver.y)
+        if watch:
+            event, before = _first_event(leg, solver, t0, y0, y1, before, armed, state.gap)
+            if event is not None:
+                here = replace(state, step=max(offered, 0.0), steps=steps, armed=tuple(armed))
+                return _switch(leg, here, t0, y0, *event)
+        clipped = solver.t == t_end
+        proposed = max(solver.h_abs, offered) if clipped else solver.h_abs
+        if clipped:
+            n = leg.system.n
+            return replace(
+                state,
+                t=t_end,
+                q=tuple(y1[:n].tolist()),
+                v=tuple(y1[n:].tolist()),
+                armed=tuple(armed),
+                step=float(proposed),
+                steps=steps,
+            )
+        solver.y, solver.f = y1, leg.rate(solver.t, y1)
+        done = steps - first
+        if done >= PATIENCE and done * (t_end - begun) > STEP_LIMIT * (solver.t - begun):
+            needed = done * (t_end - begun) / (solver.t - begun)
+            raise StepFailureError(
+                f"the communication step to t = {t_end!r} s would need about {needed:.0e} internal "
+                f"steps, more than {STEP_LIMIT:.0e}: take a shorter one"
+            )
+
+
+def _first_event(
+    leg: _Leg,
+    solver: Any,
+    t0: float,
+    y0: Vector,
+    y1: Vector,
+    before: Vector,
+    armed: list[bool],
+    gap: Sequence[float],
+) -> tuple[tuple[float, list[int]] | None, Vector]:
+    """The earliest sign change within the step just taken, as (time, contacts), if there is one."""
+    h = solver.t - t0
+    dense = solver.dense_output()
+    times = [t0 + x * h for x in LOOKS]
+    values = [before, *(leg.indicators(t, dense(t)) for t in times), leg.indicators(solver.t, y1)]
+    times = [t0, *times, solver.t]
+    found: list[tuple[float, int]] = []
+    for c, closed in enumerate(leg.state.closed):
+        level = 0.0 if closed or armed[c] else -gap[c]
+        trigger = 0.0 if closed else -gap[c]
+        for i in range(1, len(times)):
+            if values[i][c] < trigger:
+                t = _locate(leg, t0, y0, times[i - 1], times[i], c, level)
+                if t is not None:
+                    found.append((t, c))
+                    break
+    if not found:
+        for c, closed in enumerate(leg.state.closed):
+            armed[c] = armed[c] or (not closed and values[-1][c] > gap[c])
+        return None, values[-1]
+    earliest = min(t for t, _ in found)
+    return (earliest, [c for t, c in found if t == earliest]), values[-1]
+
+
+def _locate(
+    leg: _Leg, t0: float, y0: Vector, lo: float, hi: float, contact: int, level: float
+) -> float | None:
+    """The time in [lo, hi] at which the contact's indicator falls through `level`, to rounding."""
+
+    def height(elapsed: float) -> float:
+        t = t0 + elapsed
+        return float(leg.indicators(t, leg.reach(t0, y0, t))[contact] - level)
+
+    for a in dict.fromkeys((lo - t0, 0.0)):
+        b = hi - t0
+        if height(b) >= 0:
+            return None  # it only grazed: within the tolerance there is no event
+        if height(a) > 0:
+            return t0 + float(brentq(height, a, b, xtol=EPS * b, rtol=4 * EPS, maxiter=200))
+    return t0
+
+
+def _switch(
+    leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: list[int]
+) -> State:
+    """The state right after the event at t: contacts opened or struck, modes settled together."""
+    system, p, w = leg.system, leg.p, leg.inputs(t)
+    q, v = leg.split(leg.reach(t0, y0, t))
+    closed, armed = list(state.closed), list(state.armed)
+    offset = np.array(state.offset)
+    leaving = [c for c in contacts if closed[c]]
+    landing = [c for c in contacts if not closed[c]]
+    for c in leaving:
+        closed[c] = False
+        armed[c] = False
+    for c in landing:
+        v = impact(system, t, q, v, w, p, closed, c)
+        _, _, G, nu, _ = evaluate(system, t, q, v, w, p)
+        k = system.contacts[c]
+        speed = G[k] @ v - nu[k]
+        size = np.abs(G[k]) @ np.array(state.scale[system.n :])
+        closed[c] = bool(speed <= 1e-9 * size)
+        armed[c] = False
+        if closed[c]:
+            f = residual(system, t, q, w, p)
+            for j, row in enumerate(system.rows):
+                if row.while_closed == k:
+                    offset[j] = f[j]
+    touching = _touching(system, t, q, v, w, p, state, closed)
+    modes = complementary_modes(system, t, q, v, w, p, closed, touching, leaving)
+    q, v = project(system, t, q, v, w, p, system.active(modes), offset)
+    departures = list(state.departures)
+    for c, (old, new) in enumerate(zip(leg.state.closed, modes, strict=True)):
+        if old and not new:
+            count = departures[c].count + 1
+            departures[c] = Departure(count, t, tuple(q.tolist()), tuple(v.tolist()))
+    return replace(
+        state,
+        t=t,
+        q=tuple(q.tolist()),
+        v=tuple(v.tolist()),
+        closed=modes,
+        armed=tuple(armed),
+        offset=tuple(offset.tolist()),
+        departures=tuple(departures),
+    )
+
+
+def _touching(
+    system: System,
+    t: float,
+    q: Vector,
+    v: Vector,
+    u: Sequence[float],
+    p: Sequence[float],
+    state: State,
+    closed: Sequence[bool],
+) -> list[int]:
+    """Contacts with f and df/dt at zero: those whose mode the accelerations decide."""
+    _, _, G, nu, _ = evaluate(system, t, q, v, u, p)
+    f = residual(system, t, q, u, p)
+    size = np.abs(G) @ np.array(state.scale[system.n :])
+    return [
+        c
+        for c, k in enumerate(system.contacts)
+        if closed[c]
+        or (abs(f[k]) <= state.gap[c] and abs(G[k] @ v - nu[k]) <= 1e-9 * size[k])
+    ]

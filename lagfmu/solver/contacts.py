@@ -1,0 +1,109 @@
+"""Which contacts are closed, and what an impact does.
+
+    f >= 0 ,  lambda >= 0 ,  f lambda = 0        (Signorini's condition; Pfeiffer & Glocker 1996, ch. 4)
+
+The modes of all contacts are found together by an active set on the accelerations: a closed contact
+that would have to pull is opened, an open one that touches and would be penetrated is closed, the
+worst first, until none is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from .failure import StepFailureError
+from .linear import solve
+from .motion import Motion, evaluate, motion
+from .system import System, Vector
+
+PULL = 1e-12  # a multiplier this small, relative to the forces at work, is zero
+
+
+def complementary_modes(
+    system: System,
+    t: float,
+    q: Vector,
+    v: Vector,
+    u: Sequence[float],
+    p: Sequence[float],
+    closed: Sequence[bool],
+    touching: Collection[int],
+    leaving: Collection[int] = (),
+) -> tuple[bool, ...]:
+    """Modes, one a contact, with lambda > 0 where closed and d2f/dt2 >= 0 where open and touching.
+
+    `touching` and `leaving` are positions in `system.contacts`; one in `leaving` was opened right
+    now because its multiplier passed through zero: there f and its first two derivatives vanish, and
+    the sign of what rounding leaves of them must not close it again.
+    """
+    modes = list(closed)
+    seen: set[tuple[bool, ...]] = set()
+    while True:
+        if tuple(modes) in seen:
+            raise StepFailureError(
+                f"no combination of open and closed contacts satisfies f >= 0, lambda >= 0 at "
+                f"t = {t!r} s"
+            )
+        seen.add(tuple(modes))
+        now = motion(system, t, q, v, u, p, system.active(modes))
+        size = _force_scale(now)
+        worst, change = 0.0, None
+        for c, k in enumerate(system.contacts):
+            if modes[c]:
+                excess = -(now.lam[k] / size[k]) if size[k] else 0.0
+                pulls = excess > -PULL if c in touching else excess > PULL
+                if pulls and (change is None or excess > worst):
+                    worst, change = excess, c
+            elif c in touching and c not in leaving:
+                approach = now.gamma[k] - now.G[k] @ now.vdot
+                floor = PULL * (abs(now.gamma[k]) + np.abs(now.G[k]) @ np.abs(now.vdot))
+                if approach > floor and approach > worst:
+                    worst, change = approach, c
+        if change is None:
+            return tuple(modes)
+        modes[change] = not modes[change]
+
+
+def _force_scale(now: Motion) -> Vector:
+    """For each row the multiplier that would carry all forces alone: |G||F| / |G|^2."""
+    G = np.abs(now.G)
+    square = np.einsum("ij,ij->i", G, G)
+    return np.asarray((G @ np.abs(now.F)) / np.where(square > 0, square, 1.0))
+
+
+def impact(
+    system: System,
+    t: float,
+    q: Vector,
+    v: Vector,
+    u: Sequence[float],
+    p: Sequence[float],
+    closed: Sequence[bool],
+    landing: int,
+) -> Vector:
+    """Velocities after the contact `landing` (a position in `system.contacts`) was struck.
+
+    Newton's law of restitution, M (v+ - v-) = G^T Lambda with G v+ - nu = -e (G v- - nu) on the
+    struck row and G v+ = nu on the rows that go on acting; a closed contact that would have to pull
+    is left out.
+    """
+    M, _, G, nu, _ = evaluate(system, t, q, v, u, p)
+    struck = system.contacts[landing]
+    e = system.restitution(p)[struck]
+    modes = list(closed)
+    modes[landing] = True
+    while True:
+        rows = system.active(modes)
+        jump = nu[rows] - G[rows] @ v
+        jump[rows.index(struck)] *= 1 + e
+        found = solve(M, np.zeros(system.n), G[rows], jump)
+        pulling = [
+            c
+            for c, k in enumerate(system.contacts)
+            if modes[c] and c != landing and found.lam[rows.index(k)] < 0
+        ]
+        if not pulling:
+            return v + found.x
+        modes[pulling[0]] = False

@@ -1,0 +1,47 @@
+"""The menu of integrators behind one interface: `step()`, `t`, `y`, `f`, `h_abs`, `dense_output()`.
+
+dop853, dopri5 and radau5 are SciPy's (Hairer, Norsett & Wanner I, sects. II.5 and II.10; Hairer &
+Wanner II, sect. IV.8); rk4 is our own.  Error weights: tol * max(|y_i|, s_i), up to a factor 2 on the
+safe side, because SciPy adds the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.integrate import DOP853, RK45, Radau
+
+from .rk4 import RK4
+from .state import Settings
+from .system import Vector
+
+ADAPTIVE: dict[str, Any] = {"dop853": DOP853, "dopri5": RK45, "radau5": Radau}
+RELATIVE_FLOOR = 100 * np.finfo(float).eps  # SciPy's own
+
+
+def stepper(
+    settings: Settings,
+    fun: Callable[[float, Vector], Vector],
+    t: float,
+    y: Vector,
+    t_bound: float,
+    scale: Vector,
+    first_step: float | None,
+) -> Any:
+    """An integrator of y' = fun(t, y) from t to t_bound [s]."""
+    span = t_bound - t
+    if settings.method == "rk4":
+        return RK4(fun, t, y, t_bound, first_step)
+    rtol = max(settings.tolerance / 2, RELATIVE_FLOOR)
+    return ADAPTIVE[settings.method](
+        fun,
+        t,
+        y,
+        t_bound,
+        rtol=rtol,
+        atol=settings.tolerance / 2 * scale,
+        first_step=None if first_step is None else min(first_step, span),
+        max_step=settings.maximum_step or np.inf,
+    )

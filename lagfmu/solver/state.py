@@ -1,0 +1,74 @@
+"""Everything that a simulation remembers between two communication points, and nothing else.
+
+A State is a value: saving it is keeping it, rolling back is putting it back, bit for bit.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, fields
+
+METHODS = ("dop853", "dopri5", "rk4", "radau5")
+DEFAULT_TOLERANCE = 1e-8
+SMALLEST_TOLERANCE = 1e-14
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to step: the method, the relative tolerance, the step [s] of rk4, the largest step [s]."""
+
+    method: str = "dop853"
+    tolerance: float = DEFAULT_TOLERANCE
+    step: float = 0.0
+    maximum_step: float = 0.0
+
+
+@dataclass(frozen=True)
+class Departure:
+    """The latest opening of a contact: its time [s], the state then, and how many there were."""
+
+    count: int
+    time: float
+    q: tuple[float, ...]
+    v: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class State:
+    """Time, motion, contact modes, step-size memory.
+
+    q, v (n); closed, armed, departures: one entry a contact; offset (m): the level f = offset that a
+    constraint keeps which came back with its contact; scale (2 n): the magnitudes below which errors
+    in q and v are measured absolutely; step [s]: the next step to try; rate [1/s]: the motion's
+    natural rate at the start.
+    """
+
+    t: float
+    q: tuple[float, ...]
+    v: tuple[float, ...]
+    closed: tuple[bool, ...]
+    armed: tuple[bool, ...]
+    offset: tuple[float, ...]
+    scale: tuple[float, ...]
+    gap: tuple[float, ...]
+    rate: float
+    step: float
+    steps: int
+    departures: tuple[Departure, ...]
+
+    def to_json(self) -> str:
+        """Text that `from_json` turns into an equal state; floats keep every bit."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> State:
+        """The state written by `to_json`."""
+        raw = json.loads(text)
+        for f in fields(State):
+            if isinstance(raw[f.name], list):
+                raw[f.name] = tuple(raw[f.name])
+        raw["departures"] = tuple(
+            Departure(d["count"], d["time"], tuple(d["q"]), tuple(d["v"]))
+            for d in raw["departures"]
+        )
+        return State(**raw)

@@ -1,0 +1,134 @@
+"""The numeric form of a model, as the solver sees it: callables and index patterns, no symbols.
+
+    M(q,t) vdot = F(q,v,t,u) + G^T lambda ,   G v = nu(q,t,u) ,   G vdot = gamma(q,v,t,u) ,   f(q,t) = 0
+
+The callables return flat lists of the structurally non-zero values; `assemble` puts them into place.
+That memory layout is decided here and in the code printer, and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+HOLONOMIC, NONHOLONOMIC, CONTACT = "holonomic", "nonholonomic", "contact"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One constraint: its name, kind and, if it acts only while a contact is closed, that row."""
+
+    name: str
+    kind: str
+    while_closed: int | None = None
+
+
+@dataclass(frozen=True)
+class System:
+    """M, F, G, nu, gamma, f and the energies of n coordinates under m constraint rows.
+
+    dynamics(t, q, v, u, p) -> (M values, F, G values, nu, gamma);  residual(t, q, u, p) -> f (m), 0
+    for a nonholonomic row;  energies(t, q, v, u, p) -> (kinetic, potential) [J];  restitution(p) ->
+    one coefficient a row.  `mass` and `jacobian` are the (row, column) indices of the values; M's
+    are those of the lower triangle.  `prescribed` are the positions in u where a prescribed motion
+    and its two derivatives begin.  `extent` (n) lists for each coordinate the positions in p whose
+    values have the coordinate's dimension.
+    """
+
+    coordinates: tuple[str, ...]
+    rows: tuple[Row, ...]
+    mass: tuple[Sequence[int], Sequence[int]]
+    jacobian: tuple[Sequence[int], Sequence[int]]
+    dynamics: Callable[..., Any]
+    residual: Callable[..., Any]
+    energies: Callable[..., Any]
+    restitution: Callable[..., Any]
+    has_potential: bool = True
+    prescribed: tuple[int, ...] = ()
+    like: tuple[tuple[int, ...], ...] = ()
+    extent: tuple[tuple[int, ...], ...] = ()
+    embedding: Embedding | None = None
+    formulation: str = "multipliers"
+    parameters: tuple[str, ...] = field(default=())
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.coordinates)
+
+    @property
+    def m(self) -> int:
+        """Number of constraint rows."""
+        return len(self.rows)
+
+    @cached_property
+    def contacts(self) -> tuple[int, ...]:
+        """The rows that are contacts."""
+        return tuple(k for k, row in enumerate(self.rows) if row.kind == CONTACT)
+
+    @cached_property
+    def permanent(self) -> tuple[int, ...]:
+        """The rows that always act."""
+        return tuple(
+            k
+            for k, row in enumerate(self.rows)
+            if row.kind != CONTACT and row.while_closed is None
+        )
+
+    @cached_property
+    def _mass(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        i, j = (np.asarray(a, dtype=np.intp) for a in self.mass)
+        return i, j
+
+    @cached_property
+    def _jacobian(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        k, j = (np.asarray(a, dtype=np.intp) for a in self.jacobian)
+        return k, j
+
+    def active(self, closed: Sequence[bool]) -> list[int]:
+        """Rows that act while the contacts stand as in `closed` (one entry a contact)."""
+        shut = {k for k, c in zip(self.contacts, closed, strict=True) if c}
+        return [
+            k
+            for k, row in enumerate(self.rows)
+            if (k in shut if row.kind == CONTACT else row.while_closed in shut | {None})
+        ]
+
+    def assemble(
+        self, t: float, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
+    ) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
+        """M (n, n), F (n), G (m, n), nu (m), gamma (m) at a state; all constraint rows."""
+        mass, F, jacobian, nu, gamma = self.dynamics(t, q.tolist(), v.tolist(), u, p)
+        M = np.zeros((self.n, self.n))
+        i, j = self._mass
+        M[i, j] = mass
+        M[j, i] = mass
+        G = np.zeros((self.m, self.n))
+        G[self._jacobian] = jacobian
+        return M, np.array(F, dtype=float), G, np.array(nu, dtype=float), np.array(gamma, float)
+
+    def inputs_at(self, u: Sequence[float], elapsed: float) -> list[float]:
+        """Inputs `elapsed` seconds after they were set: held, prescribed motions by Taylor's rule."""
+        if not self.prescribed:
+            return list(u)
+        w = list(u)
+        for k in self.prescribed:
+            w[k] = u[k] + elapsed * (u[k + 1] + elapsed * u[k + 2] / 2)
+            w[k + 1] = u[k + 1] + elapsed * u[k + 2]
+        return w
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """q = phi(s, t), v = J sdot + dphi/dt, and the full system that lambda is recovered from."""
+
+    embed: Callable[..., Any]
+    full: System
