@@ -18,6 +18,7 @@ from enum import StrEnum
 from typing import Any
 
 from sympy import Dummy, Eq, Integer, S, Symbol, expand, factor_terms, simplify, sympify
+from sympy import Integral as Integral_
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu.errors import DerivationError
@@ -174,6 +175,8 @@ class _Analysis:
     def run(self, known: list[Expr], integrate: bool) -> Classification:
         rank = 0
         try:
+            for entry in (entry for row in self.rows for entry in row if entry.has(Integral_)):
+                raise Undecided(entry, "an integral, which is not looked into")
             matrix = [[self.tower.element(entry) for entry in row] for row in self.rows]
             reduced, pivots = self._echelon(matrix)
             rank = len(pivots)
@@ -224,14 +227,14 @@ class _Analysis:
         witness: Expr,
         flag: tuple[int, ...],
     ) -> Classification:
-        return Classification(
-            kind, self.forms, rank, depth, found, text, witness, self.each, flag
-        )
+        return Classification(kind, self.forms, rank, depth, found, text, witness, self.each, flag)
 
     def _echelon(self, matrix: list[list[Any]]) -> tuple[list[list[Any]], list[int]]:
         """Reduced rows, each followed by its combination of the given forms."""
         tower, count = self.tower, len(matrix)
-        unit = [[tower.K.one if i == j else tower.K.zero for j in range(count)] for i in range(count)]
+        unit = [
+            [tower.K.one if i == j else tower.K.zero for j in range(count)] for i in range(count)
+        ]
         return tower.rref([a + b for a, b in zip(matrix, unit, strict=True)], self.width)
 
     def _consistent(self, reduced: list[list[Any]], pivots: list[int]) -> None:
@@ -384,7 +387,9 @@ class _Analysis:
             return f"integrable (Frobenius): d({name}) ^ {wedge} = 0{together}"
         name = "omega" if first is None or alone else f"omega_{first + 1}"
         basis = " ^ ".join(f"d{names[j]}" for j in where)
-        text = f"{kind.value}: the coefficient of {basis} in d({name}) ^ {wedge} is {witness}, not 0"
+        text = (
+            f"{kind.value}: the coefficient of {basis} in d({name}) ^ {wedge} is {witness}, not 0"
+        )
         if not alone:
             ranks = " > ".join(map(str, flag))
             text += f"; the derived flag has the ranks {ranks}"

@@ -52,9 +52,16 @@ from lagfmu.zero import Tower, Undecided, pairs
 Expr = Any  # SymPy has no types
 
 _LONG = 600  # operations of an integrand beyond which no integration is tried
-_TERM = 60  # operations of one term of it
+_TERM = 40  # operations of one term of it
 _ANSATZ = 90  # unknowns of an ansatz
-_FAILURES = (Undecided, ArithmeticError, NotImplementedError, PolynomialError, TypeError, ValueError)
+_FAILURES = (
+    Undecided,
+    ArithmeticError,
+    NotImplementedError,
+    PolynomialError,
+    TypeError,
+    ValueError,
+)
 
 
 def first_integrals(
@@ -413,7 +420,7 @@ def potential(row: Sequence[Expr], variables: Sequence[Expr]) -> Expr | None:
     """f with df/dx_i = row_i, for an exact row."""
     count = len(variables)
     for order in (list(range(count)), list(range(count))[::-1]):
-        f: Expr | None = S.Zero
+        f: Any = S.Zero
         done: list[Expr] = []
         for i in order:
             try:
@@ -469,26 +476,38 @@ def quadrature(expr: Expr, x: Expr) -> Expr | None:
 
 
 def _primitive_of(term: Expr, x: Expr) -> Expr | None:
-    if term.count_ops() > _TERM:
+    if term.count_ops() > _TERM or term.has(Integral):
         return None
-    if term.has(AppliedUndef) and any(u.has(x) for u in term.atoms(AppliedUndef)):
+    if any(u.has(x) for u in term.atoms(AppliedUndef)):
         s = Dummy("s", real=True)
         for low in (S.Zero, S.One):
             if not term.subs(x, low).has(S.NaN, S.ComplexInfinity, S.Infinity):
                 return Integral(term.xreplace({x: s}), (s, low, x))
-    found = manualintegrate(term, x)
+        return None
+    # where all symbols are positive: the primitive is verified for what they are, afterwards
+    names = {v: Dummy(v.name, positive=True) for v in sorted(term.free_symbols | {x}, key=str)}
+    plain, variable = term.xreplace(names), names[x]
+    found = manualintegrate(plain, variable)
     if found.has(Integral):
-        found = integrate(term, x, meijerg=False, heurisch=False)
+        found = integrate(plain, variable, risch=False, meijerg=False, heurisch=False, manual=False)
     while found.has(Piecewise):
         piece = next(iter(found.atoms(Piecewise)))
         found = found.xreplace({piece: piece.args[0].expr})
-    return None if found.has(Integral) else found
+    if found.has(Integral, S.NaN, S.ComplexInfinity):
+        return None
+    return found.xreplace({new: old for old, new in names.items()})
 
 
 def tidy(f: Expr | None) -> Expr | None:
-    """A sum of logarithms with rational ratios is exponentiated: log(x) - w*t to x*exp(-w*t)."""
+    """A sum of logarithms with rational ratios is exponentiated: log(x) - w*t to x*exp(-w*t).
+
+    A product with roots is raised to the power that removes them.
+    """
     if f is None:
         return None
+    powers = [factor.as_base_exp()[1] for factor in Mul.make_args(f)]
+    if all(power.is_Rational for power in powers):
+        return f ** ilcm(1, *[power.q for power in powers])
     terms = Add.make_args(expand(f))
     logs = [(term / node, node) for term in terms for node in term.args if isinstance(node, log)]
     logs += [(S.One, term) for term in terms if isinstance(term, log)]
@@ -562,7 +581,8 @@ def _monomials(
 
 
 def _combine(vector: Sequence[Expr], basis: Sequence[Expr]) -> Expr:
-    return Add(*[c * term for c, term in zip(vector, basis, strict=True)])
+    first = next(c for c in vector if c != 0)
+    return Add(*[(c / first).cancel() * term for c, term in zip(vector, basis, strict=True)])
 
 
 def _relations(tower: Tower, columns: Sequence[Sequence[Any]]) -> list[list[Expr]]:
@@ -589,8 +609,12 @@ def _relations(tower: Tower, columns: Sequence[Sequence[Any]]) -> list[list[Expr
     chance = random.Random(3)
     numbers = [QQ(chance.randint(2, 99), chance.randint(2, 99)) for _ in tower.K.symbols]
     sample = [
-        [QQ.convert(cells[m].evaluate(list(zip(ring.gens, numbers, strict=True))))
-         if m in cells else QQ.zero for m in range(width)]
+        [
+            QQ.convert(cells[m].evaluate(list(zip(ring.gens, numbers, strict=True))))
+            if m in cells
+            else QQ.zero
+            for m in range(width)
+        ]
         for cells in table.values()
     ]
     plain = DomainMatrix(sample, (len(sample), width), QQ)

@@ -97,20 +97,13 @@ def _system(
                 "nu": eom.nu,
                 "gamma": eom.gamma,
             },
-            {**names},
+            names,
         ),
         function(
             f"{prefix}residual",
             "f of each constraint f(q, t) = 0; 0 for a nonholonomic one.",
             still,
             {"f": [sp.S.Zero if f is None else f for f in eom.f]},
-            names,
-        ),
-        function(
-            f"{prefix}energies",
-            "Kinetic and potential energy [J].",
-            state,
-            {"energy": [eom.kinetic, eom.potential if eom.potential is not None else 0]},
             names,
         ),
         function(
@@ -126,6 +119,13 @@ def _system(
             names,
         ),
     ]
+    if rows is None:  # the energies of the full system serve the reduced one too
+        energies = [eom.kinetic, eom.potential if eom.potential is not None else sp.S.Zero]
+        parts.append(
+            function(
+                "energies", "Kinetic and potential energy [J].", state, {"energy": energies}, names
+            )
+        )
     label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
     parts.append(
         f"{label} = System(\n"
@@ -135,7 +135,7 @@ def _system(
         f"    jacobian={_pattern(jacobian)},\n"
         f"    dynamics={prefix}dynamics,\n"
         f"    residual={prefix}residual,\n"
-        f"    energies={prefix}energies,\n"
+        "    energies=energies,\n"
         f"    restitution={prefix}restitution,\n"
         f"    has_potential={eom.potential is not None},\n"
         f"    prescribed={_prescribed(eom)!r},\n"

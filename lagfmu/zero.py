@@ -24,6 +24,7 @@ from sympy import (
     Float,
     I,
     Integer,
+    Integral,
     Mul,
     Poly,
     Pow,
@@ -56,7 +57,7 @@ _LARGEST = 3000  # terms of a numerator and a denominator; beyond that, the answ
 _SIMPLIFIABLE = 150  # operations up to which SymPy's simplify is asked
 
 
-class Undecided(Exception):
+class Undecided(Exception):  # noqa: N818 (an answer rather than an error)
     """It cannot be decided whether `expr` is zero."""
 
     def __init__(self, expr: Any, reason: str) -> None:
@@ -269,7 +270,7 @@ class Tower:
         parts: dict[int, Any] = {}
         for monomial, coefficient in polynomial.terms():
             k = monomial[place]
-            rest = monomial[:place] + (0,) + monomial[place + 1 :]
+            rest = (*monomial[:place], 0, *monomial[place + 1 :])
             parts.setdefault(k, ring.zero)
             parts[k] += ring.term_new(rest, coefficient)
         folded = [self.K.zero] * degree
@@ -395,9 +396,7 @@ class Tower:
     def _numbers(self, element: Any) -> list[dict[Any, Any]]:
         """The generators' values at the sample points, real ones if there are any."""
         used = [
-            symbol
-            for place, symbol in enumerate(self.K.symbols)
-            if element.numer.degree(place) > 0
+            symbol for place, symbol in enumerate(self.K.symbols) if element.numer.degree(place) > 0
         ]
         if not self._values or not self._extend(used):
             drawn = []
@@ -435,7 +434,7 @@ class Tower:
             concrete = self._concrete(meaning)
             for free in sorted(concrete.free_symbols, key=str):
                 if free not in point:
-                    point[free] = self._draw(free)
+                    point[free] = Float(self._draw(free), _DIGITS + 15)
             try:
                 number = concrete.xreplace(point).evalf(_DIGITS)
                 value = number._to_mpmath(int(_DIGITS * 3.33))
@@ -458,6 +457,12 @@ class Tower:
         """`expr` with each unknown function replaced by one of its kind, the same everywhere."""
         if not expr.has(AppliedUndef):
             return expr
+        # a quadrature of an unknown function, which only lagfmu.integrals makes: any number
+        for node in expr.atoms(Integral):
+            if node not in self._functions:
+                self._functions[node] = self._draw(Dummy(positive=True))
+        known = {n: value for n, value in self._functions.items() if isinstance(n, Integral)}
+        expr = expr.xreplace(known)
 
         def example(applied: Any) -> Any:
             key = applied.func
@@ -474,7 +479,8 @@ class Tower:
                 + sin(sum(x * (u + 1) for x, u in zip(c, applied.args, strict=True)))
             )
 
-        return expr.replace(lambda e: isinstance(e, AppliedUndef), example).doit()
+        expr = expr.replace(lambda e: isinstance(e, AppliedUndef), example)
+        return expr.doit()
 
     # --- linear algebra ---------------------------------------------------------------------
 

@@ -1,0 +1,93 @@
+"""Build every model in models/ as an FMU, verify each through fmpy, and print one table.
+
+Exit status 1 if a model cannot be built or misses a closed form.
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
+from rich.table import Table
+
+from lagfmu import LagfmuError, Verification, verify
+from lagfmu.build import prepare, write
+from lagfmu.modelfile import ModelFile, load
+from lagfmu.scene import Scene
+
+MODELS = Path(__file__).parent / "models"
+RUNS = 3  # the time is the median of these
+
+
+def build_one(file: ModelFile, scene: Scene, out: Path) -> tuple[Path, float, Verification, float]:
+    """The FMU, seconds to build it, its verification, seconds to simulate it."""
+    begun = time.perf_counter()
+    prepared = prepare(file.model, scene)
+    path = write(prepared, out, file.closed_forms)
+    built = time.perf_counter() - begun
+    runs = [verify(path) for _ in range(RUNS)]
+    write(prepared, out, file.closed_forms, runs[0].rows())
+    return path, built, runs[0], statistics.median(r.seconds for r in runs)
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="Folder for python/NAME.fmu.")] = Path("dist"),
+) -> None:
+    """Build and verify every model in models/."""
+    console = Console()
+    table = Table(title="FMUs, held against their closed forms", title_justify="left")
+    for column in ("FMU", "size", "build", "steps per s", "ms per s", "closed form", "error"):
+        table.add_column(column, justify="left" if column in ("FMU", "closed form") else "right")
+    table.add_column("verdict")
+    problems: list[str] = []
+    files: list[ModelFile] = []
+    for path in sorted(MODELS.glob("*.py")):
+        try:
+            files.append(load(path))
+        except LagfmuError as error:
+            problems.append(str(error))
+    work = [(file, scene) for file in files for scene in file.scenes]
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("", total=len(work))
+        for file, scene in work:
+            progress.update(task, description=scene.name)
+            try:
+                path, built, found, seconds = build_one(file, scene, out / "python")
+            except LagfmuError as error:
+                problems.append(f"{scene.name}: {error}")
+                table.add_row(scene.name, "", "", "", "", "", "", "[bold red]FAIL[/]")
+            else:
+                head = (
+                    scene.name,
+                    f"{path.stat().st_size / 1e3:.0f} kB",
+                    f"{built:.2f} s",
+                    f"{found.steps / found.simulated:.0f}",
+                    f"{1e3 * seconds / found.simulated:.0f}",
+                )
+                for check, row in zip(found.checks, found.rows(), strict=True):
+                    good = check.passed and check.points > 0
+                    verdict = f"[green]{row[3]}[/]" if good else f"[bold red]{row[3]}[/]"
+                    table.add_row(*head, escape(row[0]), row[1], verdict)
+                    head = ("", "", "", "", "")
+                    if not good:
+                        problems.append(f"{scene.name}: {row[0]}: {row[3]} {check.detail}")
+                table.add_section()
+            progress.advance(task)
+    console.print(table)
+    for problem in problems:
+        console.print(f"[bold red]FAIL[/] {escape(problem)}", highlight=False)
+    if problems or not work:
+        sys.exit(1)
+    console.print(f"[green]all {len(work)} FMUs in {out / 'python'} hold their closed forms[/]")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,5 @@
+"""`python -m lagfmu` is the `lagfmu` command."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,219 @@
+"""The `lagfmu` command: build, show, verify, simulate.  Errors are one message, never a traceback."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from .build import prepare, write
+from .errors import LagfmuError, SimulationError
+from .modelfile import load
+from .plot import plot
+from .show import show as show_prepared
+from .simulate import read_description, simulate
+from .verify import Verification, verify
+
+app = typer.Typer(
+    help="Lagrange's equations with multipliers, from SymPy to FMUs that report forces of constraint.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+console = Console()
+errors = Console(stderr=True)
+
+ModelPath = Annotated[Path, typer.Argument(help="A Python file that defines a Model.")]
+FmuPath = Annotated[Path, typer.Argument(help="An FMU built by lagfmu.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter or start value; repeatable."),
+]
+Tolerance = Annotated[float | None, typer.Option(help="Relative tolerance: speed against accuracy.")]
+StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
+StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
+
+
+@contextlib.contextmanager
+def _plainly() -> Iterator[None]:
+    """Warnings and errors as one message each; exit status 1 after an error."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield
+        except LagfmuError as error:
+            errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
+            raise typer.Exit(1) from None
+        finally:
+            for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
+                errors.print(f"[yellow]warning:[/] {escape(message)}", highlight=False)
+
+
+def _ours(warning: Any) -> bool:
+    return str(getattr(warning.category, "__module__", "")).startswith("lagfmu")
+
+
+@app.command()
+def build(
+    model: ModelPath,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist"),
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
+    ] = None,
+    check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
+) -> None:
+    """Build the FMUs of a model file into OUT/python/NAME.fmu and verify them."""
+    failed = False
+    with _plainly():
+        file = load(model)
+        scenes = [s for s in file.scenes if scene is None or s.name in scene]
+        if not scenes:
+            known = ", ".join(s.name for s in file.scenes)
+            raise LagfmuError(f"{model}: no FMU is called {', '.join(scene or ())}; known: {known}")
+        for s in scenes:
+            with console.status(f"building {s.name}"):
+                prepared = prepare(file.model, s)
+                path = write(prepared, out / "python", file.closed_forms)
+            console.print(f"[green]built[/] {path} ({path.stat().st_size / 1e3:.0f} kB)")
+            if check:
+                with console.status(f"verifying {s.name}"):
+                    found = verify(path)
+                    write(prepared, out / "python", file.closed_forms, found.rows())
+                _print(found)
+                failed |= not found.passed
+    if failed:
+        raise typer.Exit(1)
+
+
+@app.command()
+def show(
+    model: ModelPath,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of the file.")] = None,
+) -> None:
+    """Print equations of motion, classification of constraints, degrees of freedom and units."""
+    with _plainly():
+        file = load(model)
+        for s in file.scenes:
+            if scene is None or s.name == scene:
+                show_prepared(prepare(file.model, s), console)
+
+
+@app.command(name="verify")
+def verify_command(
+    fmu: FmuPath,
+    set_: Settings = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Tolerance = None,
+) -> None:
+    """Simulate an FMU through fmpy and hold it against the closed forms that it carries."""
+    with _plainly():
+        found = verify(fmu, _assignments(set_), stop_time, step_size, tolerance)
+        _print(found)
+    if not found.passed:
+        raise typer.Exit(1)
+
+
+@app.command(name="simulate")
+def simulate_command(
+    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    set_: Settings = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Tolerance = None,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    plot_: Annotated[
+        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
+    ] = None,
+    variable: Annotated[
+        list[str] | None, typer.Option("--variable", "-v", help="What to plot; repeatable.")
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
+) -> None:
+    """Simulate an FMU or a model; print the last values, plot or save the rest."""
+    with _plainly():
+        source: Any = target
+        if target.suffix == ".py":
+            file = load(target)
+            scenes = [s for s in file.scenes if scene is None or s.name == scene]
+            if not scenes:
+                known = ", ".join(s.name for s in file.scenes)
+                raise SimulationError(f"{target}: no FMU is called {scene!r}; known: {known}")
+            source = prepare(file.model, scenes[0])
+            name = source.scene.name
+            units = {v.name: v.unit.name for v in source.table.variables if v.unit is not None}
+        else:
+            description = read_description(target)
+            name = description.modelName
+            units = {v.name: v.unit for v in description.modelVariables if v.unit}
+        with console.status(f"simulating {name}"):
+            result = simulate(source, stop_time, step_size, tolerance, _assignments(set_))
+        _print_last(name, result, units)
+        if csv is not None:
+            _save(csv, result)
+            console.print(f"[green]wrote[/] {csv}")
+        if plot_ is not None:
+            console.print(f"[green]wrote[/] {plot(result, units, plot_, variable or (), name)}")
+
+
+def _assignments(texts: list[str] | None) -> dict[str, Any]:
+    """NAME=VALUE texts as a dict; a value that is no number stays text (solver.method)."""
+    values: dict[str, Any] = {}
+    for text in texts or []:
+        name, sign, value = text.partition("=")
+        if not sign or not name:
+            raise SimulationError(f"--set {text!r}: expected NAME=VALUE, e.g. --set theta=0.5")
+        try:
+            values[name.strip()] = float(value)
+        except ValueError:
+            values[name.strip()] = value.strip()
+    return values
+
+
+def _print(found: Verification) -> None:
+    table = Table(title=f"{found.name}: {'pass' if found.passed else 'FAIL'}", title_justify="left")
+    table.add_column("statement")
+    table.add_column("largest error", justify="right")
+    table.add_column("allowed", justify="right")
+    table.add_column("verdict")
+    for row, check in zip(found.rows(), found.checks, strict=True):
+        colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
+        table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
+    console.print(table)
+    for check in found.checks:
+        if not check.passed and check.detail:
+            errors.print(f"[red]{escape(check.name)}:[/] {escape(check.detail)}", highlight=False)
+
+
+def _print_last(name: str, result: Any, units: dict[str, str]) -> None:
+    table = Table(title=f"{name} at t = {result['time'][-1]:g} s", title_justify="left")
+    table.add_column("variable")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    for n in result.dtype.names[1:]:
+        value = result[n][-1]
+        text = f"{value:.9g}" if result[n].dtype.kind == "f" else str(value)
+        table.add_row(escape(n), text, escape(units.get(n, "")))
+    console.print(table)
+
+
+def _save(path: Path, result: Any) -> None:
+    import fmpy.util
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        fmpy.util.write_csv(str(path), result)
+    except OSError as error:
+        raise SimulationError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+
+
+def main() -> None:
+    """Entry point of `python -m lagfmu`."""
+    sys.exit(app())

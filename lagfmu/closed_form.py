@@ -1,0 +1,95 @@
+"""What a model's outputs must equal: SymPy expressions in the model's own symbols.
+
+A closed form may use coordinates and velocities (their values along the run), time, parameters,
+inputs, and the symbols that the functions below make.  `verify` evaluates it on what an FMU returns,
+with parameters and start values changed or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+from sympy.physics.vector import dynamicsymbols
+
+from .model import name_of
+
+Expr = Any
+TIME = dynamicsymbols._t
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """`actual` equals `expected` at every communication point at which it applies.
+
+    `name` is an output's name (then `actual` may be left out) or a label.  `while_closed`,
+    `while_open`: only while that contact is so; `at_departure`: only once that contact has opened, to
+    be used with the `departure` symbols.  Errors are measured relative to `scale` (default: the
+    largest magnitude of `expected` along the run) and allowed up to `within` times the solver's
+    tolerance, but at least `rounding`.  `only`: the FMUs that it applies to.
+    """
+
+    name: str
+    expected: Expr
+    actual: Expr | None = None
+    while_closed: str | None = None
+    while_open: str | None = None
+    at_departure: str | None = None
+    scale: Expr | None = None
+    within: float = 10.0
+    rounding: float = 1e-12
+    only: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Conserved:
+    """`expression` keeps the value that it has at the first communication point."""
+
+    name: str
+    expression: Expr
+    while_closed: str | None = None
+    while_open: str | None = None
+    scale: Expr | None = None
+    within: float = 10.0
+    rounding: float = 1e-12
+    only: tuple[str, ...] | None = None
+
+
+def output(name: str) -> Expr:
+    """The FMU's variable of that name, e.g. output('lambda.rod') or output('energy.total')."""
+    return sp.Symbol(name, real=True)
+
+
+def initial(state: Expr) -> Expr:
+    """The value of a coordinate or of its derivative at the first communication point."""
+    return sp.Symbol(f"initial({variable_name(state)})", real=True)
+
+
+def departure(contact: str, state: Expr = None) -> Expr:
+    """A coordinate or velocity at the contact's latest departure; its time [s] without `state`."""
+    if state is None:
+        return sp.Symbol(f"departure.{contact}.time", real=True)
+    if isinstance(state, sp.Derivative):
+        return sp.Symbol(f"departure.{contact}.velocity.{name_of(state.expr)}", real=True)
+    return sp.Symbol(f"departure.{contact}.{name_of(state)}", real=True)
+
+
+def variable_name(state: Expr) -> str:
+    """The FMU's name of a coordinate, velocity or acceleration: theta, der(theta), der(theta,2)."""
+    if isinstance(state, sp.Derivative):
+        order = state.derivative_count
+        inner = name_of(state.expr)
+        return f"der({inner})" if order == 1 else f"der({inner},{order})"
+    return name_of(state)
+
+
+def in_variables(expression: Expr) -> Expr:
+    """The expression with dynamicsymbols replaced by symbols named as the FMU's variables."""
+    expression = sp.sympify(expression)
+    rates = expression.atoms(sp.Derivative)
+    expression = expression.xreplace({d: output(variable_name(d)) for d in rates})
+    functions = expression.atoms(sp.core.function.AppliedUndef)
+    table = {f: output(name_of(f)) for f in functions}
+    table[TIME] = output("time")
+    return expression.xreplace(table)

@@ -1,0 +1,108 @@
+"""Rank, redundancy and feasibility of a model's constraints, found numerically where they hold.
+
+Degrees of freedom N = n - rank G (ME 6590).  The rank is taken at the consistent start and at
+configurations near it that satisfy the constraints, because on the constraint surface it may be smaller
+than for a general q.
+"""
+
+from __future__ import annotations
+
+import random
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from .equations import EquationsOfMotion
+from .errors import ModelError
+from .solver.failure import StepFailureError
+from .solver.initial import Start, start
+from .solver.linear import RANK
+from .solver.motion import evaluate
+from .solver.observe import expand, observe
+from .solver.state import Settings
+from .solver.system import System, Vector
+from .variables import VariableTable
+
+TRIALS = 5
+
+
+class RedundantConstraintWarning(UserWarning):
+    """Constraints that follow from others: lambda is not unique, Q is."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """n, m, rank of G with all constraints acting, degrees of freedom, redundant constraints, start."""
+
+    n: int
+    m: int
+    rank: int
+    redundant: tuple[str, ...]
+    start: Start
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """N = n - rank G."""
+        return self.n - self.rank
+
+
+def examine(eom: EquationsOfMotion, table: VariableTable, system: System) -> Structure:
+    """Check that the model can start, and count its degrees of freedom.
+
+    Warns of redundant constraints.  Raises ModelError if no configuration satisfies the constraints,
+    they contradict each other, or the mass matrix is singular on the constraint surface.
+    """
+    p = [float(x.value) for x in eom.model.parameters]
+    u = [float(table[str(s)].start or 0.0) for s in eom.u]
+    q0 = [float(table[c].start or 0.0) for c in system.coordinates]
+    v0 = [float(table[f"der({c})"].start or 0.0) for c in system.coordinates]
+    try:
+        begun = start(system, Settings(), 0.0, q0, v0, u, p)
+        observe(system, begun.state, u, p)
+    except StepFailureError as error:
+        raise ModelError(eom.model.name, [str(error)]) from error
+    generator = random.Random(1)
+    ranks = []
+    for trial in range(TRIALS):
+        q, v = np.array(begun.state.q), np.array(begun.state.v)
+        if trial:  # a nearby configuration that satisfies the constraints as well
+            size = np.maximum(np.abs(q), np.abs(q).max(initial=0.0)) + 1e-3
+            shift = [0.1 * s * generator.uniform(-1, 1) for s in size]
+            try:
+                moved = start(system, Settings(), 0.0, (q + shift).tolist(), v.tolist(), u, p)
+            except StepFailureError:
+                continue
+            q, v = np.array(moved.state.q), np.array(moved.state.v)
+        full, q, v = expand(system, 0.0, q, v, u, p)
+        ranks.append(_rank(full, q, v, u, p))
+    rank, redundant = max(ranks, key=lambda r: r[0])
+    if redundant:
+        warnings.warn(
+            f"model {eom.model.name!r}: constraint{'s' if len(redundant) > 1 else ''} "
+            f"{', '.join(map(repr, redundant))} follow{'' if len(redundant) > 1 else 's'} from the "
+            "others; lambda is shared with least norm and flagged by unique.*, Q is right",
+            RedundantConstraintWarning,
+            stacklevel=3,
+        )
+    return Structure(eom.n, eom.m, rank, redundant, begun)
+
+
+def _rank(
+    full: System, q: Vector, v: Vector, u: list[float], p: list[float]
+) -> tuple[int, tuple[str, ...]]:
+    """Rank of G with rows scaled to unit norm, and the rows that add nothing to those before them."""
+    _, _, G, _, _ = evaluate(full, 0.0, q, v, u, p)
+    norm = np.linalg.norm(G, axis=1)
+    G = G / np.where(norm > 0, norm, 1.0)[:, None]
+    kept: list[int] = []
+    redundant = []
+    for k in range(full.m):
+        trial = [*kept, k]
+        if np.linalg.svd(G[trial], compute_uv=False).min(initial=np.inf) > np.sqrt(RANK) and (
+            len(trial) <= full.n
+        ):
+            kept = trial
+        else:
+            redundant.append(full.rows[k].name)
+    return len(kept), tuple(redundant)

@@ -1,0 +1,3 @@
+"""The page inside an FMU (placeholder until the real one)."""
+def page(prepared, figures=()):
+    return "<html></html>"

@@ -1,0 +1,332 @@
+"""The FMI layer of the python target: what stands between pythonfmu and the solver.
+
+This file travels inside each FMU, together with `lagfmu/solver`, in a package whose name carries the
+hash of its content.  It needs NumPy and SciPy, no SymPy and no installed lagfmu.
+
+Status of calls: a communication step that cannot be done returns False (fmi2Discard), with the reason
+in the log and the instance as it was before the step.  pythonfmu turns every exception into fmi2Fatal
+and knows no way to return fmi2Error; other refusals are therefore exceptions with a plain message.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any, TypeVar
+
+from pythonfmu.enums import Fmi2Status
+from pythonfmu.fmi2slave import Fmi2Slave
+
+from ..solver.advance import advance
+from ..solver.failure import StepFailureError
+from ..solver.initial import start
+from ..solver.observe import Values, observe
+from ..solver.state import METHODS, SMALLEST_TOLERANCE, Settings, State
+from ..solver.system import System
+
+Call = TypeVar("Call", bound=Callable[..., Any])
+ROUNDING = 1e-6  # part of a step by which an importer's sums of times may differ from ours
+
+
+class Refused(Exception):  # noqa: N818 - its name is what the importer's log shows
+    """A call that the FMU does not carry out."""
+
+
+def guarded(method: Call) -> Call:
+    """Let an exception reach the importer as text, and the instance survive it.
+
+    pythonfmu 0.7.0 drops a reference to the instance, its class and its log too many for every
+    exception that it reports, so that the process crashes at a later call; they are added here.
+    """
+
+    @functools.wraps(method)
+    def call(self: LagfmuSlave, *arguments: Any) -> Any:
+        try:
+            return method(self, *arguments)
+        except Exception as error:
+            for kept in (self, type(self), self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            text = str(error).encode("ascii", "backslashreplace").decode()
+            if isinstance(error, (Refused, StepFailureError)):
+                raise Refused(text) from None
+            raise Refused(f"internal error, {type(error).__name__}: {text}") from error
+
+    return call  # type: ignore[return-value]
+
+
+class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
+    """A simulation of `system` behind the FMI functions.
+
+    The generated subclass gives `system`, `variables` (name, kind, role, start, min, max; the position
+    is the value reference), `default_tolerance` and `identity`.
+    """
+
+    system: System
+    variables: Sequence[tuple[str, str, str, Any, float | None, float | None]]
+    default_tolerance: float
+    identity: str
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.values: list[Any] = [v[3] for v in self.variables]
+        self.names = [v[0] for v in self.variables]
+        self.outputs = [k for k, v in enumerate(self.variables) if v[2] in ("output", "start")]
+        roles = [v[2] for v in self.variables]
+        self.parameters = [k for k, role in enumerate(roles) if role == "parameter"]
+        self.inputs = [k for k, role in enumerate(roles) if role == "input"]
+        self.reference = {name: k for k, name in enumerate(self.names)}
+        self.start_time, self.stop_time, self.tolerance = 0.0, math.inf, 0.0
+        self.running = False
+        self.state: State | None = None
+        self.observed: list[Any] | None = None
+
+    # -------------------------------------------------------------- life cycle
+
+    @guarded
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None, tolerance: float | None
+    ) -> None:
+        """Start and stop time [s]; the tolerance is the dial between speed and accuracy."""
+        self.start_time = start_time
+        self.stop_time = math.inf if stop_time is None else stop_time
+        if tolerance is not None and not 0 < tolerance < math.inf:
+            raise Refused(
+                f"fmi2SetupExperiment: tolerance = {tolerance!r}, expected a positive number"
+            )
+        if not math.isfinite(start_time) or not self.stop_time > start_time:
+            raise Refused(
+                f"fmi2SetupExperiment: start time {start_time!r} s and stop time {stop_time!r} s, "
+                "expected a finite start before the stop"
+            )
+        self.tolerance = tolerance or 0.0
+        self.state = None
+
+    def enter_initialization_mode(self) -> None:
+        """Nothing is computed before a value is read or the mode is left."""
+
+    @guarded
+    def exit_initialization_mode(self) -> None:
+        """Project the start values, choose the contact modes."""
+        if self.state is None:
+            self._initialize()
+        self._outputs()
+        self.running = True
+
+    def terminate(self) -> None:
+        """Nothing to release."""
+
+    @guarded
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Advance by `step_size` [s]; False (fmi2Discard) leaves everything as it was."""
+        before = self.state
+        try:
+            if before is None or not self.running:
+                raise StepFailureError("fmi2DoStep before the end of the initialization")
+            end = current_time + step_size
+            if not step_size > 0 or not math.isfinite(step_size):
+                raise StepFailureError(
+                    f"the communication step is {step_size!r} s, expected a positive number"
+                )
+            slack = ROUNDING * step_size + 1e-12 * abs(before.t)
+            if abs(current_time - before.t) > slack:
+                raise StepFailureError(
+                    f"the communication point is {current_time!r} s, but this FMU stands at "
+                    f"{before.t!r} s: continue there, or restore a state saved at that time"
+                )
+            if end > self.stop_time + slack:
+                raise StepFailureError(
+                    f"the step ends at {end!r} s, after the stop time {self.stop_time!r} s that "
+                    "fmi2SetupExperiment defined"
+                )
+            self.state = advance(
+                self.system, self.settings, before, self._values(self.inputs), self.p, end
+            )
+            self.observed = None
+            self._outputs()
+        except StepFailureError as error:
+            self.state, self.observed = before, None
+            self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
+            return False
+        self._report_events(before, self.state)
+        return True
+
+    # -------------------------------------------------------------- values
+
+    @guarded
+    def get_real(self, vrs: list[int]) -> list[float]:
+        """Values of Real variables."""
+        return [float(x) for x in self._get(vrs, "Real")]
+
+    @guarded
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        """Values of Integer variables."""
+        return [int(x) for x in self._get(vrs, "Integer")]
+
+    @guarded
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        """Values of Boolean variables."""
+        return [bool(x) for x in self._get(vrs, "Boolean")]
+
+    @guarded
+    def get_string(self, vrs: list[int]) -> list[str]:
+        """Values of String variables."""
+        return [str(x) for x in self._get(vrs, "String")]
+
+    @guarded
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        """Set parameters, start values (before the end of initialization) or inputs."""
+        for vr, value in zip(vrs, values, strict=True):
+            name, _, _, _, low, high = self._settable(vr, "Real")
+            if not math.isfinite(value):
+                raise Refused(f"{name!r} = {value!r}, expected a finite number")
+            if (low is not None and value < low) or (high is not None and value > high):
+                raise Refused(f"{name!r} = {value!r} is outside its bounds [{low}, {high}]")
+            self._set(vr, value)
+
+    @guarded
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        """Set `solver.method`."""
+        for vr, value in zip(vrs, values, strict=True):
+            name = self._settable(vr, "String")[0]
+            if value not in METHODS:
+                raise Refused(f"{name!r} = {value!r}, expected one of {', '.join(METHODS)}")
+            self._set(vr, value)
+
+    @guarded
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """No Integer can be set."""
+        for vr in vrs:
+            self._settable(vr, "Integer")
+
+    @guarded
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        """No Boolean can be set."""
+        for vr in vrs:
+            self._settable(vr, "Boolean")
+
+    def _variable(self, vr: int, kind: str) -> Any:
+        if not 0 <= vr < len(self.variables) or self.variables[vr][1] != kind:
+            raise Refused(f"value reference {vr} is no {kind} variable of this FMU")
+        return self.variables[vr]
+
+    def _settable(self, vr: int, kind: str) -> Any:
+        variable = self._variable(vr, kind)
+        name, role = variable[0], variable[2]
+        if role == "output":
+            raise Refused(f"{name!r} is calculated and cannot be set")
+        if self.running and role != "input":
+            raise Refused(f"{name!r} can only be set before the end of the initialization")
+        return variable
+
+    def _set(self, vr: int, value: Any) -> None:
+        self.values[vr] = value
+        self.observed = None
+        if not self.running:
+            self.state = None
+
+    def _get(self, vrs: list[int], kind: str) -> list[Any]:
+        roles = [self._variable(vr, kind)[2] for vr in vrs]
+        if not any(role in ("output", "start") for role in roles):
+            return [self.values[vr] for vr in vrs]
+        row = self._outputs()
+        return [row[vr] for vr in vrs]
+
+    def _outputs(self) -> list[Any]:
+        """All values by reference, the outputs solved anew where something was set or moved."""
+        if self.observed is None:
+            if self.state is None:
+                self._initialize()
+            assert self.state is not None
+            seen: Values = observe(self.system, self.state, self._values(self.inputs), self.p)
+            row = list(self.values)
+            for k in self.outputs:
+                row[k] = seen[self.names[k]]
+            self.observed = row
+        return self.observed
+
+    def _values(self, references: list[int]) -> list[float]:
+        return [self.values[k] for k in references]
+
+    # -------------------------------------------------------------- simulation
+
+    def _initialize(self) -> None:
+        """The consistent start; what had to be moved is logged, every value and how far."""
+        value = {name: self.values[k] for name, k in self.reference.items()}
+        tolerance = value["solver.tolerance"] or self.tolerance or self.default_tolerance
+        if tolerance < SMALLEST_TOLERANCE:
+            self._warn(
+                f"tolerance {tolerance!r} is below what double precision allows, "
+                f"{SMALLEST_TOLERANCE!r} is used"
+            )
+        self.settings = Settings(
+            method=value["solver.method"],
+            tolerance=max(tolerance, SMALLEST_TOLERANCE),
+            step=value["solver.step"],
+            maximum_step=value["solver.maximum_step"],
+        )
+        self.p = self._values(self.parameters)
+        q = [value[c] for c in self.system.coordinates]
+        v = [value[f"der({c})"] for c in self.system.coordinates]
+        u = self._values(self.inputs)
+        found = start(self.system, self.settings, self.start_time, q, v, u, self.p)
+        for name, given, used in found.moved:
+            self._warn(
+                f"start value {name} = {given!r} misses the constraints: projected to {used!r} "
+                f"(moved by {used - given:.3g})"
+            )
+        self.state, self.observed = found.state, None
+
+    def _warn(self, message: str) -> None:
+        self.log(message, Fmi2Status.warning, "logStatusWarning")
+
+    def _report_events(self, before: State, after: State) -> None:
+        for c, k in enumerate(self.system.contacts):
+            name, latest = self.system.rows[k].name, after.departures[c]
+            if latest.count != before.departures[c].count:
+                self.log(
+                    f"contact {name} opened at t = {latest.time!r} s", Fmi2Status.ok, "logEvents"
+                )
+            elif after.closed[c] and not before.closed[c]:
+                self.log(f"contact {name} closed", Fmi2Status.ok, "logEvents")
+
+    # -------------------------------------------------------------- saved states
+
+    @guarded
+    def _get_fmu_state(self) -> dict[str, Any]:
+        settings = getattr(self, "settings", None)
+        return {
+            "identity": self.identity,
+            "values": list(self.values),
+            "running": self.running,
+            "experiment": [self.start_time, self.stop_time, self.tolerance],
+            "settings": None if settings is None else asdict(settings),
+            "state": None if self.state is None else self.state.to_json(),
+        }
+
+    @guarded
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        if not isinstance(state, dict) or state.get("identity") != self.identity:
+            raise Refused("the saved state belongs to another FMU, or to another version of this")
+        self.values = list(state["values"])
+        self.running = state["running"]
+        self.start_time, self.stop_time, self.tolerance = state["experiment"]
+        if state["settings"] is not None:
+            self.settings = Settings(**state["settings"])
+        self.state = None if state["state"] is None else State.from_json(state["state"])
+        self.p = self._values(self.parameters)
+        self.observed = None
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        return json.dumps(state, sort_keys=True).encode("ascii")
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        try:
+            return dict(json.loads(state.decode("ascii")))
+        except ValueError as error:
+            raise Refused(f"the bytes are no saved state of this FMU ({error})") from None

@@ -1,0 +1,175 @@
+"""simulate(): a model directly, or an FMU through fmpy; the same columns from both."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
+
+from .build import Prepared, prepare
+from .errors import SimulationError, VerificationError
+from .model import Model
+from .scene import Scene
+from .solver.advance import advance
+from .solver.failure import StepFailureError
+from .solver.initial import start
+from .solver.observe import observe
+from .solver.state import METHODS, SMALLEST_TOLERANCE, Settings
+
+Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
+
+
+def simulate(
+    target: Model | Prepared | str | os.PathLike[str],
+    stop_time: float | None = None,
+    step_size: float | None = None,
+    tolerance: float | None = None,
+    start_values: Mapping[str, Any] | None = None,
+    inputs: Trajectory | None = None,
+    scene: Scene | None = None,
+) -> Trajectory:
+    """Outputs at every communication point, as a structured array with the FMU's variable names.
+
+    `target` is a Model (integrated in this process, in `scene`) or the path of an FMU (simulated by
+    fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
+    values; `inputs` is a structured array with 'time' and one field an input, interpolated linearly.
+    What is left out comes from the scene, or the FMU's DefaultExperiment.
+
+    Raises ModelError for a model that cannot start, SimulationError if a step fails, and
+    VerificationError for a file that is no FMU.
+    """
+    values = dict(start_values or {})
+    if isinstance(target, Model):
+        target = prepare(target, scene)
+    if isinstance(target, Prepared):
+        return _simulate_model(target, stop_time, step_size, tolerance, values, inputs)
+    return _simulate_fmu(Path(target), stop_time, step_size, tolerance, values, inputs)
+
+
+def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
+    """0, h, 2 h, ..., and the stop time."""
+    count = max(1, int(np.ceil(stop_time / step_size * (1 - 1e-12))))
+    times = np.arange(count + 1) * step_size
+    times[-1] = stop_time
+    return times
+
+
+def _simulate_model(
+    prepared: Prepared,
+    stop_time: float | None,
+    step_size: float | None,
+    tolerance: float | None,
+    values: dict[str, Any],
+    inputs: Trajectory | None,
+) -> Trajectory:
+    scene, table, system = prepared.scene, prepared.table, prepared.system
+    known = {v.name: v.start for v in table.variables if v.role != "output"}
+    unknown = sorted(set(values) - set(known))
+    if unknown:
+        raise SimulationError(
+            f"start values for {', '.join(unknown)}, expected names among {', '.join(known)}"
+        )
+    known |= values
+    method = known["solver.method"]
+    if method not in METHODS:
+        raise SimulationError(f"solver.method = {method!r}, expected one of {', '.join(METHODS)}")
+    settings = Settings(
+        method,
+        max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
+        known["solver.step"],
+        known["solver.maximum_step"],
+    )
+    p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
+    drives = [v for v in table.variables if v.role == "input"]
+    signals: Any = inputs
+
+    def drive(t: float) -> list[float]:
+        return [
+            float(np.interp(t, signals["time"], signals[v.name]))
+            if inputs is not None and v.name in signals.dtype.names
+            else float(known[v.name])
+            for v in drives
+        ]
+
+    times = communication_points(stop_time or scene.stop_time, step_size or scene.step_size)
+    columns = [("time", np.float64)]
+    kinds = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
+    columns += [(v.name, kinds[v.kind]) for v in table.outputs]
+    result = np.zeros(len(times), dtype=columns)
+    try:
+        q = [float(known[c]) for c in system.coordinates]
+        v = [float(known[f"der({c})"]) for c in system.coordinates]
+        u = drive(0.0)
+        state = start(system, settings, 0.0, q, v, u, p).state
+        for k, t in enumerate(times):
+            if k:
+                state = advance(system, settings, state, u, p, float(t))
+                u = drive(float(t))
+            seen = observe(system, state, u, p)
+            result[k] = (t, *(seen[o.name] for o in table.outputs))
+    except StepFailureError as error:
+        raise SimulationError(str(error)) from error
+    return result
+
+
+def read_description(path: Path) -> Any:
+    """fmpy's ModelDescription.  Raises VerificationError if the file is missing or no FMU."""
+    if not path.is_file():
+        raise VerificationError(f"{str(path)!r}: there is no such file")
+    try:
+        return fmpy.read_model_description(str(path), validate=False)
+    except (zipfile.BadZipFile, KeyError, OSError) as error:
+        raise VerificationError(
+            f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
+        ) from None
+    except Exception as error:
+        raise VerificationError(f"{str(path)!r}: modelDescription.xml cannot be read ({error})") from (
+            None
+        )
+
+
+def _simulate_fmu(
+    path: Path,
+    stop_time: float | None,
+    step_size: float | None,
+    tolerance: float | None,
+    values: dict[str, Any],
+    inputs: Trajectory | None,
+) -> Trajectory:
+    description = read_description(path)
+    experiment = description.defaultExperiment
+    messages: list[str] = []
+
+    def logger(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
+        if status >= 2:  # discard, error, fatal
+            messages.append(message.decode(errors="replace").strip())
+
+    stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
+    step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
+    names = {v.name for v in description.modelVariables}
+    unknown = sorted(set(values) - names)
+    if unknown:
+        raise SimulationError(f"{str(path)!r} has no variables {', '.join(unknown)}")
+    try:
+        return fmpy.simulate_fmu(
+            str(path),
+            stop_time=stop,
+            output_interval=step,
+            step_size=step,
+            relative_tolerance=tolerance,
+            start_values=values,
+            input=inputs,
+            logger=logger,
+        )
+    except FMICallException as error:
+        cause = "; ".join(messages) or "no message was logged"
+        raise SimulationError(f"{str(path)!r}: {error} ({cause})") from None
+    except Exception as error:
+        raise SimulationError(f"{str(path)!r} cannot be simulated: {error}") from None

@@ -1,0 +1,108 @@
+"""A state -> everything that the FMU reports, by the names that variables.py gave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .failure import StepFailureError
+from .motion import motion, residual
+from .state import State
+from .system import NONHOLONOMIC, System, Vector
+
+Values = dict[str, float | int | bool]
+
+
+def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]) -> Values:
+    """Coordinates, velocities, accelerations, lambda, Q, residuals, energies and contact states.
+
+    lambda, Q and the accelerations are solved for at this very state and these inputs, so that they
+    are consistent with what the importer reads.  Raises StepFailureError if a value is not finite.
+    """
+    with np.errstate(all="ignore"):
+        values = _observe(system, state, u, p)
+    bad = [name for name, value in values.items() if not np.isfinite(value)]
+    if bad:
+        raise StepFailureError(f"not finite at t = {state.t!r} s: {', '.join(bad)}")
+    return values
+
+
+def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float]) -> Values:
+    values: Values = {}
+    full, q, v = expand(system, state.t, np.array(state.q), np.array(state.v), u, p)
+    shut = {system.rows[k].name: c for k, c in zip(system.contacts, state.closed, strict=True)}
+    active = full.active([shut[full.rows[k].name] for k in full.contacts])
+    now = motion(full, state.t, q, v, u, p, active)
+    for j, name in enumerate(full.coordinates):
+        values[name] = float(q[j])
+        values[f"der({name})"] = float(v[j])
+        values[f"der({name},2)"] = float(now.vdot[j])
+    if system.embedding is not None:
+        reduced = motion(
+            system,
+            state.t,
+            np.array(state.q),
+            np.array(state.v),
+            u,
+            p,
+            system.active(state.closed),
+        )
+        for j, name in enumerate(system.coordinates):
+            if name not in values:
+                values[name] = state.q[j]
+                values[f"der({name})"] = state.v[j]
+                values[f"der({name},2)"] = float(reduced.vdot[j])
+    f = residual(full, state.t, q, u, p)
+    slip = now.G @ v - now.nu
+    kept = {row.name: level for row, level in zip(system.rows, state.offset, strict=True)}
+    for k, row in enumerate(full.rows):
+        values[f"lambda.{row.name}"] = float(now.lam[k])
+        values[f"unique.{row.name}"] = bool(now.unique[k])
+        miss = slip[k] if row.kind == NONHOLONOMIC else f[k] - kept.get(row.name, 0.0)
+        values[f"residual.{row.name}"] = float(miss)
+    share = now.G * now.lam[:, None]
+    for j, name in enumerate(full.coordinates):
+        values[f"Q.{name}"] = float(share[:, j].sum())
+    for k, j in zip(*full.jacobian, strict=True):
+        values[f"Q.{full.rows[k].name}.{full.coordinates[j]}"] = float(share[k, j])
+    kinetic, potential = full.energies(state.t, q.tolist(), v.tolist(), u, p)
+    values["energy.kinetic"] = float(kinetic)
+    if full.has_potential:
+        values["energy.potential"] = float(potential)
+        values["energy.total"] = float(kinetic + potential)
+    for c, k in enumerate(system.contacts):
+        values |= _contact(system, state, c, system.rows[k].name, u, p)
+    values["solver.steps"] = state.steps
+    return values
+
+
+def expand(
+    system: System, t: float, s: Vector, sdot: Vector, u: Sequence[float], p: Sequence[float]
+) -> tuple[System, Vector, Vector]:
+    """The full system with its q (n) and v (n), from the coordinates that are stepped."""
+    if system.embedding is None:
+        return system, s, sdot
+    q, v = system.embedding.embed(t, s.tolist(), sdot.tolist(), u, p)
+    return system.embedding.full, np.array(q, dtype=float), np.array(v, dtype=float)
+
+
+def _contact(
+    system: System, state: State, c: int, name: str, u: Sequence[float], p: Sequence[float]
+) -> Values:
+    latest = state.departures[c]
+    values: Values = {
+        f"contact.{name}": state.closed[c],
+        f"departure.{name}.count": latest.count,
+        f"departure.{name}.time": latest.time,
+    }
+    q, v = np.array(latest.q), np.array(latest.v)
+    full = system if system.embedding is None else system.embedding.full
+    if latest.count:
+        full, q, v = expand(system, latest.time, q, v, u, p)
+    else:
+        q = v = np.zeros(full.n)
+    for j, coordinate in enumerate(full.coordinates):
+        values[f"departure.{name}.{coordinate}"] = float(q[j])
+        values[f"departure.{name}.velocity.{coordinate}"] = float(v[j])
+    return values

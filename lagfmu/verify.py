@@ -1,0 +1,212 @@
+"""verify(): an FMU simulated by fmpy and held against the closed forms that it carries."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from fmpy.validation import validate_fmu
+from numpy.typing import NDArray
+
+from .errors import VerificationError
+from .proof import Claim, unpack_closed_forms
+from .simulate import Trajectory, read_description, simulate
+
+Expr = Any
+RECORD = "resources/lagfmu.json"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One statement: its largest error relative to its scale, and the error that is allowed.
+
+    `points` is the number of communication points at which it was evaluated; with 0 it was not
+    reached, and nothing is known.
+    """
+
+    name: str
+    error: float
+    allowed: float
+    points: int
+    detail: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """True if the error is within what is allowed, or the statement was not reached."""
+        return self.points == 0 or self.error <= self.allowed
+
+    @property
+    def verdict(self) -> str:
+        """pass, FAIL, or not reached."""
+        if self.points == 0:
+            return "not reached"
+        return "pass" if self.passed else "FAIL"
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The checks of one FMU and what the run cost."""
+
+    name: str
+    checks: tuple[Check, ...]
+    simulated: float
+    seconds: float
+    steps: int
+
+    @property
+    def passed(self) -> bool:
+        """True if no check failed and at least one was made."""
+        return all(c.passed for c in self.checks) and any(c.points for c in self.checks)
+
+    @property
+    def reached(self) -> bool:
+        """True if every closed form was evaluated somewhere."""
+        return all(c.points for c in self.checks)
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """(statement, largest error, allowed, verdict) as text."""
+        return [
+            (c.name, f"{c.error:.1e}" if c.points else "", f"{c.allowed:.0e}", c.verdict)
+            for c in self.checks
+        ]
+
+
+def verify(
+    fmu: str | os.PathLike[str],
+    start_values: Mapping[str, Any] | None = None,
+    stop_time: float | None = None,
+    step_size: float | None = None,
+    tolerance: float | None = None,
+) -> Verification:
+    """Simulate the FMU through fmpy and evaluate its closed forms on what it returns.
+
+    Also checks what FMU checkers do not: that every output is finite, and that the start values in
+    modelDescription.xml are those that the binary starts with.  Parameters and start values may be
+    changed; the closed forms follow.
+
+    Raises VerificationError if the file is corrupt or carries no closed forms of lagfmu, and
+    SimulationError if it cannot be simulated.
+    """
+    path = Path(fmu)
+    description = read_description(path)
+    claims = _claims(path)
+    problems = validate_fmu(str(path))
+    begun = time.perf_counter()
+    result = simulate(path, stop_time, step_size, tolerance, start_values)
+    seconds = time.perf_counter() - begun
+    experiment = description.defaultExperiment
+    used = tolerance or float(getattr(experiment, "tolerance", None) or 1e-8)
+    values = {
+        v.name: float(v.start)
+        for v in description.modelVariables
+        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
+    }
+    values |= {k: float(v) for k, v in (start_values or {}).items() if not isinstance(v, str)}
+    used = values.get("solver.tolerance") or used
+    checks = [
+        Check("valid for fmpy", len(problems), 0, 1, "; ".join(problems)),
+        _finite(result),
+        _starts(description, start_values or {}, result),
+    ]
+    checks += [_check(claim, result, values, used) for claim in claims]
+    span = float(result["time"][-1] - result["time"][0])
+    steps = int(result["solver.steps"][-1]) if "solver.steps" in result.dtype.names else 0
+    return Verification(description.modelName, tuple(checks), span, seconds, steps)
+
+
+def _claims(path: Path) -> list[Claim]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if RECORD not in archive.namelist():
+                raise VerificationError(
+                    f"{str(path)!r} carries no closed forms ({RECORD} is missing): it was not built "
+                    "by lagfmu, and there is nothing to hold it against"
+                )
+            return unpack_closed_forms(archive.read(RECORD), str(path))
+    except (zipfile.BadZipFile, OSError) as error:
+        raise VerificationError(f"{str(path)!r} cannot be read as an FMU ({error})") from None
+
+
+def _finite(result: Trajectory) -> Check:
+    bad = [n for n in result.dtype.names if not np.isfinite(result[n]).all()]
+    return Check("all outputs finite", len(bad), 0, len(result), ", ".join(bad))
+
+
+def _starts(description: Any, given: Mapping[str, Any], result: Trajectory) -> Check:
+    """Outputs with an exact start begin with it."""
+    worst, count, names = 0.0, 0, []
+    for v in description.modelVariables:
+        if v.initial == "exact" and v.causality == "output" and v.type == "Real":
+            expected = float(given.get(v.name, v.start))
+            error = abs(float(result[v.name][0]) - expected)
+            count += 1
+            if error > 0:
+                names.append(f"{v.name} starts at {result[v.name][0]!r}, described as {expected!r}")
+            worst = max(worst, error)
+    return Check("starts as described", worst, 0, max(count, 1), "; ".join(names))
+
+
+def _check(
+    claim: Claim, result: Trajectory, values: Mapping[str, float], tolerance: float
+) -> Check:
+    chosen = np.ones(len(result), dtype=bool)
+    if claim.while_closed is not None:
+        chosen &= result[f"contact.{claim.while_closed}"]
+    if claim.while_open is not None:
+        chosen &= ~result[f"contact.{claim.while_open}"]
+    if claim.at_departure is not None:
+        left = result[f"departure.{claim.at_departure}.count"] > 0
+        chosen &= left & (np.cumsum(left) == 1)
+    allowed = max(claim.within * tolerance, claim.rounding)
+    count = int(chosen.sum())
+    if count == 0:
+        return Check(claim.name, 0.0, allowed, 0)
+    rows = result[chosen]
+    actual = _evaluate(claim.actual, rows, result, values, claim.name)
+    if claim.expected is None:
+        expected = np.full_like(actual, actual[0])
+    else:
+        expected = _evaluate(claim.expected, rows, result, values, claim.name)
+    if claim.scale is None:
+        scale = float(np.abs(expected).max())
+    else:
+        scale = float(np.abs(_evaluate(claim.scale, rows, result, values, claim.name)).max())
+    error = float(np.abs(actual - expected).max())
+    if not math.isfinite(error):
+        return Check(claim.name, math.inf, allowed, count, "not a finite number")
+    return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
+
+
+def _evaluate(
+    expression: Expr,
+    rows: Trajectory,
+    result: Trajectory,
+    values: Mapping[str, float],
+    name: str,
+) -> NDArray[np.float64]:
+    symbols = sorted(expression.free_symbols, key=str)
+    columns = []
+    for symbol in symbols:
+        text = str(symbol)
+        if text.startswith("initial("):
+            column = result[text[len("initial(") : -1]][0]
+        elif text in (rows.dtype.names or ()):
+            column = rows[text]
+        elif text in values:
+            column = values[text]
+        else:
+            raise VerificationError(
+                f"closed form {name!r} uses {text!r}, which is no output or parameter of the FMU"
+            )
+        columns.append(np.asarray(column, dtype=float))
+    function = sp.lambdify(symbols, expression, modules=["scipy", "numpy"])
+    with np.errstate(all="ignore"):
+        return np.broadcast_to(np.asarray(function(*columns), dtype=float), len(rows)).copy()

@@ -1,0 +1,278 @@
+"""The classifier of Pfaffian constraints, against mathematical facts that are known by hand."""
+
+import itertools
+import random
+
+import pytest
+from sympy import (
+    Abs,
+    Function,
+    Matrix,
+    cos,
+    exp,
+    log,
+    pi,
+    polylog,
+    simplify,
+    sin,
+    sqrt,
+    symbols,
+    zeta,
+)
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu.constraints import Kind, classify, pfaffian
+from lagfmu.errors import DerivationError
+
+x, y, z, s, phi, theta, psi = dynamicsymbols("x y z s phi theta psi")
+t = dynamicsymbols._t
+R, omega, v0, alpha, l = symbols("R omega v_0 alpha l")  # noqa: E741
+h, g = Function("h"), Function("g")
+
+
+def d(f):
+    return f.diff(t)
+
+
+def check(answer, kind, rank, depth, found=None):
+    """The kind and ranks; each integral satisfies its identity; the witness fits the kind."""
+    assert answer.kind is kind, answer.certificate
+    assert (answer.rank, answer.holonomic_rank) == (rank, depth)
+    assert len(answer.integrals) == (depth if found is None else found)
+    for integral in answer.integrals:
+        pairs = zip(integral.factors, answer.forms, strict=True)
+        assert simplify(d(integral.f) - sum(mu * form for mu, form in pairs)) == 0
+    if kind in (Kind.HOLONOMIC, Kind.INTEGRABLE):
+        assert answer.witness == 0
+    else:
+        assert simplify(answer.witness) != 0
+    return answer
+
+
+# --- one form ------------------------------------------------------------------------------
+
+HOLONOMIC = {
+    "rolling without slipping": (d(y) - R * d(theta), [y, theta]),
+    "circle": (x * d(x) + y * d(y), [x, y]),
+    "moving wall": (d(x) - v0, [x]),
+    "driven angle": (d(phi) - omega, [phi]),
+    "driven with cos": (d(x) - alpha * omega * cos(omega * t), [x]),
+    "growing circle": (x * d(x) + y * d(y) - sin(omega * t), [x, y]),
+    "xyz": (y * z * d(x) + x * z * d(y) + x * y * d(z), [x, y, z]),
+    "unknown functions": (h(x) * d(x) + g(y) * d(y), [x, y]),
+    "root": ((x * d(x) + y * d(y)) / sqrt(x**2 + y**2) + d(z), [x, y, z]),
+    "half angles": (sin(phi / 2) * cos(phi / 2) * d(x) - sin(phi) * d(x) / 2 + d(y), [x, y, phi]),
+    "polar angle": ((x * d(y) - y * d(x)) / (x**2 + y**2) - d(theta), [x, y, theta]),
+}
+
+INTEGRABLE = {
+    "y dx - x dy": (y * d(x) - x * d(y), [x, y]),
+    "exponential growth": (d(x) - omega * x, [x]),
+    "nowhere-zero factor": (exp(x) * (d(x) + d(y)), [x, y]),
+    "2yz dx + xz dy + xy dz": (2 * y * z * d(x) + x * z * d(y) + x * y * d(z), [x, y, z]),
+    "(x + y)/z": (z * d(x) + z * d(y) - (x + y) * d(z), [x, y, z]),
+    "Natani": (
+        (y**2 + y * z) * d(x) + (x * z + z**2) * d(y) + (y**2 - x * y) * d(z),
+        [x, y, z],
+    ),
+    "Bernoulli": (d(y) + y * d(x) - x * y**3 * d(x), [x, y]),
+    "homogeneous": ((x**2 + y**2) * d(x) - 2 * x * y * d(y), [x, y]),
+    "steering to a moving point": (d(y) * (x - omega * t) - y * (d(x) - omega), [x, y]),
+    "rotating line": (x * d(y) - y * d(x) - omega * (x**2 + y**2), [x, y]),
+    "unknown input": (d(x) - h(t) * x, [x]),
+    "linear with an unknown function": (d(y) + h(x) * y * d(x), [x, y]),
+}
+
+NONHOLONOMIC = {
+    "knife edge": (sin(phi) * d(x) - cos(phi) * d(y), [x, y, phi]),
+    "Chaplygin sleigh, moving": (
+        sin(phi) * d(x) - cos(phi) * d(y) - alpha * exp(t) * d(phi),
+        [x, y, phi],
+    ),
+    "contact form": (d(z) - y * d(x), [x, y, z]),
+    "contact form of 5 variables": (d(z) - x * d(y) - psi * d(phi), [x, y, z, phi, psi]),
+    "pursuit": (d(y) * (v0 * t - x) + y * d(x), [x, y]),
+    "rheonomic": (d(phi) - omega * cos(omega * t) * x, [x, phi]),
+    "unknown function": (d(x) - h(y) * z * d(y), [x, y, z]),
+}
+
+
+@pytest.mark.parametrize("name", HOLONOMIC)
+def test_holonomic(name):
+    """d(omega) = 0: the form is df/dt as it stands, and the factor is 1."""
+    answer = check(classify(*HOLONOMIC[name]), Kind.HOLONOMIC, 1, 1)
+    assert simplify(answer.integrals[0].factors[0] - 1) == 0
+
+
+@pytest.mark.parametrize("name", INTEGRABLE)
+def test_integrating_factor(name):
+    """d(omega) wedge omega = 0 but d(omega) is not: an integrating factor is needed."""
+    check(classify(*INTEGRABLE[name]), Kind.INTEGRABLE, 1, 1)
+
+
+@pytest.mark.parametrize("name", NONHOLONOMIC)
+def test_nonholonomic(name):
+    """d(omega) wedge omega has a coefficient that is not zero."""
+    check(classify(*NONHOLONOMIC[name]), Kind.NONHOLONOMIC, 1, 0)
+
+
+def test_knife_edge_witness():
+    """For sin(phi) dx - cos(phi) dy, omega wedge d(omega) is dx dy dphi up to sign."""
+    assert abs(classify(*NONHOLONOMIC["knife edge"]).witness) == 1
+
+
+def test_exponential_growth():
+    """x' = omega x has the integral x exp(-omega t)."""
+    (integral,) = classify(*INTEGRABLE["exponential growth"]).integrals
+    assert integral.f == x * exp(-omega * t)
+
+
+def test_riccati_is_integrable_but_not_in_closed_form():
+    """Any form in two variables is integrable; y' = x^2 + y^2 has no elementary integral."""
+    answer = classify(d(y) - (x**2 + y**2) * d(x), [x, y])
+    check(answer, Kind.INTEGRABLE, 1, 1, found=0)
+    assert "closed form" in answer.certificate
+
+
+# --- sets ----------------------------------------------------------------------------------
+
+
+def test_vertical_disk():
+    """The rolling disk: Q = R^2 x T^2 with flag 2 > 1 > 0 (Bryant et al., Engel's normal form)."""
+    forms = [d(x) - R * cos(phi) * d(theta), d(y) - R * sin(phi) * d(theta)]
+    answer = check(classify(forms, [x, y, theta, phi]), Kind.NONHOLONOMIC, 2, 0)
+    assert answer.flag == (2, 1, 0)
+
+
+def test_engel_flag_takes_two_steps():
+    """dy - z dx, dz - psi dx is Engel's normal form: 2 > 1 > 0."""
+    answer = classify([d(y) - z * d(x), d(z) - psi * d(x)], [x, y, z, psi])
+    assert check(answer, Kind.NONHOLONOMIC, 2, 0).flag == (2, 1, 0)
+
+
+def test_disk_on_a_line_with_a_knife_edge():
+    """With the heading fixed, the disk's two forms are exact; the knife edge is not integrable."""
+    forms = [
+        d(x) - R * cos(alpha) * d(theta),
+        d(y) - R * sin(alpha) * d(theta),
+        sin(phi) * d(z) - cos(phi) * d(s),
+    ]
+    answer = check(classify(forms, [x, y, theta, z, s, phi]), Kind.PARTLY, 3, 2)
+    assert [c.kind for c in answer.each] == [Kind.HOLONOMIC, Kind.HOLONOMIC, Kind.NONHOLONOMIC]
+
+
+def test_integrable_only_together():
+    """dz - y dx is a contact form; with dy = 0, z - x y is constant, too."""
+    answer = check(classify([d(z) - y * d(x), d(y)], [x, y, z]), Kind.INTEGRABLE, 2, 2)
+    assert [c.kind for c in answer.each] == [Kind.NONHOLONOMIC, Kind.HOLONOMIC]
+
+
+def test_neither_alone_but_together():
+    """e^y-multiples of dz and d(xy) mixed: neither form is integrable, both together are."""
+    forms = [
+        y * d(x) + x * d(y) + psi * d(z),
+        d(z) - psi * (y * d(x) + x * d(y)),
+    ]
+    answer = classify(forms, [x, y, z, psi])
+    check(answer, Kind.INTEGRABLE, 2, 2)
+    assert [c.kind for c in answer.each] == [Kind.NONHOLONOMIC] * 2
+
+
+def test_only_a_combination():
+    """The knife edge, and dz - R dpsi plus the knife edge: their difference is exact."""
+    knife = sin(phi) * d(x) - cos(phi) * d(y)
+    forms = [knife, d(z) - R * d(psi) + knife]
+    answer = check(classify(forms, [x, y, z, phi, psi]), Kind.PARTLY, 2, 1)
+    assert [c.kind for c in answer.each] == [Kind.NONHOLONOMIC] * 2
+
+
+def test_only_a_combination_with_functions():
+    """x omega_1 + omega_2 = d(xy), with neither integrable."""
+    one = d(s) - z * d(phi)
+    forms = [one, y * d(x) + x * d(y) - x * one]
+    check(classify(forms, [x, y, z, s, phi]), Kind.PARTLY, 2, 1)
+
+
+def test_differential_drive():
+    """Two driven wheels: of three constraints, l phi - R (theta - psi) = const is holonomic."""
+    forward = R / 2 * (d(theta) + d(psi))
+    forms = [
+        d(x) - cos(phi) * forward,
+        d(y) - sin(phi) * forward,
+        d(phi) - R / l * (d(theta) - d(psi)),
+    ]
+    answer = check(classify(forms, [x, y, phi, theta, psi]), Kind.PARTLY, 3, 1)
+    assert answer.flag == (3, 2, 1)
+
+
+def test_exact_set_and_redundant_forms():
+    """Twice the same form has rank 1; exact forms are holonomic as a set."""
+    check(classify([d(x) - d(y), 2 * d(x) - 2 * d(y)], [x, y]), Kind.HOLONOMIC, 1, 1)
+    check(classify([d(x) - d(y), x * d(x) + d(z)], [x, y, z]), Kind.HOLONOMIC, 2, 2)
+
+
+# --- limits --------------------------------------------------------------------------------
+
+
+def test_undecided():
+    """Euler's reflection of the dilogarithm is 0, which SymPy does not know: no guess."""
+    zero = polylog(2, x) + polylog(2, 1 - x) + log(x) * log(1 - x) - pi**2 / 6
+    answer = classify(d(z) + zeta(3) * zero * y * d(x), [x, y, z])
+    assert answer.kind is Kind.UNDECIDED
+    assert answer.holonomic_rank is None
+    assert answer.witness != 0
+
+
+def test_undecided_in_regions():
+    """|y| - y is zero on one side of y = 0 only."""
+    answer = classify((Abs(y) - y) * x * d(y) + d(x) + z * d(z), [x, y, z])
+    assert answer.kind is Kind.UNDECIDED
+
+
+def test_nonlinear_in_velocities():
+    """An isokinetic constraint is not Pfaffian; the message names the term."""
+    with pytest.raises(DerivationError, match=r"Derivative\(x\(t\), t\)\*\*2"):
+        pfaffian(d(x) ** 2 + d(y) - v0, [x, y])
+    with pytest.raises(DerivationError, match="accelerations"):
+        pfaffian(x.diff(t, 2) + d(y), [x, y])
+    assert pfaffian((d(x) + 1) ** 2 - d(x) ** 2 + y, [x, y]) == ([2, 0], y + 1)
+
+
+def test_contradictory():
+    """x' = 1 and x' = 2 leave no motion; a form without velocities is no Pfaffian form."""
+    with pytest.raises(DerivationError, match="contradictory"):
+        classify([d(x) - 1, d(x) - 2], [x])
+    with pytest.raises(DerivationError, match="no velocity"):
+        classify(x**2 + y**2 - l**2, [x, y])
+
+
+# --- properties ----------------------------------------------------------------------------
+
+
+def polynomial(chance, names):
+    terms = [*names, *(a * b for a, b in itertools.combinations_with_replacement(names, 2))]
+    return sum(chance.randint(-3, 3) * term for term in terms) + 4 * names[0]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_factor_times_exact(seed):
+    """mu df is integrable, and the integral found, f2, has df2 wedge df = 0."""
+    chance = random.Random(seed)
+    names = [x, y, z]
+    f = polynomial(chance, names) + chance.choice([0, t, sin(t)])
+    mu = chance.choice([exp(x), 1 + y**2, 2 + cos(z), x + 3 * y, 1 / (1 + x**2)])
+    answer = check(classify((mu * d(f)).expand(), names), Kind.INTEGRABLE, 1, 1)
+    f2 = answer.integrals[0].f
+    for a, b in itertools.combinations(names, 2):
+        assert simplify(f2.diff(a) * f.diff(b) - f2.diff(b) * f.diff(a)) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mixture_of_exact_forms(seed):
+    """M(q) (df1, df2) with det M not 0 spans what df1, df2 span: two integrals."""
+    chance = random.Random(100 + seed)
+    names = [x, y, z, s]
+    exact = Matrix([d(polynomial(chance, [x, y])) + d(z), d(polynomial(chance, [y, z, s]))])
+    mixture = Matrix([[1, x * chance.randint(1, 3)], [s, chance.randint(2, 4) + x * s]])
+    answer = classify(list(mixture * exact), names)
+    check(answer, Kind.INTEGRABLE, 2, 2)
