@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import itertools
 import random
+import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -51,6 +52,7 @@ from lagfmu.zero import Tower, Undecided, pairs
 
 Expr = Any  # SymPy has no types
 
+_SECONDS = 10.0  # after which no further method is begun for a form
 _LONG = 600  # operations of an integrand beyond which no integration is tried
 _TERM = 40  # operations of one term of it
 _ANSATZ = 90  # unknowns of an ansatz
@@ -112,8 +114,8 @@ class _System:
             for f in self.free:
                 value = tower.element(form[f])
                 for row, pivot in zip(self.rows, self.pivots, strict=True):
-                    part = tower.element(form[pivot]) * tower.element(row[f])
-                    value = tower.lift(value) - tower.lift(part)
+                    head, entry = tower.element(form[pivot]), tower.element(row[f])
+                    value = tower.lift(value) - tower.lift(head) * tower.lift(entry)
                 if not tower.is_zero(value):
                     return False
             return _Form(form, self.variables).integrable()
@@ -131,7 +133,8 @@ class _System:
                 value = tower.diff(slope, self.variables[j])
                 for row, pivot in zip(self.rows, self.pivots, strict=True):
                     part = tower.diff(slope, self.variables[pivot])
-                    value = tower.lift(value) - tower.lift(part) * tower.element(row[j])
+                    entry = tower.element(row[j])
+                    value = tower.lift(value) - tower.lift(part) * tower.lift(entry)
                 if not tower.is_zero(value):
                     return False
             matrix = [
@@ -204,7 +207,10 @@ def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Ex
     """f with df = mu * omega for an integrable one-form omega, or None."""
     try:
         form = _Form(row, variables)
+        deadline = time.monotonic() + _SECONDS
         for f in form.attempts(depth):
+            if time.monotonic() > deadline:
+                break
             if f is not None and form.solves(f):
                 return f
     except _FAILURES:
@@ -219,6 +225,9 @@ class _Form:
         self.tower = Tower(variables, row)
         elements = [self.tower.element(entry) for entry in row]
         kept = [i for i, element in enumerate(elements) if not self.tower.is_zero(element)]
+        for element in elements:  # so that the field has the derivatives that are met later
+            for x, y in itertools.product(variables, repeat=2):
+                self.tower.diff(self.tower.diff(element, x), y)
         self.given = [row[i] for i in kept]
         self.x = [variables[i] for i in kept]
         self.a = self._primitive([elements[i] for i in kept])

@@ -1,13 +1,25 @@
 """Particle on a smooth hemisphere (Marion & Thornton, example 7.10).
 
-r [m] from the centre, theta [rad] from the vertical; the surface pushes, it never pulls.
+r [m] from the centre, theta [rad] from the vertical.  The surface pushes and never pulls: lambda [N]
+is the normal force, positive outward, and the particle leaves where it reaches zero.
 """
 
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Model, Parameter
+from lagfmu import (
+    ClosedForm,
+    Conserved,
+    Contact,
+    Model,
+    Parameter,
+    Scene,
+    departure,
+    initial,
+    output,
+)
 
+t = dynamicsymbols._t
 r, theta = dynamicsymbols("r theta")
 m, g, a = symbols("m g a", positive=True)
 
@@ -18,7 +30,43 @@ model = Model(
     name="Hemisphere",
     lagrangian=T - V,
     coordinates={r: "m", theta: "rad"},
-    constraints=[Contact("surface", r - a)],
-    parameters=[Parameter(m, 1.0, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(a, 1.0, "m")],
+    constraints=[Contact("surface", r - a, "the particle is on the sphere or above it")],
+    parameters=[
+        Parameter(m, 1.0, "kg", "mass of the particle", min=0),
+        Parameter(g, 9.81, "m/s^2", "acceleration of gravity", min=0),
+        Parameter(a, 1.0, "m", "radius of the hemisphere", min=0),
+    ],
     start={r: 1.0, theta: 0.01},
+    description="Particle that slides down a smooth hemisphere and leaves it",
+    descriptions={r: "distance from the centre", theta: "angle from the vertical"},
 )
+
+scenes = [Scene("Hemisphere", stop_time=2.0, step_size=0.01)]
+
+# On the sphere the radial equation reads  0 = m a theta'^2 - m g cos(theta) + lambda,  and the energy
+# gives  a^2 theta'^2 = v0^2 + 2 g a (cos(theta0) - cos(theta)).
+theta0 = initial(theta)
+v0 = a * initial(theta.diff())
+normal_force = m * g * (3 * cos(theta) - 2 * cos(theta0)) - m * v0**2 / a
+
+# Afterwards it flies: a parabola in x = r sin(theta), z = r cos(theta), from the departure's state.
+rd, angle = departure("surface", r), departure("surface", theta)
+rate, spin = departure("surface", r.diff()), departure("surface", theta.diff())
+tau = t - departure("surface")
+x = rd * sin(angle) + (rate * sin(angle) + rd * spin * cos(angle)) * tau
+z = rd * cos(angle) + (rate * cos(angle) - rd * spin * sin(angle)) * tau - g * tau**2 / 2
+
+closed_forms = [
+    ClosedForm("lambda.surface", normal_force, while_closed="surface"),
+    ClosedForm("lambda.surface", 0, while_open="surface"),
+    ClosedForm("r", a, while_closed="surface"),
+    ClosedForm(
+        "cos(theta) at the departure",
+        actual=cos(angle),
+        expected=2 * cos(theta0) / 3 + v0**2 / (3 * g * a),
+        at_departure="surface",
+    ),
+    ClosedForm("r sin(theta) in flight", x, actual=r * sin(theta), while_open="surface"),
+    ClosedForm("r cos(theta) in flight", z, actual=r * cos(theta), while_open="surface", scale=a),
+    Conserved("energy", output("energy.total"), scale=m * g * a),
+]

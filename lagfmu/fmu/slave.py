@@ -10,7 +10,6 @@ and knows no way to return fmi2Error; other refusals are therefore exceptions wi
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import json
 import math
@@ -27,6 +26,7 @@ from ..solver.initial import start
 from ..solver.observe import Values, observe
 from ..solver.state import METHODS, SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
+from .references import keep, keep_module_of
 
 Call = TypeVar("Call", bound=Callable[..., Any])
 ROUNDING = 1e-6  # part of a step by which an importer's sums of times may differ from ours
@@ -37,19 +37,14 @@ class Refused(Exception):  # noqa: N818 - its name is what the importer's log sh
 
 
 def guarded(method: Call) -> Call:
-    """Let an exception reach the importer as text, and the instance survive it.
-
-    pythonfmu 0.7.0 drops a reference to the instance, its class and its log too many for every
-    exception that it reports, so that the process crashes at a later call; they are added here.
-    """
+    """Let an exception reach the importer as text, and the instance survive it (references.py)."""
 
     @functools.wraps(method)
     def call(self: LagfmuSlave, *arguments: Any) -> Any:
         try:
             return method(self, *arguments)
         except Exception as error:
-            for kept in (self, type(self), self.log_queue):
-                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            keep(self, type(self), self.log_queue)
             text = str(error).encode("ascii", "backslashreplace").decode()
             if isinstance(error, (Refused, StepFailureError)):
                 raise Refused(text) from None
@@ -72,6 +67,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        keep_module_of(self)
         self.values: list[Any] = [v[3] for v in self.variables]
         self.names = [v[0] for v in self.variables]
         self.outputs = [k for k, v in enumerate(self.variables) if v[2] in ("output", "start")]

@@ -1,0 +1,69 @@
+"""Pendulum on a cart, with kinetic energy and forces (ME 6590, eq. 2) in place of a Lagrangian.
+
+s [m] the cart, x and y [m] the bob, x and s to the right and y up from the cart's pivot line, all from
+a fixed point.  The input F [N] pushes the cart, viscous friction c brakes it.  With
+f = (x - s)^2 + y^2 - L^2 the rod's force on the bob is 2 lambda (x - s, y): lambda = -tension/(2 L)
+[N/m], and the cart feels the opposite of its horizontal part.
+"""
+
+from sympy import sqrt, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import (
+    ClosedForm,
+    Conserved,
+    Holonomic,
+    Input,
+    Model,
+    Parameter,
+    Scene,
+    output,
+)
+
+t = dynamicsymbols._t
+s, x, y, F = dynamicsymbols("s x y F")
+M, m, g, L = symbols("M m g L", positive=True)
+c = symbols("c", nonnegative=True)
+
+model = Model(
+    name="CartPendulum",
+    kinetic_energy=M * s.diff() ** 2 / 2 + m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+    forces={s: F - c * s.diff(), y: -m * g},
+    coordinates={s: "m", x: "m", y: "m"},
+    constraints=[Holonomic("rod", (x - s) ** 2 + y**2 - L**2, "the rod keeps its length")],
+    parameters=[
+        Parameter(M, 2.0, "kg", "mass of the cart", min=0),
+        Parameter(m, 1.0, "kg", "mass of the bob", min=0),
+        Parameter(g, 9.81, "m/s^2", "acceleration of gravity", min=0),
+        Parameter(L, 1.0, "m", "length of the rod", min=0),
+        Parameter(c, 0.1, "N.s/m", "viscous friction of the cart", min=0),
+    ],
+    inputs=[Input(F, "N", 0.0, "force on the cart, to the right")],
+    start={s: 0.0, x: 0.8414709848078965, y: -0.5403023058681398},  # sin(1), -cos(1)
+    description="Pendulum on a cart with viscous friction and a driving force",
+    descriptions={
+        s: "cart, to the right",
+        x: "bob, to the right",
+        y: "bob, above the pivot",
+    },
+)
+
+scenes = [Scene("CartPendulum", stop_time=10.0, step_size=0.01)]
+
+# M s'' = F - c s' - 2 (x - s) lambda,  m x'' = 2 (x - s) lambda,  m y'' = -m g + 2 y lambda,  put into
+# (x - s)(x'' - s'') + y y'' + w^2 = 0,  where w is the bob's speed relative to the cart:
+d = x - s
+square = d.diff() ** 2 + y.diff() ** 2
+drive = F - c * s.diff()
+multiplier = m * (M * g * y + drive * d - M * square) / (2 * (M * L**2 + m * d**2))
+
+# The first two of these add up to  d/dt (M s' + m x' + c s) = F.
+momentum = M * s.diff() + m * x.diff() + c * s - F * t
+
+closed_forms = [
+    ClosedForm("lambda.rod", multiplier),
+    ClosedForm("der(s,2)", (drive - 2 * d * multiplier) / M),
+    ClosedForm("Q.s", -output("Q.x")),
+    # while F is held constant:
+    Conserved("momentum and friction's impulse", momentum, scale=m * sqrt(g * L)),
+]

@@ -1,0 +1,73 @@
+"""Knife edge that slides on an incline (Neimark & Fufaev, ch. I; a skate or blade on a slope).
+
+x [m] down the incline, y [m] across, phi [rad] the blade's heading from the x axis.  The blade moves
+only along (cos phi, sin phi): x' sin phi - y' cos phi = 0, which no position constraint expresses.
+lambda [N] is the sideways force on the blade, positive along (sin phi, -cos phi).
+"""
+
+from math import pi
+
+from sympy import cos, sin, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import ClosedForm, Conserved, Model, Nonholonomic, Parameter, Scene, initial, output
+
+t = dynamicsymbols._t
+x, y, phi = dynamicsymbols("x y phi")
+m, J, g = symbols("m J g", positive=True)
+alpha = symbols("alpha", real=True)
+
+T = m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * phi.diff() ** 2 / 2
+V = -m * g * x * sin(alpha)
+
+model = Model(
+    name="KnifeEdge",
+    lagrangian=T - V,
+    coordinates={x: "m", y: "m", phi: "rad"},
+    constraints=[
+        Nonholonomic(
+            "edge",
+            x.diff() * sin(phi) - y.diff() * cos(phi),
+            "the blade does not move sideways",
+        )
+    ],
+    parameters=[
+        Parameter(m, 1.0, "kg", "mass", min=0),
+        Parameter(J, 0.1, "kg.m^2", "moment of inertia about the contact point", min=0),
+        Parameter(g, 9.81, "m/s^2", "acceleration of gravity", min=0),
+        Parameter(alpha, pi / 6, "rad", "angle of the incline", min=0, max=pi / 2),
+    ],
+    start={x: 0.0, y: 0.0, phi: 0.0, phi.diff(): 1.0},
+    description="Knife edge that slides and turns on an incline",
+    descriptions={
+        x: "distance down the incline",
+        y: "distance across the incline",
+        phi: "heading of the blade",
+    },
+)
+
+scenes = [Scene("KnifeEdge", stop_time=10.0, step_size=0.01)]
+
+# J phi'' = 0.  Along the blade the speed u obeys  u' = G cos(phi), G = g sin(alpha);  across it
+# -m u phi' = m G sin(phi) + lambda.  With phi' = omega:  omega (u - u0) = G (sin phi - sin phi0).
+G = g * sin(alpha)
+phi0, omega = initial(phi), initial(phi.diff())
+u0 = initial(x.diff()) * cos(phi0) + initial(y.diff()) * sin(phi0)
+heading = phi0 + omega * t
+sideways = -m * (omega * u0 + G * (2 * sin(phi) - sin(phi0)))
+
+# x' = u cos(phi), y' = u sin(phi); for omega != 0.  From rest a cycloid that never slides off: across
+# the slope it drifts, down it swings between 0 and G / (2 omega^2).
+base = u0 - G / omega * sin(phi0)
+down = base / omega * (sin(heading) - sin(phi0))
+down += G / (2 * omega**2) * (sin(heading) ** 2 - sin(phi0) ** 2)
+across = base / omega * (cos(phi0) - cos(heading))
+across += G / (2 * omega) * (t - (sin(2 * heading) - sin(2 * phi0)) / (2 * omega))
+
+closed_forms = [
+    ClosedForm("phi", heading),
+    ClosedForm("lambda.edge", sideways),
+    ClosedForm("x", initial(x) + down),
+    ClosedForm("y", initial(y) + across),
+    Conserved("energy", output("energy.total")),
+]

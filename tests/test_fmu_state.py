@@ -1,0 +1,165 @@
+"""Rollback, serialization, several FMUs and instances in one process."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import fmpy
+import pytest
+from instance import instance
+from sympy import cos, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Model, Parameter, Scene, build_fmu
+
+STEP = 0.05
+
+
+def run(one, steps):
+    record = []
+    for _ in range(steps):
+        one.step(STEP)
+        record.append(one.outputs())
+    return record
+
+
+@pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4", "radau5"])
+@pytest.mark.parametrize("before", [10, 31])
+def test_a_restored_state_repeats_the_motion_bit_for_bit(fmu, method, before):
+    """From one state there is one future: also across the departure at 1.64 s, from a saved state and
+    from its bytes in a fresh instance."""
+    with instance(fmu("Hemisphere")) as one, instance(fmu("Hemisphere"), "fresh") as fresh:
+        one.start({"solver.method": method, "theta": 0.02, "a": 1.5, "r": 1.5})
+        run(one, before)
+        state, moment = one.fmu.getFMUState(), one.time
+        saved = one.fmu.serializeFMUState(state)
+        first = run(one, 40)
+        assert any(v["departure.surface.count"] == 1 for v in first)
+
+        one.fmu.setFMUState(state)
+        one.time = moment
+        assert run(one, 40) == first
+        one.fmu.freeFMUState(state)
+
+        fresh.start()
+        restored = fresh.fmu.deSerializeFMUstate(saved)
+        fresh.fmu.setFMUState(restored)
+        fresh.time = moment
+        assert run(fresh, 40) == first
+
+
+def test_the_state_of_another_fmu_is_refused(fmu):
+    """A saved state belongs to one system: Atwood's cannot become Hemisphere's."""
+    with instance(fmu("Hemisphere")) as one, instance(fmu("Atwood")) as other:
+        one.start()
+        other.start()
+        saved = other.fmu.serializeFMUState(other.fmu.getFMUState())
+        with pytest.raises(Exception, match="failed with status"):
+            one.fmu.setFMUState(one.fmu.deSerializeFMUstate(saved))
+        assert any("belongs to another FMU" in message for _, _, message in one.log)
+
+
+def test_instances_do_not_share_state(fmu):
+    """Two particles on two hemispheres: each keeps its own radius and its own departure."""
+    with instance(fmu("Hemisphere"), "a") as a, instance(fmu("Hemisphere"), "b") as b:
+        a.start({"theta": 0.1})
+        b.start({"theta": 0.4, "a": 2.0, "r": 2.0})
+        for _ in range(60):
+            a.step(STEP)
+            b.step(STEP)
+        left = a.get("departure.surface.theta"), b.get("departure.surface.theta")
+        assert left[0] == pytest.approx(0.8448, abs=1e-3)
+        assert left[1] == pytest.approx(0.9097, abs=1e-3)
+
+
+def particle(name: str, factor: float) -> Model:
+    r, theta = dynamicsymbols("r theta")
+    m, g, a = symbols("m g a", positive=True)
+    kinetic = m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2
+    return Model(
+        name=name,
+        lagrangian=kinetic - factor * m * g * r * cos(theta),
+        coordinates={r: "m", theta: "rad"},
+        constraints=[Contact("surface", r - a)],
+        parameters=[Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(a, 1, "m")],
+        start={r: 1.0, theta: 0.1},
+    )
+
+
+def test_two_versions_with_one_file_name_are_both_right(tmp_path):
+    """lambda at the top is m g cos(theta0), then 2 m g cos(theta0) in doubled gravity: two FMUs of the
+    same name in one process do not serve each other's equations."""
+    paths = []
+    for factor in (1.0, 2.0):
+        paths.append(build_fmu(particle("Same", factor), tmp_path / f"v{factor:g}", Scene("Same")))
+    weights = []
+    for path in (*paths, *paths):
+        result = fmpy.simulate_fmu(str(path), stop_time=0.01, output_interval=0.01)
+        weights.append(result["lambda.surface"][0])
+    assert weights == pytest.approx([9.81 * 0.995004, 19.62 * 0.995004] * 2, rel=1e-6)
+
+
+def test_two_models_in_one_process_are_both_right(fmu):
+    """The string of Atwood's machine and the surface of the hemisphere, side by side."""
+    with instance(fmu("Hemisphere")) as one, instance(fmu("Atwood")) as other:
+        one.start({"theta": 0.0})
+        other.start()
+        one.step(STEP)
+        other.step(STEP)
+        m1, m2, g = (other.get(n) for n in ("m1", "m2", "g"))
+        assert other.get("lambda.string") == pytest.approx(-2 * m1 * m2 * g / (m1 + m2))
+        assert one.get("lambda.surface") == pytest.approx(9.81)
+
+
+BUILD = """
+import sys
+from pathlib import Path
+from lagfmu.build import prepare, write
+from lagfmu.modelfile import load
+file = load(sys.argv[1])
+for scene in file.scenes:
+    write(prepare(file.model, scene), sys.argv[2], file.closed_forms)
+"""
+
+
+def test_two_builds_are_the_same_bytes(tmp_path):
+    """An FMU depends on its model alone: not on the process, the hash seed, the folder or the time."""
+    source = Path(__file__).parent.parent / "models" / "pendulum.py"
+    built = []
+    for seed in ("1", "2"):
+        folder = tmp_path / seed
+        (folder / "src").mkdir(parents=True)
+        copy = shutil.copy(source, folder / "src" / "pendulum.py")
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        subprocess.run(
+            [sys.executable, "-c", BUILD, copy, folder / "out"],
+            env=environment,
+            cwd=folder,
+            check=True,
+        )
+        built.append({p.name: p.read_bytes() for p in (folder / "out").iterdir()})
+    assert len(built[0]) == 3
+    assert built[0] == built[1]
+
+
+BLOCKED = """
+import sys
+class Block:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("sympy", "pint", "lagfmu", "typer", "rich", "matplotlib"):
+            raise ImportError(f"{name} is not there")
+sys.meta_path.insert(0, Block())
+import fmpy
+result = fmpy.simulate_fmu(sys.argv[1], stop_time=2.0, output_interval=0.1)
+assert result["departure.surface.count"][-1] == 1
+assert not [m for m in sys.modules if m == "sympy" or m == "lagfmu"]
+"""
+
+
+def test_an_fmu_needs_no_sympy_and_no_lagfmu(fmu):
+    """The importing side has Python, NumPy and SciPy: the particle still leaves the hemisphere."""
+    subprocess.run([sys.executable, "-c", BLOCKED, str(fmu("Hemisphere"))], check=True)
