@@ -41,10 +41,11 @@ def main(
     out: Annotated[Path, typer.Option(help="Folder for python/NAME.fmu.")] = Path("dist"),
 ) -> None:
     """Build and verify every model in models/."""
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else 120)
     table = Table(title="FMUs, held against their closed forms", title_justify="left")
     for column in ("FMU", "size", "build", "steps per s", "ms per s", "closed form", "error"):
-        table.add_column(column, justify="left" if column in ("FMU", "closed form") else "right")
+        left = column in ("FMU", "closed form")
+        table.add_column(column, justify="left" if left else "right", no_wrap=column != "closed form")
     table.add_column("verdict")
     problems: list[str] = []
     files: list[ModelFile] = []

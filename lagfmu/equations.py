@@ -34,7 +34,8 @@ class EquationsOfMotion:
     q, v (n): coordinates and velocities; u: inputs (with derivatives where they are needed);
     p: parameters.  M (n, n) and G (m, n) are sparse.  F (n) holds all forces without lambda, nu and
     gamma (m) the right-hand sides of G v = nu and G vdot = gamma, f (m) the residual of a position
-    constraint (None for a nonholonomic one).  Energies in joule: `kinetic` is the part of L that is
+    constraint (None for a nonholonomic one).  `symbols` maps the model's dynamicsymbols to the plain
+    symbols.  Energies in joule: `kinetic` is the part of L that is
     quadratic in v, `potential` minus the part without v; their sum is Jacobi's integral.
     """
 
@@ -51,6 +52,7 @@ class EquationsOfMotion:
     f: tuple[Expr | None, ...]
     kinetic: Expr
     potential: Expr | None
+    symbols: dict[Expr, Expr]
 
     @property
     def n(self) -> int:
@@ -69,7 +71,7 @@ class EquationsOfMotion:
 
     def plain(self, expression: Expr) -> Expr:
         """An expression of the model's dynamicsymbols in this object's plain symbols."""
-        return sp.sympify(expression).xreplace(plain_symbols(self.model))
+        return sp.sympify(expression).xreplace(self.symbols)
 
 
 def plain_symbols(model: Model) -> dict[Expr, Expr]:
@@ -122,7 +124,7 @@ def derive(model: Model) -> EquationsOfMotion:
 
     if problems:
         raise ModelError(model.name, problems)
-    kinetic, potential = _energies(model, energy, M, q, v)
+    kinetic, potential = _energies(model, energy, M, q, v, table)
     return EquationsOfMotion(
         model=model,
         q=q,
@@ -137,6 +139,7 @@ def derive(model: Model) -> EquationsOfMotion:
         f=tuple(f),
         kinetic=kinetic,
         potential=potential,
+        symbols=table,
     )
 
 
@@ -264,22 +267,24 @@ def _energies(
     M: dict[tuple[int, int], Expr],
     q: tuple[Expr, ...],
     v: tuple[Expr, ...],
+    table: dict[Expr, Expr],
 ) -> tuple[Expr, Expr | None]:
     """v^T M v / 2, and minus the part of L without velocities (or the forces' potential)."""
     kinetic = sp.Add(*(m * v[i] * v[j] / 2 for (i, j), m in sorted(M.items())))
     standing = -energy.xreplace(dict.fromkeys(v, sp.S.Zero))
     if model.lagrangian is not None:
         return kinetic, standing
-    return kinetic, _potential(model, q, standing)
+    return kinetic, _potential(model, q, standing, table)
 
 
-def _potential(model: Model, q: tuple[Expr, ...], standing: Expr) -> Expr | None:
+def _potential(
+    model: Model, q: tuple[Expr, ...], standing: Expr, table: dict[Expr, Expr]
+) -> Expr | None:
     """V of the forces that depend on q alone, where they are a gradient of polynomials and sines.
 
     Each force is split into the terms that hold coordinates and parameters only, and the rest.
     None if the first have a curl: then there is no potential energy to report.
     """
-    table = plain_symbols(model)
     allowed = set(q) | {p.symbol for p in model.parameters}
     forces = []
     for coordinate in model.coordinates:

@@ -16,7 +16,7 @@ from typing import Any
 
 import sympy as sp
 
-from .equations import TIME, EquationsOfMotion, plain_symbols
+from .equations import TIME, EquationsOfMotion
 from .errors import DerivationError
 from .model import Holonomic
 
@@ -44,7 +44,7 @@ class Reduction:
 def reduce(eom: EquationsOfMotion) -> Reduction:
     """Eliminate dependent coordinates.  Raises DerivationError if none can be, or the embedding fails."""
     relations, independent = _relations(eom)
-    table = plain_symbols(eom.model)
+    table = eom.symbols
     if independent is None:  # keep the coordinates that no relation gives
         kept = [j for j, q in enumerate(eom.q) if q not in relations]
         s = tuple(eom.q[j] for j in kept)

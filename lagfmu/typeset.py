@@ -178,7 +178,7 @@ class _Notation:
             return f"\\left[\\text{{{what}}}\\right]", f"[{what}]"
         renamed = expression.xreplace(self.into)
         text = self.text_printer.doprint(renamed)
-        text = re.sub(r"\*\*(\d+)(?![\d./])", lambda m: m[1].translate(SUPERSCRIPT), text)
+        text = re.sub(r"\*\*(\d+)(?![\d.])", lambda m: m[1].translate(SUPERSCRIPT), text)
         text = text.replace("**", "^").replace("*", " ").replace("sqrt(", "√(")
         text = re.sub(r"x\d{6}", lambda m: self.text_of[m[0]], text)
         return self.latex_printer.doprint(renamed), text

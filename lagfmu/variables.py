@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import sympy as sp
@@ -177,26 +178,40 @@ class _Builder:
 
     def group(self, *, coordinate: int | None = None, row: int | None = None) -> set[str]:
         """Symbols behind the accelerations and multipliers that are solved together."""
-        eom = self.eom
-        coordinates, rows = next(
-            g for g in coupled(eom) if coordinate in g[0] or (row is not None and row in g[1])
-        )
-        M = [m for (i, _), m in eom.M.todok().items() if i in coordinates]
-        G = [a for (k, _), a in eom.G.todok().items() if k in rows]
-        rest = [eom.F[j] for j in coordinates] + [eom.gamma[k] for k in rows]
-        return self.symbols(*M, *G, *rest)
+        for coordinates, rows, symbols in self.groups:
+            if coordinate in coordinates or (row is not None and row in rows):
+                return symbols
+        raise KeyError((coordinate, row))
+
+    @cached_property
+    def groups(self) -> list[tuple[frozenset[int], frozenset[int], set[str]]]:
+        """The groups of `coupled`, with the symbols in their equations."""
+        eom, found = self.eom, []
+        for coordinates, rows in coupled(eom):
+            M = [m for (i, _), m in eom.M.todok().items() if i in coordinates]
+            G = [a for (k, _), a in eom.G.todok().items() if k in rows]
+            rest = [eom.F[j] for j in coordinates] + [eom.gamma[k] for k in rows]
+            found.append((coordinates, rows, self.symbols(*M, *G, *rest)))
+        return found
+
+    @cached_property
+    def stepped_groups(self) -> list[tuple[set[str], set[str]]]:
+        """Of the coordinates that are stepped: the states of each group, the symbols of its start."""
+        eom, found = self.stepped, []
+        for coordinates, rows in coupled(eom):
+            own = {str(s) for j in coordinates for s in (eom.q[j], eom.v[j])}
+            behind = self.symbols(*(eom.f[k] for k in rows), *(eom.nu[k] for k in rows))
+            behind |= self.symbols(*(a for (k, _), a in eom.G.todok().items() if k in rows))
+            behind |= self.symbols(*(m for (i, _), m in eom.M.todok().items() if i in coordinates))
+            found.append((own, own | behind))
+        return found
 
     def at_start(self, names: Iterable[str]) -> tuple[str, ...]:
         """Inputs, parameters and exact start values behind a value at the start."""
-        eom, found = self.stepped, set(names)
-        for coordinates, rows in coupled(eom):
-            own = {str(s) for j in coordinates for s in (eom.q[j], eom.v[j])}
+        found = set(names)
+        for own, behind in self.stepped_groups:
             if found & own & self.movable:
-                found |= own
-                found |= self.symbols(*(eom.f[k] for k in rows))
-                found |= self.symbols(*(eom.nu[k] for k in rows))
-                found |= self.symbols(*(eom.G[k, j] for k in rows for j in coordinates))
-                found |= self.symbols(*(eom.M[i, j] for i in coordinates for j in coordinates))
+                found |= behind
         parameters = {str(p) for p in self.eom.p}
         exact = set(self.state_names) - self.movable
         return self.sorted(found & (parameters | exact | set(self.inputs)))
@@ -389,7 +404,8 @@ class _Builder:
 
     def constraint_outputs(self) -> list[Variable]:
         variables = []
-        model = self.model
+        model, jacobian = self.model, self.eom.G.todok()
+        entries = self.symbols(*jacobian.values())
         for k, c in enumerate(model.constraints):
             what = f"constraint {c.name}" + (f": {c.description}" if c.description else "")
             expression = sp.sympify(c.expression)
@@ -401,17 +417,17 @@ class _Builder:
             )
             if isinstance(c, Nonholonomic):
                 text = f"velocity residual of {what}"
-                behind = self.symbols(*self.eom.G.row(k), self.eom.nu[k], *self.eom.v)
+                own = {j: a for (i, j), a in jacobian.items() if i == k}
+                behind = self.symbols(*own.values(), self.eom.nu[k], *(self.eom.v[j] for j in own))
             else:
                 text = f"position residual of {what}"
                 behind = self.symbols(self.eom.f[k])
             variables.append(self.output(f"residual.{c.name}", text, unit, behind))
             text = f"true where lambda.{c.name} is determined uniquely"
-            names = self.symbols(*self.eom.G)
-            variables.append(self.output(f"unique.{c.name}", text, None, names, "Boolean"))
+            variables.append(self.output(f"unique.{c.name}", text, None, entries, "Boolean"))
         for j, q in enumerate(self.eom.q):
             unit = generalized_force_unit(self.units[str(q)])
-            touching = [k for k in range(self.eom.m) if self.eom.G[k, j] != 0]
+            touching = [k for k in range(self.eom.m) if (k, j) in jacobian]
             symbols = self.group(coordinate=j) if touching else set()
             text = f"generalized force of all constraints on {q}"
             variables.append(self.output(f"Q.{q}", text, unit, symbols))

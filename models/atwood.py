@@ -1,7 +1,7 @@
-"""Atwood's machine (Marion & Thornton, example 7.8 with one pulley; massless string and pulley).
+"""Atwood's machine (Marion & Thornton, example 2.9): two masses, massless string and pulley.
 
-x1, x2 [m] are the displacements of the two masses, both downward, from the start.  lambda [N] is the
-string's force on either mass, positive downward: the tension is -lambda.
+x1, x2 [m] are the displacements of the two masses from the start, both downward.  lambda [N] is
+the string's force on either mass, positive downward: the tension is -lambda.
 """
 
 from sympy import symbols

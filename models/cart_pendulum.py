@@ -1,9 +1,9 @@
 """Pendulum on a cart, with kinetic energy and forces (ME 6590, eq. 2) in place of a Lagrangian.
 
-s [m] the cart, x and y [m] the bob, x and s to the right and y up from the cart's pivot line, all from
-a fixed point.  The input F [N] pushes the cart, viscous friction c brakes it.  With
-f = (x - s)^2 + y^2 - L^2 the rod's force on the bob is 2 lambda (x - s, y): lambda = -tension/(2 L)
-[N/m], and the cart feels the opposite of its horizontal part.
+s [m] is the cart (the pivot) and x [m] the bob, both to the right from a fixed point; y [m] is the
+bob's height above the pivot, negative while it hangs.  The input F [N] pushes the cart, viscous
+friction c brakes it.  With f = (x - s)^2 + y^2 - L^2 the rod's force on the bob is
+2 lambda (x - s, y), so that lambda = -tension/(2 L) [N/m]; the cart feels its reaction, Q.s.
 """
 
 from sympy import sqrt, symbols
@@ -50,14 +50,15 @@ model = Model(
 
 scenes = [Scene("CartPendulum", stop_time=10.0, step_size=0.01)]
 
-# M s'' = F - c s' - 2 (x - s) lambda,  m x'' = 2 (x - s) lambda,  m y'' = -m g + 2 y lambda,  put into
-# (x - s)(x'' - s'') + y y'' + w^2 = 0,  where w is the bob's speed relative to the cart:
+# With d = x - s the equations of motion are
+#     M s'' = F - c s' - 2 d lambda ,   m x'' = 2 d lambda ,   m y'' = -m g + 2 y lambda ,
+# and f'' = 0 reads  d (x'' - s'') + y y'' + d'^2 + y'^2 = 0.  Solved for lambda:
 d = x - s
 square = d.diff() ** 2 + y.diff() ** 2
 drive = F - c * s.diff()
 multiplier = m * (M * g * y + drive * d - M * square) / (2 * (M * L**2 + m * d**2))
 
-# The first two of these add up to  d/dt (M s' + m x' + c s) = F.
+# The first two add up to  d/dt (M s' + m x' + c s) = F.
 momentum = M * s.diff() + m * x.diff() + c * s - F * t
 
 closed_forms = [

@@ -1,7 +1,7 @@
 """Particle on a smooth hemisphere (Marion & Thornton, example 7.10).
 
-r [m] from the centre, theta [rad] from the vertical.  The surface pushes and never pulls: lambda [N]
-is the normal force, positive outward, and the particle leaves where it reaches zero.
+r [m] from the centre, theta [rad] from the vertical.  The surface pushes and never pulls:
+lambda [N] is the normal force, positive outward, and the particle leaves where it reaches zero.
 """
 
 from sympy import cos, sin, symbols
@@ -43,8 +43,8 @@ model = Model(
 
 scenes = [Scene("Hemisphere", stop_time=2.0, step_size=0.01)]
 
-# On the sphere the radial equation reads  0 = m a theta'^2 - m g cos(theta) + lambda,  and the energy
-# gives  a^2 theta'^2 = v0^2 + 2 g a (cos(theta0) - cos(theta)).
+# On the sphere  0 = m a theta'^2 - m g cos(theta) + lambda,  and the energy gives
+# a^2 theta'^2 = v0^2 + 2 g a (cos(theta0) - cos(theta)).
 theta0 = initial(theta)
 v0 = a * initial(theta.diff())
 normal_force = m * g * (3 * cos(theta) - 2 * cos(theta0)) - m * v0**2 / a

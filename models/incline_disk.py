@@ -1,13 +1,13 @@
 """Disk that rolls down an incline without slipping (Marion & Thornton, example 7.9).
 
-y [m] down the incline, theta [rad] the disk's rotation, both from the start; y = R theta.  lambda [N]
-is the friction force on the disk, positive down the incline, so that it comes out negative.
+y [m] down the incline and theta [rad], the disk's rotation, are tied by y = R theta.  lambda [N] is
+the friction force on the disk, positive down the incline, so that it comes out negative.
 The second FMU has theta alone (y eliminated) and reports the same lambda.
 """
 
 from math import pi
 
-from sympy import Rational, sin, symbols
+from sympy import sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import ClosedForm, Conserved, Holonomic, Model, Parameter, Scene, initial, output
@@ -43,7 +43,7 @@ scenes = [
 ]
 
 # M y'' = M g sin(alpha) + lambda  and  I theta'' = -R lambda  with  y'' = R theta'':
-acceleration = Rational(2, 3) * g * sin(alpha)
+acceleration = 2 * g * sin(alpha) / 3
 friction = -M * g * sin(alpha) / 3
 
 closed_forms = [
@@ -53,8 +53,6 @@ closed_forms = [
     ClosedForm("der(y,2)", acceleration),
     ClosedForm("der(theta,2)", acceleration / R),
     ClosedForm("y", initial(y) + initial(y.diff()) * t + acceleration * t**2 / 2),
-    ClosedForm(
-        "theta", initial(theta) + initial(theta.diff()) * t + acceleration * t**2 / (2 * R)
-    ),
+    ClosedForm("theta", initial(theta) + initial(theta.diff()) * t + acceleration * t**2 / (2 * R)),
     Conserved("energy", output("energy.total"), scale=output("energy.kinetic")),
 ]

@@ -1,7 +1,7 @@
-"""Knife edge that slides on an incline (Neimark & Fufaev, ch. I; a skate or blade on a slope).
+"""Knife edge, a skate, that slides on an incline (Bloch, Nonholonomic Mechanics and Control, ch. 1).
 
-x [m] down the incline, y [m] across, phi [rad] the blade's heading from the x axis.  The blade moves
-only along (cos phi, sin phi): x' sin phi - y' cos phi = 0, which no position constraint expresses.
+x [m] down the incline, y [m] across, phi [rad] the blade's heading from the x axis.  The blade
+moves only along itself, x' sin phi - y' cos phi = 0: no relation of the coordinates can say that.
 lambda [N] is the sideways force on the blade, positive along (sin phi, -cos phi).
 """
 
@@ -48,16 +48,17 @@ model = Model(
 
 scenes = [Scene("KnifeEdge", stop_time=10.0, step_size=0.01)]
 
-# J phi'' = 0.  Along the blade the speed u obeys  u' = G cos(phi), G = g sin(alpha);  across it
-# -m u phi' = m G sin(phi) + lambda.  With phi' = omega:  omega (u - u0) = G (sin phi - sin phi0).
+# J phi'' = 0: the heading turns at the constant rate omega.  With G = g sin(alpha) the speed u along
+# the blade obeys  u' = G cos(phi),  hence  omega (u - u0) = G (sin(phi) - sin(phi0));  across the
+# blade, along (sin phi, -cos phi),  -m u omega = m G sin(phi) + lambda.
 G = g * sin(alpha)
 phi0, omega = initial(phi), initial(phi.diff())
 u0 = initial(x.diff()) * cos(phi0) + initial(y.diff()) * sin(phi0)
 heading = phi0 + omega * t
 sideways = -m * (omega * u0 + G * (2 * sin(phi) - sin(phi0)))
 
-# x' = u cos(phi), y' = u sin(phi); for omega != 0.  From rest a cycloid that never slides off: across
-# the slope it drifts, down it swings between 0 and G / (2 omega^2).
+# Integrating x' = u cos(phi), y' = u sin(phi), for omega != 0.  From rest with phi0 = 0 this is a
+# cycloid: x swings between 0 and G / (2 omega^2), y drifts across the slope at G / (2 omega).
 base = u0 - G / omega * sin(phi0)
 down = base / omega * (sin(heading) - sin(phi0))
 down += G / (2 * omega**2) * (sin(heading) ** 2 - sin(phi0) ** 2)

@@ -1,8 +1,8 @@
 """Simple pendulum (ME 6590, example): approach 2 with x and y, approach 1 with theta, and eq. (9).
 
 x [m] to the right, y [m] up, both from the pivot; theta [rad] from the downward vertical.  With
-f = x^2 + y^2 - L^2 the force of constraint is 2 lambda (x, y): lambda = -T/(2 L) [N/m], where T is the
-rod's tension.  All three FMUs report it, also where theta alone, or no multiplier, is integrated.
+f = x^2 + y^2 - L^2 the force of constraint is 2 lambda (x, y), so that lambda = -tension/(2 L) [N/m].
+All three FMUs report it, also those that integrate theta alone, or eliminate the multiplier.
 """
 
 from sympy import cos, sin, symbols
@@ -56,7 +56,7 @@ scenes = [
     Scene("PendulumNullspace", formulation="nullspace", stop_time=10.0, step_size=0.01),
 ]
 
-# Along the rod  T = m v^2/L - m g y/L,  and the energy gives  v^2 = v0^2 + 2 g (y0 - y).
+# Along the rod  tension = m v^2/L - m g y/L,  and the energy gives  v^2 = v0^2 + 2 g (y0 - y).
 x0, y0 = initial(x), initial(y)
 square = x.diff() ** 2 + y.diff() ** 2
 square0 = initial(x.diff()) ** 2 + initial(y.diff()) ** 2

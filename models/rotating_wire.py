@@ -1,14 +1,14 @@
 """Bead on a straight smooth wire that a motor turns at a constant rate in a horizontal plane.
 
-(Marion & Thornton, sect. 7.4 on rheonomic constraints.)  r [m] along the wire from the axis, phi [rad]
-the wire's angle; phi = omega t is a constraint that depends on time.  lambda [N.m] is the motor's
-torque, positive in the sense of the rotation; its power lambda omega feeds the bead.
+(Goldstein, Classical Mechanics, sect. 1.6.)  r [m] along the wire from the axis, phi [rad] the
+wire's angle; phi = omega t is a constraint that depends on time.  lambda [N.m] is the motor's torque,
+positive in the sense of the rotation; its power lambda omega feeds the bead's energy.
 """
 
 from sympy import cosh, sinh, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Holonomic, Model, Parameter, Scene, initial
+from lagfmu import ClosedForm, Conserved, Holonomic, Model, Parameter, Scene, initial, output
 
 t = dynamicsymbols._t
 r, phi = dynamicsymbols("r phi")
@@ -33,7 +33,7 @@ model = Model(
 
 scenes = [Scene("RotatingWire", stop_time=1.5, step_size=0.01)]
 
-# r'' = omega^2 r,  and the angular momentum  m r^2 omega  grows at the rate  lambda = 2 m omega r r'.
+# r'' = omega^2 r,  and the angular momentum m r^2 omega grows at the rate lambda = 2 m omega r r'.
 r0, v0 = initial(r), initial(r.diff())
 torque = m * (r0**2 * omega**2 + v0**2) * sinh(2 * omega * t)
 torque += 2 * m * omega * r0 * v0 * cosh(2 * omega * t)
@@ -43,6 +43,10 @@ closed_forms = [
     ClosedForm("r", r0 * cosh(omega * t) + v0 / omega * sinh(omega * t)),  # for omega != 0
     ClosedForm("phi", omega * t),
     ClosedForm("lambda.drive", torque),
-    ClosedForm("torque from the state", 2 * m * omega * r * r.diff(), actual=torque),
+    ClosedForm(
+        "lambda.drive from the state",
+        2 * m * omega * r * r.diff(),
+        actual=output("lambda.drive"),
+    ),
     Conserved("Jacobi's integral", jacobi, scale=T),
 ]
