@@ -18,8 +18,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 
 from lagfmu import LagfmuError, Verification, verify
-from lagfmu.build import prepare, write
+from lagfmu.build import write
 from lagfmu.modelfile import ModelFile, load
+from lagfmu.prepare import prepare
 from lagfmu.scene import Scene
 
 MODELS = Path(__file__).parent / "models"
@@ -45,7 +46,9 @@ def main(
     table = Table(title="FMUs, held against their closed forms", title_justify="left")
     for column in ("FMU", "size", "build", "steps per s", "ms per s", "closed form", "error"):
         left = column in ("FMU", "closed form")
-        table.add_column(column, justify="left" if left else "right", no_wrap=column != "closed form")
+        table.add_column(
+            column, justify="left" if left else "right", no_wrap=column != "closed form"
+        )
     table.add_column("verdict")
     problems: list[str] = []
     files: list[ModelFile] = []

@@ -12,6 +12,7 @@ import math
 import statistics
 import sys
 import time
+from itertools import pairwise
 
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
@@ -59,7 +60,7 @@ def main() -> None:
             moments.append(time.perf_counter())
             source(eom, None, "multipliers")
             moments.append(time.perf_counter())
-            runs.append([b - a for a, b in zip(moments, moments[1:], strict=False)])
+            runs.append([b - a for a, b in pairwise(moments)])
         medians = [statistics.median(column) for column in zip(*runs, strict=True)]
         growth = ""
         if before is not None:

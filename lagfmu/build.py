@@ -5,46 +5,16 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from .closed_form import ClosedForm, Conserved
-from .consistency import Structure, examine
 from .documentation import page
-from .equations import EquationsOfMotion, derive
 from .errors import BuildError
 from .fmu import python
 from .model import Model
+from .prepare import Prepared, prepare
 from .proof import pack_closed_forms
-from .reduction import Reduction, reduce
 from .scene import Scene
-from .solver.system import System
-from .numeric import lower
-from .variables import VariableTable, variable_table
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """All that is known about a model in a scene before anything is packaged."""
-
-    model: Model
-    scene: Scene
-    equations: EquationsOfMotion
-    reduction: Reduction | None
-    table: VariableTable
-    system: System
-    structure: Structure
-
-
-def prepare(model: Model, scene: Scene | None = None) -> Prepared:
-    """Derive, reduce if asked, lower and examine.  Raises ModelError or DerivationError."""
-    scene = scene or Scene(model.name)
-    equations = derive(model)
-    reduction = reduce(equations) if scene.formulation == "minimal" else None
-    table = variable_table(equations, reduction, scene)
-    system = lower(equations, reduction, scene.formulation)
-    structure = examine(equations, table, system)
-    return Prepared(model, scene, equations, reduction, table, system, structure)
 
 
 def build_fmu(

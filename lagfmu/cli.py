@@ -14,10 +14,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from .build import prepare, write
+from .build import write
 from .errors import LagfmuError, SimulationError
 from .modelfile import load
 from .plot import plot
+from .prepare import prepare
 from .show import show as show_prepared
 from .simulate import read_description, simulate
 from .verify import Verification, verify
@@ -36,7 +37,9 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter or start value; repeatable."),
 ]
-Tolerance = Annotated[float | None, typer.Option(help="Relative tolerance: speed against accuracy.")]
+Tolerance = Annotated[
+    float | None, typer.Option(help="Relative tolerance: speed against accuracy.")
+]
 StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
 StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
 

@@ -107,7 +107,9 @@ def derive(model: Model) -> EquationsOfMotion:
         F[list(model.coordinates).index(coordinate)] += sp.sympify(force).xreplace(table)
 
     G: dict[tuple[int, int], Expr] = {}
-    nu, gamma, f = [], [], []
+    nu: list[Expr] = []
+    gamma: list[Expr] = []
+    f: list[Expr | None] = []
     for k, constraint in enumerate(model.constraints):
         expression = sp.sympify(constraint.expression).xreplace(table)
         if isinstance(constraint, Nonholonomic):
@@ -146,9 +148,7 @@ def derive(model: Model) -> EquationsOfMotion:
 class _Clock:
     """Time derivatives along a motion, by the chain rule over the symbols that occur."""
 
-    def __init__(
-        self, q: tuple[Expr, ...], v: tuple[Expr, ...], rates: dict[Expr, Expr]
-    ) -> None:
+    def __init__(self, q: tuple[Expr, ...], v: tuple[Expr, ...], rates: dict[Expr, Expr]) -> None:
         self.inputs = rates
         self.all = {**dict(zip(q, v, strict=True)), **rates}
 

@@ -26,8 +26,10 @@ from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 Expr = Any  # a SymPy expression; SymPy carries no types
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
-RESERVED = ("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver")
-RESERVED += ("t", "time", "unique", "velocity")
+RESERVED: tuple[str, ...] = (
+    *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
+    *("t", "time", "unique", "velocity"),
+)
 
 
 @dataclass(frozen=True)
@@ -148,9 +150,7 @@ class Model:
     @property
     def energy_expression(self) -> Expr:
         """The Lagrangian, or the kinetic energy where forces carry the rest [J]."""
-        return sp.sympify(
-            self.lagrangian if self.lagrangian is not None else self.kinetic_energy
-        )
+        return sp.sympify(self.lagrangian if self.lagrangian is not None else self.kinetic_energy)
 
     @cached_property
     def units(self) -> dict[Expr, Unit]:
@@ -181,6 +181,9 @@ def name_of(symbol: Expr) -> str:
 
 def _problems(model: Model) -> list[str]:
     problems: list[str] = []
+    _check_types(model, problems)
+    if problems:
+        return problems
     _check_names(model, problems)
     _check_energy(model, problems)
     if problems:
@@ -191,6 +194,44 @@ def _problems(model: Model) -> list[str]:
     if not problems:
         _check_dimensions(model, units, problems)
     return problems
+
+
+def _check_types(model: Model, problems: list[str]) -> None:
+    """Things that are not what the fields of a Model hold, before anything is read from them."""
+    kinds: tuple[tuple[str, Sequence[object], tuple[type, ...]], ...] = (
+        ("parameters", model.parameters, (Parameter,)),
+        ("inputs", model.inputs, (Input,)),
+        ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact)),
+    )
+    for field_name, items, types in kinds:
+        expected = ", ".join(t.__name__ for t in types)
+        problems += [
+            f"{field_name} hold {item!r}, expected {expected}: write {types[0].__name__}(...)"
+            for item in items
+            if not isinstance(item, types)
+        ]
+    if problems:
+        return
+    for kind, symbol in [
+        *(("parameter", p.symbol) for p in model.parameters),
+        *(("input", i.symbol) for i in model.inputs),
+    ]:
+        if not isinstance(symbol, (sp.Symbol, AppliedUndef)):
+            problems.append(f"{kind} {symbol!r} is no SymPy symbol: make one with sympy.symbols")
+    expressions = [("lagrangian", model.lagrangian), ("kinetic_energy", model.kinetic_energy)]
+    expressions += [(f"force on {plain(sp.sympify(q))}", f) for q, f in model.forces.items()]
+    expressions += [(f"constraint {c.name!r}", c.expression) for c in model.constraints]
+    for what, expression in expressions:
+        if expression is not None and not _is_expression(expression):
+            problems.append(
+                f"{what}: {expression} is no SymPy expression with a value (it is a "
+                f"{type(expression).__name__}): write sums, products and functions of symbols; "
+                "a constraint is the expression that vanishes"
+            )
+
+
+def _is_expression(thing: object) -> bool:
+    return not isinstance(thing, str) and isinstance(sp.sympify(thing, strict=False), sp.Expr)
 
 
 def _check_names(model: Model, problems: list[str]) -> None:
@@ -256,8 +297,9 @@ def _check_name(kind: str, name: object, problems: list[str]) -> None:
 def _check_energy(model: Model, problems: list[str]) -> None:
     given = [f for f in (model.lagrangian, model.kinetic_energy) if f is not None]
     if len(given) != 1:
+        found = "both lagrangian and" if given else "neither lagrangian nor"
         problems.append(
-            f"{'both' if given else 'neither'} lagrangian and kinetic_energy given: give a "
+            f"{found} kinetic_energy given: give either a "
             "lagrangian (with non-conservative forces) or a kinetic_energy (with all forces)"
         )
 
@@ -269,7 +311,12 @@ def _check_numbers(model: Model, problems: list[str]) -> None:
         for bound, value in (("min", p.min), ("max", p.max)):
             if value is not None:
                 _finite(f"{bound} of parameter {name_of(p.symbol)!r}", value, problems)
-        if _number(p.value) and (
+        if p.min is not None and p.max is not None and p.min > p.max:
+            problems.append(
+                f"parameter {name_of(p.symbol)!r}: min = {p.min!r} is above max = {p.max!r}, so that "
+                "no value is allowed: exchange them"
+            )
+        elif _number(p.value) and (
             (p.min is not None and p.value < p.min) or (p.max is not None and p.value > p.max)
         ):
             problems.append(
@@ -331,6 +378,7 @@ def _expressions(model: Model) -> list[tuple[str, Expr]]:
 def _check_symbols(model: Model, problems: list[str]) -> None:
     t = dynamicsymbols._t
     known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t}
+    names = {name_of(s) for s in (*known, *model.coordinates)}
     for q in model.forces:
         if q not in model.coordinates:
             problems.append(f"a force is given on {plain(q)}, which is no coordinate of the model")
@@ -338,9 +386,19 @@ def _check_symbols(model: Model, problems: list[str]) -> None:
         unknown = _unknown(expression, known | set(model.coordinates))
         problems += [
             f"{what}: {name} is neither coordinate, parameter nor input: "
-            "declare it, e.g. as a Parameter with value and unit"
+            + (
+                "one of that name is declared, but as another symbol (other assumptions, or no "
+                "function of time): use the same"
+                if name in names
+                else "declare it, e.g. as a Parameter with value and unit"
+            )
             for name in unknown
         ]
+        if what.startswith("constraint") and not expression.has(*model.coordinates):
+            problems.append(
+                f"{what}: {expression} holds no coordinate, expected a condition on the motion: "
+                "correct it or leave it out"
+            )
         orders = [d.derivative_count for d in expression.atoms(sp.Derivative)]
         limit = 0 if what.startswith("constraint") and not _pfaffian(model, what) else 1
         if any(order > limit for order in orders):

@@ -104,8 +104,9 @@ def _group_columns(G: Expr, coordinates: list[int], rows: list[int]) -> list[dic
     columns = []
     for free in (j for j in range(c) if j not in pivots):
         over = sorted({*pivots, free}) if pivots else list(range(c))
-        minors = [_determinant(A.extract(list(range(r)), [j for j in over if j != i]))
-                  for i in over]
+        minors = [
+            _determinant(A.extract(list(range(r)), [j for j in over if j != i])) for i in over
+        ]
         cross = [(-1) ** k * minor for k, minor in enumerate(minors)]
         cross = _primitive(cross)
         columns.append({coordinates[i]: e for i, e in zip(over, cross, strict=True) if e != 0})

@@ -38,14 +38,23 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
         )
     )
     rows = tuple(reduction.rows)
-    parts.append(_system(reduction.reduced, "reduced_", "minimal", rows, "Embedding(embed, "
-                         "SYSTEM_OF_COORDINATES)"))
+    parts.append(
+        _system(
+            reduction.reduced,
+            "reduced_",
+            "minimal",
+            rows,
+            "Embedding(embed, SYSTEM_OF_COORDINATES)",
+        )
+    )
     return _imported("\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n")
 
 
 def _imported(text: str) -> str:
     """The text under an import of the functions of `math` that it calls."""
-    called = sorted(name for name in set(re.findall(r"\b([a-z]\w*)\(", text)) if hasattr(math, name))
+    called = sorted(
+        name for name in set(re.findall(r"\b([a-z]\w*)\(", text)) if hasattr(math, name)
+    )
     return (f"from math import {', '.join(called)}\n\n\n" if called else "") + text
 
 
@@ -79,9 +88,7 @@ def _system(
 ) -> str:
     names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
     names[TIME] = "t"
-    lower_triangle = sorted(
-        (i, j) for i, j in eom.M.todok() if i >= j
-    )
+    lower_triangle = sorted((i, j) for i, j in eom.M.todok() if i >= j)
     jacobian = sorted(eom.G.todok())
     state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.u, "p": eom.p}
     still = {"t": (), "q": eom.q, "u": eom.u, "p": eom.p}
@@ -180,9 +187,7 @@ def _pattern(indices: Sequence[tuple[int, int]]) -> str:
 
 def _prescribed(eom: EquationsOfMotion) -> tuple[int, ...]:
     positions = {str(s): k for k, s in enumerate(eom.u)}
-    return tuple(
-        positions[name] for name in positions if f"der({name},2)" in positions
-    )
+    return tuple(positions[name] for name in positions if f"der({name},2)" in positions)
 
 
 def _units(eom: EquationsOfMotion) -> list[Any]:

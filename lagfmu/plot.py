@@ -67,10 +67,10 @@ def plot(
             for n, colour in zip(members, COLOURS * len(members), strict=False):
                 axis.plot(result["time"], result[n], color=colour, label=n, linewidth=1.8)
             axis.set_ylabel(unit if unit != "1" else "")
-            _mark_departures(axis, result, known)
+            axis.margins(x=0)
+            _mark_departures(axis, result, known, named=axis is axes[0, 0])
             axis.legend(frameon=False, loc="best", fontsize=10)
         axes[-1, 0].set_xlabel("time in s")
-        axes[-1, 0].margins(x=0)
         if title:
             figure.suptitle(title, fontsize=12)
         path = Path(out)
@@ -85,17 +85,19 @@ def plot(
     return path
 
 
-def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str]) -> None:
+def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:
     for n in known:
         if n.startswith("departure.") and n.endswith(".count") and result[n][-1] > 0:
             contact = n.split(".")[1]
             moment = float(result[f"departure.{contact}.time"][-1])
             axis.axvline(moment, color="#888888", linewidth=1, linestyle="--")
-            axis.annotate(
-                f" leaves {contact}",
-                (moment, 1.0),
-                xycoords=("data", "axes fraction"),
-                va="top",
-                fontsize=9,
-                color="#555555",
-            )
+            if named:
+                axis.annotate(
+                    f" leaves {contact} ",
+                    (moment, 1.0),
+                    xycoords=("data", "axes fraction"),
+                    ha="right" if moment > result["time"][-1] / 2 else "left",
+                    va="top",
+                    fontsize=9,
+                    color="#555555",
+                )

@@ -70,9 +70,7 @@ def pack_closed_forms(scene: Scene, closed_forms: Sequence[ClosedForm | Conserve
     for claim in claims_of(scene, closed_forms):
         entry: dict[str, Any] = {
             key: getattr(claim, key)
-            for key in (
-                "name", "while_closed", "while_open", "at_departure", "within", "rounding"
-            )
+            for key in ("name", "while_closed", "while_open", "at_departure", "within", "rounding")
         }
         names: dict[Expr, str] = {}
         for key in ("actual", "expected", "scale"):

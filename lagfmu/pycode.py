@@ -39,7 +39,11 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
     def _print_NumberSymbol(self, number: Expr) -> str:
         return repr(float(number))
 
-    _print_Pi = _print_Exp1 = _print_NumberSymbol
+    def _print_Pi(self, number: Expr) -> str:
+        return repr(float(number))
+
+    def _print_Exp1(self, number: Expr) -> str:
+        return repr(float(number))
 
     def _print_Integer(self, number: Expr) -> str:
         return str(number) if abs(int(number)) < 2**53 else repr(float(number))
@@ -110,4 +114,3 @@ def _fresh(taken: set[str]) -> Any:
         if f"x{k}" not in taken:
             yield sp.Symbol(f"x{k}")
         k += 1
-

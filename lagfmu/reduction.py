@@ -51,8 +51,10 @@ def reduce(eom: EquationsOfMotion) -> Reduction:
         sdot = tuple(eom.v[j] for j in kept)
     else:
         s = tuple(table[c] for c in independent) + tuple(q for q in eom.q if q not in relations)
-        speeds = {**dict(zip(eom.q, eom.v, strict=True)),
-                  **{table[c]: table[c.diff(TIME)] for c in independent}}
+        speeds = {
+            **dict(zip(eom.q, eom.v, strict=True)),
+            **{table[c]: table[c.diff(TIME)] for c in independent},
+        }
         sdot = tuple(speeds[c] for c in s)
     phi = tuple(sp.sympify(relations.get(q, q)) for q in eom.q)
     rates = dict(zip(s, sdot, strict=True))
@@ -79,9 +81,7 @@ def reduce(eom: EquationsOfMotion) -> Reduction:
         for a in range(N)
         for b in range(N)
     }
-    Fr = tuple(
-        _tidy(sp.Add(*(J[i][a] * f for i, f in enumerate(rest)))) for a in range(N)
-    )
+    Fr = tuple(_tidy(sp.Add(*(J[i][a] * f for i, f in enumerate(rest)))) for a in range(N))
     rows, G, nu, gamma, f = _remaining(eom, J, drift, c, into, N)
     _check(eom, phi, into, s, sdot, rows)
     reduced = replace(
@@ -118,9 +118,10 @@ def _relations(eom: EquationsOfMotion) -> tuple[dict[Expr, Expr], tuple[Expr, ..
         given = {eom.plain(q): eom.plain(phi) for q, phi in embedding.relations.items()}
         return given, tuple(embedding.coordinates)
     relations: dict[Expr, Expr] = {}
-    for constraint, f in zip(eom.constraints, eom.f, strict=True):
+    for constraint, residual in zip(eom.constraints, eom.f, strict=True):
         if not isinstance(constraint, Holonomic) or constraint.while_closed is not None:
             continue
+        f: Expr = residual
         if f.free_symbols & set(eom.u):
             continue  # a prescribed motion stays a constraint
         f = sp.expand(f.xreplace(relations))
@@ -162,7 +163,11 @@ def _remaining(
     N: int,
 ) -> tuple[Any, Any, Any, Any, Any]:
     """The constraint rows that still act on s: G J, nu - G phi_t, gamma - G c."""
-    rows, G, nu, gamma, f = [], {}, [], [], []
+    rows: list[int] = []
+    G: dict[tuple[int, int], Expr] = {}
+    nu: list[Expr] = []
+    gamma: list[Expr] = []
+    f: list[Expr | None] = []
     for k in range(eom.m):
         a = {j: eom.G[k, j].xreplace(into) for j in range(eom.n) if eom.G[k, j] != 0}
         reduced = [sp.simplify(sp.Add(*(a[j] * J[j][b] for j in a))) for b in range(N)]
@@ -171,7 +176,8 @@ def _remaining(
         G.update({(len(rows), b): r for b, r in enumerate(reduced) if r != 0})
         nu.append(eom.nu[k].xreplace(into) - sp.Add(*(a[j] * drift[j] for j in a)))
         gamma.append(eom.gamma[k].xreplace(into) - sp.Add(*(a[j] * c[j] for j in a)))
-        f.append(None if eom.f[k] is None else eom.f[k].xreplace(into))
+        position: Expr = eom.f[k]
+        f.append(None if position is None else position.xreplace(into))
         rows.append(k)
     matrix = sp.ImmutableSparseMatrix(len(rows), N, G)
     return tuple(rows), matrix, tuple(nu), tuple(gamma), tuple(f)

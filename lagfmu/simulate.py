@@ -13,15 +13,16 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
-from .build import Prepared, prepare
 from .errors import SimulationError, VerificationError
 from .model import Model
+from .prepare import Prepared, prepare
 from .scene import Scene
 from .solver.advance import advance
 from .solver.failure import StepFailureError
 from .solver.initial import start
 from .solver.observe import observe
 from .solver.state import METHODS, SMALLEST_TOLERANCE, Settings
+from .variables import VariableTable
 
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
@@ -46,6 +47,9 @@ def simulate(
     VerificationError for a file that is no FMU.
     """
     values = dict(start_values or {})
+    for what, number in (("stop_time", stop_time), ("step_size", step_size)):
+        if number is not None and not 0 < number < np.inf:
+            raise SimulationError(f"{what} = {number!r} s, expected a positive number")
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared):
@@ -56,7 +60,7 @@ def simulate(
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
     """0, h, 2 h, ..., and the stop time."""
     count = max(1, int(np.ceil(stop_time / step_size * (1 - 1e-12))))
-    times = np.arange(count + 1) * step_size
+    times = np.arange(count + 1, dtype=np.float64) * step_size
     times[-1] = stop_time
     return times
 
@@ -70,16 +74,10 @@ def _simulate_model(
     inputs: Trajectory | None,
 ) -> Trajectory:
     scene, table, system = prepared.scene, prepared.table, prepared.system
-    known = {v.name: v.start for v in table.variables if v.role != "output"}
-    unknown = sorted(set(values) - set(known))
-    if unknown:
-        raise SimulationError(
-            f"start values for {', '.join(unknown)}, expected names among {', '.join(known)}"
-        )
+    known: dict[str, Any] = {v.name: v.start for v in table.variables if v.role != "output"}
+    _check_values(table, values)
     known |= values
     method = known["solver.method"]
-    if method not in METHODS:
-        raise SimulationError(f"solver.method = {method!r}, expected one of {', '.join(METHODS)}")
     settings = Settings(
         method,
         max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
@@ -99,8 +97,8 @@ def _simulate_model(
         ]
 
     times = communication_points(stop_time or scene.stop_time, step_size or scene.step_size)
-    columns = [("time", np.float64)]
-    kinds = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
+    columns: list[tuple[str, Any]] = [("time", np.float64)]
+    kinds: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
     columns += [(v.name, kinds[v.kind]) for v in table.outputs]
     result = np.zeros(len(times), dtype=columns)
     try:
@@ -119,6 +117,27 @@ def _simulate_model(
     return result
 
 
+def _check_values(table: VariableTable, values: Mapping[str, Any]) -> None:
+    """Refuse what the FMU would refuse: all problems at once."""
+    settable = {v.name: v for v in table.variables if v.role != "output"}
+    problems = []
+    for name, value in values.items():
+        v = settable.get(name)
+        if v is None:
+            problems.append(f"{name!r} cannot be set, expected one of {', '.join(settable)}")
+        elif v.kind == "String":
+            if value not in METHODS:
+                problems.append(f"{name} = {value!r}, expected one of {', '.join(METHODS)}")
+        elif not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+            problems.append(f"{name} = {value!r}, expected a finite number")
+        elif (v.minimum is not None and value < v.minimum) or (
+            v.maximum is not None and value > v.maximum
+        ):
+            problems.append(f"{name} = {value!r} is outside its bounds [{v.minimum}, {v.maximum}]")
+    if problems:
+        raise SimulationError("; ".join(problems))
+
+
 def read_description(path: Path) -> Any:
     """fmpy's ModelDescription.  Raises VerificationError if the file is missing or no FMU."""
     if not path.is_file():
@@ -130,9 +149,9 @@ def read_description(path: Path) -> Any:
             f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
         ) from None
     except Exception as error:
-        raise VerificationError(f"{str(path)!r}: modelDescription.xml cannot be read ({error})") from (
-            None
-        )
+        raise VerificationError(
+            f"{str(path)!r}: modelDescription.xml cannot be read ({error})"
+        ) from None
 
 
 def _simulate_fmu(
@@ -158,7 +177,7 @@ def _simulate_fmu(
     if unknown:
         raise SimulationError(f"{str(path)!r} has no variables {', '.join(unknown)}")
     try:
-        return fmpy.simulate_fmu(
+        result: Trajectory = fmpy.simulate_fmu(
             str(path),
             stop_time=stop,
             output_interval=step,
@@ -168,6 +187,7 @@ def _simulate_fmu(
             input=inputs,
             logger=logger,
         )
+        return result
     except FMICallException as error:
         cause = "; ".join(messages) or "no message was logged"
         raise SimulationError(f"{str(path)!r}: {error} ({cause})") from None

@@ -137,10 +137,10 @@ class _Text(StrPrinter):  # type: ignore[misc]
         return _positive_first(super()._as_ordered_terms(expr, order=order))
 
 
-class _Notation:
+class Notation:
     """How each symbol is written, and in which order factors stand: m g r, not g m r by the ABC."""
 
-    def __init__(self, eom: EquationsOfMotion, reduction: Reduction | None) -> None:
+    def __init__(self, eom: EquationsOfMotion, reduction: Reduction | None = None) -> None:
         written: dict[Expr, Printed] = {}
         for p in eom.p:
             written[p] = name_latex(str(p)), name_text(str(p))
@@ -158,14 +158,10 @@ class _Notation:
             symbol = sp.Dummy(f"lambda.{c.name}", real=True)
             written[symbol] = f"\\lambda_{{{_letter(c.name)}}}", f"λ_{c.name}"
             self.multipliers.append(symbol)
-        self.into = {
-            s: sp.Symbol(f"x{k:06d}", **s.assumptions0) for k, s in enumerate(written)
-        }
+        self.into = {s: sp.Symbol(f"x{k:06d}", **s.assumptions0) for k, s in enumerate(written)}
         names = [self.into[s] for s in written]
         latex = dict(zip(names, (a for a, _ in written.values()), strict=True))
-        self.text_of = {
-            str(s): b for s, (_, b) in zip(names, written.values(), strict=True)
-        }
+        self.text_of = {str(s): b for s, (_, b) in zip(names, written.values(), strict=True)}
         self.latex_printer = _Latex({"symbol_names": latex})
         self.text_printer = _Text({"full_prec": False})
 
@@ -196,6 +192,8 @@ class _Notation:
         for a, symbol in terms:
             if a == 0:
                 continue
+            if a.is_Add and a.count_ops() <= LONGEST:
+                a = min((a, sp.factor_terms(a)), key=lambda e: e.count_ops())
             if a.is_Number or (a.is_Mul and a.args[0].is_Rational and a.args[0].q != 1):
                 out.append(self.show(a * symbol))  # half of it: the symbol goes above the bar
             elif a.is_Add and a.could_extract_minus_sign():
@@ -252,7 +250,7 @@ def _tidy(expression: Expr) -> Expr:
 class _Typesetter:
     def __init__(self, eom: EquationsOfMotion, reduction: Reduction | None) -> None:
         self.eom = eom
-        self.notation = _Notation(eom, reduction)
+        self.notation = Notation(eom, reduction)
         self.vdot = accelerations(eom)
 
     def section(
@@ -330,15 +328,12 @@ class _Typesetter:
             if isinstance(c, Contact):
                 contacts = True
                 lam, f = show(self.notation.multipliers[k]), self.notation.factor(eom.f[k])
-                parts = [
-                    show(eom.f[k]), ("\\geq 0,\\quad", "≥ 0,"),
-                    lam, ("\\geq 0,\\quad", "≥ 0,"),
-                    lam, f, ("= 0", "= 0"),
-                ]
+                positive = "\\geq 0,\\quad", "≥ 0,"
+                parts = [show(eom.f[k]), positive, lam, positive, lam, f, ("= 0", "= 0")]
             equations.append((label, parts))
-        remark = "" if not contacts else (
-            "A contact pushes and never pulls: either it is closed, or its multiplier is zero."
-        )
+        remark = ""
+        if contacts:
+            remark = "A contact pushes and never pulls: it is closed, or its multiplier is zero."
         return self.section("Constraints", remark, equations)
 
     def forces(self) -> Section:

@@ -101,7 +101,9 @@ def _collisions(names: Sequence[str]) -> list[str]:
         parts = name.split(".")
         for k in range(1, len(parts)):
             if ".".join(parts[:k]) in seen:
-                problems.append(f"{'.'.join(parts[:k])!r} would be a variable and a group: rename it")
+                problems.append(
+                    f"{'.'.join(parts[:k])!r} would be a variable and a group: rename it"
+                )
     return problems
 
 
@@ -129,9 +131,7 @@ def coupled(eom: EquationsOfMotion) -> list[tuple[frozenset[int], frozenset[int]
 
 
 class _Builder:
-    def __init__(
-        self, eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene
-    ) -> None:
+    def __init__(self, eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene) -> None:
         self.eom, self.reduction, self.scene = eom, reduction, scene
         self.model = eom.model
         self.units = {str(eom.plain(s)): u for s, u in self.model.units.items()}
@@ -381,9 +381,7 @@ class _Builder:
                     )
             symbols = self.group(coordinate=j)
             name = f"der({q},2)"
-            variables.append(
-                self.output(name, texts[2], self.units[name], symbols, "Real", str(v))
-            )
+            variables.append(self.output(name, texts[2], self.units[name], symbols, "Real", str(v)))
         own = {str(q) for q in self.eom.q}
         for q, v in zip(self.stepped.q, self.stepped.v, strict=True):
             if str(q) in own:
@@ -393,9 +391,7 @@ class _Builder:
             variables.append(self.state(str(v), texts[1], str(q)))
             name = f"der({q},2)"
             symbols = self.symbols(*self.stepped.M, *self.stepped.F)
-            variables.append(
-                self.output(name, texts[2], self.units[name], symbols, "Real", str(v))
-            )
+            variables.append(self.output(name, texts[2], self.units[name], symbols, "Real", str(v)))
         return variables
 
     def _texts(self, name: str) -> tuple[str, str, str]:
@@ -412,9 +408,7 @@ class _Builder:
             unit = dimension_of(expression, model.units, c.name) or ONE
             lam = multiplier_unit(unit, isinstance(c, Nonholonomic))
             row = self.group(row=k)
-            variables.append(
-                self.output(f"lambda.{c.name}", f"multiplier of {what}", lam, row)
-            )
+            variables.append(self.output(f"lambda.{c.name}", f"multiplier of {what}", lam, row))
             if isinstance(c, Nonholonomic):
                 text = f"velocity residual of {what}"
                 own = {j: a for (i, j), a in jacobian.items() if i == k}
@@ -445,7 +439,9 @@ class _Builder:
         return [
             *variables,
             self.output("energy.potential", "potential energy", ENERGY, potential),
-            self.output("energy.total", "kinetic and potential energy", ENERGY, kinetic | potential),
+            self.output(
+                "energy.total", "kinetic and potential energy", ENERGY, kinetic | potential
+            ),
         ]
 
     def contact_outputs(self) -> list[Variable]:
@@ -472,4 +468,3 @@ class _Builder:
                     ),
                 ]
         return variables
-

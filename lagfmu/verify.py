@@ -118,7 +118,7 @@ def verify(
     ]
     checks += [_check(claim, result, values, used) for claim in claims]
     span = float(result["time"][-1] - result["time"][0])
-    steps = int(result["solver.steps"][-1]) if "solver.steps" in result.dtype.names else 0
+    steps = int(result["solver.steps"][-1]) if "solver.steps" in (result.dtype.names or ()) else 0
     return Verification(description.modelName, tuple(checks), span, seconds, steps)
 
 
@@ -136,7 +136,7 @@ def _claims(path: Path) -> list[Claim]:
 
 
 def _finite(result: Trajectory) -> Check:
-    bad = [n for n in result.dtype.names if not np.isfinite(result[n]).all()]
+    bad = [n for n in result.dtype.names or () if not np.isfinite(result[n]).all()]
     return Check("all outputs finite", len(bad), 0, len(result), ", ".join(bad))
 
 
@@ -193,12 +193,13 @@ def _evaluate(
     name: str,
 ) -> NDArray[np.float64]:
     symbols = sorted(expression.free_symbols, key=str)
+    names = rows.dtype.names or ()
     columns = []
     for symbol in symbols:
         text = str(symbol)
         if text.startswith("initial("):
             column = result[text[len("initial(") : -1]][0]
-        elif text in (rows.dtype.names or ()):
+        elif text in names:
             column = rows[text]
         elif text in values:
             column = values[text]

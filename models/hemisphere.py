@@ -58,7 +58,12 @@ z = rd * cos(angle) + (rate * cos(angle) - rd * spin * sin(angle)) * tau - g * t
 
 closed_forms = [
     ClosedForm("lambda.surface", normal_force, while_closed="surface"),
-    ClosedForm("lambda.surface", 0, while_open="surface"),
+    ClosedForm(
+        "lambda.surface in flight",
+        actual=output("lambda.surface"),
+        expected=0,
+        while_open="surface",
+    ),
     ClosedForm("r", a, while_closed="surface"),
     ClosedForm(
         "cos(theta) at the departure",

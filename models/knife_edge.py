@@ -1,4 +1,4 @@
-"""Knife edge, a skate, that slides on an incline (Bloch, Nonholonomic Mechanics and Control, ch. 1).
+"""Knife edge (a skate) on an incline (Bloch, Nonholonomic Mechanics and Control, ch. 1).
 
 x [m] down the incline, y [m] across, phi [rad] the blade's heading from the x axis.  The blade
 moves only along itself, x' sin phi - y' cos phi = 0: no relation of the coordinates can say that.
@@ -48,27 +48,28 @@ model = Model(
 
 scenes = [Scene("KnifeEdge", stop_time=10.0, step_size=0.01)]
 
-# J phi'' = 0: the heading turns at the constant rate omega.  With G = g sin(alpha) the speed u along
-# the blade obeys  u' = G cos(phi),  hence  omega (u - u0) = G (sin(phi) - sin(phi0));  across the
-# blade, along (sin phi, -cos phi),  -m u omega = m G sin(phi) + lambda.
+# J phi'' = 0: the heading turns at a constant rate, omega.  With G = g sin(alpha) the speed u along
+# the blade obeys  u' = G cos(phi),  and across it, in the direction (sin phi, -cos phi),
+#     -m u omega = m G sin(phi) + lambda .
+# Hence, with S the time integral of cos(phi) and C that of sin(phi),
+#     u = u0 + G S ,   x = x0 + u0 S + G S^2/2 ,   y = y0 + u0 C + G (integral of S sin(phi)) .
 G = g * sin(alpha)
 phi0, omega = initial(phi), initial(phi.diff())
 u0 = initial(x.diff()) * cos(phi0) + initial(y.diff()) * sin(phi0)
 heading = phi0 + omega * t
+S = (sin(heading) - sin(phi0)) / omega  # here and in C for omega != 0
+C = (cos(phi0) - cos(heading)) / omega
+down = u0 * S + G * S**2 / 2
+drift = (t - (sin(2 * heading) - sin(2 * phi0)) / (2 * omega)) / 2 - C * sin(phi0)
+across = u0 * C + G * drift / omega
 sideways = -m * (omega * u0 + G * (2 * sin(phi) - sin(phi0)))
 
-# Integrating x' = u cos(phi), y' = u sin(phi), for omega != 0.  From rest with phi0 = 0 this is a
-# cycloid: x swings between 0 and G / (2 omega^2), y drifts across the slope at G / (2 omega).
-base = u0 - G / omega * sin(phi0)
-down = base / omega * (sin(heading) - sin(phi0))
-down += G / (2 * omega**2) * (sin(heading) ** 2 - sin(phi0) ** 2)
-across = base / omega * (cos(phi0) - cos(heading))
-across += G / (2 * omega) * (t - (sin(2 * heading) - sin(2 * phi0)) / (2 * omega))
-
+# From rest with phi0 = 0 that is a cycloid, with lambda = -2 m g sin(alpha) sin(omega t): x swings
+# between 0 and G / (2 omega^2), and y drifts across the slope at the mean rate G / (2 omega).
 closed_forms = [
     ClosedForm("phi", heading),
     ClosedForm("lambda.edge", sideways),
     ClosedForm("x", initial(x) + down),
     ClosedForm("y", initial(y) + across),
-    Conserved("energy", output("energy.total")),
+    Conserved("energy", output("energy.total"), scale=output("energy.kinetic")),
 ]

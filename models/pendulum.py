@@ -1,7 +1,7 @@
 """Simple pendulum (ME 6590, example): approach 2 with x and y, approach 1 with theta, and eq. (9).
 
 x [m] to the right, y [m] up, both from the pivot; theta [rad] from the downward vertical.  With
-f = x^2 + y^2 - L^2 the force of constraint is 2 lambda (x, y), so that lambda = -tension/(2 L) [N/m].
+f = x^2 + y^2 - L^2 the force of constraint is 2 lambda (x, y): lambda = -tension/(2 L) [N/m].
 All three FMUs report it, also those that integrate theta alone, or eliminate the multiplier.
 """
 

@@ -1,8 +1,8 @@
 """Bead on a straight smooth wire that a motor turns at a constant rate in a horizontal plane.
 
 (Goldstein, Classical Mechanics, sect. 1.6.)  r [m] along the wire from the axis, phi [rad] the
-wire's angle; phi = omega t is a constraint that depends on time.  lambda [N.m] is the motor's torque,
-positive in the sense of the rotation; its power lambda omega feeds the bead's energy.
+wire's angle; phi = omega t is a constraint that depends on time.  lambda [N.m] is the motor's
+torque, positive in the sense of a growing phi; its power lambda omega feeds the bead's energy.
 """
 
 from sympy import cosh, sinh, symbols

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from lagfmu.build import Prepared, prepare, write
+from lagfmu.build import write
 from lagfmu.modelfile import load
+from lagfmu.prepare import Prepared, prepare
 
 MODELS = Path(__file__).parent.parent / "models"
 FILES = {

@@ -118,7 +118,8 @@ def test_two_models_in_one_process_are_both_right(fmu):
 BUILD = """
 import sys
 from pathlib import Path
-from lagfmu.build import prepare, write
+from lagfmu.build import write
+from lagfmu.prepare import prepare
 from lagfmu.modelfile import load
 file = load(sys.argv[1])
 for scene in file.scenes:

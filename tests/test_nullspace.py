@@ -50,7 +50,8 @@ two_links = Model(  # two particles on rods in space, tied one to the other: thr
     name="TwoLinks",
     lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2
     + 2 * m * (r.diff() ** 2 + a * a * theta.diff() ** 2) / 2
-    - m * g * (y + z) + m * g * r * cos(theta),
+    - m * g * (y + z)
+    + m * g * r * cos(theta),
     coordinates={x: "m", y: "m", z: "m", r: "m", theta: "rad"},
     constraints=[
         Holonomic("rod", x**2 + y**2 + z**2 - L**2),

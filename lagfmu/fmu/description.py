@@ -68,7 +68,8 @@ def model_description(
     indent(root, "  ")
     digest = hashlib.sha256(content + tostring(root, "utf-8")).hexdigest()
     root.set("guid", f"{{{uuid.UUID(digest[:32])}}}")
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8") + b"\n"
+    body: bytes = tostring(root, "utf-8")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + body + b"\n"
 
 
 def number(value: float) -> str:

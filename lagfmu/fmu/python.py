@@ -23,7 +23,11 @@ from ..scene import Scene
 from ..variables import VariableTable
 from .description import model_description
 
-SHIPPED = ("solver", "fmu/references.py", "fmu/slave.py")  # what travels in the FMU, besides the generated script
+SHIPPED = (
+    "solver",
+    "fmu/references.py",
+    "fmu/slave.py",
+)  # what travels in the FMU, besides the generated script
 
 CAPABILITIES = {
     "needsExecutionTool": "false",

@@ -68,6 +68,7 @@ class _Leg:
         self.rows = self.system.active(self.state.closed)
         self.offset = np.array(self.state.offset)
         self.scale = np.array(self.state.scale)
+        self.size = np.array(self.state.size)
         self.cause = ""
 
     def inputs(self, t: float) -> list[float]:
@@ -89,7 +90,7 @@ class _Leg:
     def project(self, t: float, y: Vector) -> Vector:
         q, v = self.split(y)
         return np.concatenate(
-            project(self.system, t, q, v, self.inputs(t), self.p, self.rows, self.offset)
+            project(self.system, t, q, v, self.inputs(t), self.p, self.rows, self.offset, self.size)
         )
 
     def indicators(self, t: float, y: Vector) -> Vector:
@@ -145,7 +146,7 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
     armed = list(state.armed)
     proposed, steps = state.step, state.steps
     watch = bool(leg.system.contacts)
-    before = leg.indicators(state.t, y) if watch else None
+    before = leg.indicators(state.t, y) if watch else np.zeros(0)
     while True:
         t0, y0 = solver.t, solver.y
         offered = solver.h_abs
@@ -232,9 +233,7 @@ def _locate(
     return t0
 
 
-def _switch(
-    leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: list[int]
-) -> State:
+def _switch(leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: list[int]) -> State:
     """The state right after the event at t: contacts opened or struck, modes settled together."""
     system, p, w = leg.system, leg.p, leg.inputs(t)
     q, v = leg.split(leg.reach(t0, y0, t))
@@ -260,7 +259,7 @@ def _switch(
                     offset[j] = f[j]
     touching = _touching(system, t, q, v, w, p, state, closed)
     modes = complementary_modes(system, t, q, v, w, p, closed, touching, leaving)
-    q, v = project(system, t, q, v, w, p, system.active(modes), offset)
+    q, v = project(system, t, q, v, w, p, system.active(modes), offset, leg.size)
     departures = list(state.departures)
     for c, (old, new) in enumerate(zip(leg.state.closed, modes, strict=True)):
         if old and not new:
@@ -295,6 +294,5 @@ def _touching(
     return [
         c
         for c, k in enumerate(system.contacts)
-        if closed[c]
-        or (abs(f[k]) <= state.gap[c] and abs(G[k] @ v - nu[k]) <= 1e-9 * size[k])
+        if closed[c] or (abs(f[k]) <= state.gap[c] and abs(G[k] @ v - nu[k]) <= 1e-9 * size[k])
     ]

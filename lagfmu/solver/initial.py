@@ -77,7 +77,7 @@ def _start(
     q, v, closed = _velocities(system, t, q, v0, u, p, closed, size)
     touching = [c for c, shut in enumerate(closed) if shut]
     modes = complementary_modes(system, t, q, v, u, p, closed, touching)
-    q, v = project(system, t, q, v, u, p, system.active(modes), none)
+    q, v = project(system, t, q, v, u, p, system.active(modes), none, size)
     vdot = motion(system, t, q, v, u, p, system.active(modes)).vdot
     scale, rate = _scales(settings, size, q, v, vdot, t)
     nothing = Departure(0, 0.0, (0.0,) * system.n, (0.0,) * system.n)
@@ -89,6 +89,7 @@ def _start(
         armed=tuple(not c for c in modes),
         offset=tuple(none.tolist()),
         scale=tuple(scale.tolist()),
+        size=tuple(size.tolist()),
         gap=tuple(gap.tolist()),
         rate=rate,
         step=0.0,
@@ -169,11 +170,10 @@ def _velocities(
     unit = np.abs(G) @ np.maximum(np.abs(v0), natural)
     speed = G @ v0 - nu
     shut = [
-        c and not speed[k] > TOUCH * unit[k]
-        for c, k in zip(closed, system.contacts, strict=True)
+        c and not speed[k] > TOUCH * unit[k] for c, k in zip(closed, system.contacts, strict=True)
     ]
     rows = system.active(shut)
-    q, v = project(system, t, q, v0, u, p, rows, np.zeros(system.m))
+    q, v = project(system, t, q, v0, u, p, rows, np.zeros(system.m), size)
     _, _, G, nu, _ = evaluate(system, t, q, v, u, p)
     unit = np.abs(G) @ np.maximum(np.abs(v0), natural) + np.abs(nu)
     missed = [k for k in rows if abs(G[k] @ v - nu[k]) > 1e-9 * unit[k]]

@@ -33,7 +33,7 @@ def stepper(
     """An integrator of y' = fun(t, y) from t to t_bound [s]."""
     span = t_bound - t
     if settings.method == "rk4":
-        return RK4(fun, t, y, t_bound, first_step)
+        return RK4(fun, t, y, t_bound, first_step or span)
     rtol = max(settings.tolerance / 2, RELATIVE_FLOOR)
     return ADAPTIVE[settings.method](
         fun,

@@ -13,6 +13,8 @@ from .linear import Solution, solve, solve_nullspace
 from .system import NONHOLONOMIC, Matrix, System, Vector
 
 EPS = float(np.finfo(float).eps)
+ITERATIONS = 10
+SMALL = 1e-9  # residual, relative to the constraint's own size, that rounding may leave
 
 
 @dataclass(frozen=True)
@@ -62,9 +64,7 @@ def evaluate(
         ) from error
 
 
-def residual(
-    system: System, t: float, q: Vector, u: Sequence[float], p: Sequence[float]
-) -> Vector:
+def residual(system: System, t: float, q: Vector, u: Sequence[float], p: Sequence[float]) -> Vector:
     """f (m): how far each position constraint is missed; 0 for nonholonomic rows."""
     try:
         return np.array(system.residual(t, q.tolist(), u, p), dtype=float)
@@ -83,24 +83,38 @@ def project(
     p: Sequence[float],
     active: Sequence[int],
     offset: Vector,
-    iterations: int = 4,
+    size: Vector,
 ) -> tuple[Vector, Vector]:
     """The nearest state, in the metric of M, with f = offset and G v = nu on the active rows.
 
     Newton's method on M dq = G^T mu, G dq = -(f - offset) until the residual is at rounding level;
     then one such solve for the velocities (Hairer & Wanner II, sect. VII.2, projection methods).
-    Meant for states that are nearly consistent; `initial.py` deals with the others.
+    Meant for states that are nearly consistent; `initial.py` deals with the others.  `size` (n) are
+    the coordinates' magnitudes, which say what rounding is.  Raises StepFailureError naming the
+    constraints if Newton's method does not arrive.
     """
     rows = list(active)
     if not rows:
         return q, v
     fixed = [k for k in rows if system.rows[k].kind != NONHOLONOMIC]
     M, _, G, nu, _ = evaluate(system, t, q, v, u, p)
-    for _ in range(iterations if fixed else 0):
-        miss = (residual(system, t, q, u, p) - offset)[fixed]
-        if (np.abs(miss) <= 4 * EPS * (np.abs(G[fixed]) @ np.abs(q))).all():
+    before = np.inf
+    for count in range(ITERATIONS + 1 if fixed else 0):
+        f = (residual(system, t, q, u, p) - offset)[fixed]
+        miss, steepness = np.abs(f), np.abs(G[fixed])
+        if (miss <= 2 * EPS * (steepness @ np.abs(q))).all():
             break
-        q = q + solve(M, np.zeros(system.n), G[fixed], -miss).x
+        error = (miss / (steepness @ np.maximum(np.abs(q), size))).max()
+        if error > before / 2 and error < SMALL:
+            break  # rounding in f is all that is left
+        if count == ITERATIONS:
+            worst = [system.rows[k].name for k, a in zip(fixed, miss, strict=True) if a > 0]
+            raise StepFailureError(
+                f"the step to t = {t!r} s cannot be projected onto the constraints "
+                f"{', '.join(map(repr, worst))} (missed by {miss.max():.3g}): take smaller steps"
+            )
+        before = error
+        q = q + solve(M, np.zeros(system.n), G[fixed], -f).x
         M, _, G, nu, _ = evaluate(system, t, q, v, u, p)
     slip = nu[rows] - G[rows] @ v
     return q, v + solve(M, np.zeros(system.n), G[rows], slip).x

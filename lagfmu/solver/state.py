@@ -39,7 +39,8 @@ class State:
 
     q, v (n); closed, armed, departures: one entry a contact; offset (m): the level f = offset that a
     constraint keeps which came back with its contact; scale (2 n): the magnitudes below which errors
-    in q and v are measured absolutely; step [s]: the next step to try; rate [1/s]: the motion's
+    in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
+    below which a contact touches; step [s]: the next step to try; rate [1/s]: the motion's
     natural rate at the start.
     """
 
@@ -50,6 +51,7 @@ class State:
     armed: tuple[bool, ...]
     offset: tuple[float, ...]
     scale: tuple[float, ...]
+    size: tuple[float, ...]
     gap: tuple[float, ...]
     rate: float
     step: float

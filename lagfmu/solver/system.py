@@ -78,9 +78,7 @@ class System:
     def permanent(self) -> tuple[int, ...]:
         """The rows that always act."""
         return tuple(
-            k
-            for k, row in enumerate(self.rows)
-            if row.kind != CONTACT and row.while_closed is None
+            k for k, row in enumerate(self.rows) if row.kind != CONTACT and row.while_closed is None
         )
 
     @cached_property
