@@ -167,16 +167,18 @@ def simulate_command(
 
 
 def _assignments(texts: list[str] | None) -> dict[str, Any]:
-    """NAME=VALUE texts as a dict; a value that is no number stays text (solver.method)."""
+    """NAME=VALUE texts as a dict of numbers; the value of solver.method stays text."""
     values: dict[str, Any] = {}
     for text in texts or []:
-        name, sign, value = text.partition("=")
+        name, sign, value = (part.strip() for part in text.partition("="))
         if not sign or not name:
             raise SimulationError(f"--set {text!r}: expected NAME=VALUE, e.g. --set theta=0.5")
         try:
-            values[name.strip()] = float(value)
+            values[name] = float(value)
         except ValueError:
-            values[name.strip()] = value.strip()
+            if name != "solver.method":
+                raise SimulationError(f"--set {text!r}: {value!r} is no number") from None
+            values[name] = value
     return values
 
 

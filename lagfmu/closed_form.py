@@ -67,7 +67,10 @@ def initial(state: Expr) -> Expr:
 
 
 def departure(contact: str, state: Expr = None) -> Expr:
-    """A coordinate or velocity at the contact's latest departure; its time [s] without `state`."""
+    """A coordinate or velocity at the contact's latest departure; its time [s] without `state`.
+
+    A closed form that uses it applies only once the contact has opened.
+    """
     if state is None:
         return sp.Symbol(f"departure.{contact}.time", real=True)
     if isinstance(state, sp.Derivative):
@@ -76,7 +79,9 @@ def departure(contact: str, state: Expr = None) -> Expr:
 
 
 def variable_name(state: Expr) -> str:
-    """The FMU's name of a coordinate, velocity or acceleration: theta, der(theta), der(theta,2)."""
+    """The FMU's name of a coordinate, velocity, acceleration or time: theta, der(theta,2), time."""
+    if state == TIME:
+        return "time"
     if isinstance(state, sp.Derivative):
         order = state.derivative_count
         inner = name_of(state.expr)

@@ -13,14 +13,16 @@ from __future__ import annotations
 
 import itertools
 import random
-import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from sympy import (
+    Abs,
     Add,
     Dummy,
+    Function,
     Integral,
+    Matrix,
     Mul,
     Piecewise,
     Poly,
@@ -31,28 +33,37 @@ from sympy import (
     apart,
     asin,
     atan,
+    cancel,
     cos,
+    cosh,
+    csc,
     exp,
     expand,
+    eye,
+    factor_list,
+    factorial,
     factor_terms,
     ilcm,
     integrate,
     log,
+    sec,
     sin,
+    sinh,
     sqrt,
     tan,
     together,
 )
+from sympy import factor as factor_
 from sympy.core.function import AppliedUndef
 from sympy.integrals.manualintegrate import manualintegrate
 from sympy.polys.domains import QQ
 from sympy.polys.matrices import DomainMatrix
+from sympy.simplify.fu import TR8
 
-from lagfmu.zero import Tower, Undecided, pairs
+from lagfmu.zero import Tower, Undecided, late, pairs
 
 Expr = Any  # SymPy has no types
 
-_SECONDS = 10.0  # after which no further method is begun for a form
 _LONG = 600  # operations of an integrand beyond which no integration is tried
 _TERM = 40  # operations of one term of it
 _ANSATZ = 90  # unknowns of an ansatz
@@ -61,6 +72,7 @@ _FAILURES = (
     ArithmeticError,
     NotImplementedError,
     PolynomialError,
+    RecursionError,
     TypeError,
     ValueError,
 )
@@ -80,16 +92,16 @@ def first_integrals(
     system = _System(rows, variables)
     for f in known:
         system.offer(f)
+    if not system.complete():
+        system.linear()
     for row in (*forms, *rows):
-        if system.complete():
-            return system.found
-        if system.contains(row):
+        if not system.complete() and not late() and system.contains(row):
             system.offer(single(row, variables))
     for degree in (1, 2, 3):
-        if not system.complete():
+        if not system.complete() and not late():
             system.ansatz(degree)
     for f in list(system.found):
-        if not system.complete() and depth < 3:
+        if not system.complete() and not late() and depth < 3:
             system.eliminate(f, depth)
     return system.found
 
@@ -124,7 +136,7 @@ class _System:
 
     def offer(self, f: Expr | None) -> bool:
         """Keep f if df = 0 along the system, and if it is independent of those found."""
-        if f is None or self.complete():
+        if f is None or self.complete() or late():
             return False
         try:
             tower = Tower(self.variables, [f, *self.found, *itertools.chain(*self.rows)])
@@ -147,6 +159,44 @@ class _System:
             return False
         self.found.append(f)
         return True
+
+    def linear(self) -> None:
+        """dx = (A x + c(s)) ds with constant A: f = l exp(-A s) x - int l exp(-A s) c ds.
+
+        The row vectors l are taken from the kernels of (A - a)**m and of A**2 - 2 m A + d, for the
+        factors of the characteristic polynomial: the second ones give cosines and sines.
+        """
+        if len(self.free) != 1:
+            return
+        s = self.variables[self.free[0]]
+        names = [self.variables[p] for p in self.pivots]
+        speeds = [-row[self.free[0]] for row in self.rows]
+        kept = list(range(len(names)))
+        while True:
+            x = [names[k] for k in kept]
+            table = [[expand(speeds[k]).coeff(v) for v in x] for k in kept]
+            rest = [
+                expand(speeds[k] - Add(*[a * v for a, v in zip(line, x, strict=True)]))
+                for k, line in zip(kept, table, strict=True)
+            ]
+            good = [
+                k
+                for k, line, c in zip(kept, table, rest, strict=True)
+                if not any(a.has(s, *names) for a in line) and not c.has(*names)
+            ]
+            if good == kept:
+                break
+            kept = good
+        if not 1 < len(kept) <= 6:
+            return
+        try:
+            for vector in _exponentials(Matrix(table), s):
+                drive = Add(*[a * c for a, c in zip(vector, rest, strict=True)])
+                forced = S.Zero if drive == 0 else quadrature(drive, s)
+                if forced is not None:
+                    self.offer(Add(*[a * v for a, v in zip(vector, x, strict=True)]) - forced)
+        except _FAILURES:
+            return
 
     def ansatz(self, degree: int) -> None:
         """f = sum of monomials with constant coefficients: a linear system for these."""
@@ -177,8 +227,10 @@ class _System:
         """Restrict the system to f = c, where it has one integral less, and integrate that."""
         c = Dummy("c", real=True)
         for place, x in enumerate(self.variables):
-            inverse = _invert(f, c, x) if f.has(x) else None
-            if inverse is None or self.complete():
+            if self.complete() or late() or not f.has(x):
+                continue
+            inverse = _invert(f, c, x)
+            if inverse is None:
                 continue
             rest = [v for v in self.variables if v != x]
             try:
@@ -207,14 +259,17 @@ def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Ex
     """f with df = mu * omega for an integrable one-form omega, or None."""
     try:
         form = _Form(row, variables)
-        deadline = time.monotonic() + _SECONDS
-        for f in form.attempts(depth):
-            if time.monotonic() > deadline:
-                break
-            if f is not None and form.solves(f):
-                return f
     except _FAILURES:
-        pass
+        return None
+    for method in form.methods(depth):
+        try:
+            for f in method:
+                if late():
+                    return None
+                if f is not None and form.solves(f):
+                    return f
+        except _FAILURES:
+            continue
     return None
 
 
@@ -281,25 +336,65 @@ class _Form:
             for i, j in pairs(len(a))
         )
 
-    def attempts(self, depth: int) -> Iterator[Expr | None]:
-        """Candidates for f, the cheap methods first."""
+    def methods(self, depth: int) -> list[Iterator[Expr | None]]:
+        """Iterators over candidates for f, the cheap methods first."""
         if len(self.x) < 2:
-            yield self.x[0] if self.x else None
-            return
+            return [iter(self.x)]
+        found = [
+            self.already_exact(),
+            self.by_factors(self.bernoulli()),
+            self.by_factors(self.separable()),
+            self.homogeneous(depth),
+            self.by_factors(self.combination()),
+            self.inverse_factors(),
+        ]
+        return [*found, self.natani(depth)] if len(self.x) > 2 and depth < 3 else found
+
+    def already_exact(self) -> Iterator[Expr | None]:
         given = [self.tower.element(entry) for entry in self.given]
         if self.exact(given):
             yield potential(self.given, self.x)
         if self.exact(self.a):
             yield tidy(potential(self.terms, self.x))
-        for logarithm in itertools.chain(self.bernoulli(), self.separable(), self.combination()):
-            if logarithm is not None:
-                yield self.by_factor(exp(expand(logarithm)))
-        yield from self.inverse_factors()
-        if len(self.x) > 2 and depth < 3:
-            yield from self.natani(depth)
 
-    def by_factor(self, mu: Expr) -> Expr | None:
-        return tidy(potential([mu * term for term in self.terms], self.x))
+    def by_factors(self, logarithms: Iterator[Expr | None]) -> Iterator[Expr | None]:
+        """The potential of mu * omega, for each of some log(mu)."""
+        for logarithm in logarithms:
+            if logarithm is not None:
+                mu = exp(expand(logarithm))
+                yield tidy(potential([mu * term for term in self.terms], self.x))
+
+    def homogeneous(self, depth: int) -> Iterator[Expr | None]:
+        """x_i = x w_i, if the ratios of the coefficients depend on the ratios w_i only.
+
+        omega is then proportional to S dx/x + sum b_i dw_i, with S = sum_i b_i w_i and w = 1 at x;
+        if S is not 0, b/S is exact.
+        """
+        tower, count = self.tower, len(self.x)
+        for ratio in (self.a[i] / self.a[0] for i in range(1, count)):
+            along = tower.K.zero
+            for x in self.x:
+                part = tower.diff(ratio, x)
+                along = tower.lift(along) + tower.lift(part) * tower.element(x)
+            if not tower.is_zero(along):
+                return
+        for p, x in enumerate(self.x):
+            rest = [i for i in range(count) if i != p]
+            w = {i: Dummy(f"w{i}", real=True) for i in rest}
+            put = {self.x[i]: w[i] for i in rest} | {x: S.One}
+            inner = Tower(list(w.values()))
+            b = [inner.element(term.subs(put, simultaneous=True)) for term in self.terms]
+            total = inner.lift(b[p])
+            for i in rest:
+                total += inner.lift(b[i]) * inner.element(w[i])
+            names = list(w.values())
+            if inner.is_zero(total):
+                f = single([inner.back(b[i]) for i in rest], names, depth + 1)
+            else:
+                row = [inner.back(inner.reduce(inner.lift(b[i]) / total)) for i in rest]
+                f = potential(row, names)
+                f = f if f is None else tidy(log(x) + f)
+            yield f if f is None else f.xreplace({w[i]: self.x[i] / x for i in rest})
 
     def bernoulli(self) -> Iterator[Expr | None]:
         """mu = y**(-k) exp(g(rest)) for dy + sum b_i dx_i; k = 0 is the linear equation."""
@@ -485,7 +580,7 @@ def quadrature(expr: Expr, x: Expr) -> Expr | None:
 
 
 def _primitive_of(term: Expr, x: Expr) -> Expr | None:
-    if term.count_ops() > _TERM or term.has(Integral):
+    if term.count_ops() > _TERM or term.has(Integral) or late():
         return None
     if any(u.has(x) for u in term.atoms(AppliedUndef)):
         s = Dummy("s", real=True)
@@ -496,15 +591,93 @@ def _primitive_of(term: Expr, x: Expr) -> Expr | None:
     # where all symbols are positive: the primitive is verified for what they are, afterwards
     names = {v: Dummy(v.name, positive=True) for v in sorted(term.free_symbols | {x}, key=str)}
     plain, variable = term.xreplace(names), names[x]
-    found = manualintegrate(plain, variable)
-    if found.has(Integral):
-        found = integrate(plain, variable, risch=False, meijerg=False, heurisch=False, manual=False)
-    while found.has(Piecewise):
-        piece = next(iter(found.atoms(Piecewise)))
-        found = found.xreplace({piece: piece.args[0].expr})
-    if found.has(Integral, S.NaN, S.ComplexInfinity):
+    for method in (_oscillation, _heuristics, _half_angle):
+        try:
+            found = method(plain, variable)
+        except Exception:  # SymPy's heuristics may raise anything
+            continue
+        if found is None:
+            continue
+        while found.has(Piecewise):
+            piece = next(iter(found.atoms(Piecewise)))
+            found = found.xreplace({piece: piece.args[0].expr})
+        if not found.has(Integral, S.NaN, S.ComplexInfinity):
+            return found.xreplace({new: old for old, new in names.items()})
+    return None
+
+
+def _heuristics(term: Expr, x: Expr) -> Expr | None:
+    """SymPy's, which may take minutes: not for terms with several functions of curved arguments."""
+    if term.is_rational_function(x):
+        above, below = (Poly(part, x).degree() for part in together(term).as_numer_denom())
+        if above + below > 12:
+            return None
+        return integrate(term, x, risch=False, meijerg=False, heurisch=False, manual=False)
+    curved = {
+        node.exp * log(node.base) if isinstance(node, Pow) else node.args[0]
+        for node in term.atoms(Function, Pow)
+        if node.has(x) and not (isinstance(node, Pow) and node.exp.is_Integer)
+    }
+    curved = {u for u in curved if u.diff(x).has(x)}
+    if len(curved) > 1 or (curved and term.count_ops() > 25):
         return None
-    return found.xreplace({new: old for old, new in names.items()})
+    found = manualintegrate(term, x)
+    if not found.has(Integral):
+        return found
+    inverse = {cos: sec, sin: csc}
+    other = term.replace(
+        lambda e: isinstance(e, Pow) and e.exp.is_negative and type(e.base) in inverse,
+        lambda e: inverse[type(e.base)](*e.base.args) ** -e.exp,
+    )
+    return None if other == term else manualintegrate(other, x)
+
+
+def _oscillation(term: Expr, x: Expr) -> Expr | None:
+    """The integral of a sum of x**n exp(a x) sin(b x + c), products of sines included."""
+    if not term.has(sin, cos, exp):
+        return None
+    total: Expr = S.Zero
+    for part in Add.make_args(expand(TR8(term))):
+        constant, rest = part.as_independent(x, as_Add=False)
+        power, exponent, wave = 0, S.Zero, None
+        for factor in Mul.make_args(rest):
+            if isinstance(factor, exp):
+                exponent += factor.args[0]
+            elif isinstance(factor, sin | cos) and wave is None:
+                wave = factor
+            elif factor != 1:
+                base, power = factor.as_base_exp()
+                if base != x or not power.is_Integer or not 0 <= power <= 6:
+                    return None
+        rate = expand(exponent).diff(x)
+        angle = wave.args[0] if wave is not None else S.Zero
+        turn = angle.diff(x)
+        if rate.has(x) or turn.has(x) or rate == turn == 0:
+            return None
+        # y = (u cos + v sin) exp is stood for by u - i v: to integrate is to divide by a + i b
+        u, v = (S.One, S.Zero) if wave is None or isinstance(wave, cos) else (S.Zero, S.One)
+        size = rate**2 + turn**2
+        for k in range(power, -1, -1):
+            u, v = (u * rate - v * turn) / size, (u * turn + v * rate) / size
+            total += constant * x**k * (u * cos(angle) + v * sin(angle)) * exp(exponent)
+            constant *= -k
+    return total
+
+
+def _half_angle(term: Expr, x: Expr) -> Expr | None:
+    """A rational function of the sine and cosine of one angle, by the tangent of its half."""
+    angles = {node.args[0] for node in term.atoms(sin, cos, tan, sec, csc) if node.has(x)}
+    if len(angles) != 1:
+        return None
+    angle = angles.pop()
+    turn, t = angle.diff(x), Dummy("t", positive=True)
+    put = {sin(angle): 2 * t / (1 + t**2), cos(angle): (1 - t**2) / (1 + t**2)}
+    put[tan(angle)] = 2 * t / (1 - t**2)
+    plain = together(term.xreplace(put) * 2 / (turn * (1 + t**2))).cancel()
+    if turn.has(x) or plain.has(x):
+        return None
+    found = _heuristics(apart(plain, t), t)
+    return found if found is None else found.xreplace({t: tan(angle / 2)})
 
 
 def tidy(f: Expr | None) -> Expr | None:
@@ -567,6 +740,42 @@ def _invert(f: Expr, value: Expr, x: Expr) -> Expr | None:
         return -b / a
     a, b, c = polynomial.all_coeffs()
     return (-b + sqrt(b**2 - 4 * a * c)) / (2 * a)
+
+
+def _exponentials(A: Expr, s: Expr) -> Iterator[list[Expr]]:
+    """Real row vectors l exp(-A s), where the characteristic polynomial's factors allow it."""
+    count = A.shape[0]
+    z = Dummy("z")
+    polynomial = together(A.charpoly(z).as_expr()).as_numer_denom()[0]
+    for factor, power in factor_list(polynomial)[1]:
+        degree = Poly(factor, z).degree()
+        if degree not in (1, 2) or (degree == 2 and power > 1):
+            continue
+        if degree == 1:
+            one, zero = Poly(factor, z).all_coeffs()
+            value = (-zero / one).cancel()
+            N = (A - value * eye(count)).applyfunc(cancel)
+            for column in (N.T**power).applyfunc(cancel).nullspace():
+                vector = total = column.T
+                for k in range(1, power):
+                    vector = (vector * N).applyfunc(cancel)
+                    total += vector * (-s) ** k / factorial(k)
+                yield list((total * exp(-value * s)).applyfunc(factor_terms))
+            continue
+        two, one, zero = Poly(factor, z).all_coeffs()
+        middle = (-one / two / 2).cancel()
+        square = factor_terms(factor_(middle**2 - zero / two))
+        N = (A - middle * eye(count)).applyfunc(cancel)
+        kernel = (N**2 - square * eye(count)).T.applyfunc(cancel).nullspace()
+        turns = square.is_negative or (not square.is_positive and square.could_extract_minus_sign())
+        rate = sqrt(-square if turns else square).replace(Abs, lambda u: u)
+        for column in kernel:
+            one_, other = column.T, (column.T * N).applyfunc(cancel) / rate
+            if turns:
+                total = one_ * cos(rate * s) - other * sin(rate * s)
+            else:
+                total = one_ * cosh(rate * s) - other * sinh(rate * s)
+            yield list((total * exp(-middle * s)).applyfunc(factor_terms))
 
 
 # --- ansatz ----------------------------------------------------------------------------------

@@ -8,6 +8,8 @@ import sys
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from .closed_form import ClosedForm, Conserved
 from .errors import LagfmuError, ModelError
@@ -43,7 +45,7 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
         spec.loader.exec_module(module)
     except LagfmuError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ModelError(str(file), [_where(error, file)]) from error
     finally:
         sys.path.remove(folder)
@@ -55,15 +57,39 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
             [f"the file defines {len(models)} models ({names}), expected one: model = Model(...)"],
         )
     ((_, model),) = models.values()
-    scenes = tuple(getattr(module, "scenes", ())) or (Scene(model.name),)
-    forms = tuple(getattr(module, "closed_forms", ()))
+    problems: list[str] = []
+    scenes = _listed(module, "scenes", (Scene,), problems) or (Scene(model.name),)
+    forms = _listed(module, "closed_forms", (ClosedForm, Conserved), problems)
+    names = [s.name for s in scenes if isinstance(s, Scene)]
+    problems += [
+        f"scenes hold the name {name!r} twice, so that one FMU would replace the other: rename one"
+        for name in sorted({n for n in names if names.count(n) > 1})
+    ]
+    if problems:
+        raise ModelError(str(file), problems)
     return ModelFile(file, model, scenes, forms)
 
 
-def _where(error: Exception, file: Path) -> str:
+def _listed(
+    module: ModuleType, name: str, types: tuple[type, ...], problems: list[str]
+) -> tuple[Any, ...]:
+    """The file's list of that name; what is no list, or stands in it wrongly, is a problem."""
+    found = getattr(module, name, ())
+    expected = f"expected a list of {types[0].__name__}(...)"
+    if not isinstance(found, (list, tuple)):
+        problems.append(f"{name} = {found!r}, {expected}")
+        return ()
+    problems += [f"{name} hold {x!r}, {expected}" for x in found if not isinstance(x, types)]
+    return tuple(found)
+
+
+def _where(error: BaseException, file: Path) -> str:
     """The file's own line at which it raised, and what it raised."""
     if isinstance(error, SyntaxError):
-        return f"line {error.lineno}: syntax error, {error.msg}"
+        place = f"line {error.lineno}: " if error.lineno else ""
+        if error.filename and error.filename != str(file):
+            place = f"{error.filename}, {place}"
+        return f"{place}syntax error, {error.msg}"
     frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(file)]
     place = f"line {frames[-1].lineno} ({frames[-1].line}): " if frames else ""
     return f"{place}raises {type(error).__name__}: {error}"

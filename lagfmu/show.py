@@ -49,8 +49,8 @@ def show(prepared: Prepared, console: Console) -> None:
         _classes(prepared.equations, console)
 
     _heading(console, "Degrees of freedom")
-    line = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
-    console.print(Text(line))
+    count = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
+    console.print(Text(count))
     if structure.redundant:
         names = ", ".join(structure.redundant)
         console.print(Text(f"  redundant: {names} (λ is shared with least norm, Q is unique)"))
@@ -81,7 +81,7 @@ def _classes(eom: EquationsOfMotion, console: Console) -> None:
         kind = "contact (unilateral, holonomic while closed)"
         if not isinstance(c, Contact):
             kind = "holonomic"
-        if f.free_symbols & {TIME, *eom.u}:
+        if f is not None and f.free_symbols & {TIME, *eom.u}:
             kind += ", rheonomic"
         _line(console, f"{c.name:{width}}", kind + note)
     if len(forms) > 1:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import sympy as sp
@@ -19,6 +20,7 @@ from sympy.functions.elementary.trigonometric import TrigonometricFunction
 from sympy.printing.latex import LatexPrinter, tex_greek_dictionary
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 from sympy.printing.str import StrPrinter
+from sympy.simplify.fu import TR8
 
 from .equations import TIME, EquationsOfMotion
 from .model import Contact, Nonholonomic
@@ -29,8 +31,8 @@ Expr = Any  # SymPy carries no types
 Printed = tuple[str, str]  # LaTeX, text
 MOST = 24  # equations of a kind that are printed
 LONGEST = 500  # operations beyond which an expression is not printed
-TIDY = 80  # operations below which trigonometric identities are tried
-MINORS = 5  # constraints in one group beyond which lambda is not eliminated in symbols
+TIDY = 80  # operations below which a factor is sought in products
+MINORS = 3  # constraints in one group beyond which lambda is not eliminated in symbols
 GREEK = {*greeks, *(name.capitalize() for name in greeks), "lambda", "Lambda"}
 PARTS = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
@@ -182,9 +184,21 @@ class Notation:
     def factor(self, expression: Expr) -> Printed:
         """An expression that stands before another factor: in brackets if it is a sum."""
         latex, text = self.show(expression)
-        if expression.is_Add:
+        if expression.xreplace(self.into).is_Add:  # 2*(x - s), rebuilt, is a sum
             return f"\\left({latex}\\right)", f"({text})"
         return latex, f"({text})" if "/" in text else text
+
+    def _sum(self, a: Expr) -> list[Printed]:
+        """A sum as factors: 2*x - 2*s as 2 and (x - s); a sign in front of all terms goes ahead."""
+        number, rest = a.primitive()
+        if number.q != 1:
+            number, rest = sp.S.One, a
+        if all(term.could_extract_minus_sign() for term in rest.args):
+            number, rest = -number, -rest
+        if number == 1:
+            return [self.factor(rest)]
+        front = ("-", "-") if number == -1 else self.show(number)
+        return [front, self.factor(rest)]
 
     def linear(self, terms: Iterable[tuple[Expr, Expr]]) -> list[Printed]:
         """The terms coefficient * symbol."""
@@ -192,12 +206,13 @@ class Notation:
         for a, symbol in terms:
             if a == 0:
                 continue
-            if a.is_Add and a.count_ops() <= LONGEST:
-                a = min((a, sp.factor_terms(a)), key=lambda e: e.count_ops())
+            product = sp.factor_terms(a) if a.is_Add else a
+            if sum(not b.is_Number for b in sp.Mul.make_args(product)) > 1:
+                a = product  # m (cos(theta) + 1) rather than m cos(theta) + m
             if a.is_Number or (a.is_Mul and a.args[0].is_Rational and a.args[0].q != 1):
                 out.append(self.show(a * symbol))  # half of it: the symbol goes above the bar
-            elif a.is_Add and a.could_extract_minus_sign():
-                out.append(_joined([("-", "-"), self.factor(-a), self.show(symbol)]))
+            elif a.is_Add:
+                out.append(_joined([*self._sum(a), self.show(symbol)]))
             else:
                 out.append(_joined([self.factor(a), self.show(symbol)]))
         return out
@@ -238,10 +253,16 @@ def _tidy(expression: Expr) -> Expr:
     if size > LONGEST:
         return expression
     forms = [expression, sp.expand(expression)]
-    if len(expression.atoms(TrigonometricFunction)) > 1 and size <= TIDY:
-        forms.append(sp.trigsimp(forms[-1]))
-        forms.append(sp.expand(forms[-1]))
+    if expression.has(TrigonometricFunction) and forms[-1].count_ops() <= LONGEST:
+        forms.append(sp.expand(TR8(forms[-1])))  # products of sines to sums, where they cancel
     return min(forms, key=lambda e: e.count_ops())
+
+
+def _factored(expression: Expr) -> Expr:
+    """A short expression as a product, if that is shorter."""
+    if expression.count_ops() > TIDY or expression.has(sp.Float):
+        return _tidy(expression)
+    return min((_tidy(expression), sp.factor(expression)), key=lambda e: e.count_ops())
 
 
 # --------------------------------------------------------------------------------- sections
@@ -254,27 +275,35 @@ class _Typesetter:
         self.vdot = accelerations(eom)
 
     def section(
-        self, title: str, remark: str, equations: Sequence[tuple[str, Sequence[Printed]]]
+        self,
+        title: str,
+        remark: str,
+        equations: Iterable[tuple[str, Sequence[Printed]]],
+        count: int = 0,
     ) -> Section:
-        """`equations`: label, and the sides and signs that stand one after the other."""
-        lines = tuple(Equation(label, *_joined(parts)) for label, parts in equations[:MOST])
-        if len(equations) > MOST:
-            remark += f" The first {MOST} of {len(equations)} are shown."
+        """`equations`: label, and the sides and signs that stand one after the other; `count`: all."""
+        lines = tuple(Equation(label, *_joined(parts)) for label, parts in islice(equations, MOST))
+        if count > MOST:
+            remark += f" The first {MOST} of {count} are shown."
         return Section(title, remark, lines)
 
     def energies(self) -> Section:
         show = self.notation.show
-        T = self.eom.kinetic
+        v, M = self.eom.v, self.eom.M.todok()
+        mass = {ij: _tidy(m) for ij, m in M.items()} if self.eom.n <= MOST else M
+        T = sp.Add(*(m * v[i] * v[j] / 2 for (i, j), m in mass.items()))
         equations = [("kinetic energy", [("T =", "T ="), show(_energy(T))])]
         if self.eom.potential is not None:
-            equations.append(("potential energy", [("V =", "V ="), show(self.eom.potential)]))
+            equations.append(
+                ("potential energy", [("V =", "V ="), show(_energy(self.eom.potential))])
+            )
         return self.section("Energies", "", equations)
 
     def lagrange(self) -> Section:
         """(M vdot)_j - (F - Q_nc)_j = Q_nc,j + sum_k lambda_k a_kj."""
         eom, model = self.eom, self.eom.model
         equations = []
-        for j, coordinate in enumerate(model.coordinates):
+        for j, coordinate in enumerate(islice(model.coordinates, MOST)):
             given = _tidy(eom.plain(model.forces.get(coordinate, 0)))
             left = self._motion(eom, j, self.vdot, given)
             right = self.terms(given) + self.multiplied(eom.G, range(eom.m), j)
@@ -289,7 +318,7 @@ class _Typesetter:
             f"on the right {' and '.join(sides) or 'zero'}."
         )
         title = "Lagrange's equations" + (" with multipliers" if eom.m else "")
-        return self.section(title, remark, equations)
+        return self.section(title, remark, equations, eom.n)
 
     def _motion(
         self, eom: EquationsOfMotion, j: int, vdot: Sequence[Expr], given: Expr = sp.S.Zero
@@ -314,7 +343,7 @@ class _Typesetter:
         eom, show = self.eom, self.notation.show
         equations = []
         contacts = False
-        for k, c in enumerate(eom.constraints):
+        for k, c in enumerate(eom.constraints[:MOST]):
             label = c.name
             closed = getattr(c, "while_closed", None)
             if closed is not None:
@@ -334,11 +363,11 @@ class _Typesetter:
         remark = ""
         if contacts:
             remark = "A contact pushes and never pulls: it is closed, or its multiplier is zero."
-        return self.section("Constraints", remark, equations)
+        return self.section("Constraints", remark, equations, eom.m)
 
     def forces(self) -> Section:
         equations = []
-        for j, q in enumerate(self.eom.q):
+        for j, q in enumerate(self.eom.q[:MOST]):
             right = self.multiplied(self.eom.G, range(self.eom.m), j)
             left = f"Q_{{{name_latex(str(q))}}} =", f"Q_{name_text(str(q))} ="
             equations.append((str(q), [left, _total(right)]))
@@ -346,12 +375,12 @@ class _Typesetter:
             "Q = Gᵀλ stands with a plus on the side of the forces; a multiplier is zero while its "
             "constraint does not act."
         )
-        return self.section("Generalized forces of constraint", remark, equations)
+        return self.section("Generalized forces of constraint", remark, equations, self.eom.n)
 
     def accelerations(self) -> Section:
         eom = self.eom
         equations = []
-        for k, c in enumerate(eom.constraints):
+        for k, c in enumerate(eom.constraints[:MOST]):
             row = ((_tidy(eom.G[k, j]), self.vdot[j]) for j in range(eom.n))
             left = _total(self.notation.linear(row))
             equations.append((c.name, [left, ("=", "="), self.notation.show(_tidy(eom.gamma[k]))]))
@@ -359,7 +388,7 @@ class _Typesetter:
             "The constraints differentiated to accelerations, G v̇ = γ: with Lagrange's equations "
             "they determine v̇ and λ."
         )
-        return self.section("Constraints as accelerations", remark, equations)
+        return self.section("Constraints as accelerations", remark, equations, eom.m)
 
     def without_lambda(self) -> Section:
         title = "Equations without multipliers"
@@ -371,13 +400,13 @@ class _Typesetter:
             return Section(title, remark, ())
         equations = [
             (f"{k + 1}", [self._homogeneous(e), ("= 0", "= 0")])
-            for k, e in enumerate(lambda_free(self.eom))
+            for k, e in enumerate(lambda_free(self.eom)[:MOST])
         ]
         remark = (
             "Sᵀ (M v̇ − F) = 0 with G S = 0, and G v̇ = γ, without common factors. They hold while "
             "all constraints act; λ is evaluated afterwards."
         )
-        return self.section(title, remark, equations)
+        return self.section(title, remark, equations, self.eom.n)
 
     def _homogeneous(self, equation: Expr) -> Printed:
         """The terms with accelerations, then the others."""
@@ -385,7 +414,7 @@ class _Typesetter:
         if equation.count_ops() > LONGEST:
             return self.notation.show(equation)
         rest = equation.xreplace(dict.fromkeys(self.vdot, sp.S.Zero))
-        slopes = [(_tidy(equation.diff(a)), a) for a in self.vdot]
+        slopes = [(_factored(equation.diff(a)), a) for a in self.vdot]
         return _total(self.notation.linear(slopes) + self.terms(_tidy(rest)))
 
     def embedding(self, reduction: Reduction) -> Section:
@@ -395,24 +424,25 @@ class _Typesetter:
                 left, right = self.notation.show(q), self.notation.show(phi)
                 equations.append((str(q), [left, ("=", "="), right]))
         remark = "What the independent coordinates determine, q = φ(s)."
-        return self.section("Dependent coordinates", remark, equations)
+        return self.section("Dependent coordinates", remark, equations, len(equations))
 
     def reduced(self, reduction: Reduction) -> Section:
         eom = reduction.reduced
         sddot = accelerations(eom)
         equations = []
-        for j, s in enumerate(eom.q):
+        for j, s in enumerate(eom.q[:MOST]):
             right = self.multiplied(eom.G, reduction.rows, j)
             equations.append((str(s), [self._motion(eom, j, sddot), ("=", "="), _total(right)]))
         remark = (
             "The equations that are integrated, in the independent coordinates; λ is recovered "
             "from Lagrange's equations with multipliers."
         )
-        return self.section("Reduced equations", remark, equations)
+        return self.section("Reduced equations", remark, equations, eom.n)
 
 
-def _energy(T: Expr) -> Expr:
-    """T in the shorter of its form as it stands and with common factors taken out."""
-    if T.count_ops() > LONGEST:
-        return T
-    return min((_tidy(T), sp.factor_terms(T)), key=lambda e: e.count_ops())
+def _energy(E: Expr) -> Expr:
+    """An energy in the shorter of its forms, with common factors taken out or not."""
+    if E.count_ops() > LONGEST:
+        return E
+    tidy = _tidy(E)
+    return min((tidy, sp.factor_terms(E), sp.factor_terms(tidy)), key=lambda e: e.count_ops())

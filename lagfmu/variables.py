@@ -30,6 +30,7 @@ class Variable:
     `kind` is Real, Integer, Boolean or String; `role` says what may set it: parameter, start, input,
     solver, or output (nothing).  `depends` are the inputs and states that it is computed from at a
     communication point, `depends_initially` the inputs and exact start values at the start.
+    `positive`: zero, though not below the minimum, makes no sense.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Variable:
     derivative_of: str | None = None
     minimum: float | None = None
     maximum: float | None = None
+    positive: bool = False
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
 
@@ -296,6 +298,7 @@ class _Builder:
                 unit=self.units[name_of(p.symbol)],
                 minimum=p.min,
                 maximum=p.max,
+                positive=bool(p.symbol.is_positive),
             )
             for p in self.model.parameters
         ]

@@ -16,7 +16,7 @@ import sympy as sp
 from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
-from .errors import VerificationError
+from .errors import SimulationError, VerificationError
 from .proof import Claim, unpack_closed_forms
 from .simulate import Trajectory, read_description, simulate
 
@@ -98,6 +98,7 @@ def verify(
     path = Path(fmu)
     description = read_description(path)
     claims = _claims(path)
+    _check_texts(description, start_values or {})
     problems = validate_fmu(str(path))
     begun = time.perf_counter()
     result = simulate(path, stop_time, step_size, tolerance, start_values)
@@ -120,6 +121,14 @@ def verify(
     span = float(result["time"][-1] - result["time"][0])
     steps = int(result["solver.steps"][-1]) if "solver.steps" in (result.dtype.names or ()) else 0
     return Verification(description.modelName, tuple(checks), span, seconds, steps)
+
+
+def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
+    """A text is a value for a String variable only."""
+    texts = {v.name for v in description.modelVariables if v.type == "String"}
+    wrong = [f"{k} = {v!r}" for k, v in given.items() if isinstance(v, str) and k not in texts]
+    if wrong:
+        raise SimulationError(f"{', '.join(wrong)}: expected a number")
 
 
 def _claims(path: Path) -> list[Claim]:
@@ -162,9 +171,11 @@ def _check(
         chosen &= result[f"contact.{claim.while_closed}"]
     if claim.while_open is not None:
         chosen &= ~result[f"contact.{claim.while_open}"]
+    for contact in _departures(claim):  # before the first one there is nothing to compare with
+        chosen &= result[f"departure.{contact}.count"] > 0
     if claim.at_departure is not None:
         left = result[f"departure.{claim.at_departure}.count"] > 0
-        chosen &= left & (np.cumsum(left) == 1)
+        chosen &= np.cumsum(left) == 1
     allowed = max(claim.within * tolerance, claim.rounding)
     count = int(chosen.sum())
     if count == 0:
@@ -183,6 +194,14 @@ def _check(
     if not math.isfinite(error):
         return Check(claim.name, math.inf, allowed, count, "not a finite number")
     return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
+
+
+def _departures(claim: Claim) -> list[str]:
+    """Contacts whose departure the claim speaks of."""
+    symbols = {
+        str(s) for e in (claim.actual, claim.expected) if e is not None for s in e.free_symbols
+    }
+    return sorted({s.split(".")[1] for s in symbols if s.startswith("departure.")})
 
 
 def _evaluate(

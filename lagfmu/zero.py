@@ -2,16 +2,21 @@
 
 An expression is rewritten as a rational function of *generators*: symbols, tan(angle/2), exp(u),
 roots, and anything else (unknown functions, logarithms, ...) as it stands.  If its numerator
-vanishes, the expression is zero.  If its value at random points, evaluated with 60 digits, is
-clearly not zero at every one of them, it is not.  Otherwise, `Undecided` is raised.
+vanishes, the expression is zero: that is exact.  That it is *not* zero is decided by numerics of
+high precision: if at each of a few random points, its value with 60 digits is not zero to 30
+digits, relative to its terms.  (Rational functions of symbols need no numerics.)  Otherwise,
+`Undecided` is raised.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 import random
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from math import lcm
 from typing import Any
 
@@ -55,6 +60,22 @@ _DIGITS = 60
 _POINTS = 3
 _LARGEST = 3000  # terms of a numerator and a denominator; beyond that, the answer is "undecided"
 _SIMPLIFIABLE = 150  # operations up to which SymPy's simplify is asked
+_UNTIL: ContextVar[float] = ContextVar("until", default=math.inf)
+
+
+@contextmanager
+def within(seconds: float) -> Iterator[None]:
+    """Towers made within this block decide nothing after so many seconds."""
+    token = _UNTIL.set(min(time.monotonic() + seconds, _UNTIL.get()))
+    try:
+        yield
+    finally:
+        _UNTIL.reset(token)
+
+
+def late() -> bool:
+    """The time of the innermost `within` is over."""
+    return time.monotonic() > _UNTIL.get()
 
 
 class Undecided(Exception):  # noqa: N818 (an answer rather than an error)
@@ -89,7 +110,7 @@ class Tower:
         self._values: list[dict[Any, Any]] = []
         self._random = random.Random(20)
         self._functions: dict[Any, Any] = {}
-        self._deadline = time.monotonic() + seconds
+        self._deadline = min(time.monotonic() + seconds, _UNTIL.get())
         for variable in self.variables:
             self._new(variable, variable)
         self._field()
@@ -359,7 +380,7 @@ class Tower:
     # --- decisions --------------------------------------------------------------------------
 
     def is_zero(self, element: Any) -> bool:
-        """True or False, both proven; raises `Undecided` otherwise."""
+        """True if proven, False by numerics of high precision; raises `Undecided` otherwise."""
         element = self.reduce(element)
         if not element:
             return True
@@ -373,7 +394,7 @@ class Tower:
             raise Undecided(expr, "no point was found at which it can be evaluated")
         if any(signs):
             raise Undecided(expr, "zero in one region and not in another")
-        if expr.count_ops() <= _SIMPLIFIABLE and simplify(expr) == 0:
+        if expr.count_ops() <= _SIMPLIFIABLE and not late() and simplify(expr) == 0:
             return True
         raise Undecided(expr, f"zero to {_DIGITS // 2} digits, which is no proof")
 

@@ -467,7 +467,7 @@ model = Model(name="Free", lagrangian=m * x.diff() ** 2 / 2, coordinates={x: "m"
             ("scenes", "'A'", "twice"),
         ),
         ("\0", ("null bytes",)),
-        (b"\xff\xfe\x00", ("'utf-8'",)),
+        (b"\xff\xfe", ("utf-8",)),
     ],
 )
 def test_a_model_file_that_is_no_good_is_refused(tmp_path, text, parts):
@@ -604,7 +604,7 @@ def test_an_fmu_whose_script_raises_is_not_verified(fmu, tmp_path):
     says(refusal(lambda: verify(path)), "X.fmu")
 
 
-def test_verify_refuses_values_that_cannot_be(fmu, tmp_path):
+def test_verify_refuses_values_that_cannot_be(fmu):
     """An unknown variable, a text for a number, a stop time that is none."""
     path = fmu("Atwood")
     says(refusal(lambda: verify(path, {"mass": 1.0})), "mass", "Atwood")
@@ -716,6 +716,8 @@ def test_illegal_calls_are_refused_and_the_instance_survives(fmu):
                 one.set("solver.method", "euler")
             with refused(one, FATAL, "'m' = -1.0", "bounds [0, None]"):
                 one.set("m", -1.0)
+            with refused(one, FATAL, "'L' = 0.0", "positive"):
+                one.set("L", 0.0)
             for bad in (math.nan, math.inf, -math.inf):
                 for name in ("m", "x", "der(y)", "solver.tolerance"):
                     with refused(one, FATAL, f"{name!r} = {bad!r}", "finite"):
@@ -779,11 +781,10 @@ def test_an_experiment_that_cannot_be_is_refused(fmu):
 
 
 def test_parameters_that_make_the_start_impossible_are_refused_by_name(fmu):
-    """No mass; start values at the rod's centre: the cause, not a NaN.  Better values mend it."""
+    """Start at the rod's centre, a rod out of range: the cause, not a NaN; both can be mended."""
     for bad, good, parts in (
-        ({"m": 0.0}, {"m": 1.0}, ("mass matrix is singular",)),
         ({"x": 0.0, "y": 0.0}, {"x": 1.0}, ("cannot be projected", "'rod'", "x = 0.0, y = 0.0")),
-        ({"L": 0.0}, {"L": 1.0}, ("'rod'",)),
+        ({"L": 1e200}, {"L": 1.0}, ("the start",)),
     ):
         with instance(fmu("PendulumCartesian")) as one:
             one.fmu.setupExperiment()
@@ -810,8 +811,9 @@ def test_bytes_that_are_no_state_are_refused(fmu):
         saved = one.fmu.serializeFMUState(one.fmu.getFMUState())
         before = one.outputs()
         for rubbish in (b"", b"rubbish", b"[]", b"{}", b"\xff\x00", saved[: len(saved) // 2]):
-            with pytest.raises(FMICallException):
-                one.fmu.setFMUState(one.fmu.deSerializeFMUstate(rubbish))
+            for _ in range(3):
+                with refused(one, FATAL, "saved state"):
+                    one.fmu.setFMUState(one.fmu.deSerializeFMUstate(rubbish))
         assert one.outputs() == before
         one.step(0.1)
 

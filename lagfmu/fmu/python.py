@@ -51,7 +51,7 @@ from {package}.fmu.slave import LagfmuSlave as Fmi2Slave  # pythonfmu looks for 
 from {package}.solver.system import Embedding, Row, System
 {equations}
 
-# name, type, what may set it, start, min, max; the position is the value reference
+# name, type, what may set it, start, min, max, positive; the position is the reference
 VARIABLES = (
 {variables})
 
@@ -131,7 +131,7 @@ def _script(
     package: str,
 ) -> str:
     rows = "".join(
-        f"    {(v.name, v.kind, v.role, v.start, v.minimum, v.maximum)!r},\n"
+        f"    {(v.name, v.kind, v.role, v.start, v.minimum, v.maximum, v.positive)!r},\n"
         for v in table.variables
     )
     equations = source(eom, reduction, scene.formulation)

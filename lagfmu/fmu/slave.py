@@ -56,12 +56,12 @@ def guarded(method: Call) -> Call:
 class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     """A simulation of `system` behind the FMI functions.
 
-    The generated subclass gives `system`, `variables` (name, kind, role, start, min, max; the position
-    is the value reference), `default_tolerance` and `identity`.
+    The generated subclass gives `system`, `variables` (name, kind, role, start, min, max, must it be
+    positive; the position is the value reference), `default_tolerance` and `identity`.
     """
 
     system: System
-    variables: Sequence[tuple[str, str, str, Any, float | None, float | None]]
+    variables: Sequence[tuple[str, str, str, Any, float | None, float | None, bool]]
     default_tolerance: float
     identity: str
 
@@ -128,7 +128,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                     f"the communication step is {step_size!r} s, expected a positive number"
                 )
             slack = ROUNDING * step_size + 1e-12 * abs(before.t)
-            if abs(current_time - before.t) > slack:
+            if not abs(current_time - before.t) <= slack:
                 raise StepFailureError(
                     f"the communication point is {current_time!r} s, but this FMU stands at "
                     f"{before.t!r} s: continue there, or restore a state saved at that time"
@@ -175,13 +175,15 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     @guarded
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set parameters, start values (before the end of initialization) or inputs."""
-        for vr, value in zip(vrs, values, strict=True):
-            name, _, _, _, low, high = self._settable(vr, "Real")
+        for vr, value in zip(vrs, values, strict=True):  # all are checked before one is set
+            name, _, _, _, low, high, positive = self._settable(vr, "Real")
             if not math.isfinite(value):
                 raise Refused(f"{name!r} = {value!r}, expected a finite number")
             if (low is not None and value < low) or (high is not None and value > high):
                 raise Refused(f"{name!r} = {value!r} is outside its bounds [{low}, {high}]")
-            self._set(vr, value)
+            if positive and not value > 0:
+                raise Refused(f"{name!r} = {value!r}, expected a positive number")
+        self._set(vrs, values)
 
     @guarded
     def set_string(self, vrs: list[int], values: list[str]) -> None:
@@ -190,7 +192,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             name = self._settable(vr, "String")[0]
             if value not in METHODS:
                 raise Refused(f"{name!r} = {value!r}, expected one of {', '.join(METHODS)}")
-            self._set(vr, value)
+        self._set(vrs, values)
 
     @guarded
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
@@ -218,8 +220,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             raise Refused(f"{name!r} can only be set before the end of the initialization")
         return variable
 
-    def _set(self, vr: int, value: Any) -> None:
-        self.values[vr] = value
+    def _set(self, vrs: list[int], values: Sequence[Any]) -> None:
+        for vr, value in zip(vrs, values, strict=True):
+            self.values[vr] = value
         self.observed = None
         if not self.running:
             self.state = None
@@ -305,7 +308,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if not isinstance(state, dict) or state.get("identity") != self.identity:
+        if "refused" in state:
+            raise Refused(state["refused"])
+        if state.get("identity") != self.identity:
             raise Refused("the saved state belongs to another FMU, or to another version of this")
         self.values = list(state["values"])
         self.running = state["running"]
@@ -324,5 +329,5 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         try:
             return dict(json.loads(state.decode("ascii")))
-        except ValueError as error:
-            raise Refused(f"the bytes are no saved state of this FMU ({error})") from None
+        except (TypeError, ValueError) as error:  # raised here, it would crash pythonfmu's binary
+            return {"refused": f"the bytes are no saved state of an FMU ({error})"}

@@ -124,7 +124,7 @@ class _Leg:
         if "step size" in message:
             message = "step size underflow"
         cause = f": {self.cause}" if self.cause else ""
-        return StepFailureError(f"the integration stops at t = {t!r} s, {message}{cause}")
+        return StepFailureError(f"the integration stops at t = {float(t)!r} s, {message}{cause}")
 
     def reach(self, t: float, y: Vector, t1: float) -> Vector:
         """The state at t1, integrated from (t, y) and projected."""

@@ -9,6 +9,7 @@ worst first, until none is left.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ from .linear import solve
 from .motion import Motion, evaluate, motion
 from .system import System, Vector
 
+MOST = 12  # contacts whose combinations are tried one by one
 PULL = 1e-12  # a multiplier this small, relative to the forces at work, is zero
 
 
@@ -38,32 +40,45 @@ def complementary_modes(
     now because its multiplier passed through zero: there f and its first two derivatives vanish, and
     the sign of what rounding leaves of them must not close it again.
     """
-    modes = list(closed)
-    seen: set[tuple[bool, ...]] = set()
-    while True:
-        if tuple(modes) in seen:
-            raise StepFailureError(
-                f"no combination of open and closed contacts satisfies f >= 0, lambda >= 0 at "
-                f"t = {t!r} s"
-            )
-        seen.add(tuple(modes))
+
+    def change(modes: Sequence[bool]) -> int | None:
+        """The contact whose mode contradicts the accelerations most; None if none does."""
         now = motion(system, t, q, v, u, p, system.active(modes))
         size = _force_scale(now)
-        worst, change = 0.0, None
+        worst, found = 0.0, None
         for c, k in enumerate(system.contacts):
             if modes[c]:
                 excess = -(now.lam[k] / size[k]) if size[k] else 0.0
                 pulls = excess > -PULL if c in touching else excess > PULL
-                if pulls and (change is None or excess > worst):
-                    worst, change = excess, c
+                if pulls and (found is None or excess > worst):
+                    worst, found = excess, c
             elif c in touching and c not in leaving:
                 approach = now.gamma[k] - now.G[k] @ now.vdot
                 floor = PULL * (abs(now.gamma[k]) + np.abs(now.G[k]) @ np.abs(now.vdot))
                 if approach > floor and approach > worst:
-                    worst, change = approach, c
-        if change is None:
+                    worst, found = approach, c
+        return found
+
+    modes = list(closed)
+    seen: set[tuple[bool, ...]] = set()
+    while tuple(modes) not in seen:
+        seen.add(tuple(modes))
+        wrong = change(modes)
+        if wrong is None:
             return tuple(modes)
-        modes[change] = not modes[change]
+        modes[wrong] = not modes[wrong]
+    undecided = sorted(touching)  # the active set went in a circle: try all combinations
+    for choice in itertools.product((True, False), repeat=min(len(undecided), MOST)):
+        trial = list(closed)
+        for c, mode in zip(undecided, choice, strict=False):
+            trial[c] = mode and c not in leaving
+        if change(trial) is None:
+            return tuple(trial)
+    names = ", ".join(repr(system.rows[system.contacts[c]].name) for c in undecided)
+    raise StepFailureError(
+        f"no combination of open and closed contacts {names} satisfies f >= 0, lambda >= 0 at "
+        f"t = {float(t)!r} s"
+    )
 
 
 def _force_scale(now: Motion) -> Vector:

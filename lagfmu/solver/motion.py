@@ -60,7 +60,7 @@ def evaluate(
         return system.assemble(t, q, v, u, p)
     except (ArithmeticError, ValueError) as error:
         raise StepFailureError(
-            f"the equations cannot be evaluated at t = {t!r} s ({error})"
+            f"the equations cannot be evaluated at t = {float(t)!r} s ({error})"
         ) from error
 
 
@@ -70,7 +70,7 @@ def residual(system: System, t: float, q: Vector, u: Sequence[float], p: Sequenc
         return np.array(system.residual(t, q.tolist(), u, p), dtype=float)
     except (ArithmeticError, ValueError) as error:
         raise StepFailureError(
-            f"the constraints cannot be evaluated at t = {t!r} s ({error})"
+            f"the constraints cannot be evaluated at t = {float(t)!r} s ({error})"
         ) from error
 
 
@@ -105,12 +105,12 @@ def project(
         if (miss <= 2 * EPS * (steepness @ np.abs(q))).all():
             break
         error = (miss / (steepness @ np.maximum(np.abs(q), size))).max()
-        if error > before / 2 and error < SMALL:
-            break  # rounding in f is all that is left
+        if error < EPS**2 or (error > before / 2 and error < SMALL):
+            break  # f vanishes with q, or rounding in f is all that is left
         if count == ITERATIONS:
             worst = [system.rows[k].name for k, a in zip(fixed, miss, strict=True) if a > 0]
             raise StepFailureError(
-                f"the step to t = {t!r} s cannot be projected onto the constraints "
+                f"the step to t = {float(t)!r} s cannot be projected onto the constraints "
                 f"{', '.join(map(repr, worst))} (missed by {miss.max():.3g}): take smaller steps"
             )
         before = error

@@ -1,0 +1,670 @@
+"""What an importer finds in each FMU of models/: the description, the archive, the life cycle."""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+
+import pytest
+from conftest import FILES
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+from instance import Instance, instance
+from sympy import Rational, cos, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu
+from lagfmu.model import name_of
+
+ALL = sorted(FILES)
+REPOSITORY = Path(__file__).parent.parent
+
+
+@pytest.fixture(params=ALL)
+def name(request) -> str:
+    """Every FMU of models/."""
+    return request.param
+
+
+@pytest.fixture
+def path(name, fmu) -> Path:
+    """The built FMU."""
+    return fmu(name)
+
+
+@pytest.fixture
+def xml(path) -> ET.Element:
+    """Its modelDescription.xml."""
+    with zipfile.ZipFile(path) as archive:
+        return ET.fromstring(archive.read("modelDescription.xml"))
+
+
+def variables(xml) -> dict[str, tuple[dict, str, dict]]:
+    """name -> (attributes, type, attributes of the type), in the order of the indices."""
+    found = {}
+    for element in xml.find("ModelVariables"):
+        (typed,) = [e for e in element if e.tag != "Annotations"]
+        found[element.get("name")] = (element.attrib, typed.tag, typed.attrib)
+    return found
+
+
+def listed(xml, what) -> dict[str, list[str]]:
+    """name -> names of the dependencies, for Outputs, Derivatives or InitialUnknowns."""
+    names = list(variables(xml))
+    return {
+        names[int(e.get("index")) - 1]: [names[int(d) - 1] for d in e.attrib["dependencies"].split()]
+        for e in xml.find(f"ModelStructure/{what}")
+    }
+
+
+# ---------------------------------------------------------------------------- checkers
+
+
+def test_fmpy_reports_no_problem(path):
+    """fmpy validate is silent."""
+    assert validate_fmu(str(path)) == []
+
+
+def test_fmutool_reports_no_error(path):
+    """fmutool -check (fmu-manipulation-toolbox): schema and rules of the standard."""
+    command = [sys.executable, "-c", "from fmu_manipulation_toolbox.cli.fmutool import fmutool\n"
+               "fmutool()", "-input", str(path), "-check"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    text = run.stdout + run.stderr
+    assert run.returncode == 0, text
+    assert "compliant with FMI-2.0" in text
+    assert not re.search(r"\b(ERROR|FATAL|CRITICAL|WARNING)\b", text), text
+
+
+# ---------------------------------------------------------------------------- the description
+
+
+def test_names_are_those_of_the_design(name, xml, prepared):
+    """Motion, multipliers, forces, residuals, energies, contacts and departures, and nothing else."""
+    model = prepared(name).model
+    q = [name_of(c) for c in model.coordinates]
+    expected = {name_of(p.symbol) for p in model.parameters}
+    expected |= {name_of(i.symbol) for i in model.inputs}
+    motions = list(q)
+    if prepared(name).reduction is not None and model.embedding is not None:
+        motions += [name_of(c) for c in model.embedding.coordinates]
+    expected |= {form.format(c) for c in motions for form in ("{}", "der({})", "der({},2)")}
+    expected |= {f"Q.{c}" for c in q}
+    for constraint in model.constraints:
+        c = constraint.name
+        expected |= {f"lambda.{c}", f"residual.{c}", f"unique.{c}"}
+        if isinstance(constraint, Contact):
+            expected |= {f"contact.{c}", f"departure.{c}.time", f"departure.{c}.count"}
+            expected |= {f"departure.{c}.{s}" for s in q}
+            expected |= {f"departure.{c}.velocity.{s}" for s in q}
+    expected |= {f"energy.{e}" for e in ("kinetic", "potential", "total")}
+    expected |= {f"solver.{s}" for s in ("method", "tolerance", "step", "maximum_step", "steps")}
+    constraints = "|".join(c.name for c in model.constraints)
+    found = {v for v in variables(xml) if not re.fullmatch(rf"Q\.({constraints})\.\w+", v)}
+    assert found == expected
+    for c in q:
+        shares = [v for v in variables(xml) if re.fullmatch(rf"Q\.({constraints})\.{c}", v)]
+        assert shares or name in ("Hemisphere", "RotatingWire", "KnifeEdge")
+
+
+UNITS = {
+    ("Hemisphere", "lambda.surface"): {"kg": 1, "m": 1, "s": -2},
+    ("Hemisphere", "Q.theta"): {"kg": 1, "m": 2, "s": -2},
+    ("Hemisphere", "Q.r"): {"kg": 1, "m": 1, "s": -2},
+    ("Hemisphere", "departure.surface.velocity.theta"): {"s": -1, "rad": 1},
+    ("Hemisphere", "departure.surface.time"): {"s": 1},
+    ("PendulumCartesian", "lambda.rod"): {"kg": 1, "s": -2},
+    ("PendulumAngle", "lambda.rod"): {"kg": 1, "s": -2},
+    ("PendulumAngle", "der(theta,2)"): {"s": -2, "rad": 1},
+    ("PendulumCartesian", "residual.rod"): {"m": 2},
+    ("RotatingWire", "lambda.drive"): {"kg": 1, "m": 2, "s": -2},
+    ("RotatingWire", "omega"): {"s": -1, "rad": 1},
+    ("InclineDisk", "lambda.rolling"): {"kg": 1, "m": 1, "s": -2},
+    ("InclineDisk", "Q.theta"): {"kg": 1, "m": 2, "s": -2},
+    ("KnifeEdge", "lambda.edge"): {"kg": 1, "m": 1, "s": -2},
+    ("KnifeEdge", "residual.edge"): {"m": 1, "s": -1},
+    ("KnifeEdge", "J"): {"kg": 1, "m": 2},
+    ("CartPendulum", "c"): {"kg": 1, "s": -1},
+    ("CartPendulum", "F"): {"kg": 1, "m": 1, "s": -2},
+    ("CartPendulum", "energy.total"): {"kg": 1, "m": 2, "s": -2},
+    ("Atwood", "lambda.string"): {"kg": 1, "m": 1, "s": -2},
+}
+
+
+def test_every_real_has_a_unit_that_is_defined(name, xml):
+    """Each Real names a unit, each unit is defined once, with the right exponents of the base units."""
+    definitions = {}
+    for unit in xml.find("UnitDefinitions"):
+        assert unit.get("name") not in definitions
+        definitions[unit.get("name")] = {k: int(v) for k, v in unit.find("BaseUnit").attrib.items()}
+    used = set()
+    for variable, (_, kind, typed) in variables(xml).items():
+        if kind == "Real":
+            assert typed["unit"] in definitions, variable
+            used.add(typed["unit"])
+    assert used == set(definitions)
+    for (model, variable), exponents in UNITS.items():
+        if model == name:
+            assert definitions[variables(xml)[variable][2]["unit"]] == exponents, variable
+    if name == "Hemisphere":
+        assert variables(xml)["Q.theta"][2]["unit"] == "N.m"
+
+
+def test_every_variable_is_described(xml):
+    """No description is empty or repeats the name only; value references count up from 0."""
+    for reference, (variable, (attributes, _, _)) in enumerate(variables(xml).items()):
+        assert len(attributes["description"]) > 3
+        assert attributes["description"] != variable
+        assert int(attributes["valueReference"]) == reference
+
+
+def test_experiment_log_categories_and_capabilities_are_stated(name, xml, prepared):
+    """DefaultExperiment is the scene's; all categories are described; no tool is needed."""
+    scene = prepared(name).scene
+    experiment = xml.find("DefaultExperiment").attrib
+    assert float(experiment["startTime"]) == 0.0
+    assert float(experiment["stopTime"]) == scene.stop_time
+    assert float(experiment["tolerance"]) == scene.tolerance
+    assert float(experiment["stepSize"]) == scene.step_size
+    categories = {c.get("name"): c.get("description") for c in xml.find("LogCategories")}
+    assert {"logStatusWarning", "logStatusDiscard", "logStatusFatal", "logEvents"} <= set(categories)
+    assert all(categories.values())
+    co_simulation = xml.find("CoSimulation").attrib
+    assert co_simulation["needsExecutionTool"] == "false"
+    assert co_simulation["canGetAndSetFMUstate"] == "true"
+    assert co_simulation["canSerializeFMUstate"] == "true"
+    assert co_simulation["modelIdentifier"] == xml.get("modelName") == name
+    assert xml.get("variableNamingConvention") == "structured"
+    assert re.fullmatch(r"\{[0-9a-f-]{36}\}", xml.get("guid"))
+
+
+def test_derivatives_refer_to_their_states(xml):
+    """der(theta) is the derivative of theta, der(theta,2) of der(theta)."""
+    names = list(variables(xml))
+    for variable, (_, _, typed) in variables(xml).items():
+        if variable.startswith("der("):
+            inner, _, order = variable[4:-1].partition(",")
+            of = f"der({inner})" if order == "2" else inner
+            assert names[int(typed["derivative"]) - 1] == of
+        else:
+            assert "derivative" not in typed
+    states = {n for n, (a, _, _) in variables(xml).items() if a["causality"] == "output"
+              and a.get("initial") in ("exact", "approx")}
+    derivatives = listed(xml, "Derivatives")
+    assert {names[int(variables(xml)[d][2]["derivative"]) - 1] for d in derivatives} == states
+
+
+def test_the_model_structure_is_complete(xml):
+    """Every output, state derivative and approx or calculated output, each with `dependencies`."""
+    outputs = {n for n, (a, _, _) in variables(xml).items() if a["causality"] == "output"}
+    unknown = {n for n in outputs if variables(xml)[n][0]["initial"] in ("approx", "calculated")}
+    assert set(listed(xml, "Outputs")) == outputs
+    assert set(listed(xml, "InitialUnknowns")) == unknown
+    for name, (attributes, _, typed) in variables(xml).items():
+        has_start = attributes.get("initial") in ("exact", "approx") or (
+            attributes["causality"] == "input"
+        )
+        assert ("start" in typed) == has_start, name
+    known = {n for n, (a, _, _) in variables(xml).items()
+             if a["causality"] == "input" or a.get("initial") == "exact"}
+    for dependencies in listed(xml, "InitialUnknowns").values():
+        assert set(dependencies) <= known
+
+
+APPROX = {
+    "Hemisphere": {"r", "der(r)"},  # the surface touches r alone, M is diagonal
+    "InclineDisk": {"y", "theta", "der(y)", "der(theta)"},
+    "InclineDiskMinimal": set(),
+    "PendulumCartesian": {"x", "y", "der(x)", "der(y)"},
+    "PendulumNullspace": {"x", "y", "der(x)", "der(y)"},
+    "PendulumAngle": set(),
+    "RotatingWire": {"phi", "der(phi)"},
+    "KnifeEdge": {"der(x)", "der(y)"},  # no position constraint; phi is not in the blade's row
+    "Atwood": {"x1", "x2", "der(x1)", "der(x2)"},
+    "CartPendulum": {"s", "x", "y", "der(s)", "der(x)", "der(y)"},
+}
+
+
+def test_only_states_that_a_projection_can_move_are_approximate(name, xml):
+    """The others start exactly as they are described or set."""
+    found = {n for n, (a, _, _) in variables(xml).items() if a.get("initial") == "approx"}
+    assert found == APPROX[name]
+
+
+def test_start_values_in_the_description_are_those_of_the_binary(path, xml):
+    """17 digits: the text reads back as the very double that the instance holds and starts with."""
+    with instance(path) as one:
+        one.fmu.setupExperiment()
+        one.fmu.enterInitializationMode()
+        for variable, (_, kind, typed) in variables(xml).items():
+            if "start" in typed:
+                expected = typed["start"] if kind == "String" else float(typed["start"])
+                assert one.get(variable) == expected, variable
+                if kind != "String":
+                    assert float(repr(expected)) == expected
+
+
+def test_awkward_start_values_survive(tmp_path):
+    """0.1 + 0.2, 1/3 and 1e-300 come back bit for bit from the text and from the binary."""
+    x, m, k = dynamicsymbols("x"), symbols("m", positive=True), symbols("k", real=True)
+    model = Model(
+        name="Awkward",
+        lagrangian=m * x.diff() ** 2 / 2 - k * x,
+        coordinates={x: "m"},
+        parameters=[Parameter(m, Rational(1, 3), "kg"), Parameter(k, 1e-300, "N")],
+        start={x: 0.1 + 0.2, x.diff(): -2 / 3},
+    )
+    path = build_fmu(model, tmp_path)
+    expected = {"x": 0.1 + 0.2, "der(x)": -2 / 3, "m": 1 / 3, "k": 1e-300}
+    described = {v.name: v for v in read_model_description(str(path)).modelVariables}
+    with instance(path) as one:
+        one.start()
+        for variable, value in expected.items():
+            assert float(described[variable].start) == value
+            assert one.get(variable) == value
+
+
+# ---------------------------------------------------------------------------- true dependencies
+
+SAFE = {  # states that satisfy the constraints, away from symmetric ones
+    "Hemisphere": {"theta": 0.3, "der(theta)": 0.4},
+    "CartPendulum": {"F": 2.0, "der(s)": 0.3},
+    "KnifeEdge": {"phi": 0.4, "der(phi)": 0.9, "der(x)": 0.5, "der(y)": 0.2},
+    "PendulumAngle": {"theta": 0.7, "der(theta)": 0.4},
+    "RotatingWire": {"r": 0.6, "der(r)": 0.2},
+}
+
+
+def initial_outputs(path, values) -> dict:
+    """All outputs in initialization mode."""
+    with instance(path) as one:
+        one.fmu.setupExperiment()
+        one.fmu.enterInitializationMode()
+        for variable, value in values.items():
+            one.set(variable, value)
+        return one.outputs()
+
+
+def outputs_after(path, values, late=None) -> dict:
+    """All outputs right after initialization; `late` sets inputs after it."""
+    with instance(path) as one:
+        one.start(values)
+        for variable, value in (late or {}).items():
+            one.set(variable, value)
+        return one.outputs()
+
+
+def changed(a, b) -> set[str]:
+    """Outputs that differ by more than rounding."""
+    return {
+        n
+        for n in a
+        if abs(a[n] - b[n]) > 1e-9 * max(abs(a[n]), abs(b[n]), 1e-3) and n != "solver.steps"
+    }
+
+
+@pytest.mark.parametrize("name", sorted(SAFE))
+def test_initial_dependencies_are_true(name, fmu):
+    """Perturb each exact start value, parameter and input: what changes has listed it."""
+    path = fmu(name)
+    with zipfile.ZipFile(path) as archive:
+        xml = ET.fromstring(archive.read("modelDescription.xml"))
+    base = initial_outputs(path, SAFE[name])
+    dependencies = listed(xml, "InitialUnknowns")
+    seen = set()
+    for known, (attributes, kind, typed) in variables(xml).items():
+        exact = attributes.get("initial") == "exact" or attributes["causality"] == "input"
+        if not exact or kind != "Real" or known.startswith("solver."):
+            continue
+        value = SAFE[name].get(known, float(typed["start"]))
+        moved = initial_outputs(path, SAFE[name] | {known: value * 1.01 + 1e-3})
+        for output in changed(base, moved):
+            if output == known:
+                continue
+            assert known in dependencies[output], f"{output} depends on {known}"
+            seen.add(output)
+    assert "energy.kinetic" in seen
+    assert any(n.startswith("lambda.") for n in seen)
+
+
+@pytest.mark.parametrize("name", ["CartPendulum"])
+def test_inputs_act_on_the_outputs_that_list_them(name, fmu):
+    """An input set between two steps changes accelerations and lambda at once, as listed, no state."""
+    path = fmu(name)
+    with zipfile.ZipFile(path) as archive:
+        xml = ET.fromstring(archive.read("modelDescription.xml"))
+    moved = changed(outputs_after(path, {}), outputs_after(path, {}, {"F": 5.0}))
+    assert {"lambda.rod", "der(s,2)", "Q.s"} <= moved
+    listing = {n for n, d in listed(xml, "Outputs").items() if "F" in d}
+    assert moved <= listing
+    assert not listing & {"s", "x", "y", "der(s)", "energy.total", "residual.rod"}
+
+
+@pytest.mark.parametrize("name", sorted(SAFE))
+def test_dependencies_on_states_are_true(name, fmu):
+    """From states that satisfy the constraints, reached by moving each free state: what changes has
+    listed one of the states that moved."""
+    path = fmu(name)
+    with zipfile.ZipFile(path) as archive:
+        xml = ET.fromstring(archive.read("modelDescription.xml"))
+    base = outputs_after(path, SAFE[name])
+    dependencies = listed(xml, "Outputs")
+    states = [n for n, (a, _, _) in variables(xml).items()
+              if a["causality"] == "output" and a.get("initial") in ("exact", "approx")]
+    for state in states:
+        moved = outputs_after(path, SAFE[name] | {state: base[state] * 1.01 + 1e-3})
+        different = changed(base, moved)
+        sources = different & set(states)
+        for output in different - set(states):
+            assert sources & set(dependencies[output]), f"{output} depends on one of {sources}"
+
+
+# ---------------------------------------------------------------------------- the archive
+
+
+def test_the_archive_holds_what_it_needs_and_no_more(name, path):
+    """Binaries, script, solver, documentation; no caches, no paths of the machine that built it."""
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        names = archive.namelist()
+        content = {n: archive.read(n) for n in names}
+        assert all(i.date_time == (1980, 1, 1, 0, 0, 0) for i in archive.infolist())
+    assert len(names) == len(set(names))
+    assert names[0] == "modelDescription.xml"
+    for needed in (
+        f"binaries/linux64/{name}.so",
+        "documentation/index.html",
+        "resources/lagfmu.json",
+        "resources/slavemodule.txt",
+    ):
+        assert needed in names
+    assert not [n for n in names if "__pycache__" in n or n.endswith((".pyc", "/"))]
+    traces = {str(REPOSITORY), str(path.parent), os.path.expanduser("~"), sys.prefix, "/tmp/"}
+    for entry, data in content.items():
+        if not entry.startswith("binaries/"):
+            assert not [p for p in traces if p.encode() in data], entry
+    own = {str(REPOSITORY), str(path.parent), sys.prefix}
+    assert not [e for e, data in content.items() for p in own if p.encode() in data]
+
+
+def test_the_documentation_stands_by_itself(name, path):
+    """A page about this model, with nothing fetched from elsewhere."""
+    with zipfile.ZipFile(path) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert name in page
+    assert "<math" in page
+    assert not re.search(r"(src|href)=[\"']https?://", page)
+    assert "<script" not in page
+
+
+def test_the_slave_script_is_numeric(path):
+    """No SymPy, no lagfmu in the resources but in names of the FMU's own package."""
+    with zipfile.ZipFile(path) as archive:
+        for entry in archive.namelist():
+            if entry.startswith("resources/") and entry.endswith(".py") and "pythonfmu" not in entry:
+                text = archive.read(entry).decode()
+                assert not re.search(r"^\s*(import|from)\s+(sympy|pint|lagfmu)\b", text, re.M), entry
+
+
+BUILD = """
+import sys
+from lagfmu.modelfile import load
+from lagfmu.prepare import prepare
+from lagfmu.build import write
+file = load(sys.argv[1])
+write(prepare(file.model, file.scenes[0]), sys.argv[2])
+"""
+
+
+def test_source_date_epoch_gives_a_date_in_utc(tmp_path):
+    """1,700,000,000 s after 1970 is 2023-11-14T22:13:20Z; without the variable there is no date."""
+    for epoch, expected in (("1700000000", "2023-11-14T22:13:20Z"), ("", None)):
+        environment = {**os.environ, "SOURCE_DATE_EPOCH": epoch}
+        command = [sys.executable, "-c", BUILD, str(REPOSITORY / "models/atwood.py"), str(tmp_path)]
+        subprocess.run(command, env=environment, check=True, timeout=120)
+        found = read_model_description(str(tmp_path / "Atwood.fmu")).generationDateAndTime
+        assert found == expected
+
+
+# ---------------------------------------------------------------------------- life cycle
+
+
+def record(one, steps=5, size=0.05) -> list[dict]:
+    """Outputs after each step."""
+    found = []
+    for _ in range(steps):
+        one.step(size)
+        found.append(one.outputs())
+    return found
+
+
+def test_a_second_experiment_after_reset_gives_the_same_numbers(path):
+    """Also after parameters were changed, and right after instantiation."""
+    with instance(path) as one:
+        one.fmu.reset()
+        one.start()
+        first = record(one)
+        one.fmu.terminate()
+        one.fmu.reset()
+        parameter = one.description.modelVariables[0].name
+        one.start({parameter: 1.25, "solver.method": "rk4"})
+        assert record(one) != first
+        one.fmu.reset()
+        one.start()
+        assert record(one) == first
+
+
+def test_outputs_can_be_read_in_initialization_mode(path):
+    """Each output has a finite value before the first step, the one that the initialization keeps."""
+    with instance(path) as one:
+        one.fmu.setupExperiment()
+        one.fmu.enterInitializationMode()
+        before = one.outputs()
+        one.fmu.exitInitializationMode()
+        assert one.outputs() == before
+
+
+def test_values_can_be_set_and_read_before_initialization(path):
+    """Right after instantiation, as the standard allows for start values."""
+    with instance(path) as one:
+        parameter = one.description.modelVariables[0].name
+        one.set(parameter, 1.25)
+        assert one.get(parameter) == 1.25
+        one.start()
+        assert one.get(parameter) == 1.25
+
+
+def test_calls_with_no_variables_are_accepted(path):
+    """Arrays of length zero and null pointers, as some importers pass."""
+    with instance(path) as one:
+        one.fmu.setupExperiment()
+        one.fmu.enterInitializationMode()
+        for kind in ("Real", "Integer", "Boolean", "String"):
+            getattr(one.fmu, f"set{kind}")([], [])
+            assert getattr(one.fmu, f"get{kind}")([]) == []
+        null = ctypes.POINTER(ctypes.c_uint)()
+        one.fmu.fmi2SetReal(one.fmu.component, null, 0, ctypes.POINTER(ctypes.c_double)())
+        one.fmu.fmi2GetReal(one.fmu.component, null, 0, ctypes.POINTER(ctypes.c_double)())
+        one.fmu.exitInitializationMode()
+        one.step(0.01)
+
+
+def test_an_experiment_may_start_late(name, path):
+    """Started at t = 10 s: an autonomous system repeats what it does from t = 0."""
+    with instance(path) as one, instance(path) as late:
+        one.start()
+        late.start(start_time=10.0, stop_time=11.0, values={})
+        if name == "RotatingWire":  # rheonomic: the wire stands at omega t
+            assert late.get("phi") == pytest.approx(10 * late.get("omega"))
+            late.step(0.1)
+            assert late.get("residual.drive") == pytest.approx(0.0, abs=1e-12)
+            return
+        for a, b in zip(record(one), record(late), strict=True):
+            for output in a:
+                if not output.startswith(("solver", "departure")):
+                    assert b[output] == pytest.approx(a[output], rel=1e-5, abs=1e-6), output
+
+
+def test_a_communication_step_of_any_size_follows_any_other(path):
+    """1e-9, 0.1, 1e-3 s: the coordinates are those of one single step."""
+    with instance(path) as one, instance(path) as single:
+        one.start(tolerance=1e-10)
+        for size in (1e-9, 0.1, 1e-3, 0.05, 1e-6, 0.1):
+            one.step(size)
+        single.start(tolerance=1e-10)
+        single.step(one.time)
+        a, b = one.outputs(), single.outputs()
+        for output in a:
+            if output.startswith(("solver", "residual")):
+                continue
+            assert a[output] == pytest.approx(b[output], rel=1e-6, abs=1e-7), output
+
+
+CYCLES = """
+import sys
+sys.path.insert(0, sys.argv[2])
+from instance import instance
+first = None
+for k in range(60):
+    with instance(sys.argv[1], f"i{k}") as one:
+        one.start()
+        one.step(0.1)
+        found = one.outputs()
+        first = first or found
+        assert found == first
+print("60")
+"""
+
+
+@pytest.mark.parametrize("name", ["Hemisphere"])
+def test_sixty_instances_one_after_another(name, fmu):
+    """Instantiate, run, free, sixty times in one process: no crash and the same numbers."""
+    command = [sys.executable, "-c", CYCLES, str(fmu(name)), str(Path(__file__).parent)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
+    assert run.returncode == 0, run.stderr[-2000:]
+    assert run.stdout.strip() == "60"
+
+
+def test_thirty_instances_at_the_same_time(fmu):
+    """Interleaved steps: each goes its own way and all arrive."""
+    path = fmu("Hemisphere")
+    many = [Instance(path, f"i{k}") for k in range(30)]
+    try:
+        for k, one in enumerate(many):
+            one.start({"theta": 0.1 + 0.01 * k})
+        for _ in range(3):
+            for one in many:
+                one.step(0.1)
+        angles = [one.get("theta") for one in many]
+        assert angles == sorted(angles)
+        assert len(set(angles)) == 30
+    finally:
+        for one in reversed(many):
+            one.free()
+
+
+def test_the_log_tells_projected_starts_and_departures(fmu):
+    """Start values off the surface: which, how far; the departure: when."""
+    with instance(fmu("Hemisphere")) as one:
+        one.start({"a": 2.0, "theta": 0.3})  # r = 1 is inside the sphere of radius 2
+        assert one.get("r") == 2.0
+        messages = [m for _, c, m in one.log if c == "logStatusWarning"]
+        assert any("r = 1.0" in m and "2.0" in m and "moved by 1" in m for m in messages), one.log
+        for _ in range(40):
+            one.step(0.1)
+        assert any("surface opened at t = " in m for _, c, m in one.log if c == "logEvents")
+
+
+def test_a_start_above_the_surface_is_free_flight(fmu):
+    """a = 0.5 with r = 1: nothing is projected, lambda is 0 and the particle falls with g."""
+    with instance(fmu("Hemisphere")) as one:
+        one.start({"a": 0.5, "theta": 0.0})
+        assert one.get("r") == 1.0
+        assert not one.get("contact.surface")
+        assert one.get("lambda.surface") == 0.0
+        assert one.get("der(r,2)") == -9.81
+        assert one.get("departure.surface.count") == 0
+
+
+def test_before_the_first_departure_its_outputs_are_zero(fmu):
+    """Count 0 and finite zeros, as the table of variables says."""
+    with instance(fmu("Hemisphere")) as one:
+        one.start()
+        one.step(0.1)
+        values = {n: v for n, v in one.outputs().items() if n.startswith("departure.")}
+        assert len(values) == 6
+        assert set(values.values()) == {0}
+
+
+def test_the_tolerance_of_the_experiment_is_obeyed_and_the_parameter_goes_first(fmu):
+    """Fewer steps at 1e-4 than at 1e-12; solver.tolerance overrides fmi2SetupExperiment."""
+
+    def steps(values, tolerance):
+        with instance(fmu("PendulumCartesian")) as one:
+            one.start(values, tolerance=tolerance)
+            one.step(2.0)
+            return one.get("solver.steps")
+
+    rough, default, fine = steps({}, 1e-4), steps({}, None), steps({}, 1e-12)
+    assert rough < default < fine
+    assert steps({"solver.tolerance": 1e-12}, 1e-4) == fine
+    assert steps({}, 1e-8) == default
+
+
+def test_only_the_independent_coordinate_of_an_embedding_can_be_set(fmu):
+    """theta is set, x and y follow: x = L sin(theta)."""
+    description = read_model_description(str(fmu("PendulumAngle")))
+    starts = {v.name for v in description.modelVariables if v.initial in ("exact", "approx")}
+    assert {"theta", "der(theta)"} <= starts
+    assert not {"x", "y", "der(x)", "der(y)"} & starts
+    with instance(fmu("PendulumAngle")) as one:
+        one.start({"theta": 0.5, "L": 2.0})
+        assert one.get("x") == pytest.approx(2 * 0.479425538604203, rel=1e-15)
+
+
+def test_an_input_is_read_back_and_its_effect_is_there_at_once(fmu):
+    """After fmi2SetReal(F) the accelerations are new, without a step."""
+    with instance(fmu("CartPendulum")) as one:
+        one.start()
+        before = one.get("der(s,2)")
+        one.set("F", 10.0)
+        assert one.get("F") == 10.0
+        assert one.get("der(s,2)") > before
+
+
+def test_constraints_that_mix_give_every_variable_its_dependencies(tmp_path):
+    """A contact, a rheonomic, a nonholonomic constraint and a prescribed motion in one FMU that no
+    checker complains about."""
+    t = dynamicsymbols._t
+    x, y, z, u = dynamicsymbols("x y z u")
+    m, w, g = symbols("m w g", positive=True)
+    model = Model(
+        name="Mixed",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
+        coordinates={x: "m", y: "m", z: "m"},
+        constraints=[
+            Contact("floor", z - u),
+            Nonholonomic("steer", x.diff() * cos(w * t) - y.diff()),
+            Holonomic("rail", x - w * t * g / w**2, while_closed="floor"),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(w, 1.0, "rad/s"),
+            Parameter(g, 9.81, "m/s^2"),
+        ],
+        inputs=[Input(u, "m")],
+    )
+    path = build_fmu(model, tmp_path, Scene("Mixed"))
+    assert validate_fmu(str(path)) == []
+    with instance(path) as one:
+        one.start()
+        one.step(0.1)
+        assert one.get("lambda.floor") == pytest.approx(9.81)
+        assert one.get("der(x)") == pytest.approx(9.81)

@@ -1,0 +1,248 @@
+"""Particle on a smooth hemisphere (Marion & Thornton, example 7.10), through fmpy on the built FMU."""
+
+from __future__ import annotations
+
+import fmpy
+import numpy as np
+import pytest
+from instance import instance
+
+# m [kg], g [m/s^2], a [m]
+EARTH = {"m": 1.0, "g": 9.81, "a": 1.0}
+MOON = {"m": 3e-3, "g": 1.62, "a": 25.0}
+HEAVY = {"m": 1e3, "g": 9.81, "a": 1e-3}
+VAST = {"m": 1.0, "g": 9.81, "a": 1e6}
+TINY = {"m": 1.0, "g": 9.81, "a": 1e-6}
+FAST = {"m": 1.0, "g": 9.81e12, "a": 1.0}  # the same system in seconds a million times as long
+
+WORLDS = {"earth": EARTH, "moon": MOON, "heavy": HEAVY, "vast": VAST, "tiny": TINY, "fast": FAST}
+
+
+def slide(path, world, theta0, share=0.0, tolerance=None, stop=14.0, points=1):
+    """The motion from theta0 with v0^2 = share * g a cos(theta0); `stop` in units of sqrt(a/g)."""
+    m, g, a = world["m"], world["g"], world["a"]
+    rate = np.sqrt(share * g / a * np.cos(theta0))
+    stop *= np.sqrt(a / g)
+    return fmpy.simulate_fmu(
+        str(path),
+        stop_time=stop,
+        output_interval=stop / points,
+        step_size=stop / points,
+        relative_tolerance=tolerance,
+        start_values={"m": m, "g": g, "a": a, "r": a, "theta": theta0, "der(theta)": rate},
+    )
+
+
+def departure_miss(result, theta0, share):
+    """cos(theta) at the departure minus (2/3) cos(theta0) + v0^2/(3 g a)."""
+    assert result["departure.surface.count"][-1] == 1
+    expected = (2 + share) / 3 * np.cos(theta0)
+    return np.cos(result["departure.surface.theta"][-1]) - expected
+
+
+@pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
+@pytest.mark.parametrize("theta0", [1e-6, 0.01, 0.3, 1.2])
+def test_it_leaves_where_two_thirds_of_the_height_and_the_speed_say(
+    fmu, theta0, tolerance, allowed
+):
+    """The particle leaves the sphere at cos theta = (2/3) cos theta0 + v0^2/(3 g a), from rest and
+    from every speed up to a part in a million of the one at which it leaves at once."""
+    stop = 25.0 if theta0 < 1e-3 else 14.0
+    for share in (0.0, 0.1, 0.5, 0.9, 0.999, 1 - 1e-6):
+        result = slide(fmu("Hemisphere"), EARTH, theta0, share, tolerance, stop)
+        assert abs(departure_miss(result, theta0, share)) < allowed, share
+
+
+@pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
+@pytest.mark.parametrize("name", [name for name in WORLDS if name != "earth"])
+def test_mass_gravity_and_radius_do_not_change_the_angle_of_departure(
+    fmu, name, tolerance, allowed
+):
+    """In v0^2/(g a) the departure's angle is the same for every mass, gravity and radius: lengths
+    scaled by 1e6 and 1e-6 and times by 1e-6 included."""
+    for theta0, share in ((1e-6, 0.0), (0.01, 0.3), (1.2, 0.999)):
+        stop = 25.0 if theta0 < 1e-3 else 14.0
+        result = slide(fmu("Hemisphere"), WORLDS[name], theta0, share, tolerance, stop)
+        assert abs(departure_miss(result, theta0, share)) < allowed, (theta0, share)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_the_motion_does_not_depend_on_the_unit_of_length(fmu, factor):
+    """A sphere and a gravity 1e6 times as large or small, in metres, are the same motion: same times
+    and angles, lengths in proportion, forces too."""
+    world = {"m": 1.0, "g": 9.81 * factor, "a": factor}
+    here, there = (slide(fmu("Hemisphere"), w, 0.1, 0.2, 1e-10, 3.0, 20) for w in (EARTH, world))
+    for name, unit in (
+        ("departure.surface.time", 1.0),
+        ("departure.surface.theta", 1.0),
+        ("theta", 1.0),
+        ("r", factor),
+        ("lambda.surface", factor),
+        ("energy.total", factor**2),
+    ):
+        np.testing.assert_allclose(there[name] / unit, here[name], rtol=1e-9, atol=1e-9)
+
+
+def test_started_ever_nearer_to_the_top_it_leaves_at_two_thirds(fmu):
+    """As theta0 -> 0 from rest the particle leaves at cos theta = 2/3, and what is missing falls as
+    theta0^2/3."""
+    for theta0 in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8):
+        result = slide(fmu("Hemisphere"), EARTH, theta0, tolerance=1e-12, stop=35.0)
+        short = 2 / 3 - np.cos(result["departure.surface.theta"][-1])
+        assert short == pytest.approx(theta0**2 / 3, rel=theta0**2, abs=1e-11)
+
+
+@pytest.mark.parametrize("theta0", [0.01, 0.5])
+def test_the_time_of_departure_does_not_depend_on_the_communication_step(fmu, theta0):
+    """When the particle leaves is physics: communication steps of 1 ms, 50 ms and a single one over
+    the whole run give the same time."""
+    stop = 2.0
+    times = [
+        fmpy.simulate_fmu(
+            str(fmu("Hemisphere")),
+            stop_time=stop,
+            output_interval=step,
+            step_size=step,
+            relative_tolerance=1e-10,
+            start_values={"theta": theta0},
+        )["departure.surface.time"][-1]
+        for step in (1e-3, 0.05, stop)
+    ]
+    assert 0 < min(times)
+    assert max(times) - min(times) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("world", "theta0", "share", "tolerance", "allowed"),
+    [
+        (EARTH, 0.01, 0.0, None, 1e-7),
+        (EARTH, 0.3, 0.5, 1e-12, 1e-11),
+        (MOON, 0.3, 0.5, 1e-12, 1e-11),
+        (HEAVY, 0.1, 0.1, 1e-12, 1e-11),
+    ],
+)
+def test_multiplier_is_the_normal_force_until_it_is_nothing(
+    fmu, world, theta0, share, tolerance, allowed
+):
+    """lambda = m g (3 cos theta - 2 cos theta0) - m v0^2/a [N] while the particle is on the sphere,
+    positive; from the departure on it is exactly 0, and so is Q."""
+    result = slide(fmu("Hemisphere"), world, theta0, share, tolerance, 8.0, 400)
+    weight = world["m"] * world["g"]
+    closed = result["contact.surface"]
+    normal = weight * (3 * np.cos(result["theta"]) - (2 + share) * np.cos(theta0))
+    assert 10 < closed.sum() < len(closed) - 10
+    assert (np.diff(closed.astype(int)) <= 0).all()
+    assert (result["lambda.surface"][closed] > 0).all()
+    assert np.abs(result["lambda.surface"] - normal)[closed].max() < allowed * weight
+    assert np.abs(result["Q.r"] - normal)[closed].max() < allowed * weight
+    assert np.abs(result["residual.surface"])[closed].max() <= 1e-15 * world["a"]
+    for name in ("lambda.surface", "Q.r", "Q.theta"):
+        assert (result[name][~closed] == 0).all()
+    assert (result["time"][closed] <= result["departure.surface.time"][-1]).all()
+    assert (result["time"][~closed] >= result["departure.surface.time"][-1]).all()
+
+
+@pytest.mark.parametrize("world", [EARTH, MOON, HEAVY], ids=["earth", "moon", "heavy"])
+@pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
+def test_after_the_departure_it_flies_a_parabola(fmu, world, tolerance, allowed):
+    """Off the sphere only gravity acts: x = r sin theta grows evenly and z = r cos theta falls by
+    g tau^2/2 from the departure's state; the energy stays m g a cos theta0, the total of rest."""
+    theta0, a, g = 0.2, world["a"], world["g"]
+    result = slide(fmu("Hemisphere"), world, theta0, 0.0, tolerance, 6.0, 300)
+    flying = ~result["contact.surface"]
+    assert flying.sum() > 50
+    last = result[-1]
+    angle, spin = last["departure.surface.theta"], last["departure.surface.velocity.theta"]
+    radius, rise = last["departure.surface.r"], last["departure.surface.velocity.r"]
+    assert radius == pytest.approx(a, rel=1e-14)
+    assert abs(rise) <= 1e-14 * a * spin
+    assert spin == pytest.approx(np.sqrt(g / a * np.cos(angle)), rel=10 * allowed)
+    tau = result["time"][flying] - last["departure.surface.time"]
+    x = a * np.sin(angle) + a * spin * np.cos(angle) * tau
+    z = a * np.cos(angle) - a * spin * np.sin(angle) * tau - g * tau**2 / 2
+    r, theta = result["r"][flying], result["theta"][flying]
+    size = np.hypot(x, z)
+    assert np.abs((r * np.sin(theta) - x) / size).max() < allowed
+    assert np.abs((r * np.cos(theta) - z) / size).max() < allowed
+    energy = world["m"] * g * a * np.cos(theta0)
+    assert np.abs(result["energy.total"] - energy).max() < 30 * allowed * energy
+
+
+def test_no_departure_no_departure_state(fmu):
+    """Exactly on the top the particle balances: lambda = m g, and the departure is a finite zero."""
+    result = slide(fmu("Hemisphere"), EARTH, 0.0, stop=10.0, points=5)
+    assert (result["contact.surface"]).all()
+    np.testing.assert_allclose(result["lambda.surface"], 9.81, rtol=1e-14)
+    for name in ("count", "time", "r", "theta", "velocity.r", "velocity.theta"):
+        assert (result[f"departure.surface.{name}"] == 0).all()
+
+
+# ------------------------------------------------------------------------------------ the start
+
+
+def parabola(t, radius, theta0, speed, g):
+    """x and z of a particle thrown along the tangent from (radius, theta0) with `speed`."""
+    x = radius * np.sin(theta0) + speed * np.cos(theta0) * t
+    z = radius * np.cos(theta0) - speed * np.sin(theta0) * t - g * t**2 / 2
+    return x, z
+
+
+def check_parabola(result, radius, theta0, speed, g=9.81):
+    x, z = parabola(result["time"], radius, theta0, speed, g)
+    r, theta = result["r"], result["theta"]
+    assert np.abs(r * np.sin(theta) - x).max() < 1e-11
+    assert np.abs(r * np.cos(theta) - z).max() < 1e-11
+
+
+def test_a_start_inside_the_sphere_is_moved_onto_its_surface(fmu):
+    """A particle put at r = 1 inside a sphere of a = 2 is put on its surface, r = 2, with a warning
+    that names the value, and slides from there."""
+    with instance(fmu("Hemisphere")) as one:
+        one.start({"a": 2.0, "theta": 0.3}, tolerance=1e-12)
+        assert one.get("r") == 2.0
+        assert one.get("theta") == 0.3
+        assert one.get("contact.surface")
+        assert one.get("lambda.surface") == pytest.approx(9.81 * np.cos(0.3), rel=1e-14)
+        assert [(status, category) for status, category, _ in one.log] == [(1, "logStatusWarning")]
+        message = one.log[0][2]
+        assert "start value r = 1.0" in message
+        assert "projected to 2.0" in message
+        one.step(3.0)
+        angle = one.get("departure.surface.theta")
+        assert np.cos(angle) == pytest.approx(2 / 3 * np.cos(0.3), abs=1e-11)
+
+
+def test_a_start_above_the_sphere_is_in_flight(fmu):
+    """r = 1 over a sphere of a = 0.5: the particle is in free flight from the start, nothing is moved,
+    lambda is 0, and no departure is counted."""
+    with instance(fmu("Hemisphere")) as one:
+        one.start({"a": 0.5, "theta": 1.4}, tolerance=1e-12)
+        assert one.get("r") == 1.0
+        assert not one.get("contact.surface")
+        assert one.get("lambda.surface") == 0
+        assert one.get("residual.surface") == 0.5
+        assert one.log == []
+    result = fmpy.simulate_fmu(
+        str(fmu("Hemisphere")),
+        stop_time=0.3,
+        output_interval=0.01,
+        relative_tolerance=1e-12,
+        start_values={"a": 0.5, "theta": 1.4, "der(theta)": 0.2},
+    )
+    assert not result["contact.surface"].any()
+    assert (result["lambda.surface"] == 0).all()
+    assert (result["departure.surface.count"] == 0).all()
+    check_parabola(result, 1.0, 1.4, 0.2)
+
+
+@pytest.mark.parametrize("share", [1 + 1e-6, 1.1, 4.0])
+def test_too_fast_for_the_sphere_it_flies_at_once(fmu, share):
+    """With v0^2 > g a cos theta0 gravity cannot hold the particle on the sphere: it starts open and
+    flies a parabola, and since it was never on the surface no departure is counted."""
+    theta0 = 0.3
+    result = slide(fmu("Hemisphere"), EARTH, theta0, share, 1e-12, 1.0, 20)
+    assert not result["contact.surface"].any()
+    assert (result["lambda.surface"] == 0).all()
+    assert (result["departure.surface.count"] == 0).all()
+    assert (result["residual.surface"] >= 0).all()
+    check_parabola(result, 1.0, theta0, np.sqrt(share * 9.81 * np.cos(theta0)))

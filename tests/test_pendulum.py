@@ -1,0 +1,190 @@
+"""Simple pendulum in x and y with a multiplier, in theta alone, and with lambda eliminated (ME 6590,
+eq. 9), through fmpy on the built FMUs, against Jacobi's elliptic functions."""
+
+from __future__ import annotations
+
+import fmpy
+import numpy as np
+import pytest
+from instance import instance
+from scipy.special import ellipj, ellipk
+
+NAMES = ("PendulumCartesian", "PendulumAngle", "PendulumNullspace")
+EVERY = pytest.mark.parametrize("name", NAMES)
+DEFAULT = {"m": 1.0, "g": 9.81, "L": 1.0}
+OTHER = {"m": 0.02, "g": 1.62, "L": 40.0}
+
+
+def swing(path, theta0, rate=0.0, world=DEFAULT, stop=5.0, tolerance=1e-12, points=100):
+    """From theta0 [rad] with theta' = rate [rad/s]; each FMU is started in its own coordinates."""
+    L = world["L"]
+    if path.stem == "PendulumAngle":
+        start = {"theta": theta0, "der(theta)": rate}
+    else:
+        start = {
+            "x": L * np.sin(theta0),
+            "y": -L * np.cos(theta0),
+            "der(x)": L * rate * np.cos(theta0),
+            "der(y)": L * rate * np.sin(theta0),
+        }
+    return fmpy.simulate_fmu(
+        str(path),
+        stop_time=stop,
+        output_interval=stop / points,
+        step_size=stop / points,
+        relative_tolerance=tolerance,
+        start_values={**world, **start},
+    )
+
+
+def libration(t, theta0, g, L):
+    """theta and theta' from rest at theta0: sin(theta/2) = k sn(w t + K, k), k = sin(theta0/2)."""
+    w, k = np.sqrt(g / L), np.sin(theta0 / 2)
+    sn, cn, _, _ = ellipj(w * t + ellipk(k**2), k**2)
+    return 2 * np.arcsin(k * sn), 2 * k * w * cn
+
+
+def rotation(t, rate, g, L):
+    """theta (unwrapped) and theta' from the bottom with rate > 2 sqrt(g/L): theta/2 = am(rate t/2)."""
+    m = 4 * g / L / rate**2
+    _, _, dn, amplitude = ellipj(rate * t / 2, m)
+    return 2 * amplitude, rate * dn
+
+
+def multiplier(theta, rate, world):
+    """lambda = -T/(2 L) [N/m] with the tension T = m (L theta'^2 + g cos theta)."""
+    return -world["m"] * (world["L"] * rate**2 + world["g"] * np.cos(theta)) / (2 * world["L"])
+
+
+@pytest.mark.parametrize(
+    ("theta0", "rate", "world"),
+    [(1.0, 0.0, DEFAULT), (3.0, 0.0, DEFAULT), (0.4, 7.5, DEFAULT), (2.0, -0.1, OTHER)],
+    ids=["one radian", "nearly upright", "rotating", "on the Moon"],
+)
+def test_three_formulations_give_one_multiplier(fmu, theta0, rate, world):
+    """lambda is a property of the motion: with the multiplier solved for, eliminated, or not there at
+    all, the same rod pulls with the same force, and the bob is at the same place."""
+    cartesian, angle, nullspace = (swing(fmu(n), theta0, rate, world) for n in NAMES)
+    weight, L = world["m"] * world["g"], world["L"]
+    for other in (angle, nullspace):
+        for variable, scale in (
+            ("lambda.rod", weight / L),
+            ("Q.x", weight),
+            ("Q.y", weight),
+            ("x", L),
+            ("y", L),
+            ("der(x,2)", world["g"]),
+            ("der(y,2)", world["g"]),
+        ):
+            error = np.abs(cartesian[variable] - other[variable]).max()
+            assert error <= 1e-10 * scale, variable
+
+
+@EVERY
+@pytest.mark.parametrize(("theta0", "allowed"), [(1e-3, 1e-10), (1.0, 1e-10), (3.0, 1e-10)])
+def test_motion_and_multiplier_are_elliptic_functions(fmu, name, theta0, allowed):
+    """sin(theta/2) = k sn(w t + K) with k = sin(theta0/2), and
+    lambda = -m (L theta'^2 + g cos theta)/(2 L), for small and for nearly upright swings."""
+    result = swing(fmu(name), theta0, stop=6.0)
+    theta, rate = libration(result["time"], theta0, 9.81, 1.0)
+    assert np.abs(result["x"] - np.sin(theta)).max() < allowed
+    assert np.abs(result["y"] + np.cos(theta)).max() < allowed
+    assert np.abs(result["lambda.rod"] - multiplier(theta, rate, DEFAULT)).max() < allowed * 9.81
+    if name == "PendulumAngle":
+        assert np.abs(result["theta"] - theta).max() < allowed
+
+
+@EVERY
+@pytest.mark.parametrize("theta0", [0.01, 1.0, 2.5, 3.0])
+def test_the_period_is_four_complete_elliptic_integrals(fmu, name, theta0):
+    """After T = 4 K(sin(theta0/2)) sqrt(L/g) the bob is back where it was let go and at rest; after
+    T/2 it is on the other side."""
+    period = 4 * ellipk(np.sin(theta0 / 2) ** 2) / np.sqrt(9.81)
+    result = swing(fmu(name), theta0, stop=period, points=2)
+    speed = np.hypot(result["der(x)"], result["der(y)"])
+    # a time error dt leaves the speed g sin(theta0) dt
+    assert speed[1:].max() / (9.81 * np.sin(theta0)) < 1e-10 * period
+    np.testing.assert_allclose(result["x"], np.sin(theta0) * np.array([1, -1, 1]), atol=1e-10)
+    np.testing.assert_allclose(result["y"], -np.cos(theta0), atol=1e-10)
+
+
+@EVERY
+def test_a_fast_pendulum_rotates(fmu, name):
+    """Pushed at the bottom with theta' = 7 > 2 sqrt(g/L), it goes round and round: theta/2 is
+    Jacobi's amplitude, and the rod is pulled all the time, hardest at the bottom."""
+    result = swing(fmu(name), 0.0, 7.0, stop=4.0)
+    theta, rate = rotation(result["time"], 7.0, 9.81, 1.0)
+    assert theta[-1] > 4 * np.pi
+    assert np.abs(result["x"] - np.sin(theta)).max() < 1e-10
+    assert np.abs(result["lambda.rod"] - multiplier(theta, rate, DEFAULT)).max() < 1e-10 * 49
+    assert (result["lambda.rod"] < 0).all()
+    if name == "PendulumAngle":
+        assert np.abs(result["theta"] - theta).max() < 1e-10 * theta[-1]
+
+
+@EVERY
+def test_the_defaults_hold_the_default_tolerance(fmu, name):
+    """Ten seconds of the FMU as it comes, at the tolerance 1e-8 that it states: lambda stays within
+    1e-6 of the elliptic function's, in units of the weight."""
+    result = swing(fmu(name), 1.0, stop=10.0, tolerance=None)
+    theta, rate = libration(result["time"], 1.0, 9.81, 1.0)
+    assert np.abs(result["lambda.rod"] - multiplier(theta, rate, DEFAULT)).max() < 1e-6 * 9.81
+
+
+def test_the_rod_keeps_its_length_for_a_thousand_seconds(fmu):
+    """|x^2 + y^2 - L^2| <= 1e-12 L^2 at every communication point of 1,000 s, and the velocity stays
+    at right angles to the rod."""
+    result = swing(fmu("PendulumCartesian"), 1.0, stop=1000.0, tolerance=None, points=2000)
+    x, y = result["x"], result["y"]
+    assert len(x) == 2001
+    assert np.abs(x**2 + y**2 - 1).max() <= 1e-12
+    assert np.abs(result["residual.rod"]).max() <= 1e-12
+    assert np.abs(x * result["der(x)"] + y * result["der(y)"]).max() <= 1e-12
+    assert np.abs(result["energy.total"] - result["energy.total"][0]).max() < 1e-3
+
+
+def test_the_rods_force_does_no_work(fmu):
+    """Q stands at right angles to the velocity: energy is constant, Q_x x' + Q_y y' = 0."""
+    result = swing(fmu("PendulumCartesian"), 2.0)
+    power = result["Q.x"] * result["der(x)"] + result["Q.y"] * result["der(y)"]
+    assert np.abs(power).max() < 1e-13
+    assert np.abs(result["energy.total"] - result["energy.total"][0]).max() < 1e-11 * 9.81
+
+
+def test_theta_determines_x_and_y(fmu):
+    """With the embedding theta alone is free: x = L sin theta and y = -L cos theta follow, with their
+    velocities, and follow a change of L too."""
+    with instance(fmu("PendulumAngle")) as one:
+        kinds = {n: (v.causality, v.initial) for n, v in one.variables.items()}
+        assert kinds["theta"] == ("output", "exact")
+        for name in ("x", "y", "der(x)", "der(y)", "lambda.rod"):
+            assert kinds[name] == ("output", "calculated")
+        one.start({"theta": 0.7, "der(theta)": 2.0, "L": 3.0})
+        assert one.get("x") == pytest.approx(3 * np.sin(0.7), rel=1e-15)
+        assert one.get("y") == pytest.approx(-3 * np.cos(0.7), rel=1e-15)
+        assert one.get("der(x)") == pytest.approx(6 * np.cos(0.7), rel=1e-15)
+        assert one.get("der(y)") == pytest.approx(6 * np.sin(0.7), rel=1e-15)
+        assert one.log == []
+
+
+@pytest.mark.parametrize("name", ["x", "y", "der(x)"])
+def test_a_calculated_coordinate_cannot_be_set(fmu, name):
+    """x of the pendulum in theta is an outcome: setting it is an error that says so."""
+    with instance(fmu("PendulumAngle")) as one:
+        with pytest.raises(Exception, match="failed with status 3"):
+            one.start({name: 0.5})
+        assert any(f"'{name}' is calculated and cannot be set" in text for _, _, text in one.log)
+
+
+def test_a_start_off_the_circle_is_moved_onto_it(fmu):
+    """A bob put at (0.6, -0.9) on a rod of length 1 moves along the rod to the circle, and a velocity
+    along the rod is taken away: both are reported."""
+    with instance(fmu("PendulumCartesian")) as one:
+        one.start({"x": 0.6, "y": -0.9, "der(x)": 0.6, "der(y)": -0.9})
+        length = np.hypot(0.6, 0.9)
+        assert one.get("x") == pytest.approx(0.6 / length, rel=1e-14)
+        assert one.get("y") == pytest.approx(-0.9 / length, rel=1e-14)
+        assert abs(one.get("der(x)")) < 1e-15
+        assert abs(one.get("der(y)")) < 1e-15
+        assert len(one.log) == 4
+        assert {status for status, _, _ in one.log} == {1}
