@@ -16,9 +16,10 @@ from rich.table import Table
 
 from .build import write
 from .errors import LagfmuError, SimulationError
-from .modelfile import load
+from .modelfile import ModelFile, load
 from .plot import plot
 from .prepare import prepare
+from .scene import Scene
 from .show import show as show_prepared
 from .simulate import read_description, simulate
 from .verify import Verification, verify
@@ -52,11 +53,15 @@ def _plainly() -> Iterator[None]:
         try:
             yield
         except LagfmuError as error:
-            errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
+            errors.print(
+                f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
+            )
             raise typer.Exit(1) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
-                errors.print(f"[yellow]warning:[/] {escape(message)}", highlight=False)
+                errors.print(
+                    f"[yellow]warning:[/] {escape(message)}", highlight=False, soft_wrap=True
+                )
 
 
 def _ours(warning: Any) -> bool:
@@ -76,15 +81,14 @@ def build(
     failed = False
     with _plainly():
         file = load(model)
-        scenes = [s for s in file.scenes if scene is None or s.name in scene]
-        if not scenes:
-            known = ", ".join(s.name for s in file.scenes)
-            raise LagfmuError(f"{model}: no FMU is called {', '.join(scene or ())}; known: {known}")
-        for s in scenes:
+        for s in _chosen(file, scene):
             with console.status(f"building {s.name}"):
                 prepared = prepare(file.model, s)
                 path = write(prepared, out / "python", file.closed_forms)
-            console.print(f"[green]built[/] {path} ({path.stat().st_size / 1e3:.0f} kB)")
+            console.print(
+                f"[green]built[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
+                soft_wrap=True,
+            )
             if check:
                 with console.status(f"verifying {s.name}"):
                     found = verify(path)
@@ -103,9 +107,8 @@ def show(
     """Print equations of motion, classification of constraints, degrees of freedom and units."""
     with _plainly():
         file = load(model)
-        for s in file.scenes:
-            if scene is None or s.name == scene:
-                show_prepared(prepare(file.model, s), console)
+        for s in _chosen(file, None if scene is None else [scene]):
+            show_prepared(prepare(file.model, s), console)
 
 
 @app.command(name="verify")
@@ -145,11 +148,7 @@ def simulate_command(
         source: Any = target
         if target.suffix == ".py":
             file = load(target)
-            scenes = [s for s in file.scenes if scene is None or s.name == scene]
-            if not scenes:
-                known = ", ".join(s.name for s in file.scenes)
-                raise SimulationError(f"{target}: no FMU is called {scene!r}; known: {known}")
-            source = prepare(file.model, scenes[0])
+            source = prepare(file.model, _chosen(file, None if scene is None else [scene])[0])
             name = source.scene.name
             units = {v.name: v.unit.name for v in source.table.variables if v.unit is not None}
         else:
@@ -161,9 +160,21 @@ def simulate_command(
         _print_last(name, result, units)
         if csv is not None:
             _save(csv, result)
-            console.print(f"[green]wrote[/] {csv}")
+            console.print(f"[green]wrote[/] {escape(str(csv))}", soft_wrap=True)
         if plot_ is not None:
-            console.print(f"[green]wrote[/] {plot(result, units, plot_, variable or (), name)}")
+            console.print(
+                f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
+                soft_wrap=True,
+            )
+
+
+def _chosen(file: ModelFile, names: list[str] | None) -> list[Scene]:
+    """The scenes of a file that are called so; all of them without names."""
+    known = [s.name for s in file.scenes]
+    unknown = ", ".join(repr(n) for n in names or [] if n not in known)
+    if unknown:
+        raise LagfmuError(f"{file.path}: no FMU is called {unknown}; known: {', '.join(known)}")
+    return [s for s in file.scenes if names is None or s.name in names]
 
 
 def _assignments(texts: list[str] | None) -> dict[str, Any]:
@@ -194,7 +205,11 @@ def _print(found: Verification) -> None:
     console.print(table)
     for check in found.checks:
         if not check.passed and check.detail:
-            errors.print(f"[red]{escape(check.name)}:[/] {escape(check.detail)}", highlight=False)
+            errors.print(
+                f"[red]{escape(check.name)}:[/] {escape(check.detail)}",
+                highlight=False,
+                soft_wrap=True,
+            )
 
 
 def _print_last(name: str, result: Any, units: dict[str, str]) -> None:

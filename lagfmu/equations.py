@@ -116,7 +116,7 @@ def derive(model: Model) -> EquationsOfMotion:
             row, drift = _pfaffian(constraint, expression, v, problems)
             f.append(None)
         else:
-            row = {j: d for j, d in _gradient(expression, q)}
+            row = dict(_gradient(expression, q))
             drift = clock.partial(expression)
             f.append(expression)
         G.update({(k, j): a for j, a in row.items()})

@@ -14,6 +14,8 @@ from __future__ import annotations
 import itertools
 import random
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from functools import lru_cache
 from typing import Any
 
 from sympy import (
@@ -41,8 +43,8 @@ from sympy import (
     expand,
     eye,
     factor_list,
-    factorial,
     factor_terms,
+    factorial,
     ilcm,
     integrate,
     log,
@@ -94,7 +96,7 @@ def first_integrals(
         system.offer(f)
     if not system.complete():
         system.linear()
-    for row in (*forms, *rows):
+    for row in forms if forms and len(rows) == 1 else (*forms, *rows):
         if not system.complete() and not late() and system.contains(row):
             system.offer(single(row, variables))
     for degree in (1, 2, 3):
@@ -102,7 +104,8 @@ def first_integrals(
             system.ansatz(degree)
     for f in list(system.found):
         if not system.complete() and not late() and depth < 3:
-            system.eliminate(f, depth)
+            with suppress(*_FAILURES):
+                system.eliminate(f, depth)
     return system.found
 
 
@@ -261,6 +264,13 @@ def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Ex
         form = _Form(row, variables)
     except _FAILURES:
         return None
+    try:
+        given = [form.tower.element(entry) for entry in form.given]
+        if len(given) > 1 and form.exact(given):  # then no factor makes it easier
+            f = potential(form.given, form.x)
+            return f if f is not None and form.solves(f) else None
+    except _FAILURES:
+        return None
     for method in form.methods(depth):
         try:
             for f in method:
@@ -341,7 +351,7 @@ class _Form:
         if len(self.x) < 2:
             return [iter(self.x)]
         found = [
-            self.already_exact(),
+            self.exact_without_factors(),
             self.by_factors(self.bernoulli()),
             self.by_factors(self.separable()),
             self.homogeneous(depth),
@@ -350,10 +360,7 @@ class _Form:
         ]
         return [*found, self.natani(depth)] if len(self.x) > 2 and depth < 3 else found
 
-    def already_exact(self) -> Iterator[Expr | None]:
-        given = [self.tower.element(entry) for entry in self.given]
-        if self.exact(given):
-            yield potential(self.given, self.x)
+    def exact_without_factors(self) -> Iterator[Expr | None]:
         if self.exact(self.a):
             yield tidy(potential(self.terms, self.x))
 
@@ -588,6 +595,11 @@ def _primitive_of(term: Expr, x: Expr) -> Expr | None:
             if not term.subs(x, low).has(S.NaN, S.ComplexInfinity, S.Infinity):
                 return Integral(term.xreplace({x: s}), (s, low, x))
         return None
+    return _search(term, x)
+
+
+@lru_cache(maxsize=500)
+def _search(term: Expr, x: Expr) -> Expr | None:
     # where all symbols are positive: the primitive is verified for what they are, afterwards
     names = {v: Dummy(v.name, positive=True) for v in sorted(term.free_symbols | {x}, key=str)}
     plain, variable = term.xreplace(names), names[x]
@@ -619,8 +631,16 @@ def _heuristics(term: Expr, x: Expr) -> Expr | None:
         if node.has(x) and not (isinstance(node, Pow) and node.exp.is_Integer)
     }
     curved = {u for u in curved if u.diff(x).has(x)}
-    if len(curved) > 1 or (curved and term.count_ops() > 25):
+    if len(curved) > 1:
         return None
+    if curved:
+        (u,), v = curved, Dummy("v", positive=True)
+        plain = (term / u.diff(x)).subs(u, v)
+        if not plain.has(x):
+            found = _heuristics(plain, v)
+            return found if found is None else found.xreplace({v: u})
+        if term.count_ops() > 10:
+            return None
     found = manualintegrate(term, x)
     if not found.has(Integral):
         return found
@@ -746,7 +766,7 @@ def _exponentials(A: Expr, s: Expr) -> Iterator[list[Expr]]:
     """Real row vectors l exp(-A s), where the characteristic polynomial's factors allow it."""
     count = A.shape[0]
     z = Dummy("z")
-    polynomial = together(A.charpoly(z).as_expr()).as_numer_denom()[0]
+    polynomial = together(A.charpoly(z).as_expr(z)).as_numer_denom()[0]
     for factor, power in factor_list(polynomial)[1]:
         degree = Poly(factor, z).degree()
         if degree not in (1, 2) or (degree == 2 and power > 1):

@@ -60,10 +60,10 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
     problems: list[str] = []
     scenes = _listed(module, "scenes", (Scene,), problems) or (Scene(model.name),)
     forms = _listed(module, "closed_forms", (ClosedForm, Conserved), problems)
-    names = [s.name for s in scenes if isinstance(s, Scene)]
+    titles = [s.name for s in scenes if isinstance(s, Scene)]
     problems += [
         f"scenes hold the name {name!r} twice, so that one FMU would replace the other: rename one"
-        for name in sorted({n for n in names if names.count(n) > 1})
+        for name in sorted({n for n in titles if titles.count(n) > 1})
     ]
     if problems:
         raise ModelError(str(file), problems)

@@ -186,10 +186,17 @@ def _simulate_fmu(
             start_values=values,
             input=inputs,
             logger=logger,
+            debug_logging=True,
         )
-        return result
     except FMICallException as error:
         cause = "; ".join(messages) or "no message was logged"
         raise SimulationError(f"{str(path)!r}: {error} ({cause})") from None
     except Exception as error:
         raise SimulationError(f"{str(path)!r} cannot be simulated: {error}") from None
+    reached = float(result["time"][-1])
+    if reached < stop * (1 - 1e-9):  # fmpy ends a run at fmi2Discard without a word
+        cause = "; ".join(messages) or "no message was logged"
+        raise SimulationError(
+            f"{str(path)!r}: the run ends at t = {reached!r} s, before {stop!r} s ({cause})"
+        )
+    return result

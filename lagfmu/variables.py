@@ -450,10 +450,10 @@ class _Builder:
     def contact_outputs(self) -> list[Variable]:
         variables = []
         coordinates = [(str(q), str(v)) for q, v in zip(self.eom.q, self.eom.v, strict=True)]
-        for c in self.model.constraints:
+        for k, c in enumerate(self.model.constraints):
             if not isinstance(c, Contact):
                 continue
-            names = self.at_start(self.known)
+            names = self.known | self.group(row=k)  # it opens and closes by f, its rate and lambda
             head = f"departure.{c.name}"
             tail = f"the latest departure from {c.name}, 0 before the first"
             variables += [

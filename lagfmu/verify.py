@@ -72,9 +72,14 @@ class Verification:
         return all(c.points for c in self.checks)
 
     def rows(self) -> list[tuple[str, str, str, str]]:
-        """(statement, largest error, allowed, verdict) as text."""
+        """(statement, largest error, allowed, verdict) as text; no figures where it is yes or no."""
         return [
-            (c.name, f"{c.error:.1e}" if c.points else "", f"{c.allowed:.0e}", c.verdict)
+            (
+                c.name,
+                f"{c.error:.1e}" if c.points and c.allowed else "",
+                f"{c.allowed:.0e}" if c.allowed else "",
+                c.verdict,
+            )
             for c in self.checks
         ]
 

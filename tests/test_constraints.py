@@ -2,6 +2,7 @@
 
 import itertools
 import random
+import time
 
 import pytest
 from sympy import (
@@ -52,6 +53,14 @@ def check(answer, kind, rank, depth, found=None):
 # --- one form ------------------------------------------------------------------------------
 
 HOLONOMIC = {
+    "rolling on a line": (d(x) - R * d(theta), [x, theta]),
+    "1/x": (d(x) / x + d(y), [x, y]),
+    "in the rotating frame": (
+        d(y) * cos(omega * t)
+        - d(x) * sin(omega * t)
+        - omega * (x * cos(omega * t) + y * sin(omega * t)),
+        [x, y],
+    ),
     "rolling without slipping": (d(y) - R * d(theta), [y, theta]),
     "circle": (x * d(x) + y * d(y), [x, y]),
     "moving wall": (d(x) - v0, [x]),
@@ -66,6 +75,25 @@ HOLONOMIC = {
 }
 
 INTEGRABLE = {
+    "homogeneous, sin(y/x)": ((y + x * sin(y / x)) * d(x) - x * d(y), [x, y]),
+    "homogeneous, exp(y/x)": ((y + x * exp(y / x)) * d(x) - x * d(y), [x, y]),
+    "homogeneous, spiral": ((x + y) * d(x) - (x - y) * d(y), [x, y]),
+    "angle": (y * d(x) - x * d(y) + (x**2 + y**2) * d(theta), [x, y, theta]),
+    "bead on a rod": (d(x) - x * omega, [x]),
+    "relaxation to a speed": (d(x) + alpha * x - v0, [x]),
+    "driven relaxation": (d(x) + alpha * x - v0 * sin(omega * t), [x]),
+    "logistic growth": (d(x) - alpha * x * (1 - x / l), [x]),
+    "Torricelli": (d(x) + alpha * sqrt(x), [x]),
+    "sin(phi) factor": (sin(phi) * (d(x) - R * d(theta)), [x, theta, phi]),
+    "yz dx + 2xz dy + 3xy dz": (
+        y * z * d(x) + 2 * x * z * d(y) + 3 * x * y * d(z),
+        [x, y, z],
+    ),
+    "yz dx + (xz - yz^3) dy - 2xy dz": (
+        y * z * d(x) + (x * z - y * z**3) * d(y) - 2 * x * y * d(z),
+        [x, y, z],
+    ),
+    "spheres": ((y**2 + z**2 - x**2) * d(x) - 2 * x * y * d(y) - 2 * x * z * d(z), [x, y, z]),
     "y dx - x dy": (y * d(x) - x * d(y), [x, y]),
     "exponential growth": (d(x) - omega * x, [x]),
     "nowhere-zero factor": (exp(x) * (d(x) + d(y)), [x, y]),
@@ -84,6 +112,8 @@ INTEGRABLE = {
 }
 
 NONHOLONOMIC = {
+    "rotating line": (sin(omega * t) * d(x) - cos(omega * t) * d(y), [x, y]),
+    "Chaplygin sleigh": (sin(phi) * d(x) - cos(phi) * d(y) - alpha * d(phi), [x, y, phi]),
     "knife edge": (sin(phi) * d(x) - cos(phi) * d(y), [x, y, phi]),
     "Chaplygin sleigh, moving": (
         sin(phi) * d(x) - cos(phi) * d(y) - alpha * exp(t) * d(phi),
@@ -134,6 +164,15 @@ def test_riccati_is_integrable_but_not_in_closed_form():
     assert "closed form" in answer.certificate
 
 
+def test_no_closed_form_is_quick():
+    """exp(-x^2) sin(x^3) has no elementary integral: the form is exact, f is not written down."""
+    begun = time.monotonic()
+    answer = classify(exp(-(x**2)) * sin(x**3) * d(x) + d(y), [x, y])
+    check(answer, Kind.HOLONOMIC, 1, 1, found=0)
+    assert "closed form" in answer.certificate
+    assert time.monotonic() - begun < 20
+
+
 # --- sets ----------------------------------------------------------------------------------
 
 
@@ -168,7 +207,7 @@ def test_integrable_only_together():
 
 
 def test_neither_alone_but_together():
-    """e^y-multiples of dz and d(xy) mixed: neither form is integrable, both together are."""
+    """d(xy) + psi dz and dz - psi d(xy): neither is integrable; together, they span d(xy) and dz."""
     forms = [
         y * d(x) + x * d(y) + psi * d(z),
         d(z) - psi * (y * d(x) + x * d(y)),
@@ -203,6 +242,43 @@ def test_differential_drive():
     ]
     answer = check(classify(forms, [x, y, phi, theta, psi]), Kind.PARTLY, 3, 1)
     assert answer.flag == (3, 2, 1)
+
+
+LINEAR = {
+    "rotation": ([d(x) + omega * y, d(y) - omega * x], [x, y]),
+    "damped": ([d(x) - y, d(y) + 2 * x + 3 * y], [x, y]),
+    "aperiodic limit": ([d(x) - y, d(y) + x + 2 * y], [x, y]),
+    "oscillator": ([d(x) - y, d(y) + alpha * x], [x, y]),
+    "circle with drift": ([d(x) + omega * y - v0, d(y) - omega * x], [x, y]),
+    "forced": ([d(x) - y, d(y) + x - sin(omega * t)], [x, y]),
+    "integrators": ([d(x) - y, d(y) - z, d(z)], [x, y, z]),
+    "third order": ([d(x) - y, d(y) - z, d(z) + x], [x, y, z]),
+}
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_linear_system(name):
+    """x' = A x + c(t) has the n integrals exp(-A t) x - int exp(-A t) c dt."""
+    forms, names = LINEAR[name]
+    check(classify(forms, names), Kind.INTEGRABLE, len(names), len(names))
+
+
+def test_disk_with_a_given_heading():
+    """The rolling disk: phi' = 0 makes it integrable, as do a steady turn, and an arc."""
+    forms = [d(x) - R * cos(phi) * d(theta), d(y) - R * sin(phi) * d(theta)]
+    names = [x, y, theta, phi]
+    check(classify([*forms, d(phi)], names), Kind.INTEGRABLE, 3, 3)
+    check(classify([*forms, d(phi) - alpha * d(theta)], names), Kind.INTEGRABLE, 3, 3)
+    check(classify([*forms, d(phi) - omega, d(theta) - v0], names), Kind.INTEGRABLE, 4, 4)
+    answer = check(classify([*forms, d(phi) - omega], names), Kind.PARTLY, 3, 1)
+    assert answer.integrals[0].f == phi - omega * t
+
+
+def test_rotated_pair():
+    """cos dx + sin dy and -sin dx + cos dy are nonholonomic each; together, they are dx and dy."""
+    forms = [cos(psi) * d(x) + sin(psi) * d(y), -sin(psi) * d(x) + cos(psi) * d(y)]
+    answer = check(classify(forms, [x, y, psi]), Kind.INTEGRABLE, 2, 2)
+    assert [c.kind for c in answer.each] == [Kind.NONHOLONOMIC] * 2
 
 
 def test_exact_set_and_redundant_forms():

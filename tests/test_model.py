@@ -266,7 +266,9 @@ def test_a_pendulum_whose_pivot_is_driven_is_parametrically_excited():
     )
     times = np.linspace(0, 2, 201)
     b = 3.0
-    signal = np.zeros(len(times), [("time", float), ("u", float), ("der(u)", float), ("der(u,2)", float)])
+    signal = np.zeros(
+        len(times), [("time", float), ("u", float), ("der(u)", float), ("der(u,2)", float)]
+    )
     signal["time"], signal["u"] = times, b * times**2 / 2
     signal["der(u)"], signal["der(u,2)"] = b * times, b
     run = simulate(model, stop_time=2.0, step_size=0.01, inputs=signal)
@@ -296,6 +298,23 @@ def test_an_input_may_be_a_plain_symbol():
     )
     run = simulate(model, stop_time=1.0)
     assert run["x"][-1] == pytest.approx(1.5, rel=1e-12)
+
+
+def test_a_start_at_rest_is_set_in_motion_by_its_constraints():
+    """x' = w L drives y' = x' with no force along either: at rest both are projected to w L."""
+    w = symbols("w", positive=True)
+    model = Model(
+        name="Rail",
+        lagrangian=K,
+        coordinates={x: "m", y: "m"},
+        constraints=[
+            Nonholonomic("steer", x.diff() / 3 - y.diff() * 0.7),
+            Holonomic("rail", x - w * L * t),
+        ],
+        parameters=(CONSTANTS[0], CONSTANTS[2], Parameter(w, 0.1, "1/s")),
+    )
+    assert observed(model)["der(x)"] == pytest.approx(0.15)
+    assert observed(model)["der(y)"] == pytest.approx(0.15 / 2.1)
 
 
 # ---------------------------------------------------------------------------- sparsity
@@ -380,13 +399,17 @@ def test_an_embedding_may_depend_on_time_and_leave_constraints():
         name="Wire",
         lagrangian=K,
         coordinates={x: "m", y: "m"},
-        constraints=[Nonholonomic("wire", y.diff() * cos(w * t) - x.diff() * sin(w * t)
-                                  - w * (x * cos(w * t) + y * sin(w * t)))],
+        constraints=[
+            Nonholonomic(
+                "wire",
+                y.diff() * cos(w * t)
+                - x.diff() * sin(w * t)
+                - w * (x * cos(w * t) + y * sin(w * t)),
+            )
+        ],
         parameters=(CONSTANTS[0], Parameter(w, 2.0, "rad/s")),
         start={x: 0.5},
-        embedding=Embedding(
-            {s: "m"}, {x: s * cos(w * t), y: s * sin(w * t)}, {s: 0.5}
-        ),
+        embedding=Embedding({s: "m"}, {x: s * cos(w * t), y: s * sin(w * t)}, {s: 0.5}),
     )
     run = simulate(model, stop_time=1.0, scene=Scene("W", formulation="minimal"))
     radius = 0.5 * np.cosh(2 * run["time"])

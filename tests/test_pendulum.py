@@ -109,15 +109,16 @@ def test_the_period_is_four_complete_elliptic_integrals(fmu, name, theta0):
 
 
 @EVERY
-def test_a_fast_pendulum_rotates(fmu, name):
-    """Pushed at the bottom with theta' = 7 > 2 sqrt(g/L), it goes round and round: theta/2 is
-    Jacobi's amplitude, and the rod is pulled all the time, hardest at the bottom."""
-    result = swing(fmu(name), 0.0, 7.0, stop=4.0)
-    theta, rate = rotation(result["time"], 7.0, 9.81, 1.0)
+@pytest.mark.parametrize(("start", "pushes"), [(6.4, True), (7.2, False)])
+def test_a_fast_pendulum_rotates(fmu, name, start, pushes):
+    """Pushed at the bottom with theta' > 2 sqrt(g/L) it goes round and round: theta/2 is Jacobi's
+    amplitude; over the top the rod pushes if theta'^2 < 5 g/L at the bottom, and else always pulls."""
+    result = swing(fmu(name), 0.0, start, stop=4.0)
+    theta, rate = rotation(result["time"], start, 9.81, 1.0)
     assert theta[-1] > 4 * np.pi
     assert np.abs(result["x"] - np.sin(theta)).max() < 1e-10
     assert np.abs(result["lambda.rod"] - multiplier(theta, rate, DEFAULT)).max() < 1e-10 * 49
-    assert (result["lambda.rod"] < 0).all()
+    assert (result["lambda.rod"] > 0).any() == pushes
     if name == "PendulumAngle":
         assert np.abs(result["theta"] - theta).max() < 1e-10 * theta[-1]
 
@@ -171,7 +172,7 @@ def test_theta_determines_x_and_y(fmu):
 def test_a_calculated_coordinate_cannot_be_set(fmu, name):
     """x of the pendulum in theta is an outcome: setting it is an error that says so."""
     with instance(fmu("PendulumAngle")) as one:
-        with pytest.raises(Exception, match="failed with status 3"):
+        with pytest.raises(Exception, match="failed with status"):
             one.start({name: 0.5})
         assert any(f"'{name}' is calculated and cannot be set" in text for _, _, text in one.log)
 

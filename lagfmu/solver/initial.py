@@ -175,7 +175,8 @@ def _velocities(
     rows = system.active(shut)
     q, v = project(system, t, q, v0, u, p, rows, np.zeros(system.m), size)
     _, _, G, nu, _ = evaluate(system, t, q, v, u, p)
-    unit = np.abs(G) @ np.maximum(np.abs(v0), natural) + np.abs(nu)
+    fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
+    unit = np.abs(G) @ fastest + np.abs(nu)
     missed = [k for k in rows if abs(G[k] @ v - nu[k]) > 1e-9 * unit[k]]
     if missed:
         names = ", ".join(repr(system.rows[k].name) for k in missed)

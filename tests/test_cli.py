@@ -1,0 +1,254 @@
+"""The `lagfmu` command and build_fmus.py: what they print, write and return."""
+
+from __future__ import annotations
+
+import csv
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from lagfmu.cli import app
+
+REPOSITORY = Path(__file__).parent.parent
+MODELS = REPOSITORY / "models"
+
+SMALL = """
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+from lagfmu import ClosedForm, Holonomic, Model, Parameter, Scene
+x, y = dynamicsymbols("x y")
+m, g = symbols("m g", positive=True)
+model = Model(name="Link", lagrangian=m * x.diff() ** 2 / 2 - m * g * y,
+              coordinates={x: "m", y: "m"}, constraints=[Holonomic("link", x - y)],
+              parameters=[Parameter(m, 1.0, "kg"), Parameter(g, 9.81, "m/s^2")])
+scenes = [Scene("Link", stop_time=0.1), Scene("LinkMinimal", "minimal", stop_time=0.1)]
+closed_forms = [ClosedForm("der(x,2)", -g), ClosedForm("lambda.link", WRONG * m * g)]
+"""
+
+
+@pytest.fixture
+def small(tmp_path) -> Path:
+    """A model file whose closed form holds: the massless y hangs on x, lambda = -m g."""
+    file = tmp_path / "link.py"
+    file.write_text(SMALL.replace("WRONG", "-1"))
+    return file
+
+
+def lagfmu(*arguments, code=0) -> str:
+    """What the command prints, line breaks of the console undone; its exit status is `code`."""
+    result = CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "200"})
+    assert result.exit_code == code, result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    assert "Traceback" not in result.output
+    return " ".join(result.output.split())
+
+
+def test_build_writes_and_verifies_every_fmu_of_a_file(small, tmp_path):
+    """OUT/python/NAME.fmu for each scene; each is held against its closed forms."""
+    text = lagfmu("build", small, "--out", tmp_path / "dist")
+    assert "Link: pass" in text
+    assert "LinkMinimal: pass" in text
+    assert "lambda.link" in text
+    made = sorted(p.name for p in (tmp_path / "dist" / "python").iterdir())
+    assert made == ["Link.fmu", "LinkMinimal.fmu"]
+
+
+def test_build_takes_one_scene_and_may_skip_the_check(small, tmp_path):
+    """--scene and --no-check."""
+    text = lagfmu("build", small, "-o", tmp_path, "--scene", "LinkMinimal", "--no-check")
+    assert "pass" not in text
+    assert [p.name for p in (tmp_path / "python").iterdir()] == ["LinkMinimal.fmu"]
+    text = lagfmu("build", small, "-o", tmp_path, "--scene", "Chain", code=1)
+    assert "no FMU is called 'Chain'; known: Link, LinkMinimal" in text
+
+
+def test_a_closed_form_that_is_missed_makes_build_fail(tmp_path):
+    """The table says FAIL and the exit status is 1."""
+    file = tmp_path / "link.py"
+    file.write_text(SMALL.replace("WRONG", "1"))
+    text = lagfmu("build", file, "--out", tmp_path, "--scene", "Link", code=1)
+    assert "Link: FAIL" in text
+    assert lagfmu("verify", tmp_path / "python" / "Link.fmu", code=1).count("FAIL") >= 2
+
+
+def test_the_fmus_documentation_carries_the_verification(small, tmp_path):
+    """After the check the figures stand in documentation/index.html."""
+    lagfmu("build", small, "--out", tmp_path, "--scene", "Link")
+    with zipfile.ZipFile(tmp_path / "python" / "Link.fmu") as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert "lambda.link" in page
+    assert "pass" in page
+
+
+def test_show_prints_equations_degrees_of_freedom_classes_and_units():
+    """`lagfmu show` on the knife edge: 3 coordinates, 1 constraint, 2 degrees of freedom."""
+    text = lagfmu("show", MODELS / "knife_edge.py")
+    assert re.search(r"degrees of freedom\D*2\b|\b2 degrees of freedom|3 - 1 = 2", text), text
+    assert "nonholonomic" in text
+    for unit in ("lambda.edge", "Q.phi", "N.m", "rad"):
+        assert unit.replace(".", "·") in text or unit in text, unit
+
+
+def test_show_takes_one_scene():
+    """--scene PendulumAngle; an unknown one is named."""
+    assert "PendulumAngle" in lagfmu("show", MODELS / "pendulum.py", "--scene", "PendulumAngle")
+    text = lagfmu("show", MODELS / "pendulum.py", "--scene", "Nothing", code=1)
+    assert "'Nothing'" in text
+    assert "PendulumCartesian, PendulumAngle, PendulumNullspace" in text
+
+
+def test_verify_obeys_changed_parameters_and_settings(fmu):
+    """The closed forms follow --set; tolerance, stop time and step size are passed on."""
+    text = lagfmu(
+        *("verify", fmu("Hemisphere"), "--set", "theta=0.3", "--set", "g=3.7", "--set", "m=2"),
+        *("--stop-time", "1.5", "--step-size", "0.05", "--tolerance", "1e-10"),
+    )
+    assert "Hemisphere: pass" in text
+    assert "cos(theta) at the departure" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("--set", "theta"), ("--set 'theta'", "NAME=VALUE")),
+        (("--set", "=3"), ("--set '=3'", "NAME=VALUE")),
+        (("--set", "theta=wide"), ("theta=wide", "'wide' is no number")),
+        (("--set", "radius=1"), ("radius",)),
+        (("--stop-time", "-1"), ("stop_time = -1.0",)),
+        (("--step-size", "0"), ("step_size = 0.0",)),
+    ],
+)
+@pytest.mark.parametrize("command", ["verify", "simulate"])
+def test_settings_that_cannot_be_are_one_message(fmu, command, arguments, parts):
+    """Exit status 1, the setting and what was expected."""
+    text = lagfmu(command, fmu("Hemisphere"), *arguments, code=1)
+    assert "error:" in text
+    for part in parts:
+        assert part in text
+
+
+def test_simulate_writes_a_figure_and_a_table(fmu, tmp_path):
+    """--plot and --csv; the CSV has every output at every communication point."""
+    figure, table = tmp_path / "new" / "out.svg", tmp_path / "new" / "out.csv"
+    text = lagfmu(
+        *("simulate", fmu("Hemisphere"), "--plot", figure, "--csv", table),
+        *("--stop-time", "2", "--step-size", "0.1", "--set", "theta=0.1"),
+    )
+    assert "departure.surface.time" in text
+    svg = figure.read_text()
+    assert svg.startswith("<?xml")
+    assert len(svg) > 5000
+    with table.open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 21
+    assert float(rows[-1]["time"]) == 2.0
+    assert float(rows[0]["lambda.surface"]) == pytest.approx(9.81 * 0.995004165278, rel=1e-9)
+    assert float(rows[-1]["lambda.surface"]) == 0.0
+
+
+def test_simulate_takes_a_model_file_too(small, tmp_path):
+    """The same numbers without an FMU; --scene and --variable choose."""
+    figure, table = tmp_path / "out.png", tmp_path / "out.csv"
+    lagfmu(
+        *("simulate", small, "--scene", "LinkMinimal", "--plot", figure, "-v", "lambda.link"),
+        *("--csv", table),
+    )
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    with table.open() as file:
+        assert float(list(csv.DictReader(file))[-1]["x"]) == pytest.approx(-9.81 * 0.01 / 2)
+    text = lagfmu("simulate", small, "--scene", "Chain", code=1)
+    assert "'Chain'" in text
+    assert "Link, LinkMinimal" in text
+
+
+def test_figures_that_cannot_be_made_are_one_message(small, tmp_path):
+    """An unknown variable, an unknown format, a place that cannot be written."""
+    (tmp_path / "file").write_text("")
+    for options, parts in (
+        (("--plot", tmp_path / "a.svg", "-v", "lambda.rod"), ("lambda.rod", "lambda.link")),
+        (("--plot", tmp_path / "a.doc"), ("a.doc",)),
+        (("--plot", tmp_path / "file" / "a.svg"), ("a.svg",)),
+        (("--csv", tmp_path / "file" / "a.csv"), ("a.csv",)),
+    ):
+        text = lagfmu("simulate", small, *options, code=1)
+        assert "error:" in text
+        for part in parts:
+            assert part in text
+
+
+@pytest.mark.parametrize("command", ["build", "show", "verify", "simulate"])
+def test_files_that_are_no_good_are_one_message(command, tmp_path):
+    """Missing, or with nothing in it; never a traceback."""
+    assert "no such file" in lagfmu(command, tmp_path / "none.py", code=1)
+    (tmp_path / "empty.py").write_text("")
+    text = lagfmu(command, tmp_path / "empty.py", code=1)
+    assert "empty.py" in text
+
+
+def test_warnings_are_one_line_each(tmp_path):
+    """A redundant constraint: yellow, no source line, and the build goes on."""
+    file = tmp_path / "link.py"
+    twice = '[Holonomic("link", x - y), Holonomic("again", x - y)]'
+    text = SMALL.replace('[Holonomic("link", x - y)]', twice).replace("WRONG", "-0.5")
+    file.write_text(text)
+    printed = lagfmu("build", file, "-o", tmp_path, "--scene", "Link")
+    assert printed.count("warning:") == 1
+    assert "'again' follows from the others" in printed
+    assert "stacklevel" not in printed
+
+
+def test_a_failed_build_says_what_is_wrong_and_leaves_no_folder(tmp_path):
+    """All problems of the model in one list."""
+    file = tmp_path / "bad.py"
+    file.write_text(
+        SMALL.replace("WRONG", "1").replace('"m/s^2"', '"m/s"').replace("1.0, ", "-1, ")
+    )
+    text = lagfmu("build", file, "--out", tmp_path / "dist", code=1)
+    assert "declared positive" in text
+    assert not (tmp_path / "dist").exists()
+
+
+def test_help_names_every_command():
+    """lagfmu without arguments, and --help."""
+    for arguments, code in (((), 2), (("--help",), 0)):
+        text = lagfmu(*arguments, code=code)
+        for command in ("build", "show", "verify", "simulate"):
+            assert command in text
+
+
+def test_python_m_lagfmu_is_the_same_command():
+    """python -m lagfmu --help, in a process of its own."""
+    command = [sys.executable, "-m", "lagfmu", "--help"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert run.returncode == 0
+    assert "simulate" in run.stdout
+
+
+def test_build_fmus_builds_all_and_prints_one_table(tmp_path):
+    """python build_fmus.py --out DIR, from another folder: ten FMUs, each with its verdict."""
+    command = [sys.executable, str(REPOSITORY / "build_fmus.py"), "--out", str(tmp_path / "out")]
+    run = subprocess.run(
+        command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    made = sorted(p.stem for p in (tmp_path / "out" / "python").glob("*.fmu"))
+    assert len(made) == 10
+    for name in made:
+        assert name in run.stdout
+    assert "FAIL" not in run.stdout
+    assert "all 10 FMUs" in " ".join(run.stdout.split())
+
+
+def test_build_fmus_fails_where_it_cannot_write(tmp_path):
+    """A path below a file: exit status 1 and the reason, no traceback."""
+    (tmp_path / "file").write_text("")
+    command = [sys.executable, str(REPOSITORY / "build_fmus.py"), "--out", str(tmp_path / "file/x")]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert run.returncode == 1
+    assert "cannot write" in run.stdout
+    assert "Traceback" not in run.stdout + run.stderr

@@ -1,0 +1,128 @@
+"""Order and error of the integrators, and the dials that choose them, through fmpy on the pendulum's
+FMUs.  The reference are Jacobi's elliptic functions: sin(theta/2) = k sn(w t + K)."""
+
+from __future__ import annotations
+
+import fmpy
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+BOTH = pytest.mark.parametrize("name", ["PendulumAngle", "PendulumCartesian"])
+THETA0 = 1.0
+END = 5.0  # s, two and a half periods
+
+
+def run(path, stop=END, step=END, tolerance=None, **solver):
+    """From rest at THETA0; solver_method='rk4' sets solver.method."""
+    start = {name.replace("solver_", "solver."): value for name, value in solver.items()}
+    return fmpy.simulate_fmu(
+        str(path),
+        stop_time=stop,
+        output_interval=step,
+        step_size=step,
+        relative_tolerance=tolerance,
+        start_values=start,
+    )
+
+
+def error(result):
+    """Distance [m] of the bob from where it should be at the end, L = 1 m."""
+    w, k = np.sqrt(9.81), np.sin(THETA0 / 2)
+    sn = ellipj(w * result["time"][-1] + ellipk(k**2), k**2)[0]
+    theta = 2 * np.arcsin(k * sn)
+    return np.hypot(result["x"][-1] - np.sin(theta), result["y"][-1] + np.cos(theta))
+
+
+@BOTH
+def test_rk4_has_order_four(fmu, name):
+    """Halving the step of the classical Runge-Kutta method divides its error by 2^4, with projection
+    and without."""
+    steps = 0.05 / 2.0 ** np.arange(1, 6)
+    errors = [error(run(fmu(name), solver_method="rk4", solver_step=h)) for h in steps]
+    order = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.abs(order - 4).max() < 0.15
+
+
+@pytest.mark.parametrize(
+    ("step", "taken"),
+    [(0.3, 4), (0.25, 4), (0.2501, 4), (0.2499, 5), (0.7, 2), (5.0, 1), (0.01, 100)],
+)
+def test_fixed_steps_divide_the_communication_step(fmu, step, taken):
+    """h' = H / ceil(H / h): the steps are equal, at most solver.step long, and end at the
+    communication point."""
+    result = run(fmu("PendulumAngle"), 3.0, 1.0, solver_method="rk4", solver_step=step)
+    assert list(result["solver.steps"]) == [0, taken, 2 * taken, 3 * taken]
+    equal = run(fmu("PendulumAngle"), 3.0, 1.0, solver_method="rk4", solver_step=1 / taken)
+    np.testing.assert_array_equal(result["theta"], equal["theta"])
+
+
+def test_rk4_without_a_step_chooses_one(fmu):
+    """solver.step = 0 leaves the choice to the FMU: a hundredth of the pendulum's natural time, good
+    for six digits."""
+    result = run(fmu("PendulumAngle"), solver_method="rk4")
+    assert 200 < result["solver.steps"][-1] < 5000
+    assert error(result) < 1e-6
+
+
+@BOTH
+def test_the_error_of_dop853_falls_with_the_tolerance_over_nine_decades(fmu, name):
+    """Each tenth of the tolerance makes the error smaller, from 1e-1 to 1e-13, nine decades and more
+    in all, and the error stays below the tolerance."""
+    tolerances = 10.0 ** -np.arange(1, 14)
+    errors = np.array([error(run(fmu(name), tolerance=tol)) for tol in tolerances])
+    assert (errors < tolerances).all()
+    assert (np.diff(errors) < 0).all()
+    assert errors[0] / errors[-1] > 1e9
+    assert errors[2] / errors[11] > 10**8.5  # from 1e-3 to 1e-12
+
+
+@BOTH
+@pytest.mark.parametrize(("method", "finest"), [("dopri5", 10), ("radau5", 8)])
+def test_the_error_of_the_other_methods_falls_with_the_tolerance(fmu, name, method, finest):
+    """A hundredth of the tolerance makes the error of dopri5 and radau5 at least 10 times smaller."""
+    errors = [
+        error(run(fmu(name), tolerance=10.0**-k, solver_method=method))
+        for k in range(2, finest + 1, 2)
+    ]
+    assert (np.array(errors[:-1]) / errors[1:] > 10).all()
+    assert errors[-1] < 100 * 10.0**-finest
+
+
+@pytest.mark.parametrize("method", ["dop853", "dopri5", "radau5"])
+def test_the_importers_tolerance_is_obeyed(fmu, method):
+    """fmi2SetupExperiment's tolerance is the dial; solver.tolerance goes before it; without either it
+    is 1e-8, which the FMU states as its default."""
+    path = fmu("PendulumCartesian")
+
+    def motion(tolerance=None, **solver):
+        result = run(path, 1.0, 0.5, tolerance, solver_method=method, **solver)
+        return result["x"].tolist(), result["lambda.rod"].tolist(), result["solver.steps"].tolist()
+
+    default, coarse, fine = motion(), motion(1e-4), motion(1e-9)
+    assert coarse[2][-1] < default[2][-1] < fine[2][-1]
+    assert motion(1e-8) == default
+    assert motion(1e-4, solver_tolerance=1e-9) == fine
+    assert motion(solver_tolerance=1e-4) == coarse
+    assert motion(1e-9, solver_tolerance=0.0) == fine
+    stated = fmpy.read_model_description(str(path)).defaultExperiment.tolerance
+    assert float(stated) == 1e-8
+
+
+def test_steps_are_no_longer_than_the_largest_step(fmu):
+    """solver.maximum_step bounds the step: 1 s in steps of at most 0.01 s are at least 100."""
+    path = fmu("PendulumAngle")
+    free = run(path, 1.0, 1.0, 1e-3)["solver.steps"][-1]
+    bound = run(path, 1.0, 1.0, 1e-3, solver_maximum_step=0.01)["solver.steps"][-1]
+    assert free < 20
+    assert 100 <= bound <= 110
+
+
+@pytest.mark.parametrize("method", ["dop853", "dopri5"])
+def test_a_finer_communication_step_changes_nothing_beyond_the_tolerance(fmu, method):
+    """The bob does not know when it is looked at: one step of 2 s or 200 of 10 ms."""
+    path = fmu("PendulumCartesian")
+    coarse = run(path, 2.0, 2.0, 1e-10, solver_method=method)
+    fine = run(path, 2.0, 0.01, 1e-10, solver_method=method)
+    for name in ("x", "y", "der(x)", "der(y)", "lambda.rod"):
+        assert coarse[name][-1] == pytest.approx(fine[name][-1], abs=1e-8)
