@@ -25,7 +25,8 @@ from scipy.linalg import lapack
 from .failure import StepFailureError
 from .system import Matrix, Vector
 
-WELL_CONDITIONED = 1e-5  # reciprocal condition above which a Cholesky factor is trusted
+TRUSTED = 1e-5  # reciprocal condition above which the Schur complement is used
+EXACT = 1e-2  # and above which its solution needs no refinement
 RANK = 1e-12  # singular values below this, relative to rows of unit norm, count as zero
 CONSISTENT = 1e-7  # a dependent row may miss its right-hand side by this, relative to its terms
 
@@ -45,14 +46,18 @@ def solve(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
     Raises StepFailureError if a value is not finite, the mass matrix is singular on the constraint
     surface, or dependent constraints contradict each other.
     """
-    if not (np.isfinite(M).all() and np.isfinite(b).all()):
-        raise StepFailureError("a mass or a force is not finite at this state")
-    if not (np.isfinite(G).all() and np.isfinite(c).all()):
-        raise StepFailureError("a constraint or its derivative is not finite at this state")
+    _check_finite(M, b, G, c)
     found = _schur(M, b, G, c) or _kkt(M, b, G, c) or _orthogonal(M, b, G, c)
     if not (np.isfinite(found.x).all() and np.isfinite(found.lam).all()):
         raise StepFailureError("the accelerations overflow at this state")
     return found
+
+
+def _check_finite(M: Matrix, b: Vector, G: Matrix, c: Vector) -> None:
+    if not (np.isfinite(M).all() and np.isfinite(b).all()):
+        raise StepFailureError("a mass or a force is not finite at this state")
+    if not (np.isfinite(G).all() and np.isfinite(c).all()):
+        raise StepFailureError("a constraint or its derivative is not finite at this state")
 
 
 def solve_nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
@@ -61,6 +66,7 @@ def solve_nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
     Z is orthonormal in the metric of M (an unweighted basis loses digits at extreme mass ratios).
     lambda is recovered afterwards from G^T lambda = M x - b.
     """
+    _check_finite(M, b, G, c)
     factor = _mass_factor(M)
     if factor is None or not len(G):
         return solve(M, b, G, c)
@@ -107,31 +113,38 @@ def _schur(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
     if factor is None:
         return None
     L, s = factor
-    y = _half_solve(L, b * s)
     m = len(c)
+    rcond = 1.0
     if m:
         W = _half_solve(L, (G * s).T)
         r = np.sqrt(np.einsum("ij,ij->j", W, W))
         if not (r > 0).all():
             return None
         W = W / r
-        right = c / r - W.T @ y
-        if m == 1:
-            scaled = right
-        else:
-            S = W.T @ W
-            C, info = lapack.dpotrf(S, lower=1)
-            if info != 0:
-                return None
-            rcond, info = lapack.dpocon(C, np.abs(S).sum(axis=0).max(), uplo="L")
-            if rcond < WELL_CONDITIONED:
-                return None
-            scaled = lapack.dpotrs(C, right, lower=1)[0]
-        y = y + W @ scaled
-        lam = scaled / r
-    else:
-        lam = np.zeros(0)
-    x = lapack.dtrtrs(L, y, lower=1, trans=1)[0] * s
+    if m > 1:
+        S = W.T @ W
+        C, info = lapack.dpotrf(S, lower=1)
+        if info != 0:
+            return None
+        rcond, info = lapack.dpocon(C, np.abs(S).sum(axis=0).max(), uplo="L")
+        if rcond < TRUSTED:
+            return None
+
+    def substitute(b: Vector, c: Vector) -> tuple[Vector, Vector]:
+        y = _half_solve(L, b * s)
+        lam = np.zeros(m)
+        if m:
+            scaled = c / r - W.T @ y
+            if m > 1:
+                scaled = lapack.dpotrs(C, scaled, lower=1)[0]
+            y = y + W @ scaled
+            lam = scaled / r
+        return lapack.dtrtrs(L, y, lower=1, trans=1)[0] * s, lam
+
+    x, lam = substitute(b, c)
+    if rcond < EXACT:  # one refinement
+        dx, dlam = substitute(b + G.T @ lam - M @ x, c - G @ x)
+        x, lam = x + dx, lam + dlam
     return Solution(x, lam, np.ones(m, dtype=bool))
 
 
