@@ -87,20 +87,7 @@ def test_a_long_chain_of_unequal_masses(solver, ratio):
     check(found, *system)
 
 
-@pytest.mark.parametrize(
-    "solver",
-    [
-        pytest.param(
-            solve,
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason="Schur complement with rcond down to WELL_CONDITIONED = 1e-5 is not refined: "
-                "2.2e-12 at the ratios 5.6e-5 and 1.8e4",
-            ),
-        ),
-        solve_nullspace,
-    ],
-)
+@SOLVERS
 def test_no_mass_ratio_falls_between_the_rungs(solver):
     """Also where one solver hands over to the next, lambda is right to 1e-12."""
     for ratio in 10.0 ** np.arange(-6, 6.01, 0.25):
@@ -261,19 +248,7 @@ def test_neither_mass_nor_constraint(solver, constraint):
 
 @pytest.mark.parametrize("which", ["M", "b", "G", "c"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-@pytest.mark.parametrize(
-    "solver",
-    [
-        solve,
-        pytest.param(
-            solve_nullspace,
-            marks=pytest.mark.xfail(
-                reason="solve_nullspace looks at its arguments only where it hands over to solve: "
-                "'the accelerations overflow' is not the cause"
-            ),
-        ),
-    ],
-)
+@SOLVERS
 def test_what_is_not_finite_is_refused(solver, which, value):
     """No NaN and no infinity goes in or comes out, and the message says where it came from."""
     terms = dict(zip("MbGc", hanging_chain([1.0, 2.0]), strict=True))

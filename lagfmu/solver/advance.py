@@ -21,8 +21,9 @@ from scipy.optimize import brentq
 
 from .contacts import complementary_modes, impact
 from .failure import StepFailureError
+from .instant import Instant
 from .methods import stepper
-from .motion import EPS, evaluate, motion, project, residual
+from .motion import EPS, motion, project
 from .state import Departure, Settings, State
 from .system import System, Vector
 
@@ -71,8 +72,8 @@ class _Leg:
         self.size = np.array(self.state.size)
         self.cause = ""
 
-    def inputs(self, t: float) -> list[float]:
-        return self.system.inputs_at(self.u, t - self.begun)
+    def at(self, t: float) -> Instant:
+        return Instant(self.system, t, self.system.inputs_at(self.u, t - self.begun), self.p)
 
     def split(self, y: Vector) -> tuple[Vector, Vector]:
         return y[: self.system.n], y[self.system.n :]
@@ -81,7 +82,7 @@ class _Leg:
         """y' (2 n); not a number where the equations cannot be evaluated: the step is cut there."""
         q, v = self.split(y)
         try:
-            now = motion(self.system, t, q, v, self.inputs(t), self.p, self.rows)
+            now = motion(self.at(t), q, v, self.rows)
         except StepFailureError as error:
             self.cause = str(error)
             return np.full_like(y, np.nan)
@@ -89,18 +90,16 @@ class _Leg:
 
     def project(self, t: float, y: Vector) -> Vector:
         q, v = self.split(y)
-        return np.concatenate(
-            project(self.system, t, q, v, self.inputs(t), self.p, self.rows, self.offset, self.size)
-        )
+        return np.concatenate(project(self.at(t), q, v, self.rows, self.offset, self.size))
 
     def indicators(self, t: float, y: Vector) -> Vector:
         """One a contact: lambda while closed, f while open."""
         q, v = self.split(y)
-        w = self.inputs(t)
+        at = self.at(t)
         contacts = list(self.system.contacts)
-        values = residual(self.system, t, q, w, self.p)[contacts]
+        values = at.residual(q)[contacts]
         if any(self.state.closed):
-            lam = motion(self.system, t, q, v, w, self.p, self.rows).lam[contacts]
+            lam = motion(at, q, v, self.rows).lam[contacts]
             values = np.where(self.state.closed, lam, values)
         return values
 
@@ -235,7 +234,7 @@ def _locate(
 
 def _switch(leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: list[int]) -> State:
     """The state right after the event at t: contacts opened or struck, modes settled together."""
-    system, p, w = leg.system, leg.p, leg.inputs(t)
+    system, at = leg.system, leg.at(t)
     q, v = leg.split(leg.reach(t0, y0, t))
     closed, armed = list(state.closed), list(state.armed)
     offset = np.array(state.offset)
@@ -245,21 +244,21 @@ def _switch(leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: 
         closed[c] = False
         armed[c] = False
     for c in landing:
-        v = impact(system, t, q, v, w, p, closed, c)
-        _, _, G, nu, _ = evaluate(system, t, q, v, w, p)
+        v = impact(at, q, v, closed, c)
+        _, _, G, nu, _ = at.evaluate(q, v)
         k = system.contacts[c]
         speed = G[k] @ v - nu[k]
         size = np.abs(G[k]) @ np.array(state.scale[system.n :])
         closed[c] = bool(speed <= 1e-9 * size)
         armed[c] = False
         if closed[c]:
-            f = residual(system, t, q, w, p)
+            f = at.residual(q)
             for j, row in enumerate(system.rows):
                 if row.while_closed == k:
                     offset[j] = f[j]
-    touching = _touching(system, t, q, v, w, p, state, closed)
-    modes = complementary_modes(system, t, q, v, w, p, closed, touching, leaving)
-    q, v = project(system, t, q, v, w, p, system.active(modes), offset, leg.size)
+    touching = _touching(at, q, v, state, closed)
+    modes = complementary_modes(at, q, v, closed, touching, leaving)
+    q, v = project(at, q, v, system.active(modes), offset, leg.size)
     departures = list(state.departures)
     for c, (old, new) in enumerate(zip(leg.state.closed, modes, strict=True)):
         if old and not new:
@@ -278,21 +277,18 @@ def _switch(leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: 
 
 
 def _touching(
-    system: System,
-    t: float,
+    at: Instant,
     q: Vector,
     v: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
     state: State,
     closed: Sequence[bool],
 ) -> list[int]:
     """Contacts with f and df/dt at zero: those whose mode the accelerations decide."""
-    _, _, G, nu, _ = evaluate(system, t, q, v, u, p)
-    f = residual(system, t, q, u, p)
-    size = np.abs(G) @ np.array(state.scale[system.n :])
+    _, _, G, nu, _ = at.evaluate(q, v)
+    f = at.residual(q)
+    size = np.abs(G) @ np.array(state.scale[at.system.n :])
     return [
         c
-        for c, k in enumerate(system.contacts)
+        for c, k in enumerate(at.system.contacts)
         if closed[c] or (abs(f[k]) <= state.gap[c] and abs(G[k] @ v - nu[k]) <= 1e-9 * size[k])
     ]

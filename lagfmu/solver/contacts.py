@@ -15,21 +15,19 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from .failure import StepFailureError
+from .instant import Instant
 from .linear import solve
-from .motion import Motion, evaluate, motion
-from .system import System, Vector
+from .motion import Motion, motion
+from .system import Vector
 
 MOST = 12  # contacts whose combinations are tried one by one
 PULL = 1e-12  # a multiplier this small, relative to the forces at work, is zero
 
 
 def complementary_modes(
-    system: System,
-    t: float,
+    at: Instant,
     q: Vector,
     v: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
     closed: Sequence[bool],
     touching: Collection[int],
     leaving: Collection[int] = (),
@@ -41,9 +39,11 @@ def complementary_modes(
     the sign of what rounding leaves of them must not close it again.
     """
 
+    system = at.system
+
     def change(modes: Sequence[bool]) -> int | None:
         """The contact whose mode contradicts the accelerations most; None if none does."""
-        now = motion(system, t, q, v, u, p, system.active(modes))
+        now = motion(at, q, v, system.active(modes))
         size = _force_scale(now)
         worst, found = 0.0, None
         for c, k in enumerate(system.contacts):
@@ -77,7 +77,7 @@ def complementary_modes(
     names = ", ".join(repr(system.rows[system.contacts[c]].name) for c in undecided)
     raise StepFailureError(
         f"no combination of open and closed contacts {names} satisfies f >= 0, lambda >= 0 at "
-        f"t = {float(t)!r} s"
+        f"t = {float(at.t)!r} s"
     )
 
 
@@ -89,12 +89,9 @@ def _force_scale(now: Motion) -> Vector:
 
 
 def impact(
-    system: System,
-    t: float,
+    at: Instant,
     q: Vector,
     v: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
     closed: Sequence[bool],
     landing: int,
 ) -> Vector:
@@ -104,9 +101,10 @@ def impact(
     struck row and G v+ = nu on the rows that go on acting; a closed contact that would have to pull
     is left out.
     """
-    M, _, G, nu, _ = evaluate(system, t, q, v, u, p)
+    system = at.system
+    M, _, G, nu, _ = at.evaluate(q, v)
     struck = system.contacts[landing]
-    e = system.restitution(p)[struck]
+    e = system.restitution(at.p)[struck]
     modes = list(closed)
     modes[landing] = True
     while True:

@@ -14,8 +14,9 @@ import numpy as np
 
 from .contacts import complementary_modes
 from .failure import StartFailureError, StepFailureError
+from .instant import Instant
 from .linear import solve
-from .motion import EPS, evaluate, motion, project, residual
+from .motion import EPS, motion, project
 from .state import Departure, Settings, State
 from .system import NONHOLONOMIC, System, Vector
 
@@ -41,48 +42,41 @@ def start(
     p: Sequence[float],
 ) -> Start:
     """The consistent state nearest to the start values.  Raises StartFailureError with the cause."""
-    w = system.inputs_at(u, 0.0)
     try:
         with np.errstate(all="ignore"):
-            return _start(system, settings, t, np.array(q0, float), np.array(v0, float), w, p)
+            at = Instant(system, t, system.inputs_at(u, 0.0), p)
+            return _start(at, settings, np.array(q0, float), np.array(v0, float))
     except StartFailureError:
         raise
     except StepFailureError as error:
         raise StartFailureError(f"the start is refused: {error}") from error
 
 
-def _start(
-    system: System,
-    settings: Settings,
-    t: float,
-    q0: Vector,
-    v0: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
-) -> Start:
-    size = _sizes(system, q0, p)
+def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
+    system = at.system
+    size = _sizes(system, q0, at.p)
     none = np.zeros(system.m)
-    q = project_from_afar(system, t, q0, v0, u, p, list(system.permanent), size)
+    q = project_from_afar(at, q0, v0, list(system.permanent), size)
     gap = np.array([])
     for _ in range(len(system.contacts) + 1):
-        _, _, G, _, _ = evaluate(system, t, q, v0, u, p)
+        _, _, G, _, _ = at.evaluate(q, v0)
         gap = TOUCH * (np.abs(G) @ np.maximum(np.abs(q), size))[list(system.contacts)]
-        f = residual(system, t, q, u, p)[list(system.contacts)]
+        f = at.residual(q)[list(system.contacts)]
         closed = [bool(a <= g) for a, g in zip(f, gap, strict=True)]
         rows = system.active(closed)
-        moved = project_from_afar(system, t, q, v0, u, p, rows, size)
+        moved = project_from_afar(at, q, v0, rows, size)
         if (np.abs(moved - q) <= 4 * EPS * size).all():
             break
         q = moved
-    q, v, closed = _velocities(system, t, q, v0, u, p, closed, size)
+    q, v, closed = _velocities(at, q, v0, closed, size)
     touching = [c for c, shut in enumerate(closed) if shut]
-    modes = complementary_modes(system, t, q, v, u, p, closed, touching)
-    q, v = project(system, t, q, v, u, p, system.active(modes), none, size)
-    vdot = motion(system, t, q, v, u, p, system.active(modes)).vdot
-    scale, rate = _scales(settings, size, q, v, vdot, t)
+    modes = complementary_modes(at, q, v, closed, touching)
+    q, v = project(at, q, v, system.active(modes), none, size)
+    vdot = motion(at, q, v, system.active(modes)).vdot
+    scale, rate = _scales(settings, size, q, v, vdot)
     nothing = Departure(0, 0.0, (0.0,) * system.n, (0.0,) * system.n)
     state = State(
-        t=t,
+        t=at.t,
         q=tuple(q.tolist()),
         v=tuple(v.tolist()),
         closed=modes,
@@ -100,12 +94,9 @@ def _start(
 
 
 def project_from_afar(
-    system: System,
-    t: float,
+    at: Instant,
     q0: Vector,
     v0: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
     rows: Sequence[int],
     size: Vector,
 ) -> Vector:
@@ -113,24 +104,24 @@ def project_from_afar(
 
     Raises StartFailureError naming the constraints that remain violated and by how much.
     """
-    fixed = [k for k in rows if system.rows[k].kind != NONHOLONOMIC]
+    fixed = [k for k in rows if at.system.rows[k].kind != NONHOLONOMIC]
     q = q0
     if not fixed:
         return q
-    M, _, G, _, _ = evaluate(system, t, q, v0, u, p)
-    f = residual(system, t, q, u, p)[fixed]
+    M, _, G, _, _ = at.evaluate(q, v0)
+    f = at.residual(q)[fixed]
     for _ in range(ITERATIONS):
         unit = np.abs(G[fixed]) @ np.maximum(np.abs(q), size)
         if (np.abs(f) <= 4 * EPS * unit).all():
             return q
         try:
-            step = solve(M, np.zeros(system.n), G[fixed], -f).x
+            step = solve(M, np.zeros(at.system.n), G[fixed], -f).x
         except StepFailureError:
             break
         for damping in 2.0 ** -np.arange(25):
             trial = q + damping * step
             try:
-                f_trial = residual(system, t, trial, u, p)[fixed]
+                f_trial = at.residual(trial)[fixed]
             except StepFailureError:
                 continue
             if np.linalg.norm(f_trial / unit) < (1 - 0.1 * damping) * np.linalg.norm(f / unit):
@@ -138,16 +129,18 @@ def project_from_afar(
         else:
             break
         q, f = trial, f_trial
-        M, _, G, _, _ = evaluate(system, t, q, v0, u, p)
+        M, _, G, _, _ = at.evaluate(q, v0)
     unit = np.abs(G[fixed]) @ np.maximum(np.abs(q), size)
     if (np.abs(f) <= 1e3 * EPS * unit).all():
         return q
     missed = ", ".join(
-        f"{system.rows[k].name!r} by {a:.3g}"
+        f"{at.system.rows[k].name!r} by {a:.3g}"
         for k, a, s in zip(fixed, f, unit, strict=True)
         if abs(a) > 1e3 * EPS * s
     )
-    values = ", ".join(f"{n} = {x!r}" for n, x in zip(system.coordinates, q0.tolist(), strict=True))
+    values = ", ".join(
+        f"{n} = {x!r}" for n, x in zip(at.system.coordinates, q0.tolist(), strict=True)
+    )
     raise StartFailureError(
         f"the start values {values} cannot be projected onto the constraints (missed: {missed}): "
         "choose start values near a configuration that satisfies them, or other parameters"
@@ -155,17 +148,15 @@ def project_from_afar(
 
 
 def _velocities(
-    system: System,
-    t: float,
+    at: Instant,
     q: Vector,
     v0: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
     closed: Sequence[bool],
     size: Vector,
 ) -> tuple[Vector, Vector, list[bool]]:
     """Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open."""
-    M, F, G, nu, _ = evaluate(system, t, q, v0, u, p)
+    system = at.system
+    M, F, G, nu, _ = at.evaluate(q, v0)
     natural = np.sqrt(size * np.abs(F) / np.where(M.diagonal() > 0, M.diagonal(), np.inf))
     unit = np.abs(G) @ np.maximum(np.abs(v0), natural)
     speed = G @ v0 - nu
@@ -173,8 +164,8 @@ def _velocities(
         c and not speed[k] > TOUCH * unit[k] for c, k in zip(closed, system.contacts, strict=True)
     ]
     rows = system.active(shut)
-    q, v = project(system, t, q, v0, u, p, rows, np.zeros(system.m), size)
-    _, _, G, nu, _ = evaluate(system, t, q, v, u, p)
+    q, v = project(at, q, v0, rows, np.zeros(system.m), size)
+    _, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
     unit = np.abs(G) @ fastest + np.abs(nu)
     missed = [k for k in rows if abs(G[k] @ v - nu[k]) > 1e-9 * unit[k]]
@@ -202,7 +193,7 @@ def _sizes(system: System, q0: Vector, p: Sequence[float]) -> Vector:
 
 
 def _scales(
-    settings: Settings, size: Vector, q: Vector, v: Vector, vdot: Vector, t: float
+    settings: Settings, size: Vector, q: Vector, v: Vector, vdot: Vector
 ) -> tuple[Vector, float]:
     """Error scales of q and v (2 n), and the motion's natural rate [1/s].
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .failure import StepFailureError
+from .instant import Instant
 from .linear import Solution, solve, solve_nullspace
-from .system import NONHOLONOMIC, Matrix, System, Vector
+from .system import NONHOLONOMIC, Matrix, Vector
 
 EPS = float(np.finfo(float).eps)
 ITERATIONS = 10
@@ -32,55 +33,27 @@ class Motion:
 
 
 def motion(
-    system: System,
-    t: float,
+    at: Instant,
     q: Vector,
     v: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
     active: Sequence[int],
 ) -> Motion:
     """Accelerations (n) and multipliers (m; 0 for rows that do not act) at a state."""
-    M, F, G, nu, gamma = evaluate(system, t, q, v, u, p)
+    M, F, G, nu, gamma = at.evaluate(q, v)
     rows = list(active)
-    method = solve_nullspace if system.formulation == "nullspace" else solve
+    method = solve_nullspace if at.system.formulation == "nullspace" else solve
     found: Solution = method(M, F, G[rows], gamma[rows])
-    lam = np.zeros(system.m)
+    lam = np.zeros(at.system.m)
     lam[rows] = found.lam
-    unique = np.ones(system.m, dtype=bool)
+    unique = np.ones(at.system.m, dtype=bool)
     unique[rows] = found.unique
     return Motion(M, F, G, nu, gamma, found.x, lam, unique)
 
 
-def evaluate(
-    system: System, t: float, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
-) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
-    """`System.assemble`, with arithmetic failures named."""
-    try:
-        return system.assemble(t, q, v, u, p)
-    except (ArithmeticError, ValueError) as error:
-        raise StepFailureError(
-            f"the equations cannot be evaluated at t = {float(t)!r} s ({error})"
-        ) from error
-
-
-def residual(system: System, t: float, q: Vector, u: Sequence[float], p: Sequence[float]) -> Vector:
-    """f (m): how far each position constraint is missed; 0 for nonholonomic rows."""
-    try:
-        return np.array(system.residual(t, q.tolist(), u, p), dtype=float)
-    except (ArithmeticError, ValueError) as error:
-        raise StepFailureError(
-            f"the constraints cannot be evaluated at t = {float(t)!r} s ({error})"
-        ) from error
-
-
 def project(
-    system: System,
-    t: float,
+    at: Instant,
     q: Vector,
     v: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
     active: Sequence[int],
     offset: Vector,
     size: Vector,
@@ -96,11 +69,11 @@ def project(
     rows = list(active)
     if not rows:
         return q, v
-    fixed = [k for k in rows if system.rows[k].kind != NONHOLONOMIC]
-    M, _, G, nu, _ = evaluate(system, t, q, v, u, p)
+    fixed = [k for k in rows if at.system.rows[k].kind != NONHOLONOMIC]
+    M, _, G, nu, _ = at.evaluate(q, v)
     before = np.inf
     for count in range(ITERATIONS + 1 if fixed else 0):
-        f = (residual(system, t, q, u, p) - offset)[fixed]
+        f = (at.residual(q) - offset)[fixed]
         miss, steepness = np.abs(f), np.abs(G[fixed])
         if (miss <= 2 * EPS * (steepness @ np.abs(q))).all():
             break
@@ -108,13 +81,13 @@ def project(
         if error < EPS**2 or (error > before / 2 and error < SMALL):
             break  # f vanishes with q, or rounding in f is all that is left
         if count == ITERATIONS:
-            worst = [system.rows[k].name for k, a in zip(fixed, miss, strict=True) if a > 0]
+            worst = [at.system.rows[k].name for k, a in zip(fixed, miss, strict=True) if a > 0]
             raise StepFailureError(
-                f"the step to t = {float(t)!r} s cannot be projected onto the constraints "
+                f"the step to t = {float(at.t)!r} s cannot be projected onto the constraints "
                 f"{', '.join(map(repr, worst))} (missed by {miss.max():.3g}): take smaller steps"
             )
         before = error
-        q = q + solve(M, np.zeros(system.n), G[fixed], -f).x
-        M, _, G, nu, _ = evaluate(system, t, q, v, u, p)
+        q = q + solve(M, np.zeros(at.system.n), G[fixed], -f).x
+        M, _, G, nu, _ = at.evaluate(q, v)
     slip = nu[rows] - G[rows] @ v
-    return q, v + solve(M, np.zeros(system.n), G[rows], slip).x
+    return q, v + solve(M, np.zeros(at.system.n), G[rows], slip).x

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from .failure import StepFailureError
-from .motion import motion, residual
+from .instant import Instant
+from .motion import motion
 from .state import State
 from .system import NONHOLONOMIC, System, Vector
 
@@ -33,27 +34,22 @@ def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float
     full, q, v = expand(system, state.t, np.array(state.q), np.array(state.v), u, p)
     shut = {system.rows[k].name: c for k, c in zip(system.contacts, state.closed, strict=True)}
     active = full.active([shut[full.rows[k].name] for k in full.contacts])
-    now = motion(full, state.t, q, v, u, p, active)
+    at = Instant(full, state.t, u, p)
+    now = motion(at, q, v, active)
     for j, name in enumerate(full.coordinates):
         values[name] = float(q[j])
         values[f"der({name})"] = float(v[j])
         values[f"der({name},2)"] = float(now.vdot[j])
     if system.embedding is not None:
-        reduced = motion(
-            system,
-            state.t,
-            np.array(state.q),
-            np.array(state.v),
-            u,
-            p,
-            system.active(state.closed),
-        )
+        stepped = Instant(system, state.t, u, p)
+        acting = system.active(state.closed)
+        reduced = motion(stepped, np.array(state.q), np.array(state.v), acting)
         for j, name in enumerate(system.coordinates):
             if name not in values:
                 values[name] = state.q[j]
                 values[f"der({name})"] = state.v[j]
                 values[f"der({name},2)"] = float(reduced.vdot[j])
-    f = residual(full, state.t, q, u, p)
+    f = at.residual(q)
     slip = now.G @ v - now.nu
     kept = {row.name: level for row, level in zip(system.rows, state.offset, strict=True)}
     for k, row in enumerate(full.rows):
