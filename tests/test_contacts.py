@@ -115,14 +115,7 @@ def test_a_ball_thrown_up_from_the_floor_comes_back():
     assert (result["departure.floor.count"] == 0).all()
 
 
-UNARMED = pytest.mark.xfail(
-    strict=True,
-    reason="advance._first_event arms a contact at the end of a step only: one that rises and falls "
-    "within a step is located at f = -gap, 1e-9 below the floor",
-)
-
-
-@pytest.mark.parametrize("step", [1e-3, 0.05, pytest.param(1.0, marks=UNARMED)])
+@pytest.mark.parametrize("step", [1e-3, 0.05, 1.0])
 def test_where_it_lands_does_not_depend_on_the_communication_step(step):
     """Two landings inside a communication step are found there: after the second the ball rises with
     a quarter of its first speed, whether the step is 1 ms or a single one of 1 s."""
@@ -397,11 +390,6 @@ def test_a_particle_slides_into_the_corner():
     assert np.abs(along[~before]).max() < 1e-14
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="contacts._force_scale is 0 for a contact that no applied force points at, here the wall; "
-    "its multiplier, 4 N, then counts as zero and the start is refused",
-)
 def test_a_ladder_leaves_the_wall_and_not_the_floor():
     """A smooth ladder leaning at theta0 from the wall slides down and leaves the wall where its top
     has come down by a third: cos theta = (2/3) cos theta0; the floor it keeps till then and after."""

@@ -198,9 +198,11 @@ def _first_event(
     times = [t0, *times, solver.t]
     found: list[tuple[float, int]] = []
     for c, closed in enumerate(leg.state.closed):
-        level = 0.0 if closed or armed[c] else -gap[c]
         trigger = 0.0 if closed else -gap[c]
+        risen = armed[c]
         for i in range(1, len(times)):
+            risen = risen or values[i - 1][c] > gap[c]
+            level = 0.0 if closed or risen else -gap[c]
             if values[i][c] < trigger:
                 t = _locate(leg, t0, y0, times[i - 1], times[i], c, level)
                 if t is not None:
@@ -208,7 +210,7 @@ def _first_event(
                     break
     if not found:
         for c, closed in enumerate(leg.state.closed):
-            armed[c] = armed[c] or (not closed and values[-1][c] > gap[c])
+            armed[c] = armed[c] or (not closed and any(v[c] > gap[c] for v in values))
         return None, values[-1]
     earliest = min(t for t, _ in found)
     return (earliest, [c for t, c in found if t == earliest]), values[-1]

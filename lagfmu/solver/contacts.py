@@ -82,10 +82,11 @@ def complementary_modes(
 
 
 def _force_scale(now: Motion) -> Vector:
-    """For each row the multiplier that would carry all forces alone: |G||F| / |G|^2."""
+    """For each row the multiplier that would carry all forces alone, those of constraint included."""
     G = np.abs(now.G)
     square = np.einsum("ij,ij->i", G, G)
-    return np.asarray((G @ np.abs(now.F)) / np.where(square > 0, square, 1.0))
+    forces = np.abs(now.F) + G.T @ np.abs(now.lam)
+    return np.asarray((G @ forces) / np.where(square > 0, square, 1.0))
 
 
 def impact(

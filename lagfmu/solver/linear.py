@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from .failure import StepFailureError
 from .system import Matrix, Vector
@@ -105,7 +105,10 @@ def _mass_factor(M: Matrix) -> tuple[Matrix, Vector] | None:
 
 
 def _half_solve(L: Matrix, B: Matrix) -> Matrix:
-    return np.asarray(lapack.dtrtrs(L, B, lower=1)[0])
+    """L^-1 B.  For a matrix by BLAS: dtrtrs starts threads even where B is 3 x 2."""
+    if B.ndim == 1:
+        return np.asarray(lapack.dtrtrs(L, B, lower=1)[0])
+    return np.asarray(blas.dtrsm(1.0, L, B, lower=1))
 
 
 def _schur(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
@@ -161,9 +164,9 @@ def _kkt(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
         largest = np.abs(A).max(axis=1)
         if not (largest > 0).all():
             return None
-        d /= np.sqrt(largest)
+        d /= 2.0 ** np.round(np.log2(largest) / 2)  # powers of two: scaling rounds nothing
         A = K * d * d[:, None]
-        if np.abs(np.abs(A).max(axis=1) - 1).max() < 0.1:
+        if (np.abs(np.log2(largest)) <= 1).all():
             break
     lu, pivots, info = lapack.dgetrf(A)
     if info != 0:
@@ -186,25 +189,40 @@ def _orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
     if factor is None:
         return _least_norm(M, b, G, c)
     L, s = factor
-    y = _half_solve(L, b * s)
     W = _half_solve(L, (G * s).T)
     r = np.sqrt(np.einsum("ij,ij->j", W, W))
     r[r == 0] = 1.0
-    U, sigma, Vt = np.linalg.svd(W / r, full_matrices=True)
+    W = W / r
+    U, sigma, Vt = np.linalg.svd(W, full_matrices=True)
     rank = int((sigma > RANK).sum())
-    right = c / r - (W / r).T @ y
-    scaled = Vt[:rank].T @ ((Vt[:rank] @ right) / sigma[:rank] ** 2)
-    y = y + U[:, :rank] @ ((Vt[:rank] @ right) / sigma[:rank])
     null = Vt[rank:]
-    size = np.abs(c / r).max(initial=0) + np.abs(y).max(initial=0) + np.abs(right).max(initial=0)
+
+    def substitute(b: Vector, c: Vector) -> tuple[Vector, Vector, Vector]:
+        y = _half_solve(L, b * s)
+        right = c / r - W.T @ y
+        part = (Vt[:rank] @ right) / sigma[:rank]
+        lam = (Vt[:rank].T @ (part / sigma[:rank])) / r
+        y = y + U[:, :rank] @ part
+        return lapack.dtrtrs(L, y, lower=1, trans=1)[0] * s, lam, right
+
+    x, lam, right = substitute(b, c)
+    size = np.abs(c / r).max(initial=0) + np.abs(right).max(initial=0)
+    size += np.abs(_half_solve(L, (b + G.T @ lam) * s)).max(initial=0)
     if len(null) and np.abs(null @ right).max() > CONSISTENT * size:
         raise StepFailureError(
             "the constraints contradict each other at this state: dependent rows of G ask for "
             "different accelerations"
         )
+    Mw, Gw, xw, lamw = (a.astype(np.longdouble) for a in (M, G, x, lam))
+    for _ in range(
+        3
+    ):  # refinement in extended precision: rows that are nearly parallel lose digits
+        rest = (b + Gw.T @ lamw - Mw @ xw).astype(float), (c - Gw @ xw).astype(float)
+        dx, dlam, _ = substitute(*rest)
+        xw, lamw = xw + dx, lamw + dlam
+    x, lam = xw.astype(float), lamw.astype(float)
     unique = (np.abs(null) < 1e-8).all(axis=0) if len(null) else np.ones(len(c), dtype=bool)
-    x = lapack.dtrtrs(L, y, lower=1, trans=1)[0] * s
-    return Solution(x, scaled / r, unique)
+    return Solution(x, lam, unique)
 
 
 def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
