@@ -10,7 +10,7 @@ part; its rank is the number of independent first integrals (Bryant et al., *Ext
 Systems*, ch. II).  All ranks are generic: they hold away from singular points.
 
 That a coefficient vanishes is proven by exact arithmetic; that one does not is decided by its
-values with 60 digits at random points (`lagfmu.zero`).
+values with 60 digits at random points (`lagfmu/pfaffian/`).
 """
 
 from __future__ import annotations
@@ -21,13 +21,18 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from sympy import Dummy, Eq, Integer, S, Symbol, expand, factor_terms, simplify, sympify
+from sympy import Eq, Symbol, factor_terms, sympify
 from sympy import Integral as Integral_
-from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu.errors import DerivationError
-from lagfmu.integrals import first_integrals
-from lagfmu.zero import Tower, Undecided, pairs, within
+from .errors import DerivationError
+from .pfaffian.coefficients import Chart, pfaffian
+from .pfaffian.echelon import rref
+from .pfaffian.frobenius import curvature, derived_flag, exact, obstruction
+from .pfaffian.integrals import first_integrals
+from .pfaffian.tower import Tower
+from .pfaffian.undecided import Undecided, within
+
+__all__ = ["Classification", "Integral", "Kind", "classify", "pfaffian"]
 
 Expr = Any  # SymPy has no types
 
@@ -74,70 +79,6 @@ class Classification:
     flag: tuple[int, ...] = ()
 
 
-def pfaffian(form: Expr, coordinates: Sequence[Expr]) -> tuple[list[Expr], Expr]:
-    """The coefficients (a_1, ..., a_n) and a_0 of sum_j a_j q_j' + a_0.
-
-    Raises `DerivationError`, which names the term, if the form is not linear in the velocities.
-    """
-    time = dynamicsymbols._t
-    if isinstance(form, Eq):
-        form = form.lhs - form.rhs
-    form = sympify(form)
-    speeds = [Dummy(f"v{j}") for j in range(len(coordinates))]
-    plain = form.subs(
-        {q.diff(time, 2): Dummy("acceleration") for q in coordinates if form.has(q.diff(time, 2))}
-    )
-    if plain != form:
-        raise DerivationError(
-            f"constraint {form} has accelerations: a Pfaffian constraint is linear in the "
-            "velocities; integrate it once, or leave it to the dynamics"
-        )
-    names = dict(zip([q.diff(time) for q in coordinates], speeds, strict=True))
-    plain = form.xreplace(names)
-    coefficients = [_coefficient(plain, v) for v in speeds]
-    if any(coefficient.has(*speeds) for coefficient in coefficients if speeds):
-        back = {v: q for q, v in names.items()}
-        terms = [
-            term
-            for term in expand(plain).as_ordered_terms()
-            if any(term.diff(v, w) != 0 for v in speeds for w in speeds)
-        ]
-        listed = ", ".join(str(term.xreplace(back)) for term in terms) or str(form)
-        raise DerivationError(
-            f"constraint {form} is not linear in the velocities: {listed}; a Pfaffian constraint "
-            "is sum_j a_j(q, t)*q_j' + a_0(q, t) = 0"
-        )
-    rest = plain.xreplace(dict.fromkeys(speeds, S.Zero))
-    return coefficients, rest
-
-
-def _coefficient(plain: Expr, speed: Expr) -> Expr:
-    slope = plain.diff(speed)
-    if any(isinstance(v, Dummy) and v.name.startswith("v") for v in slope.free_symbols):
-        slope = simplify(expand(slope))
-    return slope
-
-
-class _Chart:
-    """Coordinates q_j(t) and t as independent real symbols, and back."""
-
-    def __init__(self, coordinates: Sequence[Expr], used: set[Any]) -> None:
-        time = dynamicsymbols._t
-        names = [str(getattr(q, "func", q)) for q in coordinates]
-        self.variables = [Dummy(name, real=True) for name in [*names, "t"]]
-        self._there = dict(zip([*coordinates, time], self.variables, strict=True))
-        for symbol in sorted(used - set(self._there), key=str):
-            if symbol.is_extended_real is None:
-                self._there[symbol] = Dummy(symbol.name, real=True)
-        self._back = {value: key for key, value in self._there.items()}
-
-    def there(self, expr: Expr) -> Expr:
-        return expr.xreplace(self._there)
-
-    def back(self, expr: Expr) -> Expr:
-        return sympify(expr).xreplace(self._back)
-
-
 def classify(
     forms: Sequence[Expr] | Expr, coordinates: Sequence[Expr], *, integrate: bool = True
 ) -> Classification:
@@ -160,7 +101,7 @@ def _classify(
     split = [pfaffian(form, coordinates) for form in forms]
     rows = [[*a, a0] for a, a0 in split]
     used: set[Any] = set().union(*(entry.free_symbols for row in rows for entry in row))
-    chart = _Chart(coordinates, {symbol for symbol in used if isinstance(symbol, Symbol)})
+    chart = Chart(coordinates, {symbol for symbol in used if isinstance(symbol, Symbol)})
     rows = [[chart.there(entry) for entry in row] for row in rows]
     each: tuple[Classification, ...] = ()
     if len(forms) > 1:
@@ -177,7 +118,7 @@ class _Analysis:
         self,
         forms: tuple[Expr, ...],
         rows: list[list[Expr]],
-        chart: _Chart,
+        chart: Chart,
         each: tuple[Classification, ...],
     ) -> None:
         self.forms, self.rows, self.chart, self.each = forms, rows, chart, each
@@ -195,9 +136,10 @@ class _Analysis:
             rank = len(pivots)
             self._consistent(reduced, pivots)
             basis = [row[: self.width] for row in reduced[:rank]]
-            curvature, (first, witness, where) = self._obstruction(matrix, basis, pivots)
-            flag, bottom = self._flag(basis, curvature)
-            exact = all(self._exact(row) for row in matrix)
+            bend = curvature(self.tower, basis, pivots)
+            first, witness, where = obstruction(self.tower, matrix, bend, pivots)
+            flag, bottom = derived_flag(self.tower, basis, bend)
+            stands = all(exact(self.tower, row) for row in matrix)
         except Undecided as undecided:
             return self._answer(
                 Kind.UNDECIDED,
@@ -210,7 +152,7 @@ class _Analysis:
                 (),
             )
         depth = flag[-1]
-        if exact:
+        if stands:
             kind = Kind.HOLONOMIC
         elif depth == rank:
             kind = Kind.INTEGRABLE
@@ -251,7 +193,7 @@ class _Analysis:
         unit = [
             [tower.K.one if i == j else tower.K.zero for j in range(count)] for i in range(count)
         ]
-        return tower.rref([a + b for a, b in zip(matrix, unit, strict=True)], self.width)
+        return rref(tower, [a + b for a, b in zip(matrix, unit, strict=True)], self.width)
 
     def _consistent(self, reduced: list[list[Any]], pivots: list[int]) -> None:
         """dt is no combination of the forms: else, they ask that a function of (q, t) be zero."""
@@ -270,101 +212,6 @@ class _Analysis:
             f"contradictory constraints {names}: a combination of them has no velocity in it, and "
             "is not zero; remove or correct one of them"
         )
-
-    def _exact(self, row: list[Any]) -> bool:
-        """d(omega) = 0 as it stands."""
-        tower = self.tower
-        for i, j in pairs(self.width):
-            one = tower.diff(row[j], self.variables[i])
-            two = tower.diff(row[i], self.variables[j])
-            if not tower.is_zero(tower.lift(one) - tower.lift(two)):
-                return False
-        return True
-
-    def _curvature(
-        self, basis: list[list[Any]], pivots: list[int]
-    ) -> dict[tuple[int, int], list[Any]]:
-        """d(omega_i)(X_f, X_g), omega_i being the reduced rows, and X_f the fields they annul.
-
-        With omega_i = dx_p + sum_f b_f dx_f, it is X_f(b_g) - X_g(b_f).
-        """
-        free = [j for j in range(self.width) if j not in pivots]
-        table = {}
-        for f, g in ((free[i], free[j]) for i, j in pairs(len(free))):
-            column = []
-            for row in basis:
-                one = self._along(basis, pivots, f, row[g])
-                two = self._along(basis, pivots, g, row[f])
-                value = self.tower.reduce(self.tower.lift(one) - self.tower.lift(two))
-                column.append(self.tower.K.zero if self.tower.is_zero(value) else value)
-            table[f, g] = column
-        return table
-
-    def _along(self, basis: list[list[Any]], pivots: list[int], f: int, value: Any) -> Any:
-        """X_f(value), with X_f = d/dx_f - sum_i b_if d/dx_(p_i)."""
-        tower = self.tower
-        total = tower.diff(value, self.variables[f])
-        for row, pivot in zip(basis, pivots, strict=True):
-            if row[f]:
-                slope = tower.diff(value, self.variables[pivot])
-                total = tower.lift(total) - tower.lift(row[f]) * slope
-        return tower.reduce(total)
-
-    def _obstruction(
-        self, matrix: list[list[Any]], basis: list[list[Any]], pivots: list[int]
-    ) -> tuple[dict[tuple[int, int], list[Any]], tuple[int | None, Any, tuple[int, ...]]]:
-        """The curvature, and a coefficient of d(omega_k) wedge omega_1 ... that is not zero.
-
-        The coefficient at dx_f, dx_g and the pivots is det(a_P) d(omega_k)(X_f, X_g), a_P being
-        the pivot columns of independent forms; as omega_k = sum_i a_(k, p_i) (reduced row i),
-        d(omega_k)(X_f, X_g) = sum_i a_(k, p_i) d(reduced row i)(X_f, X_g).
-        """
-        tower = self.tower
-        curvature = self._curvature(basis, pivots)
-        nothing = (None, tower.K.zero, ())
-        best: tuple[int | None, Any, tuple[int, ...]] = nothing
-        for (f, g), column in curvature.items():
-            for k, row in enumerate(matrix):
-                value = tower.K.zero
-                for pivot, entry in zip(pivots, column, strict=True):
-                    value += tower.lift(row[pivot]) * tower.lift(entry)
-                value = tower.reduce(value)
-                if value and not tower.is_zero(value):
-                    value = tower.reduce(value * self._minor(matrix, pivots))
-                    size = len(value.numer) + len(value.denom)
-                    if best[0] is None or size < len(best[1].numer) + len(best[1].denom):
-                        best = (k, value, (f, g, *pivots))
-        return curvature, best
-
-    def _minor(self, matrix: list[list[Any]], pivots: list[int]) -> Any:
-        """The determinant of the pivot columns of the first independent forms."""
-        tower = self.tower
-        transposed = [[tower.lift(row[p]) for row in matrix] for p in pivots]
-        _, independent = tower.rref(transposed, len(matrix))
-        square = [[tower.lift(matrix[k][p]) for p in pivots] for k in independent]
-        return _determinant(tower, square)
-
-    def _flag(
-        self, basis: list[list[Any]], curvature: dict[tuple[int, int], list[Any]]
-    ) -> tuple[list[int], list[list[Any]]]:
-        """The ranks of the derived flag down to where it is stable, and the reduced rows there."""
-        tower = self.tower
-        flag = [len(basis)]
-        while basis and any(any(column) for column in curvature.values()):
-            kernel = tower.nullspace(list(curvature.values()), len(basis))
-            derived = []
-            for vector in kernel:
-                row = [tower.K.zero] * self.width
-                for factor, form in zip(vector, basis, strict=True):
-                    row = [
-                        a + tower.lift(factor) * tower.lift(b)
-                        for a, b in zip(row, form, strict=True)
-                    ]
-                derived.append([tower.reduce(entry) for entry in row])
-            flag.append(len(derived))
-            basis, pivots = tower.rref(derived, self.width)
-            curvature = self._curvature(basis, pivots)
-        return flag, basis
 
     def _integral(self, f: Expr, reduced: list[list[Any]], pivots: list[int]) -> Integral:
         """f with its integrating factors: df = sum_i (df/dx_(p_i)) (reduced row i)."""
@@ -412,15 +259,3 @@ class _Analysis:
             ranks = " > ".join(map(str, flag))
             text += f"; the derived flag has the ranks {ranks}"
         return text
-
-
-def _determinant(tower: Tower, matrix: list[list[Any]]) -> Any:
-    """By expansion along the first row: the sets are small."""
-    if not matrix:
-        return tower.K.one
-    total = tower.K.zero
-    for j, entry in enumerate(matrix[0]):
-        if entry:
-            minor = [[*row[:j], *row[j + 1 :]] for row in matrix[1:]]
-            total += Integer(-1) ** j * entry * _determinant(tower, minor)
-    return tower.reduce(total)

@@ -1,0 +1,76 @@
+"""First integrals of an integrable Pfaffian system in closed form, by a bounded list of methods.
+
+In this order: known candidates, linear systems, each form alone, an ansatz for f, and elimination of a
+variable by each integral already found.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import Any
+
+from .ansatz import combine, monomials, relations
+from .elimination import restricted
+from .frobenius import along
+from .linear import exponential_integrals
+from .single import single
+from .system import System
+from .tower import Tower
+from .undecided import FAILURES, late
+
+Expr = Any  # SymPy has no types
+
+
+def first_integrals(
+    forms: Sequence[Sequence[Expr]],
+    rows: Sequence[Sequence[Expr]],
+    variables: Sequence[Expr],
+    known: Sequence[Expr] = (),
+    depth: int = 0,
+) -> list[Expr]:
+    """Independent first integrals of the integrable system that the reduced `rows` span.
+
+    `forms` are further one-forms worth trying, and `known` candidates for integrals.
+    """
+    system = System(rows, variables)
+
+    def inner(rows: Sequence[Sequence[Expr]], variables: Sequence[Expr]) -> list[Expr]:
+        return first_integrals((), rows, variables, (), depth + 1)
+
+    for f in known:
+        system.offer(f)
+    if not system.complete():
+        with suppress(*FAILURES):
+            for f in exponential_integrals(system):
+                system.offer(f)
+    for row in forms if forms and len(rows) == 1 else (*forms, *rows):
+        if not system.complete() and not late() and system.contains(row):
+            system.offer(single(row, variables))
+    for degree in (1, 2, 3):
+        if not system.complete() and not late():
+            with suppress(*FAILURES):
+                for f in _polynomial_integrals(system, degree):
+                    system.offer(f)
+    for f in list(system.found):
+        if not system.complete() and not late() and depth < 3:
+            with suppress(*FAILURES):
+                for g in restricted(system, f, inner):
+                    system.offer(g)
+    return system.found
+
+
+def _polynomial_integrals(system: System, degree: int) -> Iterator[Expr]:
+    """f = sum of monomials with constant coefficients: a linear system for these."""
+    tower = Tower(system.variables, itertools.chain(*system.rows))
+    rows = [[tower.element(entry) for entry in row] for row in system.rows]
+    basis = monomials(tower, system.variables, system.rows, degree)
+    if basis is None:
+        return
+    columns = []
+    for monomial in basis:
+        element = tower.element(monomial)
+        columns.append([along(tower, rows, system.pivots, j, element) for j in system.free])
+    for vector in relations(tower, columns)[:40]:
+        yield combine(vector, basis)

@@ -1,0 +1,107 @@
+"""Linear systems dx = (A x + c(s)) ds with a constant matrix A: f = l exp(-A s) x - int l exp(-A s) c ds.
+
+The row vectors l are taken from the kernels of (A - a)**m and of A**2 - 2 m A + d, for the factors of
+the characteristic polynomial: the second ones give cosines and sines (Arnold, *Ordinary Differential
+Equations*, ch. 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from sympy import (
+    Abs,
+    Add,
+    Dummy,
+    Matrix,
+    Poly,
+    S,
+    cancel,
+    cos,
+    cosh,
+    exp,
+    expand,
+    eye,
+    factor,
+    factor_list,
+    factor_terms,
+    factorial,
+    sin,
+    sinh,
+    sqrt,
+    together,
+)
+
+from .quadrature import quadrature
+from .system import System
+
+Expr = Any  # SymPy has no types
+
+
+def exponential_integrals(system: System) -> Iterator[Expr]:
+    """The integrals of the largest part of the system that is linear on its own."""
+    if len(system.free) != 1:
+        return
+    s = system.variables[system.free[0]]
+    names = [system.variables[p] for p in system.pivots]
+    speeds = [-row[system.free[0]] for row in system.rows]
+    kept = list(range(len(names)))
+    while True:
+        x = [names[k] for k in kept]
+        table = [[expand(speeds[k]).coeff(v) for v in x] for k in kept]
+        rest = [
+            expand(speeds[k] - Add(*[a * v for a, v in zip(line, x, strict=True)]))
+            for k, line in zip(kept, table, strict=True)
+        ]
+        good = [
+            k
+            for k, line, c in zip(kept, table, rest, strict=True)
+            if not any(a.has(s, *names) for a in line) and not c.has(*names)
+        ]
+        if good == kept:
+            break
+        kept = good
+    if not 1 < len(kept) <= 6:
+        return
+    for vector in _exponentials(Matrix(table), s):
+        drive = Add(*[a * c for a, c in zip(vector, rest, strict=True)])
+        forced = S.Zero if drive == 0 else quadrature(drive, s)
+        if forced is not None:
+            yield Add(*[a * v for a, v in zip(vector, x, strict=True)]) - forced
+
+
+def _exponentials(A: Expr, s: Expr) -> Iterator[list[Expr]]:
+    """Real row vectors l exp(-A s), where the characteristic polynomial's factors allow it."""
+    count = A.shape[0]
+    z = Dummy("z")
+    polynomial = together(A.charpoly(z).as_expr(z)).as_numer_denom()[0]
+    for part, power in factor_list(polynomial)[1]:
+        degree = Poly(part, z).degree()
+        if degree not in (1, 2) or (degree == 2 and power > 1):
+            continue
+        if degree == 1:
+            one, zero = Poly(part, z).all_coeffs()
+            value = (-zero / one).cancel()
+            N = (A - value * eye(count)).applyfunc(cancel)
+            for column in (N.T**power).applyfunc(cancel).nullspace():
+                vector = total = column.T
+                for k in range(1, power):
+                    vector = (vector * N).applyfunc(cancel)
+                    total += vector * (-s) ** k / factorial(k)
+                yield list((total * exp(-value * s)).applyfunc(factor_terms))
+            continue
+        two, one, zero = Poly(part, z).all_coeffs()
+        middle = (-one / two / 2).cancel()
+        square = factor_terms(factor(middle**2 - zero / two))
+        N = (A - middle * eye(count)).applyfunc(cancel)
+        kernel = (N**2 - square * eye(count)).T.applyfunc(cancel).nullspace()
+        turns = square.is_negative or (not square.is_positive and square.could_extract_minus_sign())
+        rate = sqrt(-square if turns else square).replace(Abs, lambda u: u)
+        for column in kernel:
+            one_, other = column.T, (column.T * N).applyfunc(cancel) / rate
+            if turns:
+                total = one_ * cos(rate * s) - other * sin(rate * s)
+            else:
+                total = one_ * cosh(rate * s) - other * sinh(rate * s)
+            yield list((total * exp(-middle * s)).applyfunc(factor_terms))

@@ -1,0 +1,75 @@
+"""f with df = mu omega for one integrable one-form omega: a bounded list of methods, cheap ones first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from sympy import exp, expand
+
+from .factors import bernoulli, combination, separable
+from .form import OneForm
+from .homogeneous import homogeneous
+from .lie import inverse_factors
+from .natani import natani
+from .potential import potential, tidy
+from .undecided import FAILURES, late
+
+Expr = Any  # SymPy has no types
+
+
+def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Expr | None:
+    """f with df = mu * omega for an integrable one-form omega, or None."""
+    try:
+        form = OneForm(row, variables)
+    except FAILURES:
+        return None
+    try:
+        given = [form.tower.element(entry) for entry in form.given]
+        if len(given) > 1 and form.exact(given):  # then no factor makes it easier
+            f = potential(form.given, form.x)
+            return f if f is not None and form.solves(f) else None
+    except FAILURES:
+        return None
+    for method in _methods(form, depth):
+        try:
+            for f in method:
+                if late():
+                    return None
+                if f is not None and form.solves(f):
+                    return f
+        except FAILURES:
+            continue
+    return None
+
+
+def _methods(form: OneForm, depth: int) -> list[Iterator[Expr | None]]:
+    """Iterators over candidates for f, the cheap methods first."""
+    if len(form.x) < 2:
+        return [iter(form.x)]
+
+    def inner(row: Sequence[Expr], variables: Sequence[Expr]) -> Expr | None:
+        return single(row, variables, depth + 1)
+
+    found = [
+        _exact(form),
+        _by_factors(form, bernoulli(form)),
+        _by_factors(form, separable(form)),
+        homogeneous(form, inner),
+        _by_factors(form, combination(form)),
+        inverse_factors(form),
+    ]
+    return [*found, natani(form, inner)] if len(form.x) > 2 and depth < 3 else found
+
+
+def _exact(form: OneForm) -> Iterator[Expr | None]:
+    if form.exact(form.a):
+        yield tidy(potential(form.terms, form.x))
+
+
+def _by_factors(form: OneForm, logarithms: Iterator[Expr | None]) -> Iterator[Expr | None]:
+    """The potential of mu * omega, for each of some log(mu)."""
+    for logarithm in logarithms:
+        if logarithm is not None:
+            mu = exp(expand(logarithm))
+            yield tidy(potential([mu * term for term in form.terms], form.x))
