@@ -12,6 +12,7 @@ the event does not depend on the communication step.
 
 from __future__ import annotations
 
+import collections
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -27,7 +28,9 @@ from .motion import EPS, motion, project
 from .state import Departure, Settings, State
 from .system import System, Vector
 
-LOOKS = (0.25, 0.5, 0.75)  # where a step is looked into for a contact that opens and closes in it
+LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
+ROUNDS = 50  # in which an impact is passed on between contacts that touch
+CHATTER = 200  # contact events in next to no time after which the step is given up
 PATIENCE = 200  # steps after which a communication step is judged by its average step
 STEP_LIMIT = 1e7  # internal steps that a communication step may need
 FEWEST_STEPS = 100  # rk4's steps in one natural time of the motion, unless solver.step is set
@@ -43,6 +46,7 @@ def advance(
 ) -> State:
     """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was."""
     begun, first = state.t, state.steps
+    events: collections.deque[float] = collections.deque(maxlen=CHATTER)
     if not np.isfinite(t_end) or t_end <= state.t:
         raise StepFailureError(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
@@ -51,6 +55,12 @@ def advance(
         while state.t < t_end:
             leg = _Leg(system, settings, state, u, p, begun)
             state = _travel(leg, state, t_end, begun, first)
+            events.append(state.t)
+            if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
+                raise StepFailureError(
+                    f"{CHATTER} contacts open or close in {events[-1] - events[0]:.1g} s at "
+                    f"t = {state.t!r} s: the contacts chatter without end"
+                )
     return state
 
 
@@ -191,11 +201,9 @@ def _first_event(
     gap: Sequence[float],
 ) -> tuple[tuple[float, list[int]] | None, Vector]:
     """The earliest sign change within the step just taken, as (time, contacts), if there is one."""
-    h = solver.t - t0
-    dense = solver.dense_output()
-    times = [t0 + x * h for x in LOOKS]
-    values = [before, *(leg.indicators(t, dense(t)) for t in times), leg.indicators(solver.t, y1)]
-    times = [t0, *times, solver.t]
+    times, values = _looks(leg, solver, t0, y0, before)
+    times.append(solver.t)
+    values.append(leg.indicators(solver.t, y1))
     found: list[tuple[float, int]] = []
     for c, closed in enumerate(leg.state.closed):
         trigger = 0.0 if closed else -gap[c]
@@ -210,10 +218,39 @@ def _first_event(
                     break
     if not found:
         for c, closed in enumerate(leg.state.closed):
-            armed[c] = armed[c] or (not closed and any(v[c] > gap[c] for v in values))
+            armed[c] = bool(armed[c] or (not closed and any(v[c] > gap[c] for v in values)))
         return None, values[-1]
     earliest = min(t for t, _ in found)
     return (earliest, [c for t, c in found if t == earliest]), values[-1]
+
+
+def _looks(
+    leg: _Leg, solver: Any, t0: float, y0: Vector, before: Vector
+) -> tuple[list[float], list[Vector]]:
+    """Times within the step at which the indicators are looked at, and their values, y0's first.
+
+    A quarter of the step at most; while a contact is open, no further than half of the way to it at
+    the present speed, |f| / (|G| |v|), so that a step is not taken across an obstacle.
+    """
+    h, dense = solver.t - t0, solver.dense_output()
+    rows = [k for k, c in zip(leg.system.contacts, leg.state.closed, strict=True) if not c]
+    times, values, y = [t0], [before], y0
+    while True:
+        stride = h * LARGEST_LOOK
+        if rows:
+            q, v = leg.split(y)
+            _, _, G, nu, _ = leg.at(times[-1]).evaluate(q, v)
+            f = np.abs(values[-1][[not c for c in leg.state.closed]])
+            speed = np.abs(G[rows]) @ np.abs(v) + np.abs(nu[rows])
+            ahead = 0.5 * f / np.where(speed > 0, speed, np.inf)
+            near = float(ahead[speed > 0].min(initial=stride))
+            stride = min(stride, max(near, h * SMALLEST_LOOK))
+        t = times[-1] + stride
+        if t >= solver.t - h * SMALLEST_LOOK:
+            return times, values
+        times.append(t)
+        y = dense(t)
+        values.append(leg.indicators(t, y))
 
 
 def _locate(
@@ -230,8 +267,9 @@ def _locate(
         if height(b) >= 0:
             return None  # it only grazed: within the tolerance there is no event
         if height(a) > 0:
-            return t0 + float(brentq(height, a, b, xtol=EPS * b, rtol=4 * EPS, maxiter=200))
-    return t0
+            found = brentq(height, a, b, xtol=EPS * b, rtol=4 * EPS, maxiter=200)
+            return float(t0 + found)
+    return float(t0)
 
 
 def _switch(leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: list[int]) -> State:
@@ -246,18 +284,17 @@ def _switch(leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: 
         closed[c] = False
         armed[c] = False
     for c in landing:
-        v = impact(at, q, v, closed, c)
-        _, _, G, nu, _ = at.evaluate(q, v)
         k = system.contacts[c]
-        speed = G[k] @ v - nu[k]
-        size = np.abs(G[k]) @ np.array(state.scale[system.n :])
-        closed[c] = bool(speed <= 1e-9 * size)
+        v = impact(at, q, v, closed, c)
+        closed[c] = _comes_to_rest(at, q, v, closed, c, state.gap[c])
         armed[c] = False
         if closed[c]:
             f = at.residual(q)
             for j, row in enumerate(system.rows):
                 if row.while_closed == k:
                     offset[j] = f[j]
+    if landing:
+        v = _pass_on(at, q, v, closed, state)
     touching = _touching(at, q, v, state, closed)
     modes = complementary_modes(at, q, v, closed, touching, leaving)
     q, v = project(at, q, v, system.active(modes), offset, leg.size)
@@ -276,6 +313,41 @@ def _switch(leg: _Leg, state: State, t0: float, y0: Vector, t: float, contacts: 
         offset=tuple(offset.tolist()),
         departures=tuple(departures),
     )
+
+
+def _pass_on(at: Instant, q: Vector, v: Vector, closed: Sequence[bool], state: State) -> Vector:
+    """An impact passed on through contacts that touch: each that is approached is struck in turn.
+
+    After `ROUNDS` rounds the rest is taken as one plastic impact.
+    """
+    system = at.system
+    f = at.residual(q)
+    near = [c for c, k in enumerate(system.contacts) if not closed[c] and abs(f[k]) <= state.gap[c]]
+    for count in range(ROUNDS):
+        _, _, G, nu, _ = at.evaluate(q, v)
+        speed = {c: G[system.contacts[c]] @ v - nu[system.contacts[c]] for c in near}
+        size = np.abs(G) @ (np.array(state.size) * state.rate)
+        struck = [c for c in near if speed[c] < -1e-9 * size[system.contacts[c]]]
+        if not struck:
+            return v
+        plastic = count == ROUNDS - 1
+        for c in struck:
+            v = impact(at, q, v, closed, c, plastic)
+    return v
+
+
+def _comes_to_rest(
+    at: Instant, q: Vector, v: Vector, closed: Sequence[bool], contact: int, gap: float
+) -> bool:
+    """True if the rebound would not rise above the gap within which contacts touch, v^2/(2a) <= gap.
+
+    Without it a ball would bounce infinitely often in a finite time.
+    """
+    free = motion(at, q, v, at.system.active(closed))
+    k = at.system.contacts[contact]
+    speed = free.G[k] @ v - free.nu[k]
+    acceleration = free.G[k] @ free.vdot - free.gamma[k]
+    return bool(speed <= 0 or (acceleration < 0 and speed**2 <= -2 * acceleration * gap))
 
 
 def _touching(

@@ -95,17 +95,18 @@ def impact(
     v: Vector,
     closed: Sequence[bool],
     landing: int,
+    plastic: bool = False,
 ) -> Vector:
     """Velocities after the contact `landing` (a position in `system.contacts`) was struck.
 
     Newton's law of restitution, M (v+ - v-) = G^T Lambda with G v+ - nu = -e (G v- - nu) on the
     struck row and G v+ = nu on the rows that go on acting; a closed contact that would have to pull
-    is left out.
+    is left out.  `plastic`: without rebound.
     """
     system = at.system
     M, _, G, nu, _ = at.evaluate(q, v)
     struck = system.contacts[landing]
-    e = system.restitution(at.p)[struck]
+    e = 0.0 if plastic else system.restitution(at.p)[struck]
     modes = list(closed)
     modes[landing] = True
     while True:
