@@ -164,6 +164,8 @@ class Model:
         for constraint in self.constraints:
             if not isinstance(constraint, Nonholonomic):
                 used |= sp.sympify(constraint.expression).atoms(AppliedUndef)
+        for relation in self.embedding.relations.values() if self.embedding else ():
+            used |= sp.sympify(relation).atoms(AppliedUndef)
         return tuple(i for i in self.inputs if i.symbol in used)
 
     def constraint(self, name: str) -> Constraint:

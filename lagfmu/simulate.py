@@ -108,8 +108,10 @@ def _simulate_model(
         state = start(system, settings, 0.0, q, v, u, p).state
         for k, t in enumerate(times):
             if k:
-                state = advance(system, settings, state, u, p, float(t))
-                u = drive(float(t))
+                u = drive(state.t)  # held over the step, as an importer of the FMU does
+                moved = advance(system, settings, state, u, p, float(t))
+                u = system.inputs_at(u, moved.t - state.t)
+                state = moved
             seen = observe(system, state, u, p)
             result[k] = (t, *(seen[o.name] for o in table.outputs))
     except StepFailureError as error:

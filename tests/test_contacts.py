@@ -8,7 +8,7 @@ import pytest
 from sympy import Rational, cos, pi, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Model, Nonholonomic, Parameter, Scene, simulate
+from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate
 from lagfmu.prepare import prepare
 
 G = 9.81
@@ -483,3 +483,83 @@ def test_every_method_finds_the_departure(method):
     result = simulate(spheres({"one": 0.3}), 1.5, 0.5, 1e-8, values)
     angle = result["departure.one.theta_one"][-1]
     assert np.cos(angle) == pytest.approx(2 / 3 * np.cos(0.3), abs=1e-7)
+
+
+# --------------------------------------------------------------------------- what a review found
+
+
+@pytest.mark.parametrize("step", [1.0, 20.0, 200.0])
+def test_a_force_free_particle_does_not_fly_through_a_sphere(step):
+    """Without forces a step may be as long as one likes; the particle that comes from x = -100 at the
+    impact parameter 0.2 meets the unit sphere all the same, and slides off along the tangent."""
+    model = Model(
+        name="Shot",
+        lagrangian=kinetic(x, y),
+        coordinates={x: "m", y: "m"},
+        constraints=[Contact("sphere", x**2 + y**2 - a**2)],
+        parameters=[MASS, Parameter(a, 1.0, "m")],
+        start={x: -100.0, y: 0.2, x.diff(): 1.0},
+    )
+    result = simulate(model, 200.0, step)
+    # tangential speed 0.2 m/s on the circle from the point of impact; it never leaves: no force
+    # pulls it off, and the sphere carries m v^2/a < 0: so it leaves at once, along the tangent
+    rest = 200.0 - (100.0 - np.sqrt(1 - 0.04))
+    assert result["x"][-1] == pytest.approx(-np.sqrt(0.96) + 0.2 * 0.2 * rest, abs=1e-6)
+    assert result["y"][-1] == pytest.approx(0.2 + 0.2 * np.sqrt(0.96) * rest, abs=1e-6)
+
+
+@pytest.mark.parametrize("restitution", [0.2, 0.5])
+def test_two_balls_on_each_other_come_to_rest(restitution):
+    """A ball falls on a ball that falls on the floor: infinitely many impacts in a finite time, after
+    which the floor carries (m1 + m2) g and the lower ball m2 g."""
+    z1, z2 = dynamicsymbols("z1 z2")
+    m1, m2, d = symbols("m1 m2 d", positive=True)
+    model = Model(
+        name="Stack",
+        lagrangian=(m1 * z1.diff() ** 2 + m2 * z2.diff() ** 2) / 2 - g * (m1 * z1 + m2 * z2),
+        coordinates={z1: "m", z2: "m"},
+        constraints=[
+            Contact("floor", z1, restitution=e),
+            Contact("between", z2 - z1 - d, restitution=e),
+        ],
+        parameters=[
+            Parameter(m1, 1.0, "kg"),
+            Parameter(m2, 0.5, "kg"),
+            Parameter(d, 0.3, "m"),
+            Parameter(e, restitution, "1"),
+            GRAVITY,
+        ],
+        start={z1: 1.0, z2: 1.6},
+    )
+    result = simulate(model, 3.0, 0.1)
+    assert result["lambda.floor"][-1] == pytest.approx(1.5 * G, rel=1e-9)
+    assert result["lambda.between"][-1] == pytest.approx(0.5 * G, rel=1e-9)
+    assert np.diff(result["energy.total"]).max() < 1e-9
+
+
+def test_a_table_that_drops_away_leaves_the_block_in_free_fall():
+    """A table that jumps down by 0.2 m no longer touches the block on it, which falls from where it
+    is: lambda = 0 and y'' = -g, until it has fallen 0.2 m."""
+    table = dynamicsymbols("table")
+    model = Model(
+        name="Table",
+        lagrangian=kinetic(y) - m * g * y,
+        coordinates={y: "m"},
+        constraints=[Contact("top", y - table)],
+        parameters=[MASS, GRAVITY],
+        inputs=[Input(table, "m")],
+        start={y: 0.0},
+    )
+    signal = np.array(
+        [(0.0, 0.0), (0.1, 0.0), (0.1, -0.2), (1.0, -0.2)],
+        dtype=[("time", float), ("table", float)],
+    )
+    result = simulate(model, 1.0, 0.02, 1e-10, inputs=signal)
+    fallen = result["time"] - 0.1
+    flying = (fallen > 0.03) & (fallen < np.sqrt(2 * 0.2 / G))
+    late = result["time"] > 0.4
+    assert flying.any()
+    assert not result["contact.top"][flying].any()
+    assert result["lambda.top"][flying] == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(result["y"][flying] + G * fallen[flying] ** 2 / 2) < 0.05
+    assert result["y"][late] == pytest.approx(-0.2, abs=1e-9)

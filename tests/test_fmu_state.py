@@ -52,6 +52,28 @@ def test_a_restored_state_repeats_the_motion_bit_for_bit(fmu, method, before):
         assert run(fresh, 40) == first
 
 
+def test_every_state_of_a_run_can_be_restored(fmu):
+    """Sliding, just departed, in flight: each moment, saved as bytes, has the same future in a fresh
+    instance."""
+    with instance(fmu("Hemisphere")) as one, instance(fmu("Hemisphere"), "fresh") as fresh:
+        one.start({"theta": 0.3})
+        fresh.start()
+        saved = []
+        for _ in range(12):
+            state = one.fmu.getFMUState()
+            saved.append((one.time, one.fmu.serializeFMUState(state)))
+            one.fmu.freeFMUState(state)
+            one.step(0.1)
+        last = one.outputs()
+        assert last["departure.surface.count"] == 1
+        for moment, data in saved:
+            fresh.fmu.setFMUState(fresh.fmu.deserializeFMUState(data))
+            fresh.time = moment
+            while fresh.time < one.time - 0.05:
+                fresh.step(0.1)
+            assert fresh.outputs() == last
+
+
 def test_the_state_of_another_fmu_is_refused(fmu):
     """A saved state belongs to one system: Atwood's cannot become Hemisphere's."""
     with instance(fmu("Hemisphere")) as one, instance(fmu("Atwood")) as other:

@@ -416,3 +416,35 @@ def test_an_embedding_may_depend_on_time_and_leave_constraints():
     assert run["s"] == pytest.approx(radius, rel=1e-7)
     force = 2 * 2.0 * 2.0 * np.sinh(2 * run["time"])  # 2 m w s', s' = sinh 2t
     assert run["lambda.wire"] == pytest.approx(force, rel=1e-6, abs=1e-6)
+
+
+def test_an_embedding_may_ride_on_a_prescribed_motion():
+    """A pendulum on a pivot that is moved by U: the angle alone, with x = U + L sin(phi), moves and
+    pulls on its rod as the Cartesian one does, dU/dt and its derivative included."""
+    x, y, phi, U = dynamicsymbols("x y phi U")
+    m, g, L = symbols("m g L", positive=True)
+    model = Model(
+        name="Moved",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("rod", (x - U) ** 2 + y**2 - L**2)],
+        parameters=[
+            Parameter(m, 1.3, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(L, 0.7, "m"),
+        ],
+        inputs=[Input(U, "m")],
+        start={x: 0.1 + 0.7 * math.sin(0.4), y: -0.7 * math.cos(0.4)},
+        embedding=Embedding(
+            {phi: "rad"}, {x: U + L * sin(phi), y: -L * cos(phi)}, {phi: 0.4, phi.diff(): 0.5}
+        ),
+    )
+    drive = {"U": 0.1, "der(U)": 0.7, "der(U,2)": 0.5}
+    speeds = {
+        "der(x)": 0.7 + 0.7 * 0.5 * math.cos(0.4),
+        "der(y)": 0.7 * 0.5 * math.sin(0.4),
+    }
+    free = simulate(model, 0.5, 0.5, 1e-12, {**drive, **speeds}, scene=Scene("Moved"))
+    angle = simulate(model, 0.5, 0.5, 1e-12, drive, scene=Scene("Moved", "minimal"))
+    for name in ("x", "der(x)", "der(x,2)", "y", "lambda.rod", "energy.total"):
+        np.testing.assert_allclose(angle[name], free[name], rtol=1e-9, err_msg=name)

@@ -79,6 +79,8 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         self.running = False
         self.state: State | None = None
         self.observed: list[Any] | None = None
+        self.expected: list[float] = []
+        self.warned = False
 
     # -------------------------------------------------------------- life cycle
 
@@ -117,38 +119,65 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Advance by `step_size` [s]; False (fmi2Discard) leaves everything as it was."""
-        before = self.state
+        """Advance by `step_size` [s]; False (fmi2Discard) leaves everything as it was.
+
+        A prescribed motion goes on by its derivatives until it is set again, so that what is read
+        after the step belongs to the time at its end.
+        """
+        before, values = self.state, list(self.values)
         try:
-            if before is None or not self.running:
-                raise StepFailureError("fmi2DoStep before the end of the initialization")
-            end = current_time + step_size
-            if not step_size > 0 or not math.isfinite(step_size):
-                raise StepFailureError(
-                    f"the communication step is {step_size!r} s, expected a positive number"
-                )
-            slack = ROUNDING * step_size + 1e-12 * abs(before.t)
-            if not abs(current_time - before.t) <= slack:
-                raise StepFailureError(
-                    f"the communication point is {current_time!r} s, but this FMU stands at "
-                    f"{before.t!r} s: continue there, or restore a state saved at that time"
-                )
-            if end > self.stop_time + slack:
-                raise StepFailureError(
-                    f"the step ends at {end!r} s, after the stop time {self.stop_time!r} s that "
-                    "fmi2SetupExperiment defined"
-                )
+            before = self._checked(current_time, step_size)
+            u = self._values(self.inputs)
+            self._warn_of_jumps(u)
             self.state = advance(
-                self.system, self.settings, before, self._values(self.inputs), self.p, end
+                self.system, self.settings, before, u, self.p, current_time + step_size
             )
+            self.expected = self.system.inputs_at(u, self.state.t - before.t)
+            for k, value in zip(self.inputs, self.expected, strict=True):
+                self.values[k] = value
             self.observed = None
             self._outputs()
         except StepFailureError as error:
-            self.state, self.observed = before, None
+            self.state, self.values, self.observed = before, values, None
             self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
             return False
         self._report_events(before, self.state)
         return True
+
+    def _checked(self, current_time: float, step_size: float) -> State:
+        """The state that a step may start from.  Raises StepFailureError."""
+        state = self.state
+        if state is None or not self.running:
+            raise StepFailureError("fmi2DoStep before the end of the initialization")
+        if not step_size > 0 or not math.isfinite(step_size):
+            raise StepFailureError(
+                f"the communication step is {step_size!r} s, expected a positive number"
+            )
+        slack = ROUNDING * step_size + 1e-12 * abs(state.t)
+        if not abs(current_time - state.t) <= slack:
+            raise StepFailureError(
+                f"the communication point is {current_time!r} s, but this FMU stands at "
+                f"{state.t!r} s: continue there, or restore a state saved at that time"
+            )
+        end = current_time + step_size
+        if end > self.stop_time + slack:
+            raise StepFailureError(
+                f"the step ends at {end!r} s, after the stop time {self.stop_time!r} s that "
+                "fmi2SetupExperiment defined"
+            )
+        return state
+
+    def _warn_of_jumps(self, u: Sequence[float]) -> None:
+        """Once: a prescribed motion moves, but its derivatives are left at zero."""
+        for k in self.system.prescribed:
+            still = u[k + 1] == 0 and u[k + 2] == 0
+            if self.expected and u[k] != self.expected[k] and still and not self.warned:
+                name = self.names[self.inputs[k]]
+                self._warn(
+                    f"input {name} moves while der({name}) = der({name},2) = 0: it jumps at each "
+                    "communication point; connect its derivatives as well"
+                )
+                self.warned = True
 
     # -------------------------------------------------------------- values
 

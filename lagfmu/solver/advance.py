@@ -52,6 +52,7 @@ def advance(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
         )
     with np.errstate(all="ignore"):
+        state = _released(Instant(system, state.t, system.inputs_at(u, 0.0), p), state)
         while state.t < t_end:
             leg = _Leg(system, settings, state, u, p, begun)
             state = _travel(leg, state, t_end, begun, first)
@@ -62,6 +63,19 @@ def advance(
                     f"t = {state.t!r} s: the contacts chatter without end"
                 )
     return state
+
+
+def _released(at: Instant, state: State) -> State:
+    """Contacts opened that a jump of a prescribed motion has left a gap in."""
+    if not (at.system.prescribed and any(state.closed)):
+        return state
+    f = at.residual(np.array(state.q))[list(at.system.contacts)]
+    gone = [shut and a > g for shut, a, g in zip(state.closed, f, state.gap, strict=True)]
+    return replace(
+        state,
+        closed=tuple(bool(c and not g) for c, g in zip(state.closed, gone, strict=True)),
+        armed=tuple(bool(a or g) for a, g in zip(state.armed, gone, strict=True)),
+    )
 
 
 @dataclass
@@ -246,7 +260,7 @@ def _looks(
             near = float(ahead[speed > 0].min(initial=stride))
             stride = min(stride, max(near, h * SMALLEST_LOOK))
         t = times[-1] + stride
-        if t >= solver.t - h * SMALLEST_LOOK:
+        if t >= solver.t - h * SMALLEST_LOOK or t <= times[-1]:
             return times, values
         times.append(t)
         y = dense(t)
