@@ -41,7 +41,7 @@ def write(
     """Package what `prepare` made."""
     extra = {
         "documentation/index.html": page(prepared, figures).encode(),
-        "resources/lagfmu.json": pack_closed_forms(prepared.scene, closed_forms),
+        "resources/lagfmu.json": pack_closed_forms(prepared.scene, closed_forms, prepared.table),
     }
     content = python.build(
         prepared.equations, prepared.reduction, prepared.scene, prepared.table, extra

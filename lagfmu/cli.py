@@ -203,6 +203,8 @@ def _print(found: Verification) -> None:
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
         table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
     console.print(table)
+    if not found.claims:
+        console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
     for check in found.checks:
         if not check.passed and check.detail:
             errors.print(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +12,9 @@ import sympy as sp
 from sympy.parsing.sympy_parser import parse_expr
 
 from .closed_form import ClosedForm, Conserved, in_variables, output
-from .errors import VerificationError
+from .errors import ModelError, VerificationError
 from .scene import Scene
+from .variables import VariableTable
 
 Expr = Any
 FORMAT = 1
@@ -64,10 +66,35 @@ def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> l
     return claims
 
 
-def pack_closed_forms(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> bytes:
-    """JSON with the claims; expressions are indexed symbols, so that any name can be read back."""
+def pack_closed_forms(
+    scene: Scene, closed_forms: Sequence[ClosedForm | Conserved], table: VariableTable
+) -> bytes:
+    """JSON with the claims; expressions are indexed symbols, so that any name can be read back.
+
+    Raises ModelError if a claim uses what the FMU does not have.
+    """
+    claims = claims_of(scene, closed_forms)
+    known = {v.name for v in table.variables}
+    problems = []
+    for claim in claims:
+        used = {
+            str(s)
+            for e in (claim.actual, claim.expected, claim.scale)
+            if e is not None
+            for s in sp.sympify(e).free_symbols
+        }
+        read = {n[len("initial(") : -1] if n.startswith("initial(") else n for n in used}
+        read |= {f"contact.{c}" for c in (claim.while_closed, claim.while_open) if c}
+        for name in sorted(read - known - {"time"}):
+            near = difflib.get_close_matches(name, known, 1)
+            problems.append(
+                f"closed form {claim.name!r} uses {name!r}, which is no variable of the FMU"
+                + (f"; did you mean {near[0]!r}?" if near else "")
+            )
+    if problems:
+        raise ModelError(scene.name, problems)
     packed = []
-    for claim in claims_of(scene, closed_forms):
+    for claim in claims:
         entry: dict[str, Any] = {
             key: getattr(claim, key)
             for key in ("name", "while_closed", "while_open", "at_departure", "within", "rounding")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 from dataclasses import dataclass
 
 from .errors import ModelError
@@ -31,6 +32,10 @@ class Scene:
         problems = []
         if not NAME.match(self.name):
             problems.append(f"scene name {self.name!r} is no FMI name: use letters, digits and _")
+        elif keyword.iskeyword(self.name):
+            problems.append(
+                f"scene name {self.name!r} is a word of the Python language: choose another"
+            )
         if self.formulation not in FORMULATIONS:
             problems.append(
                 f"formulation {self.formulation!r} is unknown, expected one of "

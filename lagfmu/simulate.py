@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,6 @@ from .solver.failure import StepFailureError
 from .solver.initial import start
 from .solver.observe import observe
 from .solver.state import METHODS, SMALLEST_TOLERANCE, Settings
-from .variables import VariableTable
 
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
@@ -75,7 +76,12 @@ def _simulate_model(
 ) -> Trajectory:
     scene, table, system = prepared.scene, prepared.table, prepared.system
     known: dict[str, Any] = {v.name: v.start for v in table.variables if v.role != "output"}
-    _check_values(table, values)
+    limits = {
+        v.name: _Settable(v.kind, v.minimum, v.maximum)
+        for v in table.variables
+        if v.role != "output"
+    }
+    _check_values(scene.name, limits, values)
     known |= values
     method = known["solver.method"]
     settings = Settings(
@@ -119,25 +125,35 @@ def _simulate_model(
     return result
 
 
-def _check_values(table: VariableTable, values: Mapping[str, Any]) -> None:
+@dataclass(frozen=True)
+class _Settable:
+    kind: str
+    minimum: float | None
+    maximum: float | None
+
+
+def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[str, Any]) -> None:
     """Refuse what the FMU would refuse: all problems at once."""
-    settable = {v.name: v for v in table.variables if v.role != "output"}
     problems = []
     for name, value in values.items():
         v = settable.get(name)
         if v is None:
-            problems.append(f"{name!r} cannot be set, expected one of {', '.join(settable)}")
+            near = difflib.get_close_matches(name, settable, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            problems.append(f"{name!r} cannot be set, expected one of {', '.join(settable)}{hint}")
         elif v.kind == "String":
             if value not in METHODS:
-                problems.append(f"{name} = {value!r}, expected one of {', '.join(METHODS)}")
+                problems.append(f"{name!r} = {value!r}, expected one of {', '.join(METHODS)}")
         elif not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
-            problems.append(f"{name} = {value!r}, expected a finite number")
+            problems.append(f"{name!r} = {value!r}, expected a finite number")
         elif (v.minimum is not None and value < v.minimum) or (
             v.maximum is not None and value > v.maximum
         ):
-            problems.append(f"{name} = {value!r} is outside its bounds [{v.minimum}, {v.maximum}]")
+            problems.append(
+                f"{name!r} = {value!r} is outside its bounds [{v.minimum}, {v.maximum}]"
+            )
     if problems:
-        raise SimulationError("; ".join(problems))
+        raise SimulationError(f"{what}: " + "; ".join(problems))
 
 
 def read_description(path: Path) -> Any:
@@ -174,10 +190,19 @@ def _simulate_fmu(
 
     stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
     step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
-    names = {v.name for v in description.modelVariables}
-    unknown = sorted(set(values) - names)
-    if unknown:
-        raise SimulationError(f"{str(path)!r} has no variables {', '.join(unknown)}")
+    _check_values(
+        str(path),
+        {
+            v.name: _Settable(
+                v.type,
+                None if v.min is None else float(v.min),
+                None if v.max is None else float(v.max),
+            )
+            for v in description.modelVariables
+            if v.causality in ("parameter", "input") or v.initial in ("exact", "approx")
+        },
+        values,
+    )
     try:
         result: Trajectory = fmpy.simulate_fmu(
             str(path),

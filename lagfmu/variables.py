@@ -443,7 +443,7 @@ class _Builder:
             *variables,
             self.output("energy.potential", "potential energy", ENERGY, potential),
             self.output(
-                "energy.total", "kinetic and potential energy", ENERGY, kinetic | potential
+                "energy.total", "kinetic plus potential energy", ENERGY, kinetic | potential
             ),
         ]
 

@@ -53,13 +53,14 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """The checks of one FMU and what the run cost."""
+    """The checks of one FMU, `claims` of them closed forms, and what the run cost."""
 
     name: str
     checks: tuple[Check, ...]
     simulated: float
     seconds: float
     steps: int
+    claims: int
 
     @property
     def passed(self) -> bool:
@@ -125,7 +126,7 @@ def verify(
     checks += [_check(claim, result, values, used) for claim in claims]
     span = float(result["time"][-1] - result["time"][0])
     steps = int(result["solver.steps"][-1]) if "solver.steps" in (result.dtype.names or ()) else 0
-    return Verification(description.modelName, tuple(checks), span, seconds, steps)
+    return Verification(description.modelName, tuple(checks), span, seconds, steps, len(claims))
 
 
 def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
