@@ -30,6 +30,7 @@ from .system import System, Vector
 
 LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
 ROUNDS = 50  # in which an impact is passed on between contacts that touch
+HOPELESS = 1.0  # error of one rk4 step, relative to the state, at which it means nothing
 CHATTER = 200  # contact events in next to no time after which the step is given up
 PATIENCE = 200  # steps after which a communication step is judged by its average step
 STEP_LIMIT = 1e7  # internal steps that a communication step may need
@@ -142,6 +143,14 @@ class _Leg:
             raise self.failure(solver.t, str(error)) from error
         if solver.status == "failed" or not np.isfinite(solver.y).all():
             raise self.failure(solver.t, message or "the state is not finite")
+        if self.settings.method == "rk4":
+            speed = self.size * self.state.rate
+            unit = np.maximum(np.abs(solver.y), np.concatenate([self.size, speed]))
+            if not (np.abs(solver.error) <= HOPELESS * unit).all():
+                raise self.failure(
+                    solver.t,
+                    f"rk4's step of {solver.h_abs:.3g} s is far too large: reduce solver.step",
+                )
 
     def failure(self, t: float, message: str) -> StepFailureError:
         if "step size" in message:

@@ -46,6 +46,7 @@ class RK4:
         self.f_old, self.y_old, self.t_old = k1, y, t
         self.t, self.y = end, y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         self.f = self.fun(end, self.y)
+        self.error = h / 6 * (k4 - self.f)  # against the method of order 3 with f(y1) for k4
         self.status = "finished" if last else "running"
 
     def dense_output(self) -> Callable[[float], Any]:
