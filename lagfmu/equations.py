@@ -21,7 +21,7 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from .errors import ModelError
-from .model import Constraint, Contact, Model, Nonholonomic, name_of
+from .model import Constraint, Model, Nonholonomic, name_of
 
 Expr = Any
 TIME = dynamicsymbols._t
@@ -35,8 +35,8 @@ class EquationsOfMotion:
     p: parameters.  M (n, n) and G (m, n) are sparse.  F (n) holds all forces without lambda, nu and
     gamma (m) the right-hand sides of G v = nu and G vdot = gamma, f (m) the residual of a position
     constraint (None for a nonholonomic one).  `symbols` maps the model's dynamicsymbols to the plain
-    symbols.  Energies in joule: `kinetic` is the part of L that is
-    quadratic in v, `potential` minus the part without v; their sum is Jacobi's integral.
+    symbols, `rates` a prescribed motion u to der(u) and der(u) to der(u,2).  Energies in joule:
+    `kinetic` is the part of L that is quadratic in v, `potential` minus the part without v; their sum is Jacobi's integral.
     """
 
     model: Model
@@ -53,6 +53,7 @@ class EquationsOfMotion:
     kinetic: Expr
     potential: Expr | None
     symbols: dict[Expr, Expr]
+    rates: dict[Expr, Expr]
 
     @property
     def n(self) -> int:
@@ -142,6 +143,7 @@ def derive(model: Model) -> EquationsOfMotion:
         kinetic=kinetic,
         potential=potential,
         symbols=table,
+        rates=rates,
     )
 
 
@@ -306,8 +308,3 @@ def _potential(
     if any(sp.simplify(f + V.diff(s)) != 0 for f, s in zip(forces, q, strict=True)):
         return None
     return V + standing
-
-
-def is_contact(constraint: Constraint) -> bool:
-    """True for a unilateral constraint."""
-    return isinstance(constraint, Contact)

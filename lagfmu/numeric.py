@@ -186,8 +186,8 @@ def _pattern(indices: Sequence[tuple[int, int]]) -> str:
 
 
 def _prescribed(eom: EquationsOfMotion) -> tuple[int, ...]:
-    positions = {str(s): k for k, s in enumerate(eom.u)}
-    return tuple(positions[name] for name in positions if f"der({name},2)" in positions)
+    """Where in u a prescribed motion begins: what has a rate that has a rate."""
+    return tuple(k for k, s in enumerate(eom.u) if eom.rates.get(s) in eom.rates)
 
 
 def _units(eom: EquationsOfMotion) -> list[Any]:

@@ -57,10 +57,9 @@ def reduce(eom: EquationsOfMotion) -> Reduction:
         }
         sdot = tuple(speeds[c] for c in s)
     phi = tuple(sp.sympify(relations.get(q, q)) for q in eom.q)
-    moving = input_rates(eom)
-    rates = {**dict(zip(s, sdot, strict=True)), **moving}
+    rates = {**dict(zip(s, sdot, strict=True)), **eom.rates}
     J = [[f.diff(c) for c in s] for f in phi]
-    drift = [_total(f, moving) for f in phi]
+    drift = [_total(f, eom.rates) for f in phi]
     vel = tuple(
         sp.Add(*(a * b for a, b in zip(row, sdot, strict=True)), d)
         for row, d in zip(J, drift, strict=True)
@@ -99,17 +98,6 @@ def reduce(eom: EquationsOfMotion) -> Reduction:
         potential=None if eom.potential is None else inside(eom.potential),
     )
     return Reduction(s, sdot, phi, vel, reduced, rows)
-
-
-def input_rates(eom: EquationsOfMotion) -> dict[Expr, Expr]:
-    """u -> der(u) and der(u) -> der(u,2) for the prescribed motions."""
-    by_name = {str(s): s for s in eom.u}
-    rates = {}
-    for name, s in by_name.items():
-        if f"der({name},2)" in by_name:
-            rates[s] = by_name[f"der({name})"]
-            rates[by_name[f"der({name})"]] = by_name[f"der({name},2)"]
-    return rates
 
 
 def _total(expression: Expr, rates: dict[Expr, Expr]) -> Expr:

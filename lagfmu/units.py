@@ -134,8 +134,9 @@ def _merged(*parts: tuple[str, Fraction]) -> Unit:
 
 
 ONE = _unit({})
-SECOND, ENERGY, POWER, FORCE = (_unit({symbol: Fraction(1)}) for symbol in ("s", "J", "W", "N"))
-METRE, RADIAN = (_unit({symbol: Fraction(1)}) for symbol in ("m", "rad"))
+SECOND, METRE, ENERGY, POWER, FORCE = (
+    _unit({name: Fraction(1)}) for name in ("s", "m", "J", "W", "N")
+)
 
 
 def parse_unit(text: str, what: str) -> Unit:

@@ -144,12 +144,11 @@ def test_restitution_may_be_a_parameter():
 # --------------------------------------------------------------------------- leaving
 
 
-def test_a_moving_floor_throws_the_block_off():
-    """A block on a table that goes up and down as A (1 - cos w t) is left behind where the table's
-    acceleration is -g: cos w t = -g/(A w^2), at the state of the table there."""
+def moving_table():
+    """A block on a table that goes up and down as A (1 - cos w t)."""
     A, w = symbols("A omega", positive=True)
     t = dynamicsymbols._t
-    model = Model(
+    return Model(
         name="Table",
         lagrangian=kinetic(y) - m * g * y,
         coordinates={y: "m"},
@@ -157,7 +156,12 @@ def test_a_moving_floor_throws_the_block_off():
         parameters=[MASS, GRAVITY, Parameter(A, 0.1, "m"), Parameter(w, 12.0, "rad/s")],
         start={y: 0.0},
     )
-    result = run(model, 0.3, 0.01, 1e-12)
+
+
+def test_a_moving_floor_throws_the_block_off():
+    """A block on a table that goes up and down as A (1 - cos w t) is left behind where the table's
+    acceleration is -g: cos w t = -g/(A w^2), at the state of the table there."""
+    result = run(moving_table(), 0.3, 0.01, 1e-12)
     leave = np.arccos(-G / (0.1 * 144)) / 12
     assert result["departure.table.count"][-1] == 1
     assert result["departure.table.time"][-1] == pytest.approx(leave, abs=1e-11)
@@ -177,17 +181,7 @@ def test_a_moving_floor_throws_the_block_off():
 def test_a_block_that_is_lifted_lands_and_leaves_again():
     """On the table of the last test with time enough the block lands, is thrown again, and each
     departure is counted; while it is on the table lambda > 0, else f > 0 and lambda = 0."""
-    A, w = symbols("A omega", positive=True)
-    t = dynamicsymbols._t
-    model = Model(
-        name="Table",
-        lagrangian=kinetic(y) - m * g * y,
-        coordinates={y: "m"},
-        constraints=[Contact("table", y - A * (1 - cos(w * t)))],
-        parameters=[MASS, GRAVITY, Parameter(A, 0.1, "m"), Parameter(w, 12.0, "rad/s")],
-        start={y: 0.0},
-    )
-    result = run(model, 5.0, 0.005)
+    result = run(moving_table(), 5.0, 0.005)
     closed, f, lam = (result[n] for n in ("contact.table", "residual.table", "lambda.table"))
     assert result["departure.table.count"][-1] >= 4
     assert (np.diff(result["departure.table.count"]) >= 0).all()

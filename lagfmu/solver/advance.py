@@ -176,7 +176,7 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
         raise StepFailureError(leg.cause)
     solver = leg.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
-    proposed, steps = state.step, state.steps
+    steps = state.steps
     watch = bool(leg.system.contacts)
     before = leg.indicators(state.t, y) if watch else np.zeros(0)
     while True:
@@ -188,11 +188,9 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
         if watch:
             event, before = _first_event(leg, solver, t0, y0, y1, before, armed, state.gap)
             if event is not None:
-                here = replace(state, step=max(offered, 0.0), steps=steps, armed=tuple(armed))
+                here = replace(state, step=offered, steps=steps, armed=tuple(armed))
                 return _switch(leg, here, t0, y0, *event)
-        clipped = solver.t == t_end
-        proposed = max(solver.h_abs, offered) if clipped else solver.h_abs
-        if clipped:
+        if solver.t == t_end:
             n = leg.system.n
             return replace(
                 state,
@@ -200,7 +198,7 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
                 q=tuple(y1[:n].tolist()),
                 v=tuple(y1[n:].tolist()),
                 armed=tuple(armed),
-                step=float(proposed),
+                step=float(max(solver.h_abs, offered)),  # the last step may have been cut short
                 steps=steps,
             )
         solver.y, solver.f = y1, leg.rate(solver.t, y1)
