@@ -36,7 +36,8 @@ class EquationsOfMotion:
     gamma (m) the right-hand sides of G v = nu and G vdot = gamma, f (m) the residual of a position
     constraint (None for a nonholonomic one).  `symbols` maps the model's dynamicsymbols to the plain
     symbols, `rates` a prescribed motion u to der(u) and der(u) to der(u,2).  Energies in joule:
-    `kinetic` is the part of L that is quadratic in v, `potential` minus the part without v; their sum is Jacobi's integral.
+    `kinetic` is the part of L that is quadratic in v, `potential` minus the part without v; their sum
+    is Jacobi's integral.
     """
 
     model: Model
