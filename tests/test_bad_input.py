@@ -885,3 +885,12 @@ def test_a_log_with_letters_that_are_not_ascii_arrives(fmu):
             one.fmu.setString([one.variables["solver.method"].valueReference], ["θ"])
         one.fmu.exitInitializationMode()
         one.step(0.1)
+
+
+def test_a_percent_sign_in_a_refused_value_is_no_format(fmu):
+    """An importer's logger prints like printf: a refused '%s%n' comes out of it as it went in."""
+    with instance(fmu("Atwood")) as one:
+        one.fmu.setupExperiment()
+        one.fmu.enterInitializationMode()
+        with refused(one, FATAL, "solver.method", "'%%s%%n'"):
+            one.fmu.setString([one.variables["solver.method"].valueReference], ["%s%n"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -186,3 +187,24 @@ assert not [m for m in sys.modules if m == "sympy" or m == "lagfmu"]
 def test_an_fmu_needs_no_sympy_and_no_lagfmu(fmu):
     """The importing side has Python, NumPy and SciPy: the particle still leaves the hemisphere."""
     subprocess.run([sys.executable, "-c", BLOCKED, str(fmu("Hemisphere"))], check=True)
+
+
+REUSED = """
+import ctypes, sys
+libc = ctypes.CDLL(None)
+libc.wcsdup.restype = ctypes.c_void_p
+ones = ctypes.c_void_p(libc.wcsdup(ctypes.c_wchar_p("\\1" * 31)))  # with its end, 128 bytes
+for _ in range(64):
+    libc.__cxa_atexit(libc.wcsdup, ones, None)
+import fmpy
+fmpy.simulate_fmu(sys.argv[1], stop_time=0.1, output_interval=0.1)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="looks into the heap of glibc")
+def test_the_end_of_the_process_touches_no_freed_memory(fmu):
+    """The handlers run after those of the FMU's library and take the blocks that it has just freed, full
+    of ones: a second release finds a count of 1 and calls a destructor at an address that is none."""
+    environment = {**os.environ, "GLIBC_TUNABLES": "glibc.malloc.tcache_count=65535"}
+    command = [sys.executable, "-c", REUSED, str(fmu("Hemisphere"))]
+    subprocess.run(command, env=environment, check=True)

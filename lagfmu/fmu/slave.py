@@ -26,7 +26,7 @@ from ..solver.initial import start
 from ..solver.observe import Values, observe
 from ..solver.state import METHODS, SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
-from .references import keep, keep_module_of
+from .references import end_once, keep, keep_module_of
 
 Call = TypeVar("Call", bound=Callable[..., Any])
 ROUNDING = 1e-6  # part of a step by which an importer's sums of times may differ from ours
@@ -46,6 +46,7 @@ def guarded(method: Call) -> Call:
         except Exception as error:
             keep(self, type(self), self.log_queue)
             text = str(error).encode("ascii", "backslashreplace").decode()
+            text = text.replace("%", "%%")  # the importer's logger reads it as a format of printf
             if isinstance(error, (Refused, StepFailureError)):
                 raise Refused(text) from None
             raise Refused(f"internal error, {type(error).__name__}: {text}") from error
@@ -68,6 +69,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         keep_module_of(self)
+        end_once(self)
         self.values: list[Any] = [v[3] for v in self.variables]
         self.names = [v[0] for v in self.variables]
         self.outputs = [k for k, v in enumerate(self.variables) if v[2] in ("output", "start")]
