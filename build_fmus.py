@@ -1,4 +1,4 @@
-"""Build every model in models/ as an FMU, verify each through fmpy, and print one table.
+"""Build every model in models/ as an FMU of either target, verify each through fmpy, print one table.
 
 Exit status 1 if a model cannot be built or misses a closed form.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import statistics
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -18,7 +19,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 
 from lagfmu import LagfmuError, Verification, verify
-from lagfmu.build import write
+from lagfmu.build import TARGETS, write
+from lagfmu.compiler import HOST, find_compiler
+from lagfmu.fmu.native import takes_long
 from lagfmu.modelfile import ModelFile, load
 from lagfmu.prepare import prepare
 from lagfmu.scene import Scene
@@ -27,25 +30,53 @@ MODELS = Path(__file__).parent / "models"
 RUNS = 3  # the time is the median of these
 
 
-def build_one(file: ModelFile, scene: Scene, out: Path) -> tuple[Path, float, Verification, float]:
+def build_one(
+    file: ModelFile, scene: Scene, target: str, out: Path, platforms: Sequence[str]
+) -> tuple[Path, float, Verification, float]:
     """The FMU, seconds to build it, its verification, seconds to simulate it."""
     begun = time.perf_counter()
     prepared = prepare(file.model, scene)
-    path = write(prepared, out, file.closed_forms)
+    path = write(prepared, out, file.closed_forms, target=target, platforms=platforms)
     built = time.perf_counter() - begun
     runs = [verify(path) for _ in range(RUNS)]
-    write(prepared, out, file.closed_forms, runs[0].rows())
+    write(prepared, out, file.closed_forms, runs[0].rows(), target, platforms)
     return path, built, runs[0], statistics.median(r.seconds for r in runs)
 
 
+def first(target: str, platforms: Sequence[str]) -> bool:
+    """True if the C runtime has to be compiled before this FMU."""
+    return target == "native" and takes_long(platforms)
+
+
 def main(
-    out: Annotated[Path, typer.Option(help="Folder for python/NAME.fmu.")] = Path("dist"),
+    out: Annotated[Path, typer.Option(help="Folder for python/ and native/NAME.fmu.")] = Path(
+        "dist"
+    ),
+    platforms: Annotated[
+        list[str] | None,
+        typer.Option(metavar="all|host|NAME...", help="Where native FMUs can run; repeatable."),
+    ] = None,
 ) -> None:
-    """Build and verify every model in models/."""
+    """Build and verify every model in models/, for both targets."""
     console = Console(width=None if sys.stdout.isatty() else 120)
+    places = tuple(platforms or [HOST])
+    targets = TARGETS if find_compiler() is not None else ("python",)
+    if targets != TARGETS:
+        console.print(
+            "no C compiler: python FMUs only; pip install lagfmu\\[native] for the others"
+        )
     table = Table(title="FMUs, held against their closed forms", title_justify="left")
-    for column in ("FMU", "size", "build", "steps per s", "ms per s", "closed form", "error"):
-        left = column in ("FMU", "closed form")
+    for column in (
+        "FMU",
+        "target",
+        "size",
+        "build",
+        "steps per s",
+        "ms per s",
+        "closed form",
+        "error",
+    ):
+        left = column in ("FMU", "target", "closed form")
         table.add_column(
             column, justify="left" if left else "right", no_wrap=column != "closed form"
         )
@@ -57,32 +88,35 @@ def main(
             files.append(load(path))
         except LagfmuError as error:
             problems.append(str(error))
-    work = [(file, scene) for file in files for scene in file.scenes]
+    work = [(file, scene, target) for file in files for scene in file.scenes for target in targets]
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("", total=len(work))
-        for file, scene in work:
-            progress.update(task, description=scene.name)
+        for file, scene, target in work:
+            name = f"{target}/{scene.name}"
+            wait = " (compiles the runtime first)" if first(target, places) else ""
+            progress.update(task, description=f"{name}{wait}")
             try:
-                path, built, found, seconds = build_one(file, scene, out / "python")
+                path, built, found, seconds = build_one(file, scene, target, out / target, places)
             except LagfmuError as error:
-                problems.append(f"{scene.name}: {error}")
-                table.add_row(scene.name, "", "", "", "", "", "", "[bold red]FAIL[/]")
+                problems.append(f"{name}: {error}")
+                table.add_row(scene.name, target, *[""] * 6, "[bold red]FAIL[/]")
             else:
                 head = (
                     scene.name,
+                    target,
                     f"{path.stat().st_size / 1e3:.0f} kB",
                     f"{built:.2f} s",
                     f"{found.steps / found.simulated:.0f}",
-                    f"{1e3 * seconds / found.simulated:.0f}",
+                    f"{1e3 * seconds / found.simulated:.3g}",
                 )
                 for check, row in zip(found.checks, found.rows(), strict=True):
                     good = check.passed and check.points > 0
                     verdict = f"[green]{row[3]}[/]" if good else f"[bold red]{row[3]}[/]"
                     table.add_row(*head, escape(row[0]), row[1], verdict)
-                    head = ("", "", "", "", "")
+                    head = ("",) * 6
                     if not good:
-                        problems.append(f"{scene.name}: {row[0]}: {row[3]} {check.detail}")
+                        problems.append(f"{name}: {row[0]}: {row[3]} {check.detail}")
                 table.add_section()
             progress.advance(task)
     console.print(table)
@@ -90,7 +124,7 @@ def main(
         console.print(f"[bold red]FAIL[/] {escape(problem)}", highlight=False)
     if problems or not work:
         sys.exit(1)
-    console.print(f"[green]all {len(work)} FMUs in {out / 'python'} hold their closed forms[/]")
+    console.print(f"[green]all {len(work)} FMUs in {out} hold their closed forms[/]")
 
 
 if __name__ == "__main__":

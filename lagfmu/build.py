@@ -8,13 +8,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .closed_form import ClosedForm, Conserved
+from .compiler import HOST
 from .documentation import page
 from .errors import BuildError
-from .fmu import python
+from .fmu import native, python
 from .model import Model
 from .prepare import Prepared, prepare
 from .proof import pack_closed_forms
 from .scene import Scene
+
+TARGETS = ("python", "native")
 
 
 def build_fmu(
@@ -23,13 +26,17 @@ def build_fmu(
     scene: Scene | None = None,
     closed_forms: Sequence[ClosedForm | Conserved] = (),
     figures: Sequence[tuple[str, ...]] = (),
+    target: str = "python",
+    platforms: Sequence[str] = (HOST,),
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu).
+
+    `target` is 'python' or 'native'; a native FMU has binaries for `platforms`, see compiler.PLATFORMS.
 
     `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them; `figures` are
     verification results for its documentation page.  Raises ModelError, DerivationError, BuildError.
     """
-    return write(prepare(model, scene), out, closed_forms, figures)
+    return write(prepare(model, scene), out, closed_forms, figures, target, platforms)
 
 
 def write(
@@ -37,15 +44,22 @@ def write(
     out: str | os.PathLike[str] = ".",
     closed_forms: Sequence[ClosedForm | Conserved] = (),
     figures: Sequence[tuple[str, ...]] = (),
+    target: str = "python",
+    platforms: Sequence[str] = (HOST,),
+    choice: str = "",
 ) -> Path:
-    """Package what `prepare` made."""
+    """Package what `prepare` made; `choice` is HTML on how the solver settings were chosen."""
+    if target not in TARGETS:
+        raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
     extra = {
-        "documentation/index.html": page(prepared, figures).encode(),
+        "documentation/index.html": page(prepared, figures, choice).encode(),
         "resources/lagfmu.json": pack_closed_forms(prepared.scene, closed_forms, prepared.table),
     }
-    content = python.build(
-        prepared.equations, prepared.reduction, prepared.scene, prepared.table, extra
-    )
+    made = (prepared.equations, prepared.reduction, prepared.scene, prepared.table)
+    if target == "native":
+        content = native.build(*made, prepared.system, extra, platforms)
+    else:
+        content = python.build(*made, extra)
     path = Path(out)
     if path.suffix != ".fmu":
         path = path / f"{prepared.scene.name}.fmu"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import enum
 import sys
 import warnings
 from collections.abc import Iterator
@@ -15,13 +16,18 @@ from rich.markup import escape
 from rich.table import Table
 
 from .build import write
+from .compiler import HOST, NAMES
 from .errors import LagfmuError, SimulationError
+from .fmu.native import takes_long
 from .modelfile import ModelFile, load
 from .plot import plot
 from .prepare import prepare
 from .scene import Scene
 from .show import show as show_prepared
 from .simulate import read_description, simulate
+from .tradeoff.command import chosen_for, compare
+from .tradeoff.goal import parse
+from .tradeoff.page import section
 from .verify import Verification, verify
 
 app = typer.Typer(
@@ -31,6 +37,14 @@ app = typer.Typer(
 )
 console = Console()
 errors = Console(stderr=True)
+
+
+class Target(enum.StrEnum):
+    """What an FMU is made of."""
+
+    python = "python"
+    native = "native"
+
 
 ModelPath = Annotated[Path, typer.Argument(help="A Python file that defines a Model.")]
 FmuPath = Annotated[Path, typer.Argument(help="An FMU built by lagfmu.")]
@@ -76,15 +90,45 @@ def build(
         list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
     ] = None,
     check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
+    target: Annotated[
+        Target, typer.Option(help="python: needs Python where it runs. native: compiled C.")
+    ] = Target.python,
+    platforms: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--platforms",
+            metavar="all|host|NAME...",
+            help=f"Where a native FMU can run: host, all, or some of {', '.join(NAMES)}; repeatable.",
+        ),
+    ] = None,
+    accuracy: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ERROR[:OUTPUT,...]",
+            help="Measure, and build with the cheapest solver settings and formulation that hold this "
+            "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
+        ),
+    ] = None,
 ) -> None:
-    """Build the FMUs of a model file into OUT/python/NAME.fmu and verify them."""
+    """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
     failed = False
+    kind = target.value
+    places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
     with _plainly():
+        if platforms and target is Target.python:
+            raise LagfmuError(
+                "--platforms is for --target native: a python FMU has no binaries of ours"
+            )
         file = load(model)
+        goal = None if accuracy is None else parse(accuracy)
         for s in _chosen(file, scene):
-            with console.status(f"building {s.name}"):
+            choice = ""
+            if goal is not None:
+                chosen = chosen_for(file, s, goal, kind, console)
+                s, choice = chosen.scene, section(chosen)
+            with console.status(f"building {s.name}{_first_time(target, places)}"):
                 prepared = prepare(file.model, s)
-                path = write(prepared, out / "python", file.closed_forms)
+                path = write(prepared, out / kind, file.closed_forms, (), kind, places, choice)
             console.print(
                 f"[green]built[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
                 soft_wrap=True,
@@ -92,11 +136,19 @@ def build(
             if check:
                 with console.status(f"verifying {s.name}"):
                     found = verify(path)
-                    write(prepared, out / "python", file.closed_forms, found.rows())
+                    rows = found.rows()
+                    write(prepared, out / kind, file.closed_forms, rows, kind, places, choice)
                 _print(found)
                 failed |= not found.passed
     if failed:
         raise typer.Exit(1)
+
+
+def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
+    """A word of patience where the runtime has to be compiled first."""
+    if target is Target.native and takes_long(platforms):
+        return " (the runtime is compiled first: for Windows the C library too, about a minute)"
+    return ""
 
 
 @app.command()
@@ -166,6 +218,42 @@ def simulate_command(
                 f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
                 soft_wrap=True,
             )
+
+
+@app.command()
+def tradeoff(
+    targets: Annotated[
+        list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path(
+        "dist/tradeoff"
+    ),
+    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
+    ] = None,
+    step_size: Annotated[
+        list[float] | None, typer.Option(help="Communication step in s; repeatable.")
+    ] = None,
+    tolerance: Annotated[
+        list[float] | None, typer.Option(help="Relative tolerance; repeatable.")
+    ] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Solver method; repeatable.")] = None,
+    repeats: Annotated[int | None, typer.Option(help="Timed runs of each setting.")] = None,
+) -> None:
+    """Measure error against wall time over methods, tolerances and communication steps."""
+    with _plainly():
+        compare(
+            targets,
+            out,
+            console,
+            target.value,
+            step_size or (),
+            tolerance or (),
+            method or (),
+            repeats,
+            scene or (),
+        )
 
 
 def _chosen(file: ModelFile, names: list[str] | None) -> list[Scene]:

@@ -24,10 +24,11 @@ class ClosedForm:
     """`actual` equals `expected` at every communication point at which it applies.
 
     `name` is an output's name (then `actual` may be left out) or a label.  `while_closed`,
-    `while_open`: only while that contact is so; `at_departure`: only once that contact has opened, to
-    be used with the `departure` symbols.  Errors are measured relative to `scale` (default: the
-    largest magnitude of `expected` along the run) and allowed up to `within` times the solver's
-    tolerance, but at least `rounding`.  `only`: the FMUs that it applies to.
+    `while_open`: only while that contact is so.  `until_departure`: only as long as that contact, closed
+    at the start, has not opened; `at_departure`: only once, when it has first opened, to be used with
+    the `departure` symbols.  Errors are measured relative to `scale` (default: the largest magnitude of
+    `expected` along the run) and allowed up to `within` times the solver's tolerance, but at least
+    `rounding`.  `only`: the FMUs that it applies to.
     """
 
     name: str
@@ -35,6 +36,7 @@ class ClosedForm:
     actual: Expr | None = None
     while_closed: str | None = None
     while_open: str | None = None
+    until_departure: str | None = None
     at_departure: str | None = None
     scale: Expr | None = None
     within: float = 10.0
@@ -44,12 +46,13 @@ class ClosedForm:
 
 @dataclass(frozen=True)
 class Conserved:
-    """`expression` keeps the value that it has at the first communication point."""
+    """`expression` keeps the value that it has at the first communication point where it applies."""
 
     name: str
     expression: Expr
     while_closed: str | None = None
     while_open: str | None = None
+    until_departure: str | None = None
     scale: Expr | None = None
     within: float = 10.0
     rounding: float = 1e-12

@@ -65,10 +65,11 @@ class Row:
     description: str
 
 
-def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = ()) -> str:
+def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = (), choice: str = "") -> str:
     """The HTML page of an FMU.
 
-    `figures` are rows (closed form, largest error, allowed, verdict) of a verification.
+    `figures` are rows (closed form, largest error, allowed, verdict) of a verification; `choice` is the
+    section on how its solver settings were chosen, in HTML (tradeoff/page.py).
     """
     model, structure, table = prepared.model, prepared.structure, prepared.table
     sections = typeset(prepared.equations, prepared.reduction, prepared.scene.formulation)
@@ -102,6 +103,7 @@ def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = ()) -> str:
         prescribed=bool(model.prescribed),
         tolerance=f"{prepared.scene.tolerance:g}",
         figures=figures,
+        choice=Markup(choice),
     )
 
 

@@ -18,6 +18,7 @@ from .variables import VariableTable
 
 Expr = Any
 FORMAT = 1
+CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Claim:
     expected: Expr | None
     while_closed: str | None
     while_open: str | None
+    until_departure: str | None
     at_departure: str | None
     scale: Expr | None
     within: float
@@ -57,6 +59,7 @@ def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> l
                 expected=expected,
                 while_closed=form.while_closed,
                 while_open=form.while_open,
+                until_departure=form.until_departure,
                 at_departure=leaving,
                 scale=scale,
                 within=form.within,
@@ -84,7 +87,8 @@ def pack_closed_forms(
             for s in sp.sympify(e).free_symbols
         }
         read = {n[len("initial(") : -1] if n.startswith("initial(") else n for n in used}
-        read |= {f"contact.{c}" for c in (claim.while_closed, claim.while_open) if c}
+        contacts = {getattr(claim, condition) for condition in CONDITIONS}
+        read |= {f"contact.{c}" for c in contacts if c}
         for name in sorted(read - known - {"time"}):
             near = difflib.get_close_matches(name, known, 1)
             problems.append(
@@ -96,8 +100,7 @@ def pack_closed_forms(
     packed = []
     for claim in claims:
         entry: dict[str, Any] = {
-            key: getattr(claim, key)
-            for key in ("name", "while_closed", "while_open", "at_departure", "within", "rounding")
+            key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
         }
         names: dict[Expr, str] = {}
         for key in ("actual", "expected", "scale"):

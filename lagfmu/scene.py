@@ -18,7 +18,8 @@ class Scene:
 
     `formulation` is 'multipliers' (KKT), 'nullspace' (lambda eliminated) or 'minimal' (dependent
     coordinates eliminated); all three report lambda and Q.  `stop_time` and `step_size` [s],
-    `tolerance` and `method` are the defaults that the FMU states and starts with.
+    `tolerance`, `method` and `step` (the largest one of a method with a fixed step [s]; 0: chosen from
+    the start) are the defaults that the FMU states and starts with.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Scene:
     step_size: float = 0.01
     tolerance: float = DEFAULT_TOLERANCE
     method: str = "dop853"
+    step: float = 0.0
 
     def __post_init__(self) -> None:
         problems = []
@@ -49,5 +51,7 @@ class Scene:
             value = getattr(self, what)
             if not 0 < value < float("inf"):
                 problems.append(f"{what} = {value!r}, expected a positive number")
+        if not 0 <= self.step < float("inf"):
+            problems.append(f"step = {self.step!r}, expected a positive number, or 0")
         if problems:
             raise ModelError(self.name, problems)

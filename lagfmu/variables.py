@@ -336,7 +336,9 @@ class _Builder:
                 f"{self.scene.tolerance!r}",
                 1.0,
             ),
-            setting("step", 0.0, SECOND, "largest step of rk4; 0: chosen from the start"),
+            setting(
+                "step", self.scene.step, SECOND, "largest step of rk4; 0: chosen from the start"
+            ),
             setting("maximum_step", 0.0, SECOND, "largest adaptive step; 0: no limit"),
         ]
 

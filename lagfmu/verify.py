@@ -103,7 +103,7 @@ def verify(
     """
     path = Path(fmu)
     description = read_description(path)
-    claims = _claims(path)
+    claims = claims_in(path)
     _check_texts(description, start_values or {})
     problems = validate_fmu(str(path))
     begun = time.perf_counter()
@@ -123,7 +123,7 @@ def verify(
         _finite(result),
         _starts(description, start_values or {}, result),
     ]
-    checks += [_check(claim, result, values, used) for claim in claims]
+    checks += [check_claim(claim, result, values, used) for claim in claims]
     span = float(result["time"][-1] - result["time"][0])
     steps = int(result["solver.steps"][-1]) if "solver.steps" in (result.dtype.names or ()) else 0
     return Verification(description.modelName, tuple(checks), span, seconds, steps, len(claims))
@@ -137,7 +137,8 @@ def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
         raise SimulationError(f"{', '.join(wrong)}: expected a number")
 
 
-def _claims(path: Path) -> list[Claim]:
+def claims_in(path: Path) -> list[Claim]:
+    """The closed forms that an FMU carries.  Raises VerificationError if it is none of lagfmu's."""
     try:
         with zipfile.ZipFile(path) as archive:
             if RECORD not in archive.namelist():
@@ -169,9 +170,33 @@ def _starts(description: Any, given: Mapping[str, Any], result: Trajectory) -> C
     return Check("starts as described", worst, 0, max(count, 1), "; ".join(names))
 
 
-def _check(
+def check_claim(
     claim: Claim, result: Trajectory, values: Mapping[str, float], tolerance: float
 ) -> Check:
+    """One closed form on what a run returned; `values` are the parameters, by name."""
+    chosen = applies(claim, result)
+    allowed = max(claim.within * tolerance, claim.rounding)
+    count = int(chosen.sum())
+    if count == 0:
+        return Check(claim.name, 0.0, allowed, 0)
+    rows = result[chosen]
+    actual = evaluate(claim.actual, rows, result, values, claim.name)
+    if claim.expected is None:
+        expected = np.full_like(actual, actual[0])
+    else:
+        expected = evaluate(claim.expected, rows, result, values, claim.name)
+    if claim.scale is None:
+        scale = float(np.abs(expected).max())
+    else:
+        scale = float(np.abs(evaluate(claim.scale, rows, result, values, claim.name)).max())
+    error = float(np.abs(actual - expected).max())
+    if not math.isfinite(error):
+        return Check(claim.name, math.inf, allowed, count, "not a finite number")
+    return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
+
+
+def applies(claim: Claim, result: Trajectory) -> NDArray[np.bool_]:
+    """The communication points of a run at which a closed form says something."""
     chosen = np.ones(len(result), dtype=bool)
     if claim.while_closed is not None:
         chosen &= result[f"contact.{claim.while_closed}"]
@@ -179,27 +204,14 @@ def _check(
         chosen &= ~result[f"contact.{claim.while_open}"]
     for contact in _departures(claim):  # before the first one there is nothing to compare with
         chosen &= result[f"departure.{contact}.count"] > 0
+    if claim.until_departure is not None:
+        closed = result[f"contact.{claim.until_departure}"]
+        left = result[f"departure.{claim.until_departure}.count"] > 0
+        chosen &= np.logical_and.accumulate(closed & ~left)
     if claim.at_departure is not None:
         left = result[f"departure.{claim.at_departure}.count"] > 0
-        chosen &= np.cumsum(left) == 1
-    allowed = max(claim.within * tolerance, claim.rounding)
-    count = int(chosen.sum())
-    if count == 0:
-        return Check(claim.name, 0.0, allowed, 0)
-    rows = result[chosen]
-    actual = _evaluate(claim.actual, rows, result, values, claim.name)
-    if claim.expected is None:
-        expected = np.full_like(actual, actual[0])
-    else:
-        expected = _evaluate(claim.expected, rows, result, values, claim.name)
-    if claim.scale is None:
-        scale = float(np.abs(expected).max())
-    else:
-        scale = float(np.abs(_evaluate(claim.scale, rows, result, values, claim.name)).max())
-    error = float(np.abs(actual - expected).max())
-    if not math.isfinite(error):
-        return Check(claim.name, math.inf, allowed, count, "not a finite number")
-    return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
+        chosen &= (np.cumsum(left) == 1) & result[f"contact.{claim.at_departure}"][0]
+    return chosen
 
 
 def _departures(claim: Claim) -> list[str]:
@@ -210,13 +222,17 @@ def _departures(claim: Claim) -> list[str]:
     return sorted({s.split(".")[1] for s in symbols if s.startswith("departure.")})
 
 
-def _evaluate(
+def evaluate(
     expression: Expr,
     rows: Trajectory,
     result: Trajectory,
     values: Mapping[str, float],
     name: str,
 ) -> NDArray[np.float64]:
+    """An expression of closed form `name` at `rows` of the run `result`, parameters in `values`.
+
+    Raises VerificationError if it uses what the FMU does not have.
+    """
     symbols = sorted(expression.free_symbols, key=str)
     names = rows.dtype.names or ()
     columns = []

@@ -57,7 +57,7 @@ x = rd * sin(angle) + (rate * sin(angle) + rd * spin * cos(angle)) * tau
 z = rd * cos(angle) + (rate * cos(angle) - rd * spin * sin(angle)) * tau - g * tau**2 / 2
 
 closed_forms = [
-    ClosedForm("lambda.surface", normal_force, while_closed="surface"),
+    ClosedForm("lambda.surface", normal_force, until_departure="surface"),
     ClosedForm(
         "lambda.surface in flight",
         actual=output("lambda.surface"),

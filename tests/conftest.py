@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from lagfmu.build import write
+from lagfmu.compiler import find_compiler
 from lagfmu.modelfile import load
 from lagfmu.prepare import Prepared, prepare
 
@@ -23,6 +24,13 @@ FILES = {
     "KnifeEdge": "knife_edge",
     "Atwood": "atwood",
     "CartPendulum": "cart_pendulum",
+    "RollingSphere": "rolling_sphere",
+    "Ladder": "ladder",
+    "Loop": "loop",
+    "Chain": "chain",
+    "SliderCrank": "slider_crank",
+    "DoublePendulum": "double_pendulum",
+    "BouncingBall": "bouncing_ball",
 }
 
 
@@ -41,18 +49,47 @@ def prepared() -> Callable[[str], Prepared]:
     return get
 
 
-@pytest.fixture(scope="session")
-def fmu(
-    prepared: Callable[[str], Prepared], tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[str], Path]:
-    """fmu(NAME): path of the FMU, built once."""
-    folder = tmp_path_factory.mktemp("fmus")
+Fmu = Callable[[str], Path]
+
+
+def _built(prepared: Callable[[str], Prepared], folder: Path, target: str) -> Fmu:
     made: dict[str, Path] = {}
 
     def get(name: str) -> Path:
         if name not in made:
             forms = load(MODELS / f"{FILES[name]}.py").closed_forms
-            made[name] = write(prepared(name), folder, forms)
+            made[name] = write(prepared(name), folder, forms, target=target)
         return made[name]
 
     return get
+
+
+@pytest.fixture(scope="session")
+def python_fmu(
+    prepared: Callable[[str], Prepared], tmp_path_factory: pytest.TempPathFactory
+) -> Fmu:
+    """python_fmu(NAME): path of the FMU of the python target, built once."""
+    return _built(prepared, tmp_path_factory.mktemp("python"), "python")
+
+
+@pytest.fixture(scope="session")
+def native_fmu(
+    prepared: Callable[[str], Prepared], tmp_path_factory: pytest.TempPathFactory
+) -> Fmu:
+    """native_fmu(NAME): path of the compiled FMU for this machine, built once."""
+    if find_compiler() is None:
+        pytest.skip("no C compiler on this machine: native FMUs are not tested")
+    return _built(prepared, tmp_path_factory.mktemp("native"), "native")
+
+
+@pytest.fixture(scope="session", params=["python", "native"])
+def target(request: pytest.FixtureRequest) -> str:
+    """What holds for an FMU holds for both targets."""
+    return str(request.param)
+
+
+@pytest.fixture(scope="session")
+def fmu(target: str, request: pytest.FixtureRequest) -> Fmu:
+    """fmu(NAME): path of the FMU of the present target."""
+    made: Fmu = request.getfixturevalue(f"{target}_fmu")
+    return made

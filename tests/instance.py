@@ -19,6 +19,9 @@ class Instance:
         self.folder = fmpy.extract(str(path))
         self.description = fmpy.read_model_description(str(path))
         self.variables = {v.name: v for v in self.description.modelVariables}
+        self.native = self.description.modelExchange is not None
+        self.refusal = 3 if self.native else 4  # pythonfmu cannot return fmi2Error, only fmi2Fatal
+        self.illegal_step = 3 if self.native else 2  # nor from fmi2DoStep: fmi2Discard
         self.log: list[tuple[int, str, str]] = []
         self.fmu = FMU2Slave(
             guid=self.description.guid,

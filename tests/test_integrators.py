@@ -30,11 +30,17 @@ def run(path, stop=END, step=END, tolerance=None, **solver):
 
 
 def error(result):
-    """Distance [m] of the bob from where it should be at the end, L = 1 m."""
+    """Largest distance [m] of the bob from where it should be, L = 1 m."""
     w, k = np.sqrt(9.81), np.sin(THETA0 / 2)
-    sn = ellipj(w * result["time"][-1] + ellipk(k**2), k**2)[0]
+    sn = ellipj(w * result["time"] + ellipk(k**2), k**2)[0]
     theta = 2 * np.arcsin(k * sn)
-    return np.hypot(result["x"][-1] - np.sin(theta), result["y"][-1] + np.cos(theta))
+    return np.hypot(result["x"] - np.sin(theta), result["y"] + np.cos(theta)).max()
+
+
+def largest_error(path, **settings):
+    """The largest of runs, each of one communication step, to times that share no phase of the swing:
+    one of them alone may cross zero."""
+    return max(error(run(path, t, t, **settings)) for t in (END, 4.57, 4.11))
 
 
 @BOTH
@@ -72,10 +78,10 @@ def test_rk4_without_a_step_chooses_one(fmu):
 @BOTH
 def test_the_error_of_dop853_falls_with_the_tolerance_over_nine_decades(fmu, name):
     """Each tenth of the tolerance makes the error smaller, from 1e-1 to 1e-13, nine decades and more
-    in all, and the error stays below the tolerance."""
+    in all, and the error stays below twice the tolerance."""
     tolerances = 10.0 ** -np.arange(1, 14)
-    errors = np.array([error(run(fmu(name), tolerance=tol)) for tol in tolerances])
-    assert (errors < tolerances).all()
+    errors = np.array([largest_error(fmu(name), tolerance=tol) for tol in tolerances])
+    assert (errors < 2 * tolerances).all()
     assert (np.diff(errors) < 0).all()
     assert errors[0] / errors[-1] > 1e9
     assert errors[2] / errors[11] > 10**8.5  # from 1e-3 to 1e-12
@@ -86,7 +92,7 @@ def test_the_error_of_dop853_falls_with_the_tolerance_over_nine_decades(fmu, nam
 def test_the_error_of_the_other_methods_falls_with_the_tolerance(fmu, name, method, finest):
     """A hundredth of the tolerance makes the error of dopri5 and radau5 at least 10 times smaller."""
     errors = [
-        error(run(fmu(name), tolerance=10.0**-k, solver_method=method))
+        largest_error(fmu(name), tolerance=10.0**-k, solver_method=method)
         for k in range(2, finest + 1, 2)
     ]
     assert (np.array(errors[:-1]) / errors[1:] > 10).all()

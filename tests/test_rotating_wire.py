@@ -50,12 +50,14 @@ def test_the_bead_runs_away_and_lambda_is_the_motors_torque(fmu, case, tolerance
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 def test_the_wire_turns_evenly(fmu, case):
-    """phi = w t and phi' = w to rounding: the motor does not give way."""
+    """phi = w t and phi' = w to rounding: the motor does not give way, and what is left of phi'' is
+    rounding in the Coriolis acceleration 2 r' w / r that it balances."""
     result = spin(fmu("RotatingWire"), **case)
     w = case["omega"]
     np.testing.assert_allclose(result["phi"], w * result["time"], rtol=1e-14, atol=0)
     np.testing.assert_allclose(result["der(phi)"], w, rtol=1e-14)
-    assert np.abs(result["der(phi,2)"]).max() == 0
+    coriolis = 2 * np.abs(result["der(r)"] * w / result["r"])
+    assert (np.abs(result["der(phi,2)"]) <= 2 * np.finfo(float).eps * coriolis).all()
 
 
 def test_the_motor_feeds_the_bead(fmu):

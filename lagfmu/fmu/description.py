@@ -6,8 +6,8 @@ import datetime
 import hashlib
 import os
 import uuid
-from collections.abc import Mapping
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from collections.abc import Collection, Mapping, Sequence
+from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
 from ..scene import Scene
 from ..units import Unit
@@ -28,10 +28,17 @@ def model_description(
     scene: Scene,
     description: str,
     tool: str,
-    co_simulation: Mapping[str, str],
+    interfaces: Mapping[str, Mapping[str, str]],
     content: bytes,
+    sources: Sequence[str] = (),
+    event_indicators: int = 0,
+    reinitialized: Collection[str] = (),
 ) -> bytes:
-    """The XML text.  The GUID is made from `content` and the text itself, not from time or chance."""
+    """The XML text.  The GUID is made from `content` and the text itself, not from time or chance.
+
+    `interfaces` maps ModelExchange and CoSimulation, in this order, to their attributes; `sources` are
+    the files that a recompilation needs; `reinitialized` the states that an event may change.
+    """
     root = Element(
         "fmiModelDescription",
         {
@@ -42,10 +49,15 @@ def model_description(
             "generationTool": tool,
             **_generation_date(),
             "variableNamingConvention": "structured",
-            "numberOfEventIndicators": "0",
+            "numberOfEventIndicators": str(event_indicators),
         },
     )
-    SubElement(root, "CoSimulation", dict(co_simulation))
+    for name, attributes in interfaces.items():
+        interface = SubElement(root, name, dict(attributes))
+        if sources:
+            listed = SubElement(interface, "SourceFiles")
+            for file in sources:
+                SubElement(listed, "File", {"name": file})
     _units(root, table)
     categories = SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
@@ -63,13 +75,18 @@ def model_description(
     index = {v.name: k + 1 for k, v in enumerate(table.variables)}
     variables = SubElement(root, "ModelVariables")
     for k, v in enumerate(table.variables):
-        _variable(variables, k, v, index)
+        _variable(variables, k, v, index, v.name in reinitialized)
     _structure(root, table, index)
     indent(root, "  ")
     digest = hashlib.sha256(content + tostring(root, "utf-8")).hexdigest()
     root.set("guid", f"{{{uuid.UUID(digest[:32])}}}")
     body: bytes = tostring(root, "utf-8")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + body + b"\n"
+
+
+def guid_of(description: bytes) -> str:
+    """The GUID in a text that `model_description` made."""
+    return str(fromstring(description).get("guid"))
 
 
 def number(value: float) -> str:
@@ -97,7 +114,13 @@ def _units(root: Element, table: VariableTable) -> None:
         SubElement(element, "BaseUnit", {k: str(e) for k, e in unit.base.items()})
 
 
-def _variable(parent: Element, reference: int, v: Variable, index: Mapping[str, int]) -> None:
+def _variable(
+    parent: Element,
+    reference: int,
+    v: Variable,
+    index: Mapping[str, int],
+    reinitialized: bool,
+) -> None:
     attributes = {
         "name": v.name,
         "valueReference": str(reference),
@@ -119,6 +142,8 @@ def _variable(parent: Element, reference: int, v: Variable, index: Mapping[str, 
         typed["start"] = _start(v.start)
     if v.derivative_of is not None:
         typed["derivative"] = str(index[v.derivative_of])
+    if reinitialized:
+        typed["reinit"] = "true"
     SubElement(element, v.kind, typed)
 
 

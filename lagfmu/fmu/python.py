@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import importlib.metadata
-import io
 import sys
 import tempfile
 import zipfile
@@ -21,6 +19,7 @@ from ..numeric import source
 from ..reduction import Reduction
 from ..scene import Scene
 from ..variables import VariableTable
+from .archive import pack, version
 from .description import model_description
 
 SHIPPED = (
@@ -83,7 +82,7 @@ def build(
         scene,
         eom.model.description or f"{eom.model.name}: forces of constraint as outputs",
         f"lagfmu {version()}",
-        {"modelIdentifier": scene.name, **CAPABILITIES},
+        {"CoSimulation": {"modelIdentifier": scene.name, **CAPABILITIES}},
         text.encode(),
     )
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
@@ -102,25 +101,6 @@ def build(
         contents = _read(archive)
     contents |= {"modelDescription.xml": description, **extra}
     return pack(contents)
-
-
-def version() -> str:
-    """The version of lagfmu that is installed."""
-    return importlib.metadata.version("lagfmu")
-
-
-def pack(contents: Mapping[str, bytes]) -> bytes:
-    """A zip archive whose bytes depend on the contents only: fixed times, modes and order."""
-    buffer = io.BytesIO()
-    order = sorted(contents, key=lambda name: (name != "modelDescription.xml", name))
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        for name in order:
-            info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
-            info.create_system = 3
-            info.external_attr = 0o644 << 16
-            info.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(info, contents[name])
-    return buffer.getvalue()
 
 
 def _script(

@@ -45,6 +45,9 @@ def complementary_modes(
         """The contact whose mode contradicts the accelerations most; None if none does."""
         now = motion(at, q, v, system.active(modes))
         size = _force_scale(now)
+        mass = now.M.diagonal()
+        forces = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
+        free = np.maximum(np.abs(now.vdot), forces / np.where(mass > 0, mass, np.inf))
         worst, found = 0.0, None
         for c, k in enumerate(system.contacts):
             if modes[c]:
@@ -54,7 +57,7 @@ def complementary_modes(
                     worst, found = excess, c
             elif c in touching and c not in leaving:
                 approach = now.gamma[k] - now.G[k] @ now.vdot
-                floor = PULL * (abs(now.gamma[k]) + np.abs(now.G[k]) @ np.abs(now.vdot))
+                floor = PULL * (abs(now.gamma[k]) + np.abs(now.G[k]) @ free)
                 if approach > floor and approach > worst:
                     worst, found = approach, c
         return found

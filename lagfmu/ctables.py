@@ -1,0 +1,144 @@
+"""The tables of model.c: index patterns, names, dimensions, flags, and the System that holds them."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from textwrap import wrap
+from typing import Any
+
+from . import elimination
+from .equations import EquationsOfMotion
+from .model import Constraint, Contact, Nonholonomic
+
+Expr = Any
+Pair = tuple[int, int]
+
+
+class Tables:
+    """Of one system; `mass` and `entries` are the positions of the values in M and G."""
+
+    def __init__(
+        self,
+        eom: EquationsOfMotion,
+        prefix: str,
+        formulation: str,
+        constraints: Sequence[Constraint],
+        mass: Sequence[Pair],
+        entries: Sequence[Pair],
+    ) -> None:
+        self.eom, self.prefix, self.formulation = eom, prefix, formulation
+        self.constraints, self.mass, self.entries = constraints, mass, entries
+
+    def text(self) -> str:
+        """The tables, the elimination's plan, and the System."""
+        eom = self.eom
+        start = [bisect_left(self.entries, (k,)) for k in range(eom.m + 1)]
+        contacts = [k for k, c in enumerate(self.constraints) if isinstance(c, Contact)]
+        prescribed = [k for k, s in enumerate(eom.u) if eom.rates.get(s) in eom.rates]
+        dimension, extent = self._dimensions()
+        names = [f'"{s}"' for s in eom.q]
+        parts = [
+            self._array("const char *const", "coordinates", names),
+            self._array("const Row", "rows", self._rows()),
+            self._integers("contact", contacts),
+            self._integers("mass_row", [i for i, _ in self.mass]),
+            self._integers("mass_column", [j for _, j in self.mass]),
+            self._integers("entry_row", [k for k, _ in self.entries]),
+            self._integers("entry_column", [j for _, j in self.entries]),
+            self._integers("row_start", start),
+            self._integers("prescribed", prescribed),
+            self._integers("dimension", dimension),
+            self._integers("extent_dimension", extent),
+            "\n" + self._plan() + "\n",
+        ]
+        p = self.prefix
+        fields = {
+            "n": eom.n,
+            "m": eom.m,
+            "contacts": len(contacts),
+            "inputs": len(eom.u),
+            "parameters": len(eom.p),
+            "masses": len(self.mass),
+            "entries": len(self.entries),
+            **{
+                name: p + name
+                for name in (
+                    *("coordinates", "rows", "contact", "mass_row", "mass_column"),
+                    *("entry_row", "entry_column", "row_start"),
+                )
+            },
+            "prescribed_count": len(prescribed),
+            **{name: p + name for name in ("prescribed", "dimension", "extent_dimension")},
+            "formulation": self.formulation.upper(),
+            "has_potential": int(eom.potential is not None),
+            "constant_mass": int(self._constant_mass()),
+            "separable": int(self._separable()),
+            "plan": f"&{p}plan",
+            **{
+                name: p + name
+                for name in ("dynamics", "residual", "energies", "restitution", "tangent")
+            },
+            "embed": "embed" if p else "NULL",
+            "embed_tangent": "embed_tangent" if p else "NULL",
+            "full": "&equations" if p else "NULL",
+        }
+        lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
+        return "".join(parts) + f"static const System {p}equations = {{\n{lines}}};\n"
+
+    def _array(self, kind: str, name: str, items: Sequence[str]) -> str:
+        head = f"static {kind} {self.prefix}{name}[] = {{"
+        body = ", ".join(items)
+        if len(head) + len(body) + 2 <= 100:
+            return f"{head}{body}}};\n"
+        lines = wrap(body, 96, break_long_words=False, break_on_hyphens=False)
+        return head + "\n" + "".join(f"    {line}\n" for line in lines) + "};\n"
+
+    def _integers(self, name: str, values: Sequence[int]) -> str:
+        return self._array("const int", name, [str(k) for k in values] or ["0"])
+
+    def _rows(self) -> list[str]:
+        position = {c.name: k for k, c in enumerate(self.constraints)}
+        items = []
+        for c in self.constraints:
+            kind = "HOLONOMIC"
+            if isinstance(c, Contact):
+                kind = "CONTACT"
+            elif isinstance(c, Nonholonomic):
+                kind = "NONHOLONOMIC"
+            closed = getattr(c, "while_closed", None)
+            items.append(f'{{"{c.name}", {kind}, {-1 if closed is None else position[closed]}}}')
+        return items or ['{"", HOLONOMIC, -1}']
+
+    def _dimensions(self) -> tuple[list[int], list[int]]:
+        """One number for each dimension of coordinates; that of each parameter, -1 if it has none."""
+        eom = self.eom
+        by_name = {str(eom.plain(s)): unit for s, unit in eom.model.units.items()}
+        units = [by_name[str(q)] for q in eom.q]
+        number: dict[Any, int] = {}
+        of_coordinates = [number.setdefault(u.exponents, len(number)) for u in units]
+        of_parameters = [
+            -1 if u.dimensionless else number.get(u.exponents, -1)
+            for u in (eom.model.units[p.symbol] for p in eom.model.parameters)
+        ]
+        return of_coordinates, of_parameters or [-1]
+
+    def _plan(self) -> str:
+        eom = self.eom
+        plan = elimination.plan(eom.n, eom.m, self.mass, self.entries)
+        text: str = plan.c_text(f"{self.prefix}plan")
+        return text
+
+    def _constant_mass(self) -> bool:
+        return all(e.free_symbols <= set(self.eom.p) for e in self.eom.M.todok().values())
+
+    def _separable(self) -> bool:
+        """M of parameters; forces without velocities; position constraints that no input moves."""
+        velocities, inputs = set(self.eom.v), set(self.eom.u)
+        return (
+            self.formulation == "multipliers"
+            and self._constant_mass()
+            and all(e.free_symbols.isdisjoint(velocities) for e in self.eom.F)
+            and not any(isinstance(c, Nonholonomic) for c in self.constraints)
+            and all(e.free_symbols.isdisjoint(inputs) for e in self.eom.G.todok().values())
+        )

@@ -1,0 +1,174 @@
+/* contacts.c -- which contacts are closed, and what an impact does.
+ *
+ *   f >= 0 ,  lambda >= 0 ,  f lambda = 0     Signorini's condition (Pfeiffer & Glocker, Multibody
+ *                                             Dynamics with Unilateral Contacts, 1996, ch. 4)
+ *   M (v+ - v-) = G^T Lambda ,  G v+ - nu = -e (G v- - nu)     Newton's law of restitution
+ *
+ * The modes of all contacts are found together by an active set on the accelerations: a closed
+ * contact that would have to pull is opened, an open one that touches and would be penetrated is
+ * closed, the worst first, until none is left. */
+#include "contacts.h"
+
+#include <string.h>
+
+#include "digits.h"
+
+enum { MOST = 12 };               /* contacts whose combinations are tried one by one */
+static const double PULL = 1e-12; /* a multiplier this small, relative to the forces, is zero */
+enum { NONE = -1 };
+
+/* For each coordinate all forces at work (n), those of constraint included. */
+static void forces_at_work(const Mechanism *b, double *forces) {
+    const System *s = b->system;
+    for (int j = 0; j < s->n; j++) forces[j] = fabs(b->F[j]);
+    for (int e = 0; e < s->entries; e++)
+        forces[s->entry_column[e]] += fabs(b->G[e] * b->lambda[s->entry_row[e]]);
+}
+
+/* The multiplier with which row k would carry all forces alone. */
+static double force_scale(const Mechanism *b, int k, const double *forces) {
+    const System *s = b->system;
+    double square = 0;
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) square += b->G[e] * b->G[e];
+    return mechanism_row_size(b, k, forces) / (square > 0 ? square : 1);
+}
+
+/* For each coordinate its acceleration, or the one that the forces at work could give it if they
+ * did not balance: what |vdot| is the rounding of. */
+static void accelerations_at_work(const Mechanism *b, const double *forces, double *reach) {
+    const System *s = b->system;
+    for (int j = 0; j < s->n; j++) reach[j] = fabs(b->vdot[j]);
+    for (int e = 0; e < s->masses; e++) {
+        int j = s->mass_row[e];
+        if (s->mass_column[e] == j && b->M[e] > 0) reach[j] = fmax(reach[j], forces[j] / b->M[e]);
+    }
+}
+
+/* The contact whose mode contradicts the accelerations most; NONE if none does. */
+static Status most_wrong(Solver *s, Instant at, const double *q, const double *v, const int *modes,
+                         const int *touching, const int *leaving, int *found) {
+    Mechanism *b = &s->stepped;
+    double *forces = s->work_contacts, *reach = forces + s->system->n, worst = 0;
+    int *active = s->iwork_contacts;
+    *found = NONE;
+    system_active(s->system, modes, active);
+    if (mechanism_motion(b, at, q, v, active) == FAILED) return FAILED;
+    forces_at_work(b, forces);
+    accelerations_at_work(b, forces, reach);
+    for (int c = 0; c < s->system->contacts; c++) {
+        int k = s->system->contact[c];
+        if (modes[c]) {
+            double size = force_scale(b, k, forces);
+            double excess = size != 0 ? -(b->lambda[k] / size) : 0;
+            if (excess > (touching[c] ? -PULL : PULL) && (*found == NONE || excess > worst)) {
+                worst = excess;
+                *found = c;
+            }
+        } else if (touching[c] && !(leaving != NULL && leaving[c])) {
+            double approach = b->gamma[k] - mechanism_row(b, k, b->vdot);
+            double floor = PULL * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
+            if (approach > floor && approach > worst) {
+                worst = approach;
+                *found = c;
+            }
+        }
+    }
+    return OK;
+}
+
+/* The active set.  It is a map from modes to modes: where it goes in a circle it meets `mark`,
+ * which is put forward after 1, 2, 4, ... changes (Brent 1980).  `settled`: it ended. */
+static Status follow(Solver *s, Instant at, const double *q, const double *v, int *modes, int *mark,
+                     const int *touching, const int *leaving, int *settled) {
+    size_t bytes = (size_t)s->system->contacts * sizeof *modes;
+    unsigned count = 0, power = 1;
+    memcpy(mark, modes, bytes);
+    for (;;) {
+        int wrong;
+        if (most_wrong(s, at, q, v, modes, touching, leaving, &wrong) == FAILED) return FAILED;
+        *settled = wrong == NONE;
+        if (*settled) return OK;
+        modes[wrong] = !modes[wrong];
+        if (memcmp(modes, mark, bytes) == 0) return OK;
+        if (++count == power) {
+            memcpy(mark, modes, bytes);
+            count = 0;
+            power *= 2;
+        }
+    }
+}
+
+/* All combinations of the contacts that touch, closed before open. */
+static Status try_all(Solver *s, Instant at, const double *q, const double *v, const int *closed,
+                      int *modes, const int *touching, const int *leaving, int *settled) {
+    const int contacts = s->system->contacts;
+    int undecided = 0;
+    for (int c = 0; c < contacts; c++) undecided += touching[c];
+    if (undecided > MOST) undecided = MOST;
+    for (unsigned choice = 0; choice < 1u << undecided; choice++) {
+        int wrong, bit = undecided;
+        memcpy(modes, closed, (size_t)contacts * sizeof *modes);
+        for (int c = 0; c < contacts && bit > 0; c++)
+            if (touching[c]) {
+                bit--;
+                modes[c] = !(choice >> bit & 1u) && !(leaving != NULL && leaving[c]);
+            }
+        if (most_wrong(s, at, q, v, modes, touching, leaving, &wrong) == FAILED) return FAILED;
+        *settled = wrong == NONE;
+        if (*settled) return OK;
+    }
+    return OK;
+}
+
+static Status no_modes(Solver *s, Instant at, const int *touching) {
+    const char *comma = "";
+    fail(&s->why, "no combination of open and closed contacts ");
+    for (int c = 0; c < s->system->contacts; c++)
+        if (touching[c]) {
+            why_append(&s->why, "%s'%s'", comma, s->system->rows[s->system->contact[c]].name);
+            comma = ", ";
+        }
+    Digits t = digits(at.t);
+    why_append(&s->why, " satisfies f >= 0, lambda >= 0 at t = %s s", t.text);
+    return FAILED;
+}
+
+Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, int *closed,
+                      const int *touching, const int *leaving) {
+    const int contacts = s->system->contacts;
+    size_t bytes = (size_t)contacts * sizeof *closed;
+    int *modes = s->iwork_contacts + s->system->m, *mark = modes + contacts, settled = 0;
+    memcpy(modes, closed, bytes);
+    if (follow(s, at, q, v, modes, mark, touching, leaving, &settled) == FAILED) return FAILED;
+    if (!settled && try_all(s, at, q, v, closed, modes, touching, leaving, &settled) == FAILED)
+        return FAILED;
+    if (!settled) return no_modes(s, at, touching);
+    memcpy(closed, modes, bytes);
+    return OK;
+}
+
+Status contacts_impact(Solver *s, Instant at, const double *q, double *v, const int *closed,
+                       int landing, int plastic) {
+    const System *system = s->system;
+    const int n = system->n, m = system->m, struck = system->contact[landing];
+    Mechanism *b = &s->stepped;
+    int *active = s->iwork_contacts, *modes = active + m;
+    double *jump = s->work_contacts, *dv = jump + m, *Lambda = dv + n, *e = Lambda + m;
+    system->restitution(s->p, e);
+    memcpy(modes, closed, (size_t)system->contacts * sizeof *modes);
+    modes[landing] = 1;
+    if (mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
+    for (int k = 0; k < m; k++) jump[k] = b->nu[k] - mechanism_row(b, k, v);
+    if (!plastic) jump[struck] *= 1 + e[struck];
+    for (int pulling = 0; pulling != NONE;) { /* a closed contact that would pull is left out */
+        system_active(system, modes, active);
+        if (linear_factor(&b->linear, b->M, b->G, active) == FAILED) return FAILED;
+        if (linear_solve(&b->linear, NULL, jump, dv, Lambda) == FAILED) return FAILED;
+        pulling = NONE;
+        for (int c = 0; c < system->contacts && pulling == NONE; c++)
+            if (modes[c] && c != landing && Lambda[system->contact[c]] < 0) pulling = c;
+        if (pulling != NONE) modes[pulling] = 0;
+    }
+    for (int j = 0; j < n; j++) v[j] += dv[j];
+    return OK;
+}

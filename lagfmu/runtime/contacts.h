@@ -1,0 +1,20 @@
+/* contacts.h -- which contacts are closed, and what an impact does. */
+#ifndef LAGFMU_CONTACTS_H
+#define LAGFMU_CONTACTS_H
+
+#include "solver.h"
+
+/* Modes, one a contact, with lambda > 0 where closed and d2f/dt2 >= 0 where open and touching.
+ * `closed` is the first guess and is replaced.  `touching`, `leaving`: flags, one a contact; one
+ * that is leaving was opened right now because its multiplier passed through zero: there f and its
+ * first two derivatives vanish, and the sign of what rounding leaves of them must not close it
+ * again. `leaving` may be NULL.  FAILED: no modes fit; `closed` is untouched. */
+Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, int *closed,
+                      const int *touching, const int *leaving);
+
+/* Velocities after the contact `landing` (a position among the contacts) was struck: v is replaced.
+ * plastic: without rebound.  FAILED leaves v untouched. */
+Status contacts_impact(Solver *s, Instant at, const double *q, double *v, const int *closed,
+                       int landing, int plastic);
+
+#endif

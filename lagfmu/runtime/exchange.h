@@ -1,0 +1,24 @@
+/* exchange.h -- an instance whose state is moved by an importer's integrator (Model Exchange).
+ *
+ * States are x = (q1, v1, q2, v2, ...) of the stepped system; an event indicator is lambda of a closed
+ * contact, and f + gap of an open one. */
+#ifndef LAGFMU_EXCHANGE_H
+#define LAGFMU_EXCHANGE_H
+
+#include "instance.h"
+
+void exchange_set_time(Instance *x, double t);
+Status exchange_get_states(Instance *x, double *states);
+void exchange_set_states(Instance *x, const double *states);
+Status exchange_derivatives(Instance *x, double *derivatives);
+Status exchange_indicators(Instance *x, double *indicators);
+Status exchange_nominals(Instance *x, double *nominals);
+
+/* After a step of the importer's integrator; `event`: 1 if the state should be projected. */
+Status exchange_step_done(Instance *x, int *event);
+
+/* Contacts open or are struck where their indicators say so, and a state that has drifted off the
+ * constraints is projected; `moved`: 1 if the continuous states changed. */
+Status exchange_event(Instance *x, int *moved);
+
+#endif

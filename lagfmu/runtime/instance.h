@@ -1,0 +1,81 @@
+/* instance.h -- one simulation behind an FMU: values by variable, start, step, saved states.
+ *
+ * Knows the table of variables and the solver, and nothing of the interface by which an importer
+ * calls.  All memory is one block that the caller gives. */
+#ifndef LAGFMU_INSTANCE_H
+#define LAGFMU_INSTANCE_H
+
+#include "sensitivity.h"
+#include "solver.h"
+#include "variables.h"
+
+/* What there is to tell while a call succeeds. */
+typedef enum { NOTE_WARNING, NOTE_EVENT } Note;
+typedef void (*Tell)(void *context, Note note, const char *text);
+
+typedef struct {
+    Solver solver;
+    Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
+    Sensitivity along;      /* of the full system, where there is an embedding */
+    Settings given;         /* solver.* as they were set; tolerance 0: not set */
+    double start_time, stop_time; /* [s] of the experiment */
+    double tolerance;             /* of the experiment; 0: none */
+    int exchange;           /* 1: an importer's integrator moves the state (exchange.h) */
+    int phase;              /* for the caller, saved with the state */
+    int started;            /* 1: the consistent start has been found */
+    int running;            /* 1: the start is over, only inputs can be set */
+    int warned;             /* 1: a jump of a prescribed motion has been told */
+    int observed, evaluated;
+    double *q0, *v0;        /* (n) start values as they were set */
+    double *expected;       /* (inputs) values at the end of the latest step */
+    int *set;               /* (inputs) 1: set since the latest step */
+    int *closed, *count;    /* (contacts) before a step */
+    int *happened;          /* (contacts) */
+    char *saved, *backup;   /* what must be saved; a copy from before a step */
+    size_t saved_size;
+    Tell tell;
+    void *context;          /* of tell() */
+    char note[512];
+} Instance;
+
+/* Takes all memory from the arena; with base = NULL it is counted. */
+void instance_layout(Instance *x, Arena *arena);
+
+/* Puts the values of the description into an instance that was laid out. */
+void instance_reset(Instance *x);
+
+/* The value of a variable.  FAILED, the cause in x->solver.why, if it cannot be calculated. */
+Status instance_get(Instance *x, const Variable *v, double *value);
+
+/* The value of a variable that is not an output, as it was set. */
+double instance_setting(const Instance *x, const Variable *v);
+
+/* Sets a variable that is not an output, and whose value has been checked. */
+void instance_set(Instance *x, const Variable *v, double value);
+
+/* Sets the derivative of an input with respect to time; order 1 or 2. */
+void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value);
+
+/* The consistent start, unless it is known already. */
+Status instance_start(Instance *x);
+
+/* What can be read at the state, unless it is known already. */
+Status instance_observe(Instance *x);
+
+/* To t_end [s].  FAILED: everything is as it was before. */
+Status instance_step(Instance *x, double t_end);
+
+/* How everything changes along a direction of time, stepped coordinates (n), velocities (n) and inputs;
+ * then how one variable changes with it.  FAILED: it cannot be said, the cause is in x->solver.why. */
+Status instance_differentiate(Instance *x, Direction d);
+Status instance_change(const Instance *x, const Variable *v, Direction d, double *change);
+
+/* The same along the motion: the derivative of a variable with respect to time. */
+Status instance_rates(Instance *x, Direction *d);
+
+/* Saved states: `instance_record_size` bytes that hold no pointer. */
+size_t instance_record_size(const Instance *x);
+void instance_save(const Instance *x, char *record);
+void instance_restore(Instance *x, const char *record);
+
+#endif

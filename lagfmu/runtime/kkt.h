@@ -1,0 +1,20 @@
+/* kkt.h -- dense LU of the scaled KKT matrix of the rows that act, with refinement. */
+#ifndef LAGFMU_KKT_H
+#define LAGFMU_KKT_H
+
+#include "linear.h"
+
+/* Doubles and ints that it needs in Linear.dense and Linear.pivots, N = n + m. */
+size_t kkt_doubles(int n, int m);
+int kkt_ints(int n, int m);
+
+/* Writes scale * K * scale (N, N), K = [[M, G^T], [G, 0]] of the rows that act, to A; row k of G
+ * stands at place[k].  Returns N. */
+int kkt_matrix(const Linear *l, const double *scale, const int *place, double *A);
+
+/* 1 if the matrix is regular to working precision. */
+int kkt_factor(Linear *l);
+
+void kkt_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+
+#endif

@@ -1,0 +1,25 @@
+/* ldlt.h -- sparse A = L D L^T without square roots, in an order and a pattern found beforehand. */
+#ifndef LAGFMU_LDLT_H
+#define LAGFMU_LDLT_H
+
+#include "plan.h"
+
+/* What is known of the condition of a matrix that was factored. */
+typedef struct {
+    double bound;  /* of its 2-norm condition number, scaled to a unit diagonal: never below it */
+    double growth; /* largest A_pp / D_p: how much of a diagonal element cancelled at worst */
+    int failed;    /* position whose pivot is not positive and finite (bound: infinity), or -1 */
+} Definite;
+
+/* In place: on entry L holds A's elements below the diagonal in the pattern of L and D its
+ * diagonal, in the order of elimination; on return L, and 1 / D.  `row_size` and `row` are scratch
+ * (size), `row` zero on entry and return. */
+Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row);
+
+/* y <- L^-1 y */
+void ldlt_forward(const Elimination *e, const double *L, double *y);
+
+/* y <- L^-T y */
+void ldlt_backward(const Elimination *e, const double *L, double *y);
+
+#endif

@@ -1,0 +1,148 @@
+/* linear.c -- the ladder:  M x = b + G^T lambda ,  G x = c  on the rows that act.
+ *
+ * Factoring takes the first rung that is safe at this state; solving climbs on if refinement does
+ * not settle.  The dense rungs need (n + m)^2 numbers and are there up to n + m = DENSE_MOST;
+ * beyond, the Schur complement is refined with residuals in doubled precision, and what that cannot
+ * settle is refused. */
+#include "linear.h"
+
+#include <math.h>
+
+#include "kkt.h"
+#include "leastnorm.h"
+#include "nullspace.h"
+#include "orthogonal.h"
+#include "schur.h"
+#include "weighted.h"
+
+static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
+
+void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
+    int n = s->n, m = s->m;
+    l->system = s;
+    l->why = why;
+    l->M = l->G = NULL;
+    l->active = NULL;
+    l->rung = RUNG_SCHUR;
+    l->unique = arena_ints(arena, m);
+    schur_layout(l, arena);
+    l->dense = NULL;
+    l->pivots = NULL;
+    if (n + m > DENSE_MOST) return;
+    size_t doubles = larger(larger(kkt_doubles(n, m), weighted_doubles(n, m)),
+                            least_norm_doubles(n, m));
+    size_t ints = larger(larger((size_t)kkt_ints(n, m), (size_t)weighted_ints(n, m)),
+                         (size_t)least_norm_ints(n, m));
+    l->dense = arena_take(arena, doubles, sizeof(double));
+    l->pivots = arena_take(arena, ints, sizeof(int));
+}
+
+static int all_finite(const double *a, int count) {
+    double sum = 0;
+    for (int i = 0; i < count; i++) sum += 0 * a[i]; /* 0, or not a number */
+    return sum == 0;
+}
+
+/* The rows of `values` that act; start == NULL: one value a row. */
+static int finite_rows(const Linear *l, const double *values, const int *start) {
+    for (int k = 0; k < l->system->m; k++) {
+        if (!l->active[k]) continue;
+        int from = start != NULL ? start[k] : k, to = start != NULL ? start[k + 1] : k + 1;
+        if (!all_finite(values + from, to - from)) return 0;
+    }
+    return 1;
+}
+
+static Status check_factored(const Linear *l) {
+    if (!all_finite(l->M, l->system->masses))
+        return fail(l->why, "a mass or a force is not finite at this state");
+    if (!finite_rows(l, l->G, l->system->row_start))
+        return fail(l->why, "a constraint or its derivative is not finite at this state");
+    return OK;
+}
+
+static Status check_right(const Linear *l, const double *b, const double *c) {
+    if (b != NULL && !all_finite(b, l->system->n))
+        return fail(l->why, "a mass or a force is not finite at this state");
+    if (!finite_rows(l, c, NULL))
+        return fail(l->why, "a constraint or its derivative is not finite at this state");
+    return OK;
+}
+
+/* The Schur complement failed and the model is too large for the dense rungs. */
+static Status too_large(const Linear *l) {
+    const System *s = l->system;
+    const Schur *schur = schur_of(l);
+    if (s->plan->massless || schur->doubtful_mass >= 0)
+        return fail(l->why,
+                    "the mass matrix is singular, or nearly so, at this state%s%s, and with %d "
+                    "coordinates and %d constraints the model is too large (more than %d together) "
+                    "for the solution that allows it: give every coordinate a mass of its own",
+                    schur->doubtful_mass >= 0 ? ": coordinate " : "",
+                    schur->doubtful_mass >= 0 ? s->coordinates[schur->doubtful_mass] : "", s->n,
+                    s->m, DENSE_MOST);
+    return fail(l->why,
+                "the constraints depend on each other, or nearly so, or masses differ too much, at "
+                "this state%s%s, and with %d coordinates and %d constraints the model is too large "
+                "(more than %d together) for the solution that allows it: remove redundant "
+                "constraints, or bring the masses closer together",
+                schur->doubtful_row >= 0 ? ": constraint " : "",
+                schur->doubtful_row >= 0 ? s->rows[schur->doubtful_row].name : "", s->n, s->m,
+                DENSE_MOST);
+}
+
+/* The rungs above the Schur complement. */
+static Status climb(Linear *l) {
+    if (check_factored(l) != OK) return FAILED;
+    if (l->dense == NULL) return too_large(l);
+    if (kkt_factor(l)) {
+        l->rung = RUNG_KKT;
+        return OK;
+    }
+    if (orthogonal_factor(l)) {
+        l->rung = RUNG_ORTHOGONAL;
+        return OK;
+    }
+    l->rung = RUNG_LEAST_NORM;
+    return least_norm_factor(l);
+}
+
+Status linear_factor(Linear *l, const double *M, const double *G, const int *active) {
+    l->M = M;
+    l->G = G;
+    l->active = active;
+    for (int k = 0; k < l->system->m; k++) l->unique[k] = 1;
+    if (l->system->formulation == NULLSPACE && l->dense != NULL && nullspace_factor(l)) {
+        l->rung = RUNG_NULLSPACE;
+        return OK;
+    }
+    l->rung = RUNG_SCHUR;
+    return schur_factor(l) ? OK : climb(l);
+}
+
+static Status solve_dense(Linear *l, const double *b, const double *c, double *x, double *lambda) {
+    if (check_right(l, b, c) != OK) return FAILED;
+    if (l->rung == RUNG_ORTHOGONAL) return orthogonal_solve(l, b, c, x, lambda);
+    if (l->rung == RUNG_LEAST_NORM) return least_norm_solve(l, b, c, x, lambda);
+    if (l->rung == RUNG_NULLSPACE)
+        nullspace_solve(l, b, c, x, lambda);
+    else
+        kkt_solve(l, b, c, x, lambda);
+    return OK;
+}
+
+Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
+    if (lambda == NULL) lambda = schur_of(l)->lambda;
+    Status status = OK;
+    if (l->rung != RUNG_SCHUR) {
+        status = solve_dense(l, b, c, x, lambda);
+    } else if (!schur_solve(l, b, c, x, lambda)) {
+        if (check_right(l, b, c) != OK || climb(l) != OK) return FAILED;
+        status = solve_dense(l, b, c, x, lambda);
+    }
+    if (status == OK && !(all_finite(x, l->system->n) && all_finite(lambda, l->system->m)))
+        status = check_right(l, b, c) != OK
+                     ? FAILED
+                     : fail(l->why, "the accelerations overflow at this state");
+    return status;
+}

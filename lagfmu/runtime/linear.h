@@ -1,0 +1,42 @@
+/* linear.h -- accelerations and multipliers:  M x = b + G^T lambda ,  G x = c  on the rows that act.
+ *
+ * Factor once, solve as often as needed.  Sign: +G^T lambda stands on the side of the forces.
+ * The ladder (linear.c) takes the first rung that is safe at this state:
+ *   1. schur.c       sparse Cholesky of the Schur complement, guarded by its condition estimate
+ *   2. kkt.c         LU of the scaled KKT matrix, with refinement
+ *   3. orthogonal.c  complete orthogonal decomposition weighted by M: dependent rows */
+#ifndef LAGFMU_LINEAR_H
+#define LAGFMU_LINEAR_H
+
+#include "arena.h"
+#include "status.h"
+#include "system.h"
+
+typedef enum { RUNG_SCHUR, RUNG_KKT, RUNG_ORTHOGONAL, RUNG_LEAST_NORM, RUNG_NULLSPACE } Rung;
+
+typedef struct {
+    const System *system;
+    const double *M, *G;  /* the values that were factored (not copied: they must stay) */
+    const int *active;    /* (m) 1 where a row acts (not copied) */
+    Rung rung;
+    int *unique;          /* (m) 1 where lambda is determined uniquely; 1 for rows that do not act */
+    Why *why;
+    double *sparse;       /* workspace of schur.c */
+    double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
+    int *pivots;
+} Linear;
+
+enum { DENSE_MOST = 600 }; /* n + m up to which the dense rungs are there */
+
+/* Takes the workspace for `s` from the arena. */
+void linear_layout(Linear *l, Arena *arena, const System *s, Why *why);
+
+/* Factors for the rows in `active`.  FAILED, with the cause in `why`: a value is not finite, or the
+ * mass matrix is singular on the constraint surface. */
+Status linear_factor(Linear *l, const double *M, const double *G, const int *active);
+
+/* x (n) and lambda (m; 0 where a row does not act).  c is read where rows act; b may be NULL (zero).
+ * lambda may be NULL.  FAILED: dependent rows contradict each other, or the result overflows. */
+Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+
+#endif

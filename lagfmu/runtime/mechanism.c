@@ -1,0 +1,77 @@
+/* mechanism.c -- a system at one state:  M vdot = F + G^T lambda ,  G vdot = gamma  on the rows
+ * that act (index 1: the constraints differentiated twice). Source: Hairer & Wanner, Solving
+ * Ordinary Differential Equations II, sect. VII.1, eq. (1.48). */
+#include "mechanism.h"
+
+#include <float.h>
+
+#include "digits.h"
+
+void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why) {
+    b->system = s;
+    b->why = why;
+    b->M = arena_doubles(arena, s->masses);
+    b->F = arena_doubles(arena, s->n);
+    b->G = arena_doubles(arena, s->entries);
+    b->nu = arena_doubles(arena, s->m);
+    b->gamma = arena_doubles(arena, s->m);
+    b->vdot = arena_doubles(arena, s->n);
+    b->lambda = arena_doubles(arena, s->m);
+    b->f = arena_doubles(arena, s->m);
+    b->dq = arena_doubles(arena, s->n);
+    b->trial = arena_doubles(arena, s->n);
+    b->fixed = arena_ints(arena, s->m);
+    linear_layout(&b->linear, arena, s, why);
+}
+
+static int all_finite(int count, const double *x) {
+    int all = 1;
+    for (int i = 0; i < count; i++) all &= fabs(x[i]) <= DBL_MAX;
+    return all;
+}
+
+static Status not_evaluated(Mechanism *b, Instant at, const char *what) {
+    Digits t = digits(at.t);
+    return fail(b->why,
+                "the equations cannot be evaluated at t = %s s (%s not finite at this state)",
+                t.text, what);
+}
+
+static Status check_values(Mechanism *b, Instant at) {
+    const System *s = b->system;
+    if (!(all_finite(s->masses, b->M) & all_finite(s->n, b->F)))
+        return not_evaluated(b, at, "a mass or a force is");
+    if (!(all_finite(s->entries, b->G) & all_finite(s->m, b->nu) & all_finite(s->m, b->gamma)))
+        return not_evaluated(b, at, "a constraint or its derivative is");
+    return OK;
+}
+
+static void evaluate(Mechanism *b, Instant at, const double *q, const double *v) {
+    b->system->dynamics(at.t, q, v, at.u, at.p, b->M, b->F, b->G, b->nu, b->gamma);
+}
+
+Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v) {
+    evaluate(b, at, q, v);
+    return check_values(b, at);
+}
+
+Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f) {
+    const System *s = b->system;
+    s->residual(at.t, q, at.u, at.p, f);
+    if (all_finite(s->m, f)) return OK;
+    int k = 0;
+    while (all_finite(1, &f[k])) k++;
+    Digits t = digits(at.t);
+    return fail(b->why, "the constraints cannot be evaluated at t = %s s ('%s' is not finite)",
+                t.text, s->rows[k].name);
+}
+
+Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
+                        const int *active) {
+    evaluate(b, at, q, v);
+    if (linear_factor(&b->linear, b->M, b->G, active) == OK &&
+        linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) == OK)
+        return OK; /* linear.h: what it solves is finite */
+    (void)check_values(b, at); /* the cause, if it is the equations */
+    return FAILED;
+}

@@ -1,0 +1,68 @@
+/* mechanism.h -- a system with the memory that its evaluation needs: values at a state,
+ * accelerations and multipliers, and the projection onto the constraints.  One for the coordinates
+ * that are stepped, and one for the full coordinates of an embedding. */
+#ifndef LAGFMU_MECHANISM_H
+#define LAGFMU_MECHANISM_H
+
+#include "arena.h"
+#include "linear.h"
+#include "status.h"
+#include "system.h"
+
+#include <math.h>
+
+typedef struct {
+    const System *system;
+    Linear linear;
+    double *M, *F, *G, *nu, *gamma; /* values at the state that was evaluated last */
+    double *vdot, *lambda;          /* of the latest motion(): (n), (m) */
+    double *f;                      /* (m) scratch for residuals */
+    double *dq, *trial;             /* (n) scratch of project() */
+    int *fixed;                     /* (m) scratch of project(): position constraints that act */
+    Why *why;
+} Mechanism;
+
+/* A time [s] with the inputs and parameters then. */
+typedef struct {
+    double t;
+    const double *u, *p;
+} Instant;
+
+void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why);
+
+/* sum_j G_kj x_j for the row k of the G that was evaluated last. */
+static inline double mechanism_row(const Mechanism *b, int k, const double *x) {
+    const System *s = b->system;
+    double sum = 0;
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
+        sum += b->G[e] * x[s->entry_column[e]];
+    return sum;
+}
+
+/* sum_j |G_kj| |x_j|: the size of the terms of mechanism_row(). */
+static inline double mechanism_row_size(const Mechanism *b, int k, const double *x) {
+    const System *s = b->system;
+    double sum = 0;
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
+        sum += fabs(b->G[e] * x[s->entry_column[e]]);
+    return sum;
+}
+
+/* M, F, G, nu, gamma at a state.  FAILED if one is not finite. */
+Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v);
+
+/* f (m).  FAILED if one is not finite. */
+Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
+
+/* evaluate, factor, solve: b->vdot (n) and b->lambda (m), 0 where a row does not act. */
+Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
+                        const int *active);
+
+/* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
+ * v are moved in place.  For states that are nearly consistent; initial.c deals with the others.
+ * `size` (n) are the coordinates' magnitudes, which say what rounding is.  On failure q and v are
+ * untouched. */
+Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,
+                         const double *offset, const double *size);
+
+#endif

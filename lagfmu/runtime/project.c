@@ -1,0 +1,126 @@
+/* project.c -- the nearest state on the constraints, in the metric of M.  Positions by Newton's
+ * method,
+ *
+ *   M dq = G^T mu ,  G dq = offset - f      until f - offset is rounding,
+ *
+ * then velocities, which are linear, with G and nu of the projected positions:
+ *
+ *   M dv = G^T mu ,  G dv = nu - G v .
+ *
+ * Source: Hairer & Wanner, Solving Ordinary Differential Equations II, sect. VII.2 (projection
+ * methods).  The factors of the first M and G serve all Newton steps while each reduces the error
+ * to CONTRACTS of what it was (simplified Newton: Deuflhard, Newton Methods for Nonlinear
+ * Problems, sect. 2.1): near the constraints that is as exact as Newton's method, and costs one
+ * evaluation of f. */
+#include "mechanism.h"
+
+#include <float.h>
+#include <string.h>
+
+#include "digits.h"
+
+enum { ITERATIONS = 10 };
+static const double SMALL = 1e-9;     /* relative residual that rounding may leave */
+static const double CONTRACTS = 1e-4; /* reduction of the error for which factors are kept */
+
+/* How far the positions are off: `error` is the largest |f - offset| relative to its own terms. */
+typedef struct {
+    double error, largest;
+    int rounding;
+} Miss;
+
+/* b->f <- offset - f on the fixed rows, and how large that is. */
+static Status measure(Mechanism *b, Instant at, const double *q, const double *offset,
+                      const double *size, Miss *miss) {
+    const System *s = b->system;
+    *miss = (Miss){0, 0, 1};
+    if (mechanism_residual(b, at, q, b->f) == FAILED) return FAILED;
+    for (int k = 0; k < s->m; k++) {
+        if (!b->fixed[k]) continue;
+        double steepness = 0, reach = 0;
+        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
+            int j = s->entry_column[e];
+            double g = fabs(b->G[e]), x = fabs(q[j]);
+            steepness += g * x;
+            reach += g * (x > size[j] ? x : size[j]);
+        }
+        b->f[k] = offset[k] - b->f[k];
+        double off = fabs(b->f[k]);
+        if (off <= 2 * DBL_EPSILON * steepness) continue;
+        miss->rounding = 0;
+        if (off > miss->error * reach) miss->error = off / reach;
+        if (off > miss->largest) miss->largest = off;
+    }
+    return OK;
+}
+
+static Status no_arrival(Mechanism *b, Instant at, const Miss *miss) {
+    const char *comma = "";
+    Digits t = digits(at.t);
+    fail(b->why, "the step to t = %s s cannot be projected onto the constraints ", t.text);
+    for (int k = 0; k < b->system->m; k++)
+        if (b->fixed[k] && b->f[k] != 0) {
+            why_append(b->why, "%s'%s'", comma, b->system->rows[k].name);
+            comma = ", ";
+        }
+    why_append(b->why, " (missed by %.3g): take smaller steps", miss->largest);
+    return FAILED;
+}
+
+/* f = offset on the fixed rows: q is moved, `moved` says whether.  M and G are those of q. */
+static Status project_positions(Mechanism *b, Instant at, double *q, const double *v,
+                                const double *offset, const double *size, int *moved) {
+    double before = HUGE_VAL;
+    for (int count = 0;; count++) {
+        Miss miss;
+        if (measure(b, at, q, offset, size, &miss) == FAILED) return FAILED;
+        *moved = count > 0;
+        if (miss.rounding || miss.error < DBL_EPSILON * DBL_EPSILON) return OK;
+        if (miss.error > before / 2 && miss.error < SMALL) return OK; /* rounding in f is left */
+        if (count == ITERATIONS) return no_arrival(b, at, &miss);
+        int stale = count > 0 && !(miss.error <= CONTRACTS * before);
+        if (stale && mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
+        if ((stale || count == 0) &&
+            linear_factor(&b->linear, b->M, b->G, b->fixed) == FAILED)
+            return FAILED;
+        if (linear_solve(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
+        for (int j = 0; j < b->system->n; j++) q[j] += b->dq[j];
+        before = miss.error;
+    }
+}
+
+/* G v = nu on the rows that act: v is moved.  Nothing is left to do where the slip is rounding. */
+static Status project_velocities(Mechanism *b, double *v, const int *active) {
+    const System *s = b->system;
+    int rounding = 1;
+    for (int k = 0; k < s->m; k++) {
+        if (!active[k]) continue;
+        b->f[k] = b->nu[k] - mechanism_row(b, k, v);
+        rounding &= fabs(b->f[k]) <= DBL_EPSILON * (mechanism_row_size(b, k, v) + fabs(b->nu[k]));
+    }
+    if (rounding) return OK;
+    if (linear_factor(&b->linear, b->M, b->G, active) == FAILED) return FAILED;
+    if (linear_solve(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
+    for (int j = 0; j < s->n; j++) v[j] += b->dq[j];
+    return OK;
+}
+
+Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,
+                         const double *offset, const double *size) {
+    const System *s = b->system;
+    int acting = 0, fixed = 0, moved = 0;
+    for (int k = 0; k < s->m; k++) {
+        b->fixed[k] = active[k] && s->rows[k].kind != NONHOLONOMIC;
+        acting |= active[k];
+        fixed |= b->fixed[k];
+    }
+    if (!acting) return OK;
+    if (mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
+    memcpy(b->trial, q, (size_t)s->n * sizeof *q);
+    if (fixed && project_positions(b, at, b->trial, v, offset, size, &moved) == FAILED)
+        return FAILED;
+    if (moved && mechanism_evaluate(b, at, b->trial, v) == FAILED) return FAILED;
+    if (project_velocities(b, v, active) == FAILED) return FAILED;
+    memcpy(q, b->trial, (size_t)s->n * sizeof *q);
+    return OK;
+}

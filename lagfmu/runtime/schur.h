@@ -1,0 +1,54 @@
+/* schur.h -- lambda from the Schur complement S = G M^-1 G^T, sparse, in the order of the plan. */
+#ifndef LAGFMU_SCHUR_H
+#define LAGFMU_SCHUR_H
+
+#include "linear.h"
+
+/* How far the factors can be trusted. */
+typedef enum {
+    SCHUR_EXACT,   /* as they are */
+    SCHUR_REFINED, /* with refinement */
+    SCHUR_DOUBLED, /* with refinement by residuals in doubled precision */
+    SCHUR_UNSAFE
+} Trust;
+
+/* Lives at the head of Linear.sparse.  Positions count in the order of elimination. */
+typedef struct {
+    double *mass_lower;        /* M = L D L^T: L, empty if M is diagonal */
+    double *inverse_mass;      /* (n) 1 / D */
+    const int *w_start, *w_column;
+    const double *w;           /* W = L^-1 P G^T by rows of G; if M is diagonal that is G itself */
+    double *w_own;             /* the same where M is not diagonal */
+    double *h;                 /* D^-1 W; 0 in rows that do not act */
+    double *lower, *inverse;   /* S = L' D' L'^T: L' and 1 / D' (m) */
+    double *diagonal;          /* (m) S_kk by rows of G; 1 where a row does not act */
+    double *row_size, *row;    /* (max(n, m)) scratch of ldlt.c; row is zero between calls */
+    double *y, *z;             /* (n), (m) scratch of schur_solve() */
+    double *r, *r_low, *g;     /* (n), (n), (m) residuals */
+    double *dx, *dlambda;      /* (n), (m) corrections */
+    double *x_low, *lambda_low, *lambda; /* (n), (m), (m) */
+    double condition, growth;  /* of M and S, the worse of the two (ldlt.h) */
+    Trust trust;
+    int doubtful_mass;         /* coordinate whose pivot in M vanishes, or -1 */
+    int doubtful_row;          /* row of G whose pivot in S vanishes, or -1 */
+} Schur;
+
+static inline Schur *schur_of(const Linear *l) { return (Schur *)(void *)l->sparse; }
+
+void schur_layout(Linear *l, Arena *arena);
+
+/* M = L D L^T, W, D^-1 W and the diagonal of S.  1; 0 if M is not safely positive definite or a row
+ * of G that acts is zero (`zero_rows`: allowed). */
+int schur_masses(Linear *l, int zero_rows);
+
+/* The same and S = L' D' L'^T, judged.  1 if it can be trusted. */
+int schur_factor(Linear *l);
+
+/* y (n) in the order of elimination: D^-1 L^-1 P b, and back: x = P^T L^-T y. */
+void schur_half(const Linear *l, const double *b, double *y);
+void schur_back(const Linear *l, double *y, double *x);
+
+/* x and lambda (not NULL), refined as the trust asks for.  0 if the refinement does not settle. */
+int schur_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+
+#endif

@@ -1,0 +1,14 @@
+/* system.c -- which constraint rows act while the contacts stand as in `closed`.
+ *
+ * A contact acts while it is closed; a row that belongs to a contact acts while that one is closed;
+ * every other row always acts. */
+#include "system.h"
+
+void system_active(const System *s, const int *closed, int *active) {
+    for (int k = 0; k < s->m; k++) active[k] = s->rows[k].kind != CONTACT;
+    for (int i = 0; i < s->contacts; i++) active[s->contact[i]] = closed[i] != 0;
+    for (int k = 0; k < s->m; k++) {
+        int contact = s->rows[k].while_closed;
+        if (s->rows[k].kind != CONTACT && contact >= 0) active[k] = active[contact];
+    }
+}

@@ -1,0 +1,127 @@
+"""Ball that bounces to rest, through fmpy on the built FMU."""
+
+from __future__ import annotations
+
+import fmpy
+import numpy as np
+import pytest
+from instance import instance
+
+G = 9.81
+CASES = {  # m [kg], e, h [m], v0 [m/s]
+    "dropped": (1.0, 0.7, 1.0, 0.0),
+    "thrown up": (0.2, 0.5, 0.3, 2.0),
+    "thrown down": (5.0, 0.3, 2.0, -3.0),
+    "lively": (1.0, 0.95, 1.0, 0.0),
+    "clay": (1.0, 0.0, 1.0, 0.0),
+    "from the floor": (1.0, 0.6, 0.0, 3.0),
+    "tiny": (1.0, 0.7, 1e-6, 0.0),
+    "vast": (1.0, 0.7, 1e6, 0.0),
+}
+EVERY = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
+
+
+def bounces(case):
+    """Times [s] of the bounces, the speeds [m/s] after each, and the time when the last is over."""
+    _, e, h, v0 = case
+    w = np.sqrt(v0**2 + 2 * G * h)
+    first = (v0 + w) / G
+    count = 400
+    speeds = w * e ** np.arange(1, count + 1)
+    times = first + np.concatenate([[0.0], np.cumsum(2 * speeds / G)[:-1]])
+    return times, speeds, first + 2 * w * e / (G * (1 - e))
+
+
+def start(case):
+    m, e, h, v0 = case
+    return {"m": m, "g": G, "e": e, "y": h, "der(y)": v0}
+
+
+@EVERY
+@pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 2e-9)])
+def test_every_parabola_is_where_the_bounces_put_it(fmu, case, tolerance, allowed):
+    """The ball leaves the floor with w, e w, e^2 w, ... at t1, t1 + 2 e w/g, ...: between two bounces it
+    flies y = v tau - g tau^2/2, and after all of them it lies.  (It rests as soon as it would rise by
+    1e-9 of its first height.)"""
+    times, speeds, end = bounces(case)
+    stop = 1.2 * end
+    result = fmpy.simulate_fmu(
+        str(fmu("BouncingBall")),
+        stop_time=stop,
+        output_interval=stop / 400,
+        step_size=stop / 400,
+        relative_tolerance=tolerance,
+        start_values=start(case),
+    )
+    _, _, h, v0 = case
+    t, highest = result["time"], h + max(v0, 0) ** 2 / (2 * G)
+    k = np.searchsorted(times, t, side="right") - 1
+    tau, speed = t - times[k], speeds[k]
+    y = np.where(k < 0, h + v0 * t - G * t**2 / 2, speed * tau - G * tau**2 / 2)
+    y = np.where(t < end, np.maximum(y, 0), 0)
+    assert np.abs(result["y"] - y).max() < allowed * highest
+    assert result["y"].min() > -1e-14 * highest
+    assert (result["departure.floor.count"] == 0).all()
+
+
+@EVERY
+def test_it_rests_when_the_bounces_have_accumulated(python_fmu, case):
+    """All the bounces are over at t1 + 2 e w/(g (1 - e)), for a drop sqrt(2 h/g)(1 + e)/(1 - e); just
+    before the ball is still bouncing, just after it lies with lambda = m g, and so ever after."""
+    m, e, h, v0 = case
+    *_, end = bounces(case)
+    if v0 == 0:
+        assert end == pytest.approx(np.sqrt(2 * h / G) * (1 + e) / (1 - e), rel=1e-12)
+    # it rests once v^2/(2 g) is 1e-9 of the coordinate's size; the rest of the bounces would have taken
+    size = h or 1.0
+    early = 2 * np.sqrt(2e-9 * size / G) / (1 - e) + 1e-8 * end
+    with instance(python_fmu("BouncingBall")) as one:
+        one.start(start(case), tolerance=1e-10)
+        one.step(end - 1.01 * early)
+        assert not one.get("contact.floor")
+        assert one.get("lambda.floor") == 0
+        one.step(1.02 * early)
+        for _ in range(3):
+            assert one.get("contact.floor")
+            assert one.get("lambda.floor") == pytest.approx(m * G, rel=1e-14)
+            assert one.get("y") == 0
+            assert one.get("der(y)") == 0
+            one.step(end)
+
+
+@pytest.mark.parametrize("points", [1, 30, 1000])
+def test_infinitely_many_bounces_fit_into_one_communication_step(fmu, points):
+    """Rest is reached whether the whole run is one communication step or a thousand."""
+    result = fmpy.simulate_fmu(
+        str(fmu("BouncingBall")), stop_time=5.0, output_interval=5 / points, step_size=5 / points
+    )
+    assert result["contact.floor"][-1]
+    assert result["y"][-1] == 0
+    assert result["lambda.floor"][-1] == pytest.approx(9.81, rel=1e-14)
+
+
+def test_each_bounce_keeps_e_squared_of_the_energy(fmu):
+    """Between the bounces the energy is m g h e^2k, falling in steps that all have the ratio e^2."""
+    e = 0.8
+    result = fmpy.simulate_fmu(
+        str(fmu("BouncingBall")),
+        stop_time=3.0,
+        output_interval=1e-2,
+        relative_tolerance=1e-12,
+        start_values={"e": e},
+    )
+    levels = np.round(np.log(result["energy.total"] / G) / np.log(e**2), 8)
+    found = np.unique(levels)
+    np.testing.assert_array_equal(found, np.arange(len(found)))
+    assert len(found) >= 7
+    assert (np.diff(levels) >= 0).all()
+
+
+def test_an_elastic_ball_bounces_for_ever(fmu):
+    """With e = 1 the bounces never end: after a hundred of them the ball is at the height it fell from."""
+    period = 2 * np.sqrt(2 / G)
+    with instance(fmu("BouncingBall")) as one:
+        one.start({"e": 1.0}, tolerance=1e-12)
+        one.step(100 * period)
+        assert one.get("y") == pytest.approx(1.0, abs=1e-8)
+        assert not one.get("contact.floor")

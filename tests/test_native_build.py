@@ -1,0 +1,409 @@
+"""Native FMUs as files: what the archive holds, for whom the binaries are, that others run and rebuild."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+
+import binaries
+import numpy as np
+import pytest
+from conftest import FILES, MODELS
+from fmi2 import FUNCTIONS
+from fmpy import extract, read_model_description, simulate_fmu
+from fmpy.build import build_platform_binary
+from fmpy.validation import validate_fmu
+from typer.testing import CliRunner
+
+from lagfmu import Contact, compiler
+from lagfmu.build import write
+from lagfmu.cli import app
+from lagfmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
+from lagfmu.errors import BuildError
+from lagfmu.fmu.native import runtime_files
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+
+HERE = Path(__file__).parent
+RUNTIME = HERE.parent / "lagfmu" / "runtime"
+EXPORTS = {f"fmi2{name}" for name in FUNCTIONS}
+LONG = 600  # seconds: the first build for Windows compiles its C library
+
+
+def cross() -> compiler.Compiler:
+    """The compiler for all platforms; the test is skipped where there is only the host's."""
+    found = find_compiler()
+    if found is None or not found.cross:
+        pytest.skip("ziglang is not installed: pip install lagfmu[native]")
+    return found
+
+
+@pytest.fixture(scope="module")
+def everywhere(prepared, tmp_path_factory) -> Path:
+    """Hemisphere.fmu for all platforms."""
+    cross()
+    folder = tmp_path_factory.mktemp("everywhere")
+    return write(prepared("Hemisphere"), folder, target="native", platforms=("all",))
+
+
+# ---------------------------------------------------------------------------- the archive
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_fmpy_reports_no_problem(native_fmu, prepared, name):
+    """fmpy validate is silent; both kinds of simulation are offered, with what they can do."""
+    path = native_fmu(name)
+    assert validate_fmu(str(path)) == []
+    description = read_model_description(str(path))
+    for interface in (description.coSimulation, description.modelExchange):
+        assert interface.modelIdentifier == name
+        assert interface.canGetAndSetFMUstate
+        assert interface.canSerializeFMUstate
+        assert interface.providesDirectionalDerivative
+    assert description.coSimulation.canInterpolateInputs
+    assert description.coSimulation.maxOutputDerivativeOrder == 1
+    assert description.numberOfContinuousStates == len(description.derivatives) > 0
+    contacts = [c for c in prepared(name).model.constraints if isinstance(c, Contact)]
+    assert description.numberOfEventIndicators == len(contacts)
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_both_targets_have_the_same_variables(native_fmu, python_fmu, name):
+    """Names, references, causality, units, starts, structure: one table."""
+
+    def described(path: Path) -> list:
+        with zipfile.ZipFile(path) as archive:
+            root = ET.fromstring(archive.read("modelDescription.xml"))
+        found = []
+        for part in ("ModelVariables", "ModelStructure", "UnitDefinitions", "DefaultExperiment"):
+            for element in root.find(part).iter():
+                attributes = {k: v for k, v in element.attrib.items() if k != "reinit"}
+                if element.get("name") == "solver.method":
+                    attributes.pop("description")
+                found.append((element.tag, attributes))
+        return found
+
+    assert described(native_fmu(name)) == described(python_fmu(name))
+
+
+def test_the_archive_holds_what_it_needs_and_no_more(native_fmu):
+    """Binary, documentation, proof, and every source that the description lists."""
+    path = native_fmu("Hemisphere")
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        names = archive.namelist()
+        assert names[0] == "modelDescription.xml"
+        root = ET.fromstring(archive.read(names[0]))
+    listed = [e.get("name") for e in root.findall("CoSimulation/SourceFiles/File")]
+    assert listed == [e.get("name") for e in root.findall("ModelExchange/SourceFiles/File")]
+    sources = {n.removeprefix("sources/") for n in names if n.startswith("sources/")}
+    assert set(listed) == {s for s in sources if s.endswith(".c")}
+    assert {"model.c", "variables.c", "identity.h", "fmi2.c"} <= sources
+    assert sources - {"model.c", "variables.c", "identity.h"} == set(runtime_files())
+    others = {n for n in names if not n.startswith("sources/")}
+    assert others == {
+        "modelDescription.xml",
+        "documentation/index.html",
+        "resources/lagfmu.json",
+        f"binaries/{host().folder}/Hemisphere{host().suffix}",
+    }
+
+
+def test_the_fmu_is_small(native_fmu, everywhere):
+    """Bounds that a library linked in by mistake would break (in kB)."""
+    assert native_fmu("Hemisphere").stat().st_size < 200e3
+    assert everywhere.stat().st_size < 600e3
+
+
+# ---------------------------------------------------------------------------- the binaries
+
+MADE_FOR = {
+    "linux64": [("linux", "x86_64", None)],
+    "aarch64-linux": [("linux", "aarch64", None)],
+    "win64": [("windows", "x86_64", None)],
+    "darwin64": [("darwin", "x86_64", (10, 15)), ("darwin", "aarch64", (11, 0))],
+    "aarch64-darwin": [("darwin", "aarch64", (11, 0))],
+}
+SYSTEM_LIBRARIES = ("libc.so.6", "libm.so.6", "KERNEL32.dll", "/usr/lib/libSystem.B.dylib")
+
+
+@pytest.mark.parametrize("folder", NAMES)
+def test_each_binary_is_for_its_platform_and_exports_fmi_alone(everywhere, folder):
+    """All 44 functions of FMI 2.0 and nothing else; no library but the system's own."""
+    suffix = next(p.suffix for p in PLATFORMS if p.folder == folder)
+    with zipfile.ZipFile(everywhere) as archive:
+        data = archive.read(f"binaries/{folder}/Hemisphere{suffix}")
+    found = binaries.read(data)
+    assert [(b.system, b.machine, b.oldest) for b in found] == MADE_FOR[folder]
+    assert len(EXPORTS) == 44
+    for b in found:
+        own = (
+            {"__dso_handle", "_mh_dylib_header"} if b.system == "darwin" else set()
+        )  # the linker's
+        assert b.exports - own == EXPORTS
+        for needed in b.needs:
+            assert needed in SYSTEM_LIBRARIES or needed.startswith("api-ms-win-crt-"), needed
+        if b.system == "darwin":
+            assert b.name == "@rpath/Hemisphere.dylib"
+            assert b.signed or b.machine == "x86_64"
+
+
+def test_no_path_of_the_building_machine_is_inside(everywhere):
+    """Neither folders of this repository, of the compiler and its caches, nor temporary ones."""
+    traces = {
+        str(HERE.parent),
+        str(everywhere.parent),
+        sys.prefix,
+        os.path.expanduser("~"),
+        "/tmp/",
+    }
+    with zipfile.ZipFile(everywhere) as archive:
+        for name in archive.namelist():
+            data = archive.read(name)
+            assert not [t for t in traces if t.encode() in data], name
+            if name.startswith("binaries/"):
+                assert b".pdb" not in data
+                assert b"lagfmu_" not in data
+
+
+BUILD = """
+import sys
+from pathlib import Path
+from lagfmu.build import write
+from lagfmu.modelfile import load
+from lagfmu.prepare import prepare
+file = load(Path(sys.argv[1]))
+for s in file.scenes:
+    if s.name == "PendulumCartesian":
+        write(prepare(file.model, s), Path(sys.argv[2]), target="native")
+"""
+
+
+def test_two_processes_build_the_same_bytes(native_fmu, tmp_path):
+    """Another hash seed, folder, and a cache that is empty: the same FMU, and the parent's."""
+    made = []
+    for seed in ("1", "2"):
+        folder = tmp_path / f"work{seed}" / ("deep/er" if seed == "2" else ".")
+        folder.mkdir(parents=True)
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        if seed == "2":
+            environment["LAGFMU_CACHE"] = str(tmp_path / "cache")
+        command = [sys.executable, "-c", BUILD, str(MODELS / "pendulum.py"), str(folder)]
+        subprocess.run(command, cwd=folder, env=environment, check=True, timeout=LONG)
+        made.append((folder / "PendulumCartesian.fmu").read_bytes())
+    assert made[0] == made[1]
+
+
+# ---------------------------------------------------------------------------- others run it
+
+COLUMNS = ("r", "theta", "der(theta)", "lambda.surface", "departure.surface.time")
+
+
+def hemisphere_by(command: list[str], library: str, path: Path) -> np.ndarray:
+    """The table that tests/host.c prints: time and COLUMNS."""
+    description = read_model_description(str(path))
+    reference = {v.name: str(v.valueReference) for v in description.modelVariables}
+    arguments = [library, description.guid, "2", "0.05", *(reference[c] for c in COLUMNS)]
+    run = subprocess.run(
+        [*command, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=LONG,
+        check=False,
+        env={**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(path.parent / "wine")},
+    )
+    assert run.returncode == 0, run.stderr
+    return np.array([[float(x) for x in line.split()] for line in run.stdout.splitlines()])
+
+
+def build_host(target: str, folder: Path, suffix: str = "") -> str:
+    """tests/host.c for a platform."""
+    program = folder / f"host_{target}{suffix}"
+    command = [*cross().command, "-target", target, "-O1", f"-I{RUNTIME}", str(HERE / "host.c")]
+    libraries = [] if "windows" in target else ["-ldl"]
+    subprocess.run([*command, "-o", str(program), *libraries], check=True, timeout=LONG)
+    return str(program)
+
+
+def on_this_machine(everywhere: Path, tmp_path: Path) -> tuple[np.ndarray, Path]:
+    folder = Path(extract(str(everywhere), str(tmp_path / "fmu")))
+    if host().folder != "linux64":
+        pytest.skip("the reference run is that of linux x86_64")
+    program = build_host("x86_64-linux-gnu.2.17", tmp_path)
+    library = folder / "binaries" / "linux64" / "Hemisphere.so"
+    return hemisphere_by([program], str(library), everywhere), folder
+
+
+def test_the_windows_binary_gives_the_same_numbers_under_wine(everywhere, tmp_path):
+    """To 1e-12, the departure in between; Windows has another C library."""
+    wine = shutil.which("wine") or shutil.which("wine64")
+    if wine is None:
+        pytest.skip("wine is not installed (Debian: wine64)")
+    expected, folder = on_this_machine(everywhere, tmp_path)
+    program = build_host("x86_64-windows-gnu", tmp_path, ".exe")
+    library = folder / "binaries" / "win64" / "Hemisphere.dll"
+    found = hemisphere_by([wine, program], str(library), everywhere)
+    assert expected[-1, -1] > 1.6
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_the_aarch64_binary_gives_the_same_numbers_under_qemu(everywhere, tmp_path):
+    """To 1e-12, the departure in between."""
+    qemu = shutil.which("qemu-aarch64") or shutil.which("qemu-aarch64-static")
+    root = Path("/usr/aarch64-linux-gnu")
+    if qemu is None:
+        pytest.skip("qemu-aarch64 is not installed (Debian: qemu-user)")
+    if not (root / "lib" / "ld-linux-aarch64.so.1").exists():
+        pytest.skip("no C library for aarch64 (Debian: libc6-arm64-cross)")
+    expected, folder = on_this_machine(everywhere, tmp_path)
+    program = build_host("aarch64-linux-gnu.2.17", tmp_path)
+    library = folder / "binaries" / "aarch64-linux" / "Hemisphere.so"
+    found = hemisphere_by([qemu, "-L", str(root), program], str(library), everywhere)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_the_sources_link_into_an_importer(everywhere, tmp_path):
+    """With a prefix for the functions, as the standard has it for several FMUs in one program."""
+    expected, folder = on_this_machine(everywhere, tmp_path)
+    program = tmp_path / "linked"
+    sources = sorted(str(p) for p in (folder / "sources").glob("*.c"))
+    flags = ["-O1", "-DLINKED", "-DFMI2_FUNCTION_PREFIX=Hemisphere_", "-ffp-contract=off"]
+    command = [*cross().command, "-target", "x86_64-linux-gnu.2.17", *flags, "-o", str(program)]
+    command += [f"-I{folder / 'sources'}", str(HERE / "host.c"), *sources, "-lm"]
+    subprocess.run(command, check=True, timeout=LONG)
+    found = hemisphere_by([str(program)], "none", everywhere)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+# ---------------------------------------------------------------------------- fmpy
+
+
+@pytest.mark.parametrize("name", ["PendulumCartesian", "Hemisphere"])
+def test_model_exchange_with_cvode_follows_co_simulation(native_fmu, name):
+    """fmpy's CVODE on the derivatives and event indicators; drift stays in proportion to its tolerance."""
+    path, outputs = (
+        native_fmu(name),
+        {"PendulumCartesian": ("x", "lambda.rod"), "Hemisphere": COLUMNS},
+    )
+    run = {"stop_time": 2.0, "output_interval": 0.1, "output": [*outputs[name]]}
+    exact = simulate_fmu(str(path), fmi_type="CoSimulation", relative_tolerance=1e-12, **run)
+    errors = []
+    for tolerance in (1e-6, 1e-9):
+        found = simulate_fmu(
+            str(path), fmi_type="ModelExchange", relative_tolerance=tolerance, **run
+        )
+        times = [int(np.argmin(abs(found["time"] - t))) for t in exact["time"]]
+        errors.append(
+            max(abs(found[n][times] - exact[n]).max() for n in outputs[name] if "time" not in n)
+        )
+    assert errors[0] < 3e-3
+    assert errors[1] < 1e-5
+
+
+def test_the_drift_of_model_exchange_is_bounded(native_fmu):
+    """A pendulum for 200 s with CVODE at 1e-6: the rod's length to 1e-4, without a single event."""
+    found = simulate_fmu(
+        str(native_fmu("PendulumCartesian")),
+        fmi_type="ModelExchange",
+        stop_time=200.0,
+        output_interval=1.0,
+        relative_tolerance=1e-6,
+        output=["residual.rod", "energy.total"],
+    )
+    assert len(found) == 201
+    assert abs(found["residual.rod"]).max() < 1e-4
+    assert abs(found["residual.rod"]).max() > 0
+
+
+def test_a_recompilation_from_the_sources_agrees(native_fmu, tmp_path):
+    """fmpy, CMake and the system's compiler make the same FMU from what is inside."""
+    if shutil.which("cmake") is None or shutil.which("cc") is None:
+        pytest.skip("cmake and cc are needed")
+    path = native_fmu("Hemisphere")
+    folder = Path(extract(str(path), str(tmp_path / "fmu")))
+    (binary,) = (folder / "binaries").rglob("Hemisphere*")
+    binary.unlink()
+    build_platform_binary(folder, cmake_options={"CMAKE_SHARED_LINKER_FLAGS:STRING": "-lm"})
+    assert binary.exists()
+    expected, found = (
+        simulate_fmu(str(p), fmi_type="CoSimulation", relative_tolerance=1e-10, output=COLUMNS)
+        for p in (path, folder)
+    )
+    assert expected["departure.surface.time"][-1] > 1.6
+    for n in COLUMNS:
+        np.testing.assert_allclose(found[n], expected[n], rtol=1e-12, atol=1e-12)
+
+
+# ---------------------------------------------------------------------------- doors and refusals
+
+
+def test_the_command_builds_and_verifies_a_native_fmu(tmp_path):
+    """lagfmu build MODEL.py --target native --platforms host."""
+    arguments = ["build", str(MODELS / "pendulum.py"), "--scene", "PendulumAngle"]
+    native = ["--target", "native", "--platforms", "host", "--out", str(tmp_path)]
+    run = CliRunner().invoke(app, [*arguments, *native])
+    assert run.exit_code == 0, run.output
+    assert (tmp_path / "native" / "PendulumAngle.fmu").exists()
+    wrong = CliRunner().invoke(app, [*arguments, "--platforms", "host", "--out", str(tmp_path)])
+    assert wrong.exit_code == 1
+    assert "--target native" in wrong.output
+    unknown = CliRunner().invoke(app, [*arguments, *native[:2], "--platforms", "amiga"])
+    assert unknown.exit_code == 1
+    assert "'amiga' is unknown" in unknown.output
+
+
+def test_platforms_are_chosen_by_name():
+    """`host`, `all`, folders; in the order of the table; unknown ones are refused with the known ones."""
+    assert [p.folder for p in chosen(["all"])] == list(NAMES)
+    assert chosen(["host"]) == (host(),)
+    assert [p.folder for p in chosen(["win64", "linux64"])] == ["linux64", "win64"]
+    with pytest.raises(BuildError, match=r"'beos' is unknown.*aarch64-linux"):
+        chosen(["beos"])
+
+
+def test_without_a_compiler_the_remedy_is_named(prepared, tmp_path, monkeypatch):
+    """None at all, or one for this machine only."""
+    monkeypatch.setattr(compiler, "find_compiler", lambda: None)
+    with pytest.raises(BuildError, match=r"pip install lagfmu\[native\]"):
+        write(prepared("PendulumAngle"), tmp_path, target="native")
+    only = compiler.Compiler(("cc",), False, "cc")
+    monkeypatch.setattr(compiler, "find_compiler", lambda: only)
+    with pytest.raises(BuildError, match=r"this machine only.*pip install lagfmu\[native\]"):
+        write(prepared("PendulumAngle"), tmp_path, target="native", platforms=("all",))
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_systems_compiler_makes_the_same_motion(native_fmu, prepared, tmp_path, monkeypatch):
+    """Without ziglang cc compiles for this machine, and the numbers agree."""
+    path = shutil.which("cc")
+    if path is None:
+        pytest.skip("no cc")
+    expected = simulate_fmu(str(native_fmu("PendulumCartesian")), output=["x", "lambda.rod"])
+    monkeypatch.setattr(compiler, "find_compiler", lambda: compiler.Compiler((path,), False, "cc"))
+    monkeypatch.setenv("LAGFMU_CACHE", str(tmp_path / "cache"))
+    made = write(prepared("PendulumCartesian"), tmp_path, target="native")
+    found = simulate_fmu(str(made), output=["x", "lambda.rod"])
+    for n in ("x", "lambda.rod"):
+        np.testing.assert_allclose(found[n], expected[n], rtol=1e-12, atol=1e-12)
+    with zipfile.ZipFile(made) as archive:
+        (library,) = [n for n in archive.namelist() if n.startswith("binaries/")]
+        (binary,) = binaries.read(archive.read(library))
+    assert binary.exports == EXPORTS
+
+
+def test_the_compilers_first_error_is_told():
+    """BuildError with the line that says what is wrong, not a page of output."""
+    with pytest.raises(BuildError, match=r"model\.c:1:\d+: error") as caught:
+        compile_libraries("Bad", {"model.c": b"int broken(\n"}, {"empty.h": b""}, (host(),))
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_target_is_refused(prepared, tmp_path):
+    """The known ones are named."""
+    with pytest.raises(BuildError, match="'fortran' is unknown, expected one of python, native"):
+        write(prepared("PendulumAngle"), tmp_path, target="fortran")

@@ -1,0 +1,958 @@
+"""The C runtime's states of motion: start, projection, contact modes, impacts and observation.
+
+One library of the runtime serves all models; each model is compiled by itself."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import subprocess
+from collections.abc import Sequence
+from ctypes import byref, c_char_p, c_double, c_int, c_void_p
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import FILES
+from runtime import FLAGS, RUNTIME, compile_library, compiler
+from sympy import sin, sqrt, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter, Scene
+from lagfmu.ccode import model_source
+from lagfmu.prepare import Prepared, prepare
+from lagfmu.solver import initial
+from lagfmu.solver.contacts import complementary_modes, impact
+from lagfmu.solver.failure import StartFailureError, StepFailureError
+from lagfmu.solver.instant import Instant
+from lagfmu.solver.observe import observe
+from lagfmu.solver.state import Settings
+
+EPS = np.finfo(float).eps
+ABOVE = {"fmi2.c", "instance.c", "exchange.c"}  # what stands on the solver
+SOURCES = sorted(path.name for path in RUNTIME.glob("*.c") if path.name not in ABOVE)
+BENCH = Path(__file__).with_name("solver_bench.c")
+
+x, y, s, theta = dynamicsymbols("x y s theta")
+push, lift = dynamicsymbols("push lift")
+m, g, J, e, arm = symbols("m g J e arm", positive=True)
+MASS = Parameter(m, 2.0, "kg")
+
+
+class Bench:
+    """A solver with its memory; arrays are views into it."""
+
+    def __init__(self, library: ctypes.CDLL, system: c_void_p, prepared: Prepared) -> None:
+        self.c, self.prepared, self.system = library, prepared, prepared.system
+        self.c.bench_open.restype = c_void_p
+        self.c.bench_array.restype = c_void_p
+        self.c.bench_solver.restype = c_void_p
+        self.c.bench_why.restype = c_char_p
+        self.c.bench_number.restype = c_double
+        self.handle = c_void_p(self.c.bench_open(system))
+        embedding = self.system.embedding
+        self.full = self.system if embedding is None else embedding.full
+        values = [v.start for v in prepared.table.variables if v.role == "parameter"]
+        self.p = self.array("p", len(values))
+        self.p[:] = values
+
+    def close(self) -> None:
+        self.c.bench_close(self.handle)
+
+    def array(self, name: str, count: int, kind: Any = c_double) -> Any:
+        if count == 0:
+            return np.zeros(0)
+        address = self.c.bench_array(self.handle, name.encode())
+        return np.ctypeslib.as_array((kind * count).from_address(address))
+
+    def number(self, name: str) -> float:
+        return float(self.c.bench_number(self.handle, name.encode()))
+
+    def why(self) -> str:
+        return bytes(self.c.bench_why(self.handle)).decode()
+
+    def drive(self, values: Sequence[float]) -> None:
+        self.array("value", len(values))[:] = values
+
+    def start(
+        self, q: Sequence[float], v: Sequence[float], t: float = 0.0, tolerance: float = 1e-8
+    ) -> bool:
+        arrays = doubles(q), doubles(v), c_double(tolerance)
+        return int(self.c.bench_start(self.handle, c_double(t), *arrays)) == 0
+
+    def moved(self) -> list[tuple[str, float, float]]:
+        found = []
+        for i in itertools.count():
+            name, given, used = c_char_p(), c_double(), c_double()
+            where = byref(name), byref(given), byref(used)
+            velocity = self.c.bench_moved(self.handle, i, *where)
+            if velocity < 0:
+                return found
+            text = (name.value or b"").decode()
+            found.append((f"der({text})" if velocity else text, given.value, used.value))
+
+    def state(self) -> dict[str, Any]:
+        n, m, c = self.system.n, self.system.m, len(self.system.contacts)
+        sizes = {"q": n, "v": n, "offset": m, "scale": 2 * n, "size": n, "gap": c}
+        found = {name: self.array(f"state.{name}", k).copy() for name, k in sizes.items()}
+        for name in ("closed", "armed", "count"):
+            found[name] = self.array(f"state.{name}", c, c_int).copy()
+        return found
+
+    def project(self, q: Any, v: Any, active: Sequence[int], t: float = 0.0) -> tuple[Any, Any]:
+        x, w = doubles(q), doubles(v)
+        if self.c.bench_project(self.handle, c_double(t), x, w, integers(active)):
+            raise AssertionError(self.why())
+        return np.array(x), np.array(w)
+
+    def observe(self) -> dict[str, Any]:
+        """The observed values by the names that the FMU gives them."""
+        if self.c.bench_observe(self.handle):
+            raise AssertionError(self.why())
+        full, system = self.full, self.system
+        contacts = [system.rows[k].name for k in system.contacts]
+        rows = [row.name for row in full.rows]
+        entries = [f"{rows[k]}.{full.coordinates[j]}" for k, j in zip(*full.jacobian, strict=True)]
+        each = [f"{c}.{x}" for c in contacts for x in full.coordinates]
+        rates = [f"{c}.velocity.{x}" for c in contacts for x in full.coordinates]
+        names = {
+            "lambda": [f"lambda.{r}" for r in rows],
+            "residual": [f"residual.{r}" for r in rows],
+            "force": [f"Q.{x}" for x in full.coordinates],
+            "share": [f"Q.{e}" for e in entries],
+            "departure_q": [f"departure.{e}" for e in each],
+            "departure_v": [f"departure.{e}" for e in rates],
+        }
+        if self.system is not full:
+            names |= _motion_names(system.coordinates, "s", "sdot", "sddot")
+        names |= _motion_names(full.coordinates, "q", "v", "vdot")
+        values: dict[str, Any] = {}
+        for array, labels in names.items():
+            seen = self.array(f"seen.{array}", len(labels))
+            values |= dict(zip(labels, seen.tolist(), strict=True))
+        unique = self.array("seen.unique", len(rows), c_int).tolist()
+        values |= {f"unique.{r}": bool(x) for r, x in zip(rows, unique, strict=True)}
+        values["energy.kinetic"] = self.number("kinetic")
+        values["energy.potential"] = self.number("potential")
+        return values
+
+
+def _motion_names(coordinates: Sequence[str], *arrays: str) -> dict[str, list[str]]:
+    patterns = ("{}", "der({})", "der({},2)")
+    return {a: [p.format(x) for x in coordinates] for a, p in zip(arrays, patterns, strict=True)}
+
+
+def doubles(values: Sequence[float]) -> Any:
+    return (c_double * len(values))(*[float(x) for x in values])
+
+
+def integers(values: Sequence[int]) -> Any:
+    return (c_int * len(values))(*[int(x) for x in values])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("solver")
+
+
+@pytest.fixture(scope="module")
+def runtime(folder: Path) -> ctypes.CDLL:
+    return compile_library(folder, SOURCES, BENCH.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def bench(runtime: ctypes.CDLL, folder: Path, prepared: Any) -> Any:
+    """bench(NAME or model): a solver for it."""
+    made: list[Bench] = []
+    keep: dict[str, tuple[ctypes.CDLL, Prepared]] = {}
+
+    def get(model: str | Model, formulation: str = "multipliers") -> Bench:
+        name = model if isinstance(model, str) else f"{model.name} {formulation}"
+        if name not in keep:
+            if isinstance(model, str):
+                one = prepared(model)
+            else:
+                one = prepare(model, Scene(model.name, formulation=formulation))
+            text = model_source(one.equations, one.reduction, one.scene.formulation)
+            keep[name] = compile_library(folder, [], text), one
+        library, one = keep[name]
+        made.append(Bench(runtime, c_void_p.in_dll(library, "MODEL_SYSTEM"), one))
+        return made[-1]
+
+    yield get
+    for one in made:
+        one.close()
+
+
+def defaults(system: Any, table: Any) -> tuple[list[float], list[float], list[float]]:
+    """Start values of q and v, and inputs."""
+    value = {v.name: v.start for v in table.variables}
+    q = [value[c] for c in system.coordinates]
+    v = [value[f"der({c})"] for c in system.coordinates]
+    return q, v, [x.start for x in table.variables if x.role == "input"]
+
+
+def agree(ours: Any, theirs: Any, size: Any = 1.0) -> None:
+    ours, theirs = np.array(ours, float), np.array(theirs, float)
+    assert ours.shape == theirs.shape
+    assert (np.abs(ours - theirs) <= 1e-13 * np.maximum(np.abs(theirs), size)).all(), (ours, theirs)
+
+
+def rounding_spread(system: Any, state: Any, u: Any, p: Any) -> dict[str, float]:
+    """How far each output moves when coordinates and velocities move by one rounding: a stiff spring
+    (SliderCrank's has 1e6 N/m) makes newtons of it, in whatever order the sums are done."""
+    centre = observe(system, state, u, p)
+    spread = dict.fromkeys(centre, 0.0)
+    for part, unit in (("q", 1.0), ("v", state.rate)):
+        for j, size in enumerate(state.size):
+            values = list(getattr(state, part))
+            values[j] += EPS * size * unit
+            moved = observe(system, replace(state, **{part: tuple(values)}), u, p)
+            for name, value in moved.items():
+                spread[name] = max(spread[name], abs(value - centre[name]))
+    return spread
+
+
+def check_start(one: Bench, q: Sequence[float], v: Sequence[float], u: Sequence[float]) -> Any:
+    """The start of the C runtime against the Python solver's: state, moved values, observation."""
+    system, p = one.system, one.p.tolist()
+    one.drive(u)
+    assert one.start(q, v), one.why()
+    start = initial.start(system, Settings(), 0.0, q, v, u, p)
+    theirs, ours = start.state, one.state()
+    speed = np.array(theirs.size) * theirs.rate
+    agree(ours["q"], theirs.q, theirs.size)
+    agree(ours["v"], theirs.v, speed)
+    agree(ours["size"], theirs.size)
+    agree(ours["gap"], theirs.gap, 0)
+    agree(ours["scale"], theirs.scale, np.concatenate([theirs.size, speed]))
+    agree(one.number("rate"), theirs.rate)
+    assert (ours["offset"] == 0).all()
+    assert tuple(ours["closed"]) == theirs.closed
+    assert tuple(ours["armed"]) == theirs.armed
+    assert [name for name, *_ in one.moved()] == [name for name, *_ in start.moved]
+    for mine, other in zip(one.moved(), start.moved, strict=True):
+        assert mine[1] == other[1]
+        agree(mine[2], other[2], max(*theirs.size, *speed))
+    seen, expected = one.observe(), observe(system, theirs, u, p)
+    known = [name for name in seen if name in expected]
+    spread = rounding_spread(system, theirs, u, p)
+    for name in known:
+        if isinstance(seen[name], bool):
+            assert seen[name] == expected[name], name
+        else:
+            off = abs(seen[name] - expected[name])
+            assert off <= 1e-13 * max(abs(expected[name]), 10.0) + spread[name], name
+    assert {k for k in expected if k not in seen} <= {
+        "solver.steps",
+        "energy.total",
+        *(k for k in expected if k.startswith("contact.")),
+        *(k for k in expected if k.startswith("departure.")),
+    }
+    return seen
+
+
+# --------------------------------------------------------------------------- start and observation
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_start_and_outputs_are_those_of_the_python_solver(name, bench):
+    """Both targets begin in one state and see the same lambda, Q, accelerations and energies."""
+    one = bench(name)
+    check_start(one, *defaults(one.system, one.prepared.table))
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.7])
+def test_surface_pushes_with_the_radial_component_of_the_weight(speed, bench):
+    """lambda = m g cos(theta) - m a theta'^2 on the hemisphere, whatever the mass."""
+    one = bench("Hemisphere")
+    m, g, a = one.p[:] = [2.5, 9.81, 0.8]
+    assert one.start([a, 0.3], [0.0, speed])
+    expected = m * g * np.cos(0.3) - m * a * speed**2
+    assert one.observe()["lambda.surface"] == pytest.approx(expected, rel=1e-14)
+
+
+def test_a_start_in_flight_is_free(bench):
+    """Above the surface r'' = r theta'^2 - g cos(theta), and lambda and Q are exactly zero."""
+    one = bench("Hemisphere")
+    seen = check_start(one, [1.5, 0.3], [0.1, 0.2], [])
+    assert seen["lambda.surface"] == seen["Q.r"] == 0
+    assert seen["der(r,2)"] == pytest.approx(1.5 * 0.04 - 9.81 * np.cos(0.3), rel=1e-14)
+    assert seen["residual.surface"] == 0.5
+
+
+def test_a_penetrated_surface_is_left_and_a_parting_one_opens(bench):
+    """r = a/2 is moved out to r = a and told; with r' > 0 there the particle is off the surface."""
+    one = bench("Hemisphere")
+    check_start(one, [0.5, 0.3], [0.0, 0.0], [])
+    assert one.moved() == [("r", 0.5, 1.0)]
+    assert one.state()["closed"].tolist() == [1]
+    check_start(one, [1.0, 0.3], [0.5, 0.0], [])
+    assert one.state()["closed"].tolist() == [0]
+    assert one.moved() == []
+    check_start(one, [1.0, 0.3], [0.0, 4.0], [])  # faster than sqrt(g a cos(theta)): it flies
+    assert one.state()["closed"].tolist() == [0]
+
+
+@pytest.mark.parametrize(("x", "y"), [(3.0, 4.0), (-30.0, 40.0), (1e-3, -2e-3), (0.6, 0.8)])
+def test_a_pendulum_starts_at_the_nearest_point_of_its_circle(x, y, bench):
+    """All masses are equal, so the nearest point of the circle lies on the same ray; of the velocity
+    the part along the circle stays."""
+    one = bench("PendulumCartesian")
+    check_start(one, [x, y], [1.0, 0.25], [])
+    ray = np.array([x, y]) / np.hypot(x, y)
+    tangent = np.array([-ray[1], ray[0]])
+    np.testing.assert_allclose(one.state()["q"], ray, rtol=1e-15, atol=1e-16)
+    expected = tangent * (tangent @ [1.0, 0.25])
+    np.testing.assert_allclose(one.state()["v"], expected, rtol=1e-14, atol=1e-16)
+
+
+def test_a_moving_start_is_exact_at_any_time_and_input(bench):
+    """phi = omega t holds at t = 0.75 s too; a cart's acceleration follows the input force."""
+    wire = bench("RotatingWire")
+    assert wire.start([0.1, 0.0], [0.0, 0.0], t=0.75)
+    assert wire.state()["q"][1] == 1.5
+    assert wire.state()["v"][1] == 2.0
+    assert wire.number("t") == 0.75
+    cart = bench("CartPendulum")
+    q, v, _ = defaults(cart.system, cart.prepared.table)
+    seen = check_start(cart, q, v, [25.0])
+    assert seen["der(s,2)"] * 2 + seen["der(x,2)"] == pytest.approx(25.0, rel=1e-14)
+
+
+def test_a_start_is_a_state_without_a_past(bench):
+    """Whatever the solver held before: no steps, no departures, nothing ahead, armed where open."""
+    one = bench("Hemisphere")
+    one.array("state.count", 1, c_int)[:] = 7
+    assert one.start([1.0, 0.3], [0.0, 0.0])
+    for number, value in {"steps": 0, "ahead": 0, "fresh": 1, "step": 0, "event_count": 0}.items():
+        assert one.number(number) == value
+    assert one.array("state.count", 1, c_int)[0] == 0
+    assert one.observe()["departure.surface.r"] == 0
+
+
+# --------------------------------------------------------------------------- refusals
+
+
+def refusal(one: Bench, q: Sequence[float], v: Sequence[float]) -> str:
+    """The reason of a refused start, which is the Python solver's to the letter."""
+    assert not one.start(q, v)
+    u = one.array("value", len(defaults(one.system, one.prepared.table)[2])).tolist()
+    with pytest.raises(StartFailureError) as error:
+        initial.start(one.system, Settings(), 0.0, q, v, u, one.p.tolist())
+    assert one.why() == str(error.value)
+    return one.why()
+
+
+def test_a_start_without_a_way_to_the_constraints_is_refused_by_name(bench):
+    """At x = y = 0 the rod has no direction; the message says what is missed by how much."""
+    why = refusal(bench("PendulumCartesian"), [0.0, 0.0], [1.0, 0.1])
+    assert "x = 0.0, y = 0.0 cannot be projected" in why
+    assert "'rod' by -1" in why
+
+
+def test_velocities_that_contradict_each_other_are_refused(bench):
+    """x' = 1 and x' = 0.5 cannot both hold."""
+    fast, slow = symbols("a b", real=True)
+    model = Model(
+        name="Twice",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        coordinates={x: "m", y: "m"},
+        constraints=[Nonholonomic("one", x.diff() - fast), Nonholonomic("two", x.diff() - slow)],
+        parameters=[MASS, Parameter(fast, 1.0, "m/s"), Parameter(slow, 1.0, "m/s")],
+    )
+    with pytest.warns(UserWarning, match="follows from the others"):
+        one = bench(model)
+    assert one.start([0.0, 0.0], [0.0, 0.0]), one.why()
+    assert one.state()["v"].tolist() == [1.0, 0.0]
+    one.p[2] = 0.5
+    assert "contradict" in refusal(one, [0.0, 0.0], [0.0, 0.0])
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_never_passes(value, bench):
+    """One such number in q, v, u or p and the start, or the values to be read, are refused."""
+    for name in ("CartPendulum", "Hemisphere", "PendulumAngle", "PendulumNullspace", "KnifeEdge"):
+        one = bench(name)
+        q, v, u = defaults(one.system, one.prepared.table)
+        arrays = [np.array(q), np.array(v), np.array(u), one.p.copy()]
+        for which, array in enumerate(arrays):
+            for k in range(len(array)):
+                trial = [a.copy() for a in arrays]
+                trial[which][k] = value
+                one.drive(trial[2])
+                one.p[:] = trial[3]
+                passed = one.start(trial[0], trial[1])
+                if passed:  # a parameter that enters no equation of motion
+                    passed = one.c.bench_observe(one.handle) == 0
+                assert not passed or _all_finite(one), (name, which, k)
+                if not passed:
+                    assert "finite" in one.why() or "overflow" in one.why(), one.why()
+                assert not passed or which == 3
+
+
+def _all_finite(one: Bench) -> bool:
+    state = one.state()
+    values = [*one.observe().values(), *state["q"], *state["v"], *state["scale"], *state["size"]]
+    return bool(np.isfinite(values).all())
+
+
+def test_an_output_that_overflows_is_named(bench):
+    """A kinetic energy beyond 1e308 J is no value, though the motion is one."""
+    one = bench("KnifeEdge")
+    q, v, _ = defaults(one.system, one.prepared.table)
+    assert one.start(q, v)
+    state = one.array("state.v", len(v))
+    state[:] *= 1e200
+    with pytest.raises(AssertionError, match=r"not finite at t = 0\.0 s: .*energy\.kinetic"):
+        one.observe()
+
+
+# --------------------------------------------------------------------------- projection
+
+
+def disturbed(one: Bench, size: float, rng: Any) -> tuple[Any, Any]:
+    """The start moved by `size`, relative to the coordinates' magnitudes."""
+    state = one.state()
+    n = one.system.n
+    scale = state["size"]
+    speed = np.maximum(scale * one.number("rate"), np.abs(state["v"]))
+    move = rng.standard_normal(2 * n) * size
+    return state["q"] + move[:n] * scale, state["v"] + move[n:] * speed
+
+
+def shares(one: Bench, q: Any, v: Any, t: float = 0.0) -> tuple[float, float]:
+    """The largest f and G v - nu, each relative to its terms."""
+    u = one.array("value", len(defaults(one.system, one.prepared.table)[2])).tolist()
+    at = Instant(one.system, t, u, one.p.tolist())
+    _, _, G, nu, _ = at.evaluate(q, v)
+    size = np.abs(G) @ np.array(one.state()["size"])
+    f = at.residual(q) / (np.abs(G) @ np.abs(q) + EPS * size)
+    slip = (G @ v - nu) / (np.abs(G) @ np.abs(v) + np.abs(nu) + EPS * size)
+    return np.abs(f).max(), np.abs(slip).max()
+
+
+@pytest.mark.parametrize("name", ["PendulumCartesian", "CartPendulum", "Atwood", "InclineDisk"])
+@pytest.mark.parametrize("size", [1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
+def test_projection_leaves_rounding_only(name, size, bench):
+    """|f| and |G v - nu| are a few roundings of their own terms, however far the state had drifted,
+    and a second projection finds nothing more to move than rounding."""
+    one = bench(name)
+    q0, v0, _ = defaults(one.system, one.prepared.table)
+    v0 = [0.3 + 0.1 * j for j in range(len(v0))]
+    assert one.start(q0, v0)
+    active = one.array("active", one.system.m, c_int).tolist()
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        q, v = one.project(*disturbed(one, size, rng), active)
+        f, slip = shares(one, q, v)
+        assert f <= 3 * EPS
+        assert slip <= 3 * EPS
+        again, w = one.project(q, v, active)
+        assert np.abs(again - q).max() <= 4 * EPS * np.abs(q).max()
+        assert np.abs(w - v).max() <= 8 * EPS * np.abs(v).max()
+
+
+def test_projection_arrives_from_further_off(bench):
+    """A drift of a tenth of the rod's length is still Newton's method's, with new factors."""
+    one = bench("PendulumCartesian")
+    assert one.start([0.6, -0.8], [0.4, 0.3])
+    for length in (0.9, 1.1, 0.75):
+        q, v = one.project([0.6 * length, -0.8 * length], [0.4, 0.3], [1])
+        np.testing.assert_allclose(q, [0.6, -0.8], rtol=2 * EPS)
+        np.testing.assert_allclose(v, [0.4, 0.3], rtol=2 * EPS)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_projection_does_not_depend_on_the_unit_of_length(unit, bench):
+    """A pendulum of 1 nm or 1e9 m is projected to the same roundings."""
+    one = bench("PendulumCartesian")
+    one.p[1:] = [9.81 * unit, unit]
+    assert one.start([0.6 * unit, -0.8 * unit], [0.4 * unit, 0.3 * unit])
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        q, v = one.project(*disturbed(one, 1e-7, rng), [1])
+        f, slip = shares(one, q, v)
+        assert f <= 2 * EPS
+        assert slip <= 3 * EPS
+
+
+def test_projection_goes_the_shortest_way_in_the_metric_of_the_mass(bench):
+    """M dq is normal to the constraint: the heavy cart moves less than the light bob, and the total
+    momentum M s' + m x' stays."""
+    one = bench("CartPendulum")
+    q0, v0, _ = defaults(one.system, one.prepared.table)
+    assert one.start(q0, v0)
+    q = one.state()["q"] + [1e-5, -2e-5, 3e-5]
+    v = np.array([0.1, 0.2, -0.3])
+    moved, w = one.project(q, v, [1])
+    for change in (moved - q, w - v):
+        M, G = np.diag([2.0, 1.0, 1.0]), 2 * np.array([moved[0] - moved[1], moved[1] - moved[0], 0])
+        G[2] = 2 * moved[2]
+        normal = np.linalg.solve(M, G)
+        along = normal * (change @ M @ normal) / (normal @ M @ normal)
+        np.testing.assert_allclose(change, along, atol=3e-5 * np.abs(change).max())
+        assert abs(2 * change[0] + change[1]) <= 4 * EPS
+
+
+def test_projection_leaves_what_no_row_holds(bench):
+    """With the contact open a state in flight is not touched, bit for bit."""
+    one = bench("Hemisphere")
+    assert one.start([1.5, 0.3], [0.1, 0.2])
+    q, v = one.project([1.1, 0.2], [0.3, 0.4], [0])
+    assert q.tolist() == [1.1, 0.2]
+    assert v.tolist() == [0.3, 0.4]
+
+
+def test_a_failed_projection_changes_nothing(bench):
+    """From the centre there is no way to the circle: refused, and q and v are what they were."""
+    one = bench("PendulumCartesian")
+    assert one.start([0.6, -0.8], [0.0, 0.0])
+    q, v = doubles([1e-300, 0.0]), doubles([1.0, 2.0])
+    assert one.c.bench_project(one.handle, c_double(0.5), q, v, integers([1]))
+    assert list(q) == [1e-300, 0.0]
+    assert list(v) == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(("size", "evaluations", "residuals"), [(0, 1, 1), (1e-9, 2, 2)])
+def test_projection_costs_two_evaluations_near_the_constraints(size, evaluations, residuals, bench):
+    """One at the state that came and one at the state that leaves; one alone where none was missed."""
+    one = bench("PendulumCartesian")
+    assert one.start([0.6, -0.8], [0.4, 0.3])
+    one.c.bench_count(one.handle)
+    one.project([0.6 * (1 + size), -0.8], [0.4, 0.3], [1])
+    assert one.number("evaluations") == evaluations
+    assert one.number("residuals") == residuals
+
+
+def test_a_row_that_came_back_keeps_its_level(bench):
+    """With the offset 0.01 m^2 the pendulum is projected to x^2 + y^2 = L^2 + 0.01 m^2, and what is
+    reported as its residual is measured from there."""
+    one = bench("PendulumCartesian")
+    assert one.start([0.6, -0.8], [0.4, 0.3])
+    one.array("state.offset", 1)[:] = 0.01
+    q, v = one.project([0.6, -0.8], [0.4, 0.3], [1])
+    assert q @ q == pytest.approx(1.01, rel=2 * EPS)
+    assert abs(q @ v) <= 2 * EPS
+    one.array("state.q", 2)[:] = q
+    one.array("state.v", 2)[:] = v
+    assert abs(one.observe()["residual.rod"]) <= 4 * EPS
+
+
+def test_nonholonomic_rows_move_velocities_only(bench):
+    """The knife edge's blade stops the slip across it; where it stands stays bit for bit."""
+    one = bench("KnifeEdge")
+    q0, v0, _ = defaults(one.system, one.prepared.table)
+    assert one.start(q0, v0)
+    state = one.state()
+    active = one.array("active", one.system.m, c_int).tolist()
+    q, v = one.project(state["q"], state["v"] + 0.1, active)
+    assert (q == state["q"]).all()
+    assert shares(one, q, v)[1] <= 2 * EPS
+
+
+# --------------------------------------------------------------------------- contacts
+
+
+def walls(count: int) -> tuple[Model, Any]:
+    """A particle in a wedge of `count` smooth walls through the origin, pushed by two inputs; the
+    walls' inward normals."""
+    angles = np.linspace(0.2, 2.9, count)
+    normals = np.column_stack([np.cos(angles), np.sin(angles)])
+    model = Model(
+        name=f"Wedge{count}",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        forces={x: push, y: lift},
+        coordinates={x: "m", y: "m"},
+        constraints=[
+            Contact(f"wall{k}", float(a) * x + float(b) * y) for k, (a, b) in enumerate(normals)
+        ],
+        parameters=[MASS],
+        inputs=[Input(push, "N"), Input(lift, "N", 1.0)],
+        start={x: 0.0, y: 1.0},
+    )
+    return model, normals
+
+
+def into_cone(force: Any, normals: Any) -> Any:
+    """The part of a plane force that no wall takes: the nearest admissible acceleration (Moreau)."""
+    trials = [force, np.zeros(2)]
+    for a in normals:
+        along = np.array([-a[1], a[0]])
+        trials.append(along * (along @ force))
+    fitting = [t for t in trials if (normals @ t >= -1e-12).all()]
+    return min(fitting, key=lambda t: float(np.sum((force - t) ** 2)))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_contact_modes_satisfy_signorinis_condition(count, bench):
+    """Whatever the force and the first guess, the modes give lambda > 0 where closed, an acceleration
+    that leaves where open, and together the force's projection into the wedge."""
+    model, normals = walls(count)
+    one = bench(model)
+    rng = np.random.default_rng(11)
+    seen = set()
+    for _ in range(60):
+        force = rng.standard_normal(2) * 10
+        one.drive(force)
+        closed = integers(rng.integers(0, 2, count))
+        still = doubles([0, 0])
+        assert not one.c.bench_modes(
+            one.handle, still, still, closed, integers([1] * count), None
+        ), one.why()
+        assert not one.c.bench_motion(one.handle, c_double(0), still, still, closed)
+        lam, vdot = one.array("lambda", count), one.array("vdot", 2)
+        for k in range(count):
+            assert lam[k] > 0 if closed[k] else lam[k] == 0
+            assert closed[k] or normals[k] @ vdot >= -1e-12
+        np.testing.assert_allclose(2.0 * vdot, into_cone(force, normals), atol=1e-12)
+        seen.add(tuple(closed))
+    assert len(seen) == 2**count
+
+
+@pytest.mark.filterwarnings("ignore:.*follows from the others")
+def test_contact_modes_are_those_of_the_python_solver(bench):
+    """Three walls, two of which can hold at once: the same choice from any first guess."""
+    model, _ = walls(3)
+    one = bench(model)
+    rng = np.random.default_rng(5)
+    still, array = doubles([0, 0]), np.zeros(2)
+    for _ in range(40):
+        force = rng.standard_normal(2)
+        guess, leaving = rng.integers(0, 2, 3), rng.integers(0, 4, 3) == 0
+        guess[leaving] = 0
+        one.drive(force)
+        closed = integers(guess)
+        touching = rng.integers(0, 4, 3) > 0
+        arguments = closed, integers(touching), integers(leaving)
+        status = one.c.bench_modes(one.handle, still, still, *arguments)
+        at = Instant(one.system, 0.0, force.tolist(), one.p.tolist())
+        sets = [c for c in range(3) if touching[c]], [c for c in range(3) if leaving[c]]
+        if status:
+            with pytest.raises(
+                StepFailureError, match="no combination of open and closed"
+            ) as error:
+                complementary_modes(at, array, array, guess.astype(bool).tolist(), *sets)
+            assert one.why() == str(error.value)
+            assert list(closed) == guess.tolist()
+        else:
+            theirs = complementary_modes(at, array, array, guess.astype(bool).tolist(), *sets)
+            assert tuple(bool(c) for c in closed) == theirs
+
+
+@pytest.mark.parametrize("guess", list(itertools.product((0, 1), repeat=2)))
+def test_a_balance_is_no_motion(guess, bench):
+    """Two masses coupled by their inertia, M = [[11, -9], [-9, 10]] kg, pushed by (-6, 0) N against
+    x >= 0 and y >= 0: lambda = 6 N holds x, and nothing moves; what rounding leaves of y'' is zero,
+    beside the accelerations that the forces could give."""
+    inertia = 11 * x.diff() ** 2 - 18 * x.diff() * y.diff() + 10 * y.diff() ** 2
+    model = Model(
+        name="Coupled",
+        lagrangian=m * inertia / 2,
+        forces={x: push, y: lift},
+        coordinates={x: "m", y: "m"},
+        constraints=[Contact("left", x), Contact("below", y)],
+        parameters=[Parameter(m, 1.0, "kg")],
+        inputs=[Input(push, "N"), Input(lift, "N")],
+        start={x: 1.0, y: 1.0},
+    )
+    one = bench(model)
+    one.drive([-6.0, 0.0])
+    closed, still = integers(guess), doubles([0, 0])
+    assert not one.c.bench_modes(one.handle, still, still, closed, integers([1, 1]), None), (
+        one.why()
+    )
+    assert not one.c.bench_motion(one.handle, c_double(0), still, still, closed)
+    np.testing.assert_allclose(one.array("lambda", 2), [6, 0], atol=1e-14)
+    np.testing.assert_allclose(one.array("vdot", 2), [0, 0], atol=1e-15)
+
+
+@pytest.mark.filterwarnings("ignore:.*follow from the others")
+def test_modes_are_found_where_the_active_set_goes_in_a_circle(bench):
+    """A particle in a narrow place, pushed by 3 N against the one wall that faces the push: opening
+    and closing the worst contact comes back to where it was; trying all finds the wall."""
+    normals = np.array([(3, -1), (2, 0), (-1, -2), (0, -1), (-1, 0)])
+    across, along = symbols("a0:5", real=True), symbols("b0:5", real=True)
+    model = Model(
+        name="Jammed",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        forces={x: push, y: lift},
+        coordinates={x: "m", y: "m"},
+        constraints=[
+            Contact(f"wall{k}", a * x + b * y)
+            for k, (a, b) in enumerate(zip(across, along, strict=True))
+        ],
+        parameters=[Parameter(m, 1.0, "kg"), *(Parameter(k, 1.0, "1") for k in (*across, *along))],
+        inputs=[Input(push, "N"), Input(lift, "N")],
+        start={x: 1.0, y: 1.0},
+    )
+    one = bench(model)
+    one.p[1:] = normals.T.ravel()
+    one.drive([-3.0, 0.0])
+    closed, still = integers([0] * 5), doubles([0, 0])
+    assert not one.c.bench_modes(one.handle, still, still, closed, integers([1] * 5), None), (
+        one.why()
+    )
+    assert list(closed) == [0, 1, 0, 0, 0]
+
+
+def test_a_contact_that_is_leaving_is_not_closed_again(bench):
+    """Where the force presses, only the flag keeps it open."""
+    one = bench(walls(1)[0])
+    force = -walls(1)[1][0]
+    one.drive(force)
+    still = doubles([0, 0])
+    for leaving, expected in ((integers([0]), 1), (integers([1]), 0), (None, 1)):
+        closed = integers([0])
+        assert not one.c.bench_modes(one.handle, still, still, closed, integers([1]), leaving)
+        assert closed[0] == expected
+
+
+def rod(restitution: Any) -> Model:
+    """A rod that falls with its tip, at a distance 1 from the centre of mass, above a floor."""
+    return Model(
+        name="Rod",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * theta.diff() ** 2 / 2 - m * g * y,
+        coordinates={x: "m", y: "m", theta: "rad"},
+        constraints=[Contact("floor", y - arm * sin(theta), restitution=restitution)],
+        parameters=[
+            MASS,
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(J, 0.5, "kg.m^2"),
+            Parameter(arm, 1.0, "m"),
+            Parameter(e, 0.5, "1"),
+        ],
+        start={y: 1.0},
+    )
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_an_impact_loses_the_energy_that_newtons_law_says(restitution, bench):
+    """The energy lost is (1 - e^2) u^2 / (2 G M^-1 G^T) for the speed u of the tip against the floor;
+    the floor, being smooth, leaves x' alone."""
+    one = bench(rod(e))
+    one.p[4] = restitution
+    assert one.start([0.0, 1.0, 0.3], [0.0, 0.0, 0.0])
+    M, angle = np.diag([2.0, 2.0, 0.5]), 0.3
+    G = np.array([0.0, 1.0, -np.cos(angle)])
+    before = np.array([0.4, -1.5, 0.7])
+    q, v = doubles([0.0, np.sin(angle), angle]), doubles(before)
+    assert not one.c.bench_impact(one.handle, q, v, integers([0]), 0, 0), one.why()
+    after = np.array(v)
+    assert G @ after == pytest.approx(-restitution * (G @ before), abs=1e-15)
+    lost = (before @ M @ before - after @ M @ after) / 2
+    effective = G @ np.linalg.solve(M, G)
+    expected = (1 - restitution**2) * (G @ before) ** 2 / (2 * effective)
+    assert lost == pytest.approx(expected, abs=1e-14)
+    assert after[0] == before[0]
+    v = doubles(before)
+    assert not one.c.bench_impact(one.handle, q, v, integers([0]), 0, 1)
+    assert G @ np.array(v) == pytest.approx(0, abs=1e-15)  # plastic, whatever e is
+
+
+@pytest.mark.filterwarnings("ignore:.*follows from the others")
+def test_impacts_are_those_of_the_python_solver(bench):
+    """Contacts that are closed hold or let go alike while another one is struck."""
+    model, _ = walls(3)
+    one = bench(model)
+    rng = np.random.default_rng(2)
+    at = Instant(one.system, 0.0, [0.0, 0.0], one.p.tolist())
+    q, still = doubles([0, 0]), np.zeros(2)
+    one.drive([0.0, 0.0])
+    for landing in range(3):
+        for _ in range(10):
+            closed = rng.integers(0, 2, 3)
+            if closed.sum() > 1:
+                continue
+            before = rng.standard_normal(2)
+            v = doubles(before)
+            assert not one.c.bench_impact(one.handle, q, v, integers(closed), landing, 0)
+            theirs = impact(at, still, before, closed.astype(bool).tolist(), landing)
+            agree(v, theirs)
+
+
+# --------------------------------------------------------------------------- inputs, embedding
+
+
+def test_inputs_go_on_as_polynomials(bench):
+    """u = 3 + 2 (t - 1) + 0.5 (t - 1)^2 for an input with two derivatives, 1 s after the start."""
+    one = bench(walls(1)[0])
+    one.start([0.0, 1.0], [0.0, 0.0], t=1.0)
+    one.array("value", 2)[:] = [3.0, -1.0]
+    one.array("first", 2)[:] = [2.0, 0.0]
+    one.array("second", 2)[:] = [1.0, 0.0]
+    for t in (1.0, 1.5, 3.0):
+        u = doubles([0, 0])
+        one.c.bench_drive(one.handle, c_double(t), u)
+        assert list(u) == [3 + 2 * (t - 1) + 0.5 * (t - 1) ** 2, -1.0]
+
+
+def table_model() -> Model:
+    return Model(
+        name="Table",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+        coordinates={x: "m", y: "m"},
+        constraints=[
+            Contact("table", y - lift),
+            Nonholonomic("grip", x.diff(), while_closed="table"),
+        ],
+        parameters=[MASS, Parameter(g, 9.81, "m/s^2")],
+        inputs=[Input(lift, "m", 1.0)],
+        start={y: 1.0},
+    )
+
+
+def test_a_prescribed_motion_goes_on_by_its_derivatives(bench):
+    """Given u, u', u'' = 1, 2, 3, at 0.5 s u is 1 + 1 + 3/8 and u' 3.5, as in the Python solver."""
+    one = bench(table_model())
+    one.start([0.0, 1.0], [0.0, 0.0])
+    one.drive([1.0, 2.0, 3.0])
+    u = doubles([0, 0, 0])
+    one.c.bench_drive(one.handle, c_double(0.5), u)
+    assert list(u) == [2.375, 3.5, 3.0]
+    assert list(u) == one.system.inputs_at([1.0, 2.0, 3.0], 0.5)
+
+
+def test_a_row_acts_while_its_contact_is_closed(bench):
+    """The grip holds x' = 0 only on the table; a table that moves carries the block: y' = u', and
+    lambda = m (g + u'')."""
+    one = bench(table_model())
+    seen = check_start(one, [0.0, 1.0], [0.3, 0.0], [1.0, 2.0, 3.0])
+    assert one.array("active", 2, c_int).tolist() == [1, 1]
+    assert seen["der(x)"] == 0
+    assert seen["der(y)"] == 2.0
+    assert seen["lambda.table"] == pytest.approx(2.0 * 12.81, rel=1e-15)
+    seen = check_start(one, [0.0, 1.5], [0.3, 0.0], [1.0, 0.0, 0.0])
+    assert one.array("active", 2, c_int).tolist() == [0, 0]
+    assert seen["der(x)"] == 0.3
+    seen = check_start(one, [0.0, 1.0], [0.3, 0.0], [1.0, 0.0, -10.0])  # falls faster than g
+    assert one.array("active", 2, c_int).tolist() == [0, 0]
+
+
+def slope_model() -> Model:
+    """A bead on an inclined wire y = x/2 with a stop at x = 0, stepped along the wire."""
+    return Model(
+        name="Slope",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("wire", y - x / 2), Contact("stop", x)],
+        parameters=[MASS, Parameter(g, 9.81, "m/s^2")],
+        embedding=Embedding({s: "m"}, {x: 2 * s / sqrt(5), y: s / sqrt(5)}, {s: 0.0}),
+    )
+
+
+def test_an_embedding_is_seen_in_its_full_coordinates(bench):
+    """At the stop the bead is held: Q.y = m g is the wire's and the stop's together; departures are
+    expanded to x and y, and only once there was one."""
+    one = bench(slope_model(), "minimal")
+    seen = check_start(one, [0.0], [0.0], [])
+    assert one.state()["closed"].tolist() == [1]
+    assert seen["Q.y"] == pytest.approx(2 * 9.81, rel=1e-15)
+    assert seen["lambda.stop"] == pytest.approx(2 * 9.81 / 2, rel=1e-14)
+    seen = check_start(one, [1.0], [0.5], [])
+    assert one.state()["closed"].tolist() == [0]
+    assert seen["s"] == 1.0
+    assert seen["x"] == pytest.approx(2 / np.sqrt(5), rel=1e-15)
+    assert seen["der(s,2)"] == pytest.approx(-9.81 / np.sqrt(5), rel=1e-15)
+    one.array("state.departure_q", 1)[:] = np.sqrt(5)
+    one.array("state.departure_v", 1)[:] = 2 * np.sqrt(5)
+    seen = one.observe()
+    assert seen["departure.stop.x"] == seen["departure.stop.velocity.y"] == 0
+    one.array("state.count", 1, c_int)[:] = 1
+    seen = one.observe()
+    assert seen["departure.stop.x"] == pytest.approx(2, rel=1e-15)
+    assert seen["departure.stop.velocity.y"] == pytest.approx(2, rel=1e-15)
+
+
+def test_inputs_that_change_drop_what_lies_ahead(bench):
+    """The integrator starts anew from the communication point; the next step's size stays."""
+    one = bench("CartPendulum")
+    q, v, _ = defaults(one.system, one.prepared.table)
+    assert one.start(q, v)
+    one.c.bench_ahead(one.handle)
+    assert one.number("ahead") == 1
+    one.c.solver_inputs_changed(c_void_p(one.c.bench_solver(one.handle)))
+    assert one.number("ahead") == one.number("event_count") == 0
+    assert one.number("fresh") == 1
+    assert one.number("step") == 0.125
+
+
+# --------------------------------------------------------------------------- memory
+
+SANITIZE = ("-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+DRIVER = """
+#include <stdio.h>
+
+#include "variables.h"
+
+/* Starts at the arguments q, v (n each) and p, also far off and at values that are not finite;
+ * observes, projects, settles modes and strikes every contact in every mode. */
+int main(int count, char **values) {
+    const System *s = MODEL_SYSTEM;
+    Bench *b = bench_open(s);
+    double q[8], v[8], x[8], w[8];
+    int active[8], modes[8] = {0}, touching[8] = {1, 1, 1, 1, 1, 1, 1, 1}, fine = 0;
+    if (b == NULL || count != 1 + 2 * s->n + s->parameters) return 2;
+    for (int j = 0; j < s->n; j++) {
+        q[j] = strtod(values[1 + j], NULL);
+        v[j] = strtod(values[1 + s->n + j], NULL);
+    }
+    for (int j = 0; j < s->parameters; j++)
+        b->solver.p[j] = strtod(values[1 + 2 * s->n + j], NULL);
+    const double scale[] = {1, 1 + 1e-9, 1.5, -3, 0, 1e300, HUGE_VAL, NAN};
+    for (int i = 0; i < 8; i++) {
+        for (int j = 0; j < s->n; j++) x[j] = q[j] * scale[i];
+        if (bench_start(b, 0.25, x, v, 1e-8) == OK && bench_observe(b) == OK) fine++;
+    }
+    if (bench_start(b, 0, q, v, 1e-8) != OK) return 3;
+    for (int code = 0; code < 1 << s->contacts; code++) {
+        for (int c = 0; c < s->contacts; c++) modes[c] = code >> c & 1;
+        system_active(s, modes, active);
+        for (int j = 0; j < s->n; j++) {
+            x[j] = b->solver.state.q[j] + 1e-6;
+            w[j] = b->solver.state.v[j] - 1e-6;
+        }
+        (void)bench_project(b, 0.5, x, w, active);
+        for (int c = 0; c < s->contacts; c++) (void)bench_impact(b, x, w, modes, c, 0);
+        (void)bench_modes(b, x, w, modes, touching, NULL);
+    }
+    printf("%d", fine);
+    bench_close(b);
+    return 0;
+}
+"""
+
+
+def sanitizing_compiler(*arguments: str) -> None:
+    command = [compiler(), *FLAGS, *SANITIZE, "-Werror", f"-I{RUNTIME}", *arguments]
+    subprocess.run(command, check=True, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def sanitized(folder: Path) -> Path:
+    """The runtime as a library, not to be loaded into Python, which is no sanitized program."""
+    target = folder / "sanitized.so"
+    files = [str(RUNTIME / name) for name in SOURCES]
+    sanitizing_compiler("-shared", "-fPIC", "-o", str(target), *files)
+    return target
+
+
+@pytest.mark.parametrize("name", ["Hemisphere", "PendulumAngle", "Atwood", "KnifeEdge"])
+def test_no_byte_outside_the_arrays_is_touched(name, folder, prepared, sanitized):
+    """Address and undefined-behaviour sanitizers find nothing from the start to the last mode."""
+    one = prepared(name)
+    q, v, _ = defaults(one.system, one.table)
+    p = [x.start for x in one.table.variables if x.role == "parameter"]
+    text = model_source(one.equations, one.reduction, one.scene.formulation)
+    (folder / f"{name}.c").write_text(text, encoding="utf-8")
+    (folder / f"{name}_main.c").write_text(BENCH.read_text("utf-8") + DRIVER, encoding="utf-8")
+    program = folder / name
+    parts = [str(folder / f"{name}.c"), str(folder / f"{name}_main.c"), str(sanitized), "-lm"]
+    sanitizing_compiler("-o", str(program), *parts)
+    arguments = [repr(float(a)) for a in (*q, *v, *p)]
+    done = subprocess.run([str(program), *arguments], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) >= 2
