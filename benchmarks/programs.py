@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import lagfmu
 from lagfmu.ccode import model_source
-from lagfmu.compiler import FLAGS
+from lagfmu.compiler import FLAGS, find_compiler, host
 from lagfmu.equations import EquationsOfMotion
 from lagfmu.prepare import Prepared, prepare
 
@@ -32,11 +32,11 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "models")]
 
 STOP, STEP = 10.0, 0.1  # [s] of a run, between samples of lambda
 BUDGET = 0.02  # [s] for which a program repeats its run
-CFLAGS = (*FLAGS, "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")  # as in an FMU
 SUNDIALS = (
     *("-lsundials_nvecserial", "-lsundials_sunmatrixdense", "-lsundials_sunlinsoldense"),
     *("-lsundials_sunnonlinsolfixedpoint", "-lsundials_generic"),
 )
+GCC = ("gcc",)
 FMI_LAYER = ("fmi2.c", "instance.c", "exchange.c")
 
 
@@ -152,15 +152,23 @@ def native(*names: str) -> list[Path]:
     return [HERE / "native" / name for name in names]
 
 
+def fmu_compiler() -> tuple[str, ...]:
+    """The command that compiles an FMU for this machine."""
+    found = find_compiler()
+    if found is None:
+        raise SystemExit("no C compiler was found")
+    return (*found.command, *(("-target", host().targets[0]) if found.cross else ()))
+
+
 @cache
-def solver(out: Path) -> Path:
+def solver(out: Path, command: tuple[str, ...] = GCC) -> Path:
     """The runtime without its FMI layer, as an archive in `out`."""
-    objects = out / "runtime"
+    objects = out / ("runtime_gcc" if command == GCC else "runtime_fmu")
     objects.mkdir(parents=True, exist_ok=True)
     archive = objects / "runtime.a"
     archive.unlink(missing_ok=True)
     made = [
-        compiled(objects / f"{p.stem}.o", [p], "-c")
+        compiled(objects / f"{p.stem}.o", [p], "-c", command=command)
         for p in sorted(RUNTIME.glob("*.c"))
         if p.name not in FMI_LAYER
     ]
@@ -174,12 +182,15 @@ def algebra(name: str, out: Path) -> list[Path]:
     return own + ([solver(out)] if name == "runtime" else [])
 
 
-def compiled(target: Path, sources: Sequence[Path], *options: str) -> Path:
+def compiled(
+    target: Path, sources: Sequence[Path], *options: str, command: tuple[str, ...] = GCC
+) -> Path:
     """One program of C files, for this machine."""
     target.parent.mkdir(parents=True, exist_ok=True)
     include = (f"-I{HERE / 'native'}", f"-I{RUNTIME}", "-isystem", str(FMI))
-    command = ["gcc", *CFLAGS, *include, "-o", str(target), *map(str, sources), *options, "-lm"]
-    subprocess.run(command, check=True, timeout=600)
+    words = [*command, *FLAGS, *include, "-o", str(target), *map(str, sources), *options]
+    libraries = [] if "-c" in options else ["-lm"]
+    subprocess.run([*words, *libraries], check=True, timeout=600)
     return target
 
 
@@ -195,9 +206,10 @@ def peer(problem: Problem, name: str, linear: str) -> Path:
 
 
 def core(folder: Path, model: Sequence[Path]) -> Path:
-    """Our solver without the FMI layer."""
-    sources = [*native("core.c", "stopwatch.c"), *model, solver(folder.parent)]
-    return compiled(folder / "core", sources)
+    """Our solver without the FMI layer, by the compiler that makes the FMUs."""
+    own = fmu_compiler()
+    sources = [*native("core.c", "stopwatch.c"), *model, solver(folder.parent, own)]
+    return compiled(folder / "core", sources, command=own)
 
 
 def launch(command: Sequence[Any], m: int) -> tuple[int, float, NDArray[Any]] | None:

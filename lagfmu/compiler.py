@@ -43,7 +43,10 @@ FLAGS = (
 )
 
 SHARED = ("-shared", "-s", "-Os")  # -Os is for what the compiler adds of its own
-NO_UNWINDING = ("-fno-asynchronous-unwind-tables", "-fno-unwind-tables")  # Windows cannot do without
+NO_UNWINDING = (
+    "-fno-asynchronous-unwind-tables",
+    "-fno-unwind-tables",
+)  # Windows cannot do without
 
 
 @dataclass(frozen=True)

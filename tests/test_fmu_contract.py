@@ -389,8 +389,8 @@ def test_dependencies_on_states_are_true(name, fmu):
 # ---------------------------------------------------------------------------- the archive
 
 
-def test_the_archive_holds_what_it_needs_and_no_more(name, path):
-    """Binaries, script, solver, documentation; no caches, no paths of the machine that built it."""
+def test_the_archive_holds_what_it_needs_and_no_more(name, path, target):
+    """Binaries, script or sources, documentation; no caches, no paths of the machine that built it."""
     with zipfile.ZipFile(path) as archive:
         assert archive.testzip() is None
         names = archive.namelist()
@@ -402,13 +402,13 @@ def test_the_archive_holds_what_it_needs_and_no_more(name, path):
         f"binaries/linux64/{name}.so",
         "documentation/index.html",
         "resources/lagfmu.json",
-        "resources/slavemodule.txt",
+        "resources/slavemodule.txt" if target == "python" else "sources/model.c",
     ):
         assert needed in names
     assert not [n for n in names if "__pycache__" in n or n.endswith((".pyc", "/"))]
     traces = {str(REPOSITORY), str(path.parent), os.path.expanduser("~"), sys.prefix, "/tmp/"}
     for entry, data in content.items():
-        if not entry.startswith("binaries/"):
+        if target == "native" or not entry.startswith("binaries/"):
             assert not [p for p in traces if p.encode() in data], entry
     own = {str(REPOSITORY), str(path.parent), sys.prefix}
     assert not [e for e, data in content.items() for p in own if p.encode() in data]
@@ -424,9 +424,9 @@ def test_the_documentation_stands_by_itself(name, path):
     assert "<script" not in page
 
 
-def test_the_slave_script_is_numeric(path):
+def test_the_slave_script_is_numeric(name, python_fmu):
     """No SymPy, no lagfmu in the resources but in names of the FMU's own package."""
-    with zipfile.ZipFile(path) as archive:
+    with zipfile.ZipFile(python_fmu(name)) as archive:
         for entry in archive.namelist():
             if (
                 entry.startswith("resources/")

@@ -266,7 +266,9 @@ def choices():
     model, forms = PENDULUM.model, PENDULUM.closed_forms
     goals = (Goal(1e-4, ("lambda.rod",)), Goal(1e-9, ("lambda.rod",)))
     plan = Plan((0.25,), methods=("dop853", "dopri5"), repeats=1, limit=0.5)
-    measured = survey(model, replace(SWING, stop_time=1.0, step_size=0.25), forms, goals[1], plan=plan)
+    measured = survey(
+        model, replace(SWING, stop_time=1.0, step_size=0.25), forms, goals[1], plan=plan
+    )
     counted = [  # times in proportion to the work, so that the choice is the same on every machine
         replace(o, row=replace(o.row, seconds=(1e-5 * o.evaluations,))) for o in measured.options
     ]

@@ -6,14 +6,11 @@
 #include "events.h"
 
 #include <float.h>
-#include <math.h>
 #include <string.h>
 
 #include "leg.h"
+#include "looks.h"
 #include "root.h"
-
-static const double LARGEST_LOOK = 1.0 / 4;    /* parts of a step in which events are looked for */
-static const double SMALLEST_LOOK = 1.0 / 200;
 
 /* The contact whose time is sought, and the level that its indicator falls through. */
 typedef struct {
@@ -57,88 +54,63 @@ static Status locate(Sought *x, double lo, double hi, double *time, int *found) 
     return OK;
 }
 
-/* How far to look on: a quarter of the step at most; while a contact is open, no further than half of
- * the way to it at the present speed, |f| / (|G| |v|), so that no obstacle is stepped across. */
-static Status stride(Solver *s, double t, const double *y, const double *values, double h,
-                     double *ahead) {
-    const System *system = s->system;
-    const Mechanism *b = &s->stepped;
-    int open = 0;
-    for (int c = 0; c < system->contacts; c++) open |= !s->state.closed[c];
-    *ahead = h * LARGEST_LOOK;
-    if (!open) return OK;
-    if (mechanism_evaluate(&s->stepped, leg_instant(s, t), y, y + system->n) != OK) return FAILED;
-    double near = *ahead;
-    for (int c = 0; c < system->contacts; c++) {
-        const int k = system->contact[c];
-        if (s->state.closed[c]) continue;
-        double speed = fabs(b->nu[k]);
-        for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++)
-            speed += fabs(b->G[e]) * fabs(y[system->n + system->entry_column[e]]);
-        if (speed > 0) near = fmin(near, 0.5 * fabs(values[c]) / speed);
+/* The first event of contact c among the looks, if there is one. */
+static Status first_of(Solver *s, Sought *x, const Looks *looks, int c, double *time, int *found) {
+    const int contacts = s->system->contacts, closed = s->state.closed[c];
+    const double gap = s->state.gap[c], *value = looks->values + c;
+    int risen = s->state.armed[c];
+    *found = 0;
+    for (int i = 1; i < looks->count && !*found; i++) {
+        if (value[(i - 1) * contacts] > gap) risen = 1;
+        if (!(value[i * contacts] < (closed ? 0 : -gap))) continue;
+        x->contact = c;
+        x->level = closed || risen ? 0 : -gap;
+        int above = i - 1;
+        while (above > 0 && !(value[above * contacts] > x->level)) above--;
+        if (locate(x, looks->t[above], looks->t[i], time, found) != OK) return FAILED;
     }
-    *ahead = fmin(*ahead, fmax(near, h * SMALLEST_LOOK));
     return OK;
 }
 
-/* The events between two looks: earliest time, and which contacts have it. */
-static Status between(Solver *s, Sought *x, double lo, double hi, const double *before,
-                      const double *after, int *risen) {
-    Numbers *now = &s->state.now;
-    for (int c = 0; c < s->system->contacts; c++) {
-        const int closed = s->state.closed[c];
-        const double gap = s->state.gap[c];
-        double time;
-        int found;
-        if (before[c] > gap) risen[c] = 1;
-        if (!(after[c] < (closed ? 0 : -gap))) continue;
-        x->contact = c;
-        x->level = closed || risen[c] ? 0 : -gap;
-        if (locate(x, lo, hi, &time, &found) != OK) return FAILED;
-        if (!found || (now->event_count > 0 && time > now->event_time)) continue;
-        if (now->event_count == 0 || time < now->event_time) {
-            now->event_count = 0;
-            memset(s->state.event_contacts, 0,
-                   (size_t)s->system->contacts * sizeof *s->state.event_contacts);
-        }
+static void note(State *x, int contacts, int c, double time) {
+    Numbers *now = &x->now;
+    if (now->event_count > 0 && time > now->event_time) return;
+    if (now->event_count == 0 || time < now->event_time) {
+        now->event_count = 0;
         now->event_time = time;
-        now->event_count += 1;
-        s->state.event_contacts[c] = 1;
+        memset(x->event_contacts, 0, (size_t)contacts * sizeof *x->event_contacts);
     }
-    return OK;
+    now->event_count += 1;
+    x->event_contacts[c] = 1;
+}
+
+/* Contacts that have risen above their gap are armed. */
+static void arm(Solver *s, const Looks *looks) {
+    const int contacts = s->system->contacts;
+    for (int c = 0; c < contacts; c++) {
+        if (s->state.closed[c]) continue;
+        for (int i = 0; i < looks->count; i++)
+            if (looks->values[i * contacts + c] > s->state.gap[c]) s->state.armed[c] = 1;
+    }
 }
 
 Status events_find(Solver *s, const double *y1) {
     const Integrator *i = &s->integrator;
-    const int ny = i->ny, contacts = s->system->contacts;
-    const double h = i->t - i->t_old;
-    double *here = s->work_events, *y = here + ny, *before = y + ny, *after = before + contacts;
-    int *risen = s->iwork_events;
-    Sought x = {s, i->t_old, i->y_old, 0, 0, y, after + contacts};
-    double t = i->t_old;
+    const int contacts = s->system->contacts;
+    double *y = s->work_events, *values = y + i->ny;
+    Looks looks = {0, values + contacts, values + contacts + MOST_LOOKS + contacts};
+    Sought x = {s, i->t_old, i->y_old, 0, 0, y, values};
     s->state.now.event_count = 0;
-    memcpy(here, i->y_old, (size_t)ny * sizeof *here);
-    memcpy(before, s->state.indicator, (size_t)contacts * sizeof *before);
-    memcpy(risen, s->state.armed, (size_t)contacts * sizeof *risen);
-    for (int last = 0; !last;) {
-        double ahead;
-        if (stride(s, t, here, before, h, &ahead) != OK) return FAILED;
-        double next = t + ahead;
-        last = next >= i->t - h * SMALLEST_LOOK || next <= t;
-        if (last) {
-            next = i->t;
-            memcpy(here, y1, (size_t)ny * sizeof *here);
-        } else {
-            i->method->dense(i, next, here);
-        }
-        if (leg_indicators(s, next, here, after) != OK) return FAILED;
-        if (between(s, &x, t, next, before, after, risen) != OK) return FAILED;
-        if (s->state.now.event_count > 0) return OK;
-        memcpy(before, after, (size_t)contacts * sizeof *before);
-        t = next;
+    if (looks_take(s, y1, y, &looks) != OK) return FAILED;
+    for (int c = 0; c < contacts; c++) {
+        double time;
+        int found;
+        if (first_of(s, &x, &looks, c, &time, &found) != OK) return FAILED;
+        if (found) note(&s->state, contacts, c, time);
     }
-    for (int c = 0; c < contacts; c++)
-        if (!s->state.closed[c] && (risen[c] || after[c] > s->state.gap[c])) s->state.armed[c] = 1;
-    memcpy(s->state.indicator, after, (size_t)contacts * sizeof *after);
+    if (s->state.now.event_count > 0) return OK;
+    arm(s, &looks);
+    memcpy(s->state.indicator, looks.values + (looks.count - 1) * contacts,
+           (size_t)contacts * sizeof *looks.values);
     return OK;
 }

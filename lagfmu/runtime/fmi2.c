@@ -670,7 +670,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component,
 
 /* ------------------------------------------------------------------ co-simulation */
 
-static int derivative_allowed(const Component *c, int modes) {
+static int co_simulates(const Component *c, int modes) {
     return allowed(c, modes) && !c->instance.exchange;
 }
 
@@ -680,7 +680,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
     static const char *const NAME = "fmi2SetRealInputDerivatives";
     Component *c = component;
     Why text;
-    if (!derivative_allowed(c, INSTANTIATED | INITIALIZATION | STEPPING)) return forbidden(c, NAME);
+    if (!co_simulates(c, INSTANTIATED | INITIALIZATION | STEPPING)) return forbidden(c, NAME);
     if (nvr > 0 && (vr == NULL || order == NULL || value == NULL)) return missing(c, NAME);
     for (size_t k = 0; k < nvr; k++) {
         const Variable *v = variable(vr[k], TYPE_REAL);
@@ -704,7 +704,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const fmi2Value
     Component *c = component;
     Direction d;
     Why text;
-    if (!derivative_allowed(c, STEPPING | TERMINATED)) return forbidden(c, NAME);
+    if (!co_simulates(c, STEPPING | TERMINATED)) return forbidden(c, NAME);
     if (nvr > 0 && (vr == NULL || order == NULL || value == NULL)) return missing(c, NAME);
     if (nvr == 0) return fmi2OK;
     if (instance_rates(&c->instance, &d) != OK) return no_value(c);
@@ -770,7 +770,7 @@ static fmi2Status nothing_to_say(Component *c, const char *function, fmi2StatusK
     static const char *const KINDS[] = {"fmi2DoStepStatus", "fmi2PendingStatus",
                                         "fmi2LastSuccessfulTime", "fmi2Terminated"};
     Why text;
-    if (!derivative_allowed(c, STEPPING | TERMINATED)) return forbidden(c, function);
+    if (!co_simulates(c, STEPPING | TERMINATED)) return forbidden(c, function);
     const int known = (unsigned)kind <= (unsigned)fmi2Terminated;
     (void)fail(&text, "%s has nothing to say about %s: steps are never pending here", function,
                known ? KINDS[kind] : "this kind of status");
@@ -785,7 +785,7 @@ fmi2Status fmi2GetStatus(fmi2Component component, const fmi2StatusKind s, fmi2St
 
 fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind s, fmi2Real *value) {
     Component *c = component;
-    if (s != fmi2LastSuccessfulTime || !derivative_allowed(c, STEPPING | TERMINATED))
+    if (s != fmi2LastSuccessfulTime || !co_simulates(c, STEPPING | TERMINATED))
         return nothing_to_say(c, "fmi2GetRealStatus", s);
     if (value == NULL) return missing(c, "fmi2GetRealStatus");
     *value = c->instance.solver.state.now.t;
@@ -801,7 +801,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component component, const fmi2StatusKind s,
 fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s,
                                 fmi2Boolean *value) {
     Component *c = component;
-    if (s != fmi2Terminated || !derivative_allowed(c, STEPPING | TERMINATED))
+    if (s != fmi2Terminated || !co_simulates(c, STEPPING | TERMINATED))
         return nothing_to_say(c, "fmi2GetBooleanStatus", s);
     if (value == NULL) return missing(c, "fmi2GetBooleanStatus");
     /* After a step that cannot be done the FMU asks for the end: an importer that is told to go on tries

@@ -1,6 +1,8 @@
 /* solver.c -- the memory of a simulation, taken in two passes (arena.h). */
 #include "solver.h"
 
+#include "looks.h"
+
 static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
     const int n = s->n, contacts = s->contacts;
     const size_t begin = saved->used;
@@ -51,7 +53,8 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_contacts = arena_doubles(scratch, 2 * n + 3 * m);
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
     s->work_advance = arena_doubles(scratch, 4 * n);
-    s->work_events = arena_doubles(scratch, 4 * n + 3 * contacts);
+    s->work_events =
+        arena_doubles(scratch, contacts == 0 ? 0 : 2 * n + contacts + looks_doubles(contacts));
     s->iwork_events = arena_ints(scratch, 5 * contacts);
 }
 

@@ -65,17 +65,19 @@ static double smaller(double a, double b) {
     return a < b ? a : b;
 }
 
-/* h0: Euler's step changes y by 0.01 of its size.  h1: h1^(order + 1) max(|y'|, |y''|) = 0.01. */
+/* h0: Euler's step changes y by 0.01 of its size.  h1: (h1/tau)^(order + 1) max(tau |y'|, tau^2 |y''|)
+ * = 0.01, in the motion's own time tau = 100 h0 instead of a unit of time. */
 static double first_step(Integrator *i, const Ode *ode, const Control *control, double span,
                          int order) {
     double d1 = weighted_norm(i, control, i->f);
-    double whole = isfinite(span) ? span : 1.0;
+    double whole = isfinite(span) || d1 > 0 ? span : 1.0;
     double h0 = d1 > 0 ? 0.01 / (step_size_tolerance(control) * d1) : FIRST_PART * whole;
     h0 = smaller(h0, whole);
-    double d2 = second_derivative(i, ode, control, &h0);
-    double largest = d1 > d2 ? d1 : d2;
+    const double tau = 100 * h0;
+    double d2 = second_derivative(i, ode, control, &h0) * tau * tau;
+    double largest = d1 * tau > d2 ? d1 * tau : d2;
     if (!(largest > 0)) return h0;
-    return smaller(100 * h0, step_size_root(0.01 / largest, order + 1));
+    return smaller(100 * h0, tau * step_size_root(0.01 / largest, order + 1));
 }
 
 static void fit(Trial *trial, double t, double h) {

@@ -11,23 +11,9 @@
 enum { ROUNDS = 50 }; /* in which an impact is passed on between contacts that touch */
 static const double SLOW = 1e-9; /* speed of a gap, relative to the motion's own, that counts as none */
 
-/* G v - nu of row k at the state evaluated last, and the same sum of magnitudes |G| w. */
+/* G v - nu of row k at the state evaluated last. */
 static double row_speed(const Mechanism *b, int k, const double *v) {
-    const System *s = b->system;
-    double sum = -b->nu[k];
-    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
-        sum += b->G[e] * v[s->entry_column[e]];
-    return sum;
-}
-
-static double row_size(const Mechanism *b, int k, const double *w, const double *times) {
-    const System *s = b->system;
-    double sum = 0;
-    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
-        const int j = s->entry_column[e];
-        sum += fabs(b->G[e]) * w[j] * (times == NULL ? 1 : times[0]);
-    }
-    return sum;
+    return mechanism_row(b, k, v) - b->nu[k];
 }
 
 /* True if the rebound would not rise above the gap within which contacts touch, v^2 / (2 a) <= gap:
@@ -39,9 +25,7 @@ static Status comes_to_rest(Solver *s, Instant at, const int *closed, int c, int
     system_active(system, closed, s->active);
     if (mechanism_motion(b, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     const double speed = row_speed(b, k, s->state.v);
-    double acceleration = -b->gamma[k];
-    for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++)
-        acceleration += b->G[e] * b->vdot[system->entry_column[e]];
+    const double acceleration = mechanism_row(b, k, b->vdot) - b->gamma[k];
     *rests = speed <= 0 ||
              (acceleration < 0 && speed * speed <= -2 * acceleration * s->state.gap[c]);
     return OK;
@@ -61,7 +45,7 @@ static Status pass_on(Solver *s, Instant at, const int *closed) {
         if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
         for (int c = 0; c < system->contacts; c++) {
             const int k = system->contact[c];
-            const double size = row_size(b, k, s->state.size, &s->state.now.rate);
+            const double size = s->state.now.rate * mechanism_row_size(b, k, s->state.size);
             struck[c] = near[c] && row_speed(b, k, s->state.v) < -SLOW * size;
             any |= struck[c];
         }
@@ -82,7 +66,7 @@ static Status find_touching(Solver *s, Instant at, const int *closed, int *touch
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++) {
         const int k = system->contact[c];
-        const double size = row_size(b, k, s->state.scale + system->n, NULL);
+        const double size = mechanism_row_size(b, k, s->state.scale + system->n);
         touching[c] = closed[c] || (fabs(b->f[k]) <= s->state.gap[c] &&
                                     fabs(row_speed(b, k, s->state.v)) <= SLOW * size);
     }

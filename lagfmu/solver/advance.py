@@ -260,7 +260,7 @@ def _looks(
     rebound is highest, so that it is not taken across a bounce.
     """
     h, dense = solver.t - t0, solver.dense_output()
-    highest = _top_of_rebound(leg, t0, y0, before)
+    highest = t0 + _top_of_rebound(leg, t0, y0, before)
     rows = [k for k, c in zip(leg.system.contacts, leg.state.closed, strict=True) if not c]
     times, values, y = [t0], [before], y0
     while True:
@@ -273,7 +273,9 @@ def _looks(
             ahead = 0.5 * f / np.where(speed > 0, speed, np.inf)
             near = float(ahead[speed > 0].min(initial=stride))
             stride = min(stride, max(near, h * SMALLEST_LOOK))
-        t = times[-1] + (min(stride, highest) if len(times) == 1 else stride)
+        t = times[-1] + stride
+        if times[-1] < highest:
+            t = min(t, highest)
         if t >= solver.t - h * SMALLEST_LOOK or t <= times[-1]:
             return times, values
         times.append(t)

@@ -37,7 +37,7 @@ STYLE: dict[str, Any] = {
     "axes.axisbelow": True,
     "hatch.linewidth": 0.4,
 }
-WORTH = 0.8  # part of the error of the last named point at which the next one is named
+WORTH = 0.1  # part of the error of the last named point at which the next one is named
 FAR = 8.0  # times fmpy's own calls: what is slower has them below its panel
 UNITS = ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns"))
 
@@ -165,10 +165,9 @@ def name_front(axis: Any, found: Tradeoff, h: float, group: str, factor: float) 
         place = (found.worst(row, group), factor * row.median)
         for dx, dy, ha, va in (
             (0, -11, "center", "top"),
-            (-9, -6, "right", "top"),
-            (9, -6, "left", "top"),
-            (-11, 0, "right", "center"),
             (0, 11, "center", "bottom"),
+            (-6, -11, "right", "top"),
+            (-11, 0, "right", "center"),
             (11, 0, "left", "center"),
         ):
             text = axis.annotate(
@@ -181,6 +180,7 @@ def name_front(axis: Any, found: Tradeoff, h: float, group: str, factor: float) 
                 fontsize=8,
                 color=COLOURS[row.setting.method],
                 fontweight="bold",
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.85},
             )
             box = text.get_window_extent(renderer).padded(1)
             inside = frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1)

@@ -31,7 +31,7 @@ from .setting import EVALUATIONS, dials
 BUDGET = 20.0  # [s] of timing
 ENOUGH = 3  # settings of a method that hold the accuracy, before no finer one is measured
 SLOW = 5.0  # times the fastest that holds it: what takes longer is not timed
-ALIKE = 1.25  # times within this factor, with quartiles that overlap, are not told apart
+ALIKE = 1.25  # times within this factor, with quartiles that overlap, cannot be told apart
 
 
 @dataclass(frozen=True)
@@ -177,9 +177,12 @@ def _worth_timing(
 def ranked(options: Sequence[Option], error: float) -> list[Option]:
     """The options whose error is at most `error`, cheapest first.
 
-    Where the times cannot be told apart, the fewest evaluations of the equations decide.
+    Where the times cannot be told apart, the fewest evaluations of the equations decide: within
+    `ALIKE`, or on a busy machine within the ratio of the quartiles that most options have.
     """
     left = [o for o in options if o.error <= error]
+    spreads = sorted(o.row.quartiles[1] / o.row.quartiles[0] for o in options)
+    factor = max(ALIKE, spreads[len(spreads) // 2] if spreads else 0.0)
     order = []
     while left:
         fastest = min(left, key=lambda o: o.row.median)
@@ -187,7 +190,7 @@ def ranked(options: Sequence[Option], error: float) -> list[Option]:
             o
             for o in left
             if o.row.quartiles[0] <= fastest.row.quartiles[1]
-            and o.row.median <= ALIKE * fastest.row.median
+            and o.row.median <= factor * fastest.row.median
         ]
         best = min(alike, key=lambda o: (o.evaluations, o.error))
         order.append(best)

@@ -1,0 +1,142 @@
+"""Chain of n bobs, through fmpy on the built FMU of four links and in this process for other n."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+from scipy.special import roots_laguerre
+
+from lagfmu import derive, simulate
+from lagfmu.numeric import lower
+
+FILE = Path(__file__).parent.parent / "models" / "chain.py"
+G, MASS, LENGTH = 9.81, 0.1, 0.25
+
+
+@pytest.fixture(scope="module")
+def chain():
+    """The module models/chain.py."""
+    spec = importlib.util.spec_from_file_location("chain_of_the_models", FILE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def places(angles):
+    """Start values x1, y1, ... of links at these angles from the downward vertical."""
+    x, y = np.cumsum(LENGTH * np.sin(angles)), np.cumsum(-LENGTH * np.cos(angles))
+    return {f"{c}{k + 1}": float(p[k]) for k in range(len(angles)) for c, p in (("x", x), ("y", y))}
+
+
+def hang(path, angles, stop, points=1, tolerance=1e-12):
+    return fmpy.simulate_fmu(
+        str(path),
+        stop_time=stop,
+        output_interval=stop / points,
+        step_size=stop / points,
+        relative_tolerance=tolerance,
+        start_values=places(angles),
+    )
+
+
+def test_at_rest_every_link_carries_what_hangs_below_it(fmu):
+    """Hanging straight down the tension of link k is (n - k + 1) m g: lambda = -T/(2 l)."""
+    result = hang(fmu("Chain"), np.zeros(4), 1.0, 5)
+    for k in range(1, 5):
+        tension = (4 - k + 1) * MASS * G
+        np.testing.assert_allclose(
+            result[f"lambda.link{k}"], -tension / (2 * LENGTH), rtol=1e-13, err_msg=f"link {k}"
+        )
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7, 20])
+def test_every_link_of_any_chain_at_rest(chain, n):
+    """The same for n links, whatever n."""
+    result = simulate(chain.chain(n), 0.1, 0.1, start_values=places(np.zeros(n)))
+    for k in range(1, n + 1):
+        tension = (n - k + 1) * MASS * G
+        assert result[f"lambda.link{k}"][-1] == pytest.approx(-tension / (2 * LENGTH), rel=1e-11)
+
+
+def mode(n, j):
+    """z_j, the j-th zero of the Laguerre polynomial L_n, and the small angles of the links in it.
+
+    With s the distance from the lower end in links, the bobs are displaced by L_s(z) and hang, from
+    the support (s = n, L_n(z) = 0) on, at the differences L_s-1(z) - L_s(z).
+    """
+    z = roots_laguerre(n)[0][j]
+    s = [float(sp.laguerre(k, sp.Float(z, 30))) for k in range(n, -1, -1)]
+    return z, np.diff(s)
+
+
+@pytest.mark.parametrize("j", range(4))
+def test_small_oscillations_have_the_frequencies_of_laguerre(fmu, j):
+    """Hung from one end, n equal bobs have the modes x_k = L_n-k(z) with w^2 = z g/l, L_n(z) = 0: after
+    half a period all are on the other side, after a whole one where they were."""
+    z, angles = mode(4, j)
+    period = 2 * np.pi / np.sqrt(z * G / LENGTH)
+    result = hang(fmu("Chain"), 1e-5 * angles / np.abs(angles).max(), 2 * period, 4)
+    for k in range(1, 5):
+        x = result[f"x{k}"]
+        np.testing.assert_allclose(x, x[0] * np.array([1, -1, 1, -1, 1]), atol=3e-8 * LENGTH * 1e-2)
+
+
+def test_the_chain_in_angles_moves_the_same(fmu):
+    """m l sum_j min(n-j, n-k) (cos(a_k - a_j) a_j'' + sin(a_k - a_j) a_j'^2) + (n-k) m g sin a_k = 0 for
+    the absolute angles, j, k = 0, ..., n - 1, integrated alone: the same bobs."""
+    n = 4
+    index = np.arange(n)
+    count = n - np.maximum.outer(index, index)
+
+    def rhs(_, s):
+        a, rate = s[:n], s[n:]
+        d = a[:, None] - a[None, :]
+        M = LENGTH * count * np.cos(d)
+        right = -LENGTH * (count * np.sin(d)) @ rate**2 - (n - index) * G * np.sin(a)
+        return np.concatenate([rate, np.linalg.solve(M, right)])
+
+    start = np.concatenate([np.full(n, 1.0), np.zeros(n)])
+    times = np.linspace(0, 1.5, 16)
+    found = solve_ivp(rhs, (0, 1.5), start, "DOP853", t_eval=times, rtol=1e-13, atol=1e-13)
+    x = np.cumsum(LENGTH * np.sin(found.y[:n]), axis=0)
+    y = np.cumsum(-LENGTH * np.cos(found.y[:n]), axis=0)
+    result = hang(fmu("Chain"), np.full(n, 1.0), 1.5, 15)
+    for k in range(n):
+        assert np.abs(result[f"x{k + 1}"] - x[k]).max() < 1e-8
+        assert np.abs(result[f"y{k + 1}"] - y[k]).max() < 1e-8
+
+
+def test_the_energy_stays_and_the_links_keep_their_length(fmu):
+    """Over ten seconds of a motion without any order the energy and the lengths stay."""
+    result = hang(fmu("Chain"), np.full(4, 1.0), 10.0, 100)
+    energy = result["energy.total"]
+    assert np.abs(energy - energy[0]).max() < 1e-9 * 10 * MASS * G * LENGTH
+    for k in range(1, 5):
+        assert np.abs(result[f"residual.link{k}"]).max() < 1e-14
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_the_closed_form_of_the_multipliers_is_exact(chain, n):
+    """The tridiagonal solution satisfies G M^-1 (F + G^T lambda) = gamma at any state."""
+    eom = derive(chain.chain(n))
+    rng = np.random.default_rng(3)
+    system = lower(eom, None, "multipliers")
+    q, v = rng.normal(size=2 * n), rng.normal(size=2 * n)
+    # lengths that differ are no chain: take a state on the constraints
+    angles, rates = rng.uniform(-3, 3, n), rng.normal(size=n)
+    q[0::2], q[1::2] = np.cumsum(LENGTH * np.sin(angles)), np.cumsum(-LENGTH * np.cos(angles))
+    v[0::2] = np.cumsum(LENGTH * np.cos(angles) * rates)
+    v[1::2] = np.cumsum(LENGTH * np.sin(angles) * rates)
+    p = [MASS, G, LENGTH]
+    M, F, jacobian, _, gamma = system.assemble(0.0, q, v, [], p)
+    table = dict(zip((*eom.q, *eom.v), (*q, *v), strict=True))
+    table |= dict(zip((q.symbol for q in eom.model.parameters), p, strict=True))
+    found = [float(eom.plain(e).subs(table)) for e in chain.multipliers(n)]
+    rest = jacobian @ np.linalg.solve(M, F + jacobian.T @ found) - gamma
+    assert np.abs(rest).max() < 1e-10 * np.abs(gamma).max()

@@ -1,0 +1,117 @@
+"""Double pendulum in Cartesian coordinates, through fmpy on the built FMU."""
+
+from __future__ import annotations
+
+import fmpy
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+G = 9.81
+CASES = {  # m1, m2 [kg], L1, L2 [m], both angles [rad] and their rates [rad/s]
+    "default": (1.0, 0.5, 1.0, 0.8, 1.0, 1.5, 0.0, 0.0),
+    "heavy end": (0.01, 5.0, 0.4, 1.5, -0.6, 0.3, 1.0, -2.0),
+    "turning over": (1.0, 1.0, 1.0, 1.0, 2.5, 3.0, 0.0, 3.0),
+}
+EVERY = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
+
+
+def bobs(case, a, b, adot, bdot):
+    """x1, y1, x2, y2 and their rates from the angles from the downward vertical."""
+    L1, L2 = case[2:4]
+    x1, y1 = L1 * np.sin(a), -L1 * np.cos(a)
+    v1, w1 = L1 * np.cos(a) * adot, L1 * np.sin(a) * adot
+    x2, y2 = x1 + L2 * np.sin(b), y1 - L2 * np.cos(b)
+    v2, w2 = v1 + L2 * np.cos(b) * bdot, w1 + L2 * np.sin(b) * bdot
+    return x1, y1, x2, y2, v1, w1, v2, w2
+
+
+NAMES = ("x1", "y1", "x2", "y2", "der(x1)", "der(y1)", "der(x2)", "der(y2)")
+
+
+def swing(path, case, tolerance=1e-12, stop=3.0, points=30):
+    start = dict(zip(NAMES, map(float, bobs(case, *case[4:])), strict=True))
+    values = dict(zip(("m1", "m2", "L1", "L2"), case, strict=False))
+    return fmpy.simulate_fmu(
+        str(path),
+        stop_time=stop,
+        output_interval=stop / points,
+        step_size=stop / points,
+        relative_tolerance=tolerance,
+        start_values={**values, "g": G, **start},
+    )
+
+
+def alone(case, times):
+    """Angles and rates by the textbook's equations in the two angles (Landau & Lifshitz, sect. 5)."""
+    m1, m2, L1, L2 = case[:4]
+
+    def rhs(_, s):
+        a, b, adot, bdot = s
+        c, sine = np.cos(a - b), np.sin(a - b)
+        M = [[(m1 + m2) * L1, m2 * L2 * c], [L1 * c, L2]]
+        right = [
+            -m2 * L2 * bdot**2 * sine - (m1 + m2) * G * np.sin(a),
+            L1 * adot**2 * sine - G * np.sin(b),
+        ]
+        return [adot, bdot, *np.linalg.solve(M, right)]
+
+    found = solve_ivp(rhs, (0, times[-1]), case[4:], "DOP853", t_eval=times, rtol=1e-13, atol=1e-13)
+    return found.y
+
+
+@EVERY
+def test_the_bobs_are_where_the_two_angles_say(fmu, case):
+    """The motion in x and y with two rods is the motion in two angles without any."""
+    result = swing(fmu("DoublePendulum"), case)
+    expected = bobs(case, *alone(case, result["time"]))
+    for name, right in zip(NAMES, expected, strict=True):
+        scale = np.abs(right).max()
+        assert np.abs(result[name] - right).max() < 1e-8 * scale, name
+
+
+@EVERY
+def test_the_tensions_are_newtons(fmu, case):
+    """T2 is what the lower bob's acceleration asks for, T1 what that of both asks for, with the
+    accelerations of the angles integrated alone: lambda = -T/(2 L)."""
+    m1, m2, L1, L2 = case[:4]
+    result = swing(fmu("DoublePendulum"), case)
+    a, b, adot, bdot = alone(case, result["time"])
+    c = np.cos(a - b)
+    one = m1 * (L1 * adot**2 + G * np.cos(a))
+    two = m1 * m2 * L2 * bdot**2
+    T2 = (two + c * m2 * one) / (m1 + m2 * (1 - c**2))
+    T1 = one + c * T2
+    for name, right in (("lambda.upper", -T1 / (2 * L1)), ("lambda.lower", -T2 / (2 * L2))):
+        assert np.abs(result[name] - right).max() < 1e-8 * np.abs(right).max(), name
+
+
+@EVERY
+def test_the_rods_keep_their_lengths_and_the_energy_stays(fmu, case):
+    """f of both rods is at rounding level, and m g h + m v^2/2 of the two bobs is what it was."""
+    m1, m2, L1, L2 = case[:4]
+    result = swing(fmu("DoublePendulum"), case, stop=20.0, points=100)
+    assert np.abs(result["residual.upper"]).max() < 1e-14 * L1**2
+    assert np.abs(result["residual.lower"]).max() < 1e-14 * (L1 + L2) ** 2
+    energy = result["energy.total"]
+    assert np.abs(energy - energy[0]).max() < 1e-10 * (m1 + m2) * G * (L1 + L2)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_small_oscillations_are_two_modes(fmu, sign):
+    """Equal masses on equal rods hang in modes with w^2 = (2 -+ sqrt 2) g/l, in which the lower angle is
+    +-sqrt 2 times the upper: after a period the bobs are where they were."""
+    a = 1e-5
+    case = (1.0, 1.0, 0.7, 0.7, a, sign * np.sqrt(2) * a, 0.0, 0.0)
+    period = 2 * np.pi / np.sqrt((2 - sign * np.sqrt(2)) * G / 0.7)
+    result = swing(fmu("DoublePendulum"), case, stop=2 * period, points=4)
+    for name in ("x1", "x2"):
+        start = result[name][0]
+        np.testing.assert_allclose(result[name] / start, [1, -1, 1, -1, 1], atol=1e-7)
+
+
+def test_at_rest_the_upper_rod_carries_both_and_the_lower_one(fmu):
+    """Hanging at rest T1 = (m1 + m2) g and T2 = m2 g."""
+    result = swing(fmu("DoublePendulum"), (3.0, 0.2, 1.5, 0.6, 0, 0, 0, 0), points=3)
+    np.testing.assert_allclose(result["lambda.upper"], -3.2 * G / (2 * 1.5), rtol=1e-14)
+    np.testing.assert_allclose(result["lambda.lower"], -0.2 * G / (2 * 0.6), rtol=1e-14)

@@ -1,0 +1,120 @@
+"""Slider-crank with a stiff, damped spring, through fmpy on the built FMU."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import fmpy
+import numpy as np
+import pytest
+from instance import instance
+from scipy.integrate import simpson, solve_ivp
+
+DEFAULT = {"J": 0.1, "m": 1.0, "M": 1.0, "r": 0.1, "l": 0.3, "s": 0.2, "k": 1e6, "c": 1e4}
+
+
+def turn(path, stop=1.0, points=100, tolerance=1e-8, **values):
+    return fmpy.simulate_fmu(
+        str(path),
+        stop_time=stop,
+        output_interval=stop / points,
+        step_size=stop / points,
+        relative_tolerance=tolerance,
+        start_values=values,
+    )
+
+
+def alone(times, tau=0.0):
+    """phi, y and their rates by the crank's own equation, without x and without a multiplier."""
+    J, m, M, r, length, s, k, c = DEFAULT.values()
+
+    def geometry(phi):
+        """x, dx/dphi, d2x/dphi2."""
+        sine, cosine = r * np.sin(phi), r * np.cos(phi)
+        rod = np.sqrt(length**2 - sine**2)
+        slope = -sine * cosine / rod
+        bend = -(cosine**2 - sine**2) / rod - (sine * cosine) ** 2 / rod**3
+        return cosine + rod, -sine + slope, -cosine + bend
+
+    def rhs(_, state):
+        phi, y, rate, speed = state
+        x, first, second = geometry(phi)
+        pull = k * (y - x - s) + c * (speed - first * rate)
+        inertia = J + m * first**2
+        return [
+            rate,
+            speed,
+            (tau + first * (pull - m * second * rate**2)) / inertia,
+            -pull / M,
+        ]
+
+    y0 = [0.0, 0.6, 10.0, 0.0]
+    found = solve_ivp(rhs, (0, times[-1]), y0, "Radau", t_eval=times, rtol=1e-11, atol=1e-13)
+    phi, y, rate, speed = found.y
+    x, first, _ = geometry(phi)
+    return phi, x, y, rate, first * rate, speed
+
+
+@pytest.mark.parametrize("tau", [0.0, 2.0])
+def test_it_moves_as_the_crank_and_the_load_alone(fmu, tau):
+    """With x put in as r cos phi + sqrt(l^2 - r^2 sin^2 phi) there are two coordinates and no rod: the
+    same motion, free and driven."""
+    result = turn(fmu("SliderCrank"), points=20, tau=tau)
+    names = ("phi", "x", "y", "der(phi)", "der(x)", "der(y)")
+    for name, right in zip(names, alone(result["time"], tau), strict=True):
+        assert np.abs(result[name] - right).max() < 1e-6 * np.abs(right).max(), name
+
+
+@pytest.mark.parametrize("tau", [0.0, 2.0])
+def test_what_the_energy_loses_heats_the_damper(fmu, tau):
+    """E(0) - E(t) is the integral of c (y' - x')^2 less the torque's work, tau (phi - phi0): seen with a
+    softer spring, which gives way enough to be heated."""
+    result = turn(fmu("SliderCrank"), points=2000, tau=tau, k=1e4, c=1e2)
+    heat = simpson(1e2 * (result["der(y)"] - result["der(x)"]) ** 2, x=result["time"])
+    work = tau * (result["phi"][-1] - result["phi"][0])
+    lost = result["energy.total"][0] - result["energy.total"][-1]
+    assert heat > 0.01
+    assert lost + work == pytest.approx(heat, rel=1e-4)
+
+
+def test_the_rods_force_is_that_on_slider_and_load(fmu):
+    """lambda 2 (x - r cos phi) accelerates slider and load: it is m x'' + M y''; and on the crank it is
+    the torque J phi''."""
+    result = turn(fmu("SliderCrank"))
+    pushed = result["der(x,2)"] + result["der(y,2)"]
+    np.testing.assert_allclose(result["Q.x"], pushed, atol=1e-9 * np.abs(pushed).max())
+    turned = 0.1 * result["der(phi,2)"]
+    np.testing.assert_allclose(result["Q.phi"], turned, atol=1e-9 * np.abs(turned).max())
+    arm = 2 * (result["x"] - 0.1 * np.cos(result["phi"]))
+    np.testing.assert_allclose(result["Q.x"], arm * result["lambda.rod"], rtol=1e-12)
+
+
+def test_the_load_follows_as_if_the_spring_were_rigid(fmu):
+    """The stiffer the spring (with its damper in proportion), the nearer is the motion to that of one
+    slider of mass m + M, which keeps (J + (m + M) (dx/dphi)^2) phi'^2: the miss falls as 1/k."""
+    misses = []
+    for k in (1e5, 1e6, 1e7):
+        result = turn(fmu("SliderCrank"), k=k, c=k / 100)
+        phi = result["phi"]
+        rod = np.sqrt(0.09 - 0.01 * np.sin(phi) ** 2)
+        slope = -0.1 * np.sin(phi) * (1 + 0.1 * np.cos(phi) / rod)
+        rigid = 10 * np.sqrt(0.1 / (0.1 + 2 * slope**2))
+        misses.append(np.abs(result["der(phi)"] - rigid).max())
+    assert misses[2] < 1e-2
+    for softer, stiffer in pairwise(misses):
+        assert softer / stiffer == pytest.approx(10, rel=0.3)
+
+
+def test_an_explicit_method_pays_for_the_stiffness(fmu):
+    """The relative speed of slider and load dies at a rate of 1e4 to 2e4 1/s: an explicit method steps
+    no further than a few of those times, whatever the accuracy; radau5 as far as the motion allows."""
+    steps = {}
+    for method in ("radau5", "dop853"):
+        for tolerance in (1e-4, 1e-7):
+            with instance(fmu("SliderCrank")) as one:
+                one.start({"solver.method": method}, tolerance=tolerance)
+                one.step(1.0)
+                steps[method, tolerance] = one.get("solver.steps")
+    assert steps["dop853", 1e-4] > 1e4 / 8
+    assert steps["dop853", 1e-7] == pytest.approx(steps["dop853", 1e-4], rel=0.05)
+    assert steps["radau5", 1e-4] < steps["dop853", 1e-4] / 15
