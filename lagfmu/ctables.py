@@ -130,15 +130,40 @@ class Tables:
         return text
 
     def _constant_mass(self) -> bool:
-        return all(e.free_symbols <= set(self.eom.p) for e in self.eom.M.todok().values())
+        return _constant_mass(self.eom)
 
     def _separable(self) -> bool:
-        """M of parameters; forces without velocities; position constraints that no input moves."""
-        velocities, inputs = set(self.eom.v), set(self.eom.u)
-        return (
-            self.formulation == "multipliers"
-            and self._constant_mass()
-            and all(e.free_symbols.isdisjoint(velocities) for e in self.eom.F)
-            and not any(isinstance(c, Nonholonomic) for c in self.constraints)
-            and all(e.free_symbols.isdisjoint(inputs) for e in self.eom.G.todok().values())
-        )
+        return not entanglements(self.eom, self.formulation)
+
+
+def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:
+    """Why the method rattle cannot step these equations; nothing if it can.
+
+    It needs M of parameters, forces without velocities, position constraints that no input moves, and
+    the formulation 'multipliers'.
+    """
+    velocities, inputs = set(eom.v), set(eom.u)
+    found = []
+    if formulation != "multipliers":
+        found.append(f"the formulation is {formulation!r}, expected 'multipliers'")
+    if not _constant_mass(eom):
+        found.append("the mass matrix holds more than parameters")
+    moved = [
+        str(q)
+        for q, e in zip(eom.q, eom.F, strict=True)
+        if not e.free_symbols.isdisjoint(velocities)
+    ]
+    if moved:
+        found.append(f"the forces on {', '.join(moved)} hold velocities")
+    found += [
+        f"the constraint {c.name!r} is nonholonomic"
+        for c in eom.constraints
+        if isinstance(c, Nonholonomic)
+    ]
+    if any(not e.free_symbols.isdisjoint(inputs) for e in eom.G.todok().values()):
+        found.append("an input stands in the constraint matrix")
+    return found
+
+
+def _constant_mass(eom: EquationsOfMotion) -> bool:
+    return all(e.free_symbols <= set(eom.p) for e in eom.M.todok().values())

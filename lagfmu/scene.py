@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 from .errors import ModelError
 from .model import NAME
-from .solver.state import DEFAULT_TOLERANCE, METHODS
+from .solver.state import DEFAULT_TOLERANCE
+from .solver.state import METHODS as PYTHON_METHODS
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
+METHODS = (*PYTHON_METHODS, "rattle")  # the last of native FMUs only
 
 
 @dataclass(frozen=True)

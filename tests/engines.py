@@ -14,10 +14,12 @@ variable]].  The answer is {rows: [[recorded values] after each step]}, {error} 
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import importlib
 import json
 import sys
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -207,11 +209,12 @@ def whole_pointers(fmi2: Any) -> None:
 
 
 def load(engine: str) -> None:
-    """The engine's library; ecos needs oneTBB, which the package `tbb` puts beside Python's."""
+    """The engine's library; ecos needs that of oneTBB, which is the system's or in the package `tbb`."""
     if engine == "ecos":
-        tbb = Path(sys.prefix, "lib", "libtbb.so.12")
-        if tbb.exists():
-            ctypes.CDLL(str(tbb), mode=ctypes.RTLD_GLOBAL)
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            for file in metadata.files("tbb") or []:
+                if file.name == "libtbb.so.12":
+                    ctypes.CDLL(str(file.locate()), mode=ctypes.RTLD_GLOBAL)
     importlib.import_module(PACKAGES[engine])
     if engine == "libcosim":
         importlib.import_module("libcosimpy._internal").libcosimc()
@@ -223,12 +226,12 @@ def main(engine: str, question: str, answer: str) -> None:
     found: dict[str, Any]
     try:
         load(engine)
-    except OSError as error:
+    except (ImportError, OSError) as error:
         found = {"absent": str(error)}
     else:
-        drive = {"libcosim": in_libcosim, "ecos": in_ecos, "fmuloader": in_fmuloader}[engine]
+        do = {"libcosim": in_libcosim, "ecos": in_ecos, "fmuloader": in_fmuloader}[engine]
         try:
-            found = {"rows": drive(job)}
+            found = {"rows": do(job)}
         except Exception as error:
             found = {"error": f"{type(error).__name__}: {error}"}
     Path(answer).write_text(json.dumps(found))

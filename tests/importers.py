@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -50,7 +51,14 @@ def run(
         question, answer = Path(folder, "job.json"), Path(folder, "answer.json")
         question.write_text(json.dumps(job))
         command = [sys.executable, engines.__file__, engine, str(question), str(answer)]
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
+        ended = subprocess.run(
+            command,
+            env={**os.environ, "TMPDIR": folder},  # where engines leave what they unpack
+            capture_output=True,
+            text=True,
+            timeout=200,
+            check=False,
+        )
         found = json.loads(answer.read_text()) if answer.exists() else {"error": "a crash"}
     said = ended.stdout + ended.stderr
     if "absent" in found:

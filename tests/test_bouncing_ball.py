@@ -65,7 +65,7 @@ def test_every_parabola_is_where_the_bounces_put_it(fmu, case, tolerance, allowe
 
 
 @EVERY
-def test_it_rests_when_the_bounces_have_accumulated(python_fmu, case):
+def test_it_rests_when_the_bounces_have_accumulated(fmu, case):
     """All the bounces are over at t1 + 2 e w/(g (1 - e)), for a drop sqrt(2 h/g)(1 + e)/(1 - e); just
     before the ball is still bouncing, just after it lies with lambda = m g, and so ever after."""
     m, e, h, v0 = case
@@ -75,7 +75,7 @@ def test_it_rests_when_the_bounces_have_accumulated(python_fmu, case):
     # it rests once v^2/(2 g) is 1e-9 of the coordinate's size; the rest of the bounces would have taken
     size = h or 1.0
     early = 2 * np.sqrt(2e-9 * size / G) / (1 - e) + 1e-8 * end
-    with instance(python_fmu("BouncingBall")) as one:
+    with instance(fmu("BouncingBall")) as one:
         one.start(start(case), tolerance=1e-10)
         one.step(end - 1.01 * early)
         assert not one.get("contact.floor")

@@ -3,6 +3,13 @@ against closed forms; two of them coupled, against the same system simulated who
 
 from __future__ import annotations
 
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
 import coupled_model
 import fmpy
 import numpy as np
@@ -14,6 +21,7 @@ from scipy.special import ellipj, ellipk, ellipkinc
 
 from lagfmu import build_fmu
 
+README = Path(__file__).parent.parent / "README.md"
 TIGHT = {"solver.tolerance": 1e-12}
 EARTH = {"m": 1.0, "g": 9.81, "a": 1.0}
 MOON = {"m": 3.0, "g": 1.62, "a": 2.0}
@@ -97,8 +105,8 @@ def test_the_particle_leaves_the_hemisphere_when_and_where_it_must(native_fmu, e
         time, angle = departure(world, theta0)
         on = t < time
         assert 50 < on.sum() < 230
-        assert when[-1] == pytest.approx(time, rel=1e-11)
-        assert where[-1] == pytest.approx(angle, rel=1e-11)
+        assert when[-1] == pytest.approx(time, rel=1e-12)
+        assert where[-1] == pytest.approx(angle, rel=1e-12)
         weight = world["m"] * world["g"]
         normal = weight * (3 * np.cos(theta) - 2 * np.cos(theta0))
         np.testing.assert_allclose(force[on], normal[on], atol=1e-11 * weight, rtol=0)
@@ -108,7 +116,7 @@ def test_the_particle_leaves_the_hemisphere_when_and_where_it_must(native_fmu, e
 
 
 def test_the_multiplier_of_the_pendulum_is_that_of_the_elliptic_functions(native_fmu, engine):
-    """lambda(t) = -T/(2 L), with other parameters and start values, to 1e-10 over three periods."""
+    """lambda(t) = -T/(2 L), with other parameters and start values, to 1e-11 over three periods."""
     world, phi0 = {"m": 0.7, "g": 3.7, "L": 2.0}, 2.0
     start = {"x": world["L"] * np.sin(phi0), "y": -world["L"] * np.cos(phi0)}
     steps, key = 200, ("bob", "lambda.rod")
@@ -121,7 +129,7 @@ def test_the_multiplier_of_the_pendulum_is_that_of_the_elliptic_functions(native
         values={"bob": {**world, **TIGHT, **start}},
     )[key]
     expected = pendulum_multiplier(world, phi0, 0.1 * np.arange(1, steps + 1))
-    np.testing.assert_allclose(found, expected, atol=1e-10 * abs(expected).max(), rtol=0)
+    np.testing.assert_allclose(found, expected, atol=1e-11 * abs(expected).max(), rtol=0)
 
 
 def test_a_cart_goes_where_the_force_drives_it(native_fmu, engine):
@@ -199,6 +207,29 @@ def test_what_cannot_be_is_an_error_in_the_engine_with_its_reason(native_fmu, en
             drive={"one": drive},
         )
     assert reason in str(stopped.value)
+
+
+def test_the_readmes_example_prints_the_time_of_departure(fmu, tmp_path):
+    """The README's lines for libcosim, as they stand, with the FMU of either target where they look."""
+    pytest.importorskip("libcosimpy", reason="the engine libcosimpy is not installed")
+    blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    (block,) = [b for b in blocks if "libcosimpy" in b]
+    (path,) = re.findall(r'fmu_path="(.*?)"', block)
+    (tmp_path / path).parent.mkdir(parents=True)
+    shutil.copy(fmu("Hemisphere"), tmp_path / path)
+    command = [sys.executable, "-c", block]
+    ended = subprocess.run(
+        command,
+        cwd=tmp_path,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stderr[-2000:]
+    (printed,) = re.findall(r"^\[([\d.]+)\]$", ended.stdout, re.MULTILINE)
+    assert float(printed) == pytest.approx(departure(EARTH, 0.01)[0], rel=1e-8)
 
 
 # ---------------------------------------------------------------------------- two FMUs coupled
@@ -285,11 +316,11 @@ def test_coupled_they_are_the_whole_to_first_order(coupled, engine):
 
 def test_with_derivatives_exchanged_they_are_the_whole_to_second_order(coupled):
     """fmi2GetRealOutputDerivatives of one is fmi2SetRealInputDerivatives of the other: the force goes
-    on along its slope, and the error falls with the square of the step, 0.04 % in s at 10 ms."""
+    on along its slope, and the error falls with the square of the step, 0.015 % in s at 10 ms (orders 1.96 to 2.03)."""
     fmus, exact = coupled
     found = errors("fmuloader", fmus, exact, rates=True)
     orders = np.log2(found[:-1] / found[1:])
-    assert abs(orders - 2).max() < 0.15, orders
+    assert abs(orders - 2).max() < 0.1, orders
     assert found[0].max() < 6e-4
     assert found[-1].max() < 8e-6
 

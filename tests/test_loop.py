@@ -53,11 +53,11 @@ def test_it_leaves_where_gravity_alone_bends_the_path(fmu, world, square, tolera
 @EVERY
 @ACCURACY
 @pytest.mark.parametrize("square", [2 + 1e-6, 2.0001, 2.001, 2.01, 2.1])
-def test_a_short_departure_is_not_stepped_over(python_fmu, world, square, tolerance, allowed):
+def test_a_short_departure_is_not_stepped_over(fmu, world, square, tolerance, allowed):
     """A little faster than to the height of the centre, the particle pulls at the loop for a moment
     only, where it turns round: it leaves and comes back, however long the steps."""
     a = world["a"]
-    last = run(python_fmu("Loop"), world, square, tolerance, 4.0)[-1]
+    last = run(fmu("Loop"), world, square, tolerance, 4.0)[-1]
     assert last["departure.loop.count"] == 1
     assert abs(last["departure.loop.y"] - a * (square - 2) / 3) < allowed * a
 

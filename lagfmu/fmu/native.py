@@ -8,8 +8,10 @@ from importlib.resources import files
 
 from ..ccode import model_source
 from ..compiler import HOST, chosen, compile_libraries, is_first
+from ..ctables import entanglements
 from ..cvariables import variables_source
 from ..equations import EquationsOfMotion
+from ..errors import BuildError
 from ..reduction import Reduction
 from ..scene import Scene
 from ..solver.system import System
@@ -48,6 +50,11 @@ def build(
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
     wanted = chosen(platforms)
+    if scene.method == "rattle" and (problems := entanglements(eom, scene.formulation)):
+        raise BuildError(
+            f"scene {scene.name!r}: rattle cannot step these equations: {'; '.join(problems)}; choose "
+            "another method"
+        )
     table = _with_rattle(table)
     runtime = runtime_files()
     generated = {

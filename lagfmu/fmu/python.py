@@ -18,6 +18,7 @@ from ..errors import BuildError
 from ..numeric import source
 from ..reduction import Reduction
 from ..scene import Scene
+from ..solver.state import METHODS
 from ..variables import VariableTable
 from .archive import pack, version
 from .description import model_description
@@ -73,6 +74,11 @@ def build(
     extra: Mapping[str, bytes],
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
+    if scene.method not in METHODS:
+        raise BuildError(
+            f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
+            f"{', '.join(METHODS)}, or the target native"
+        )
     runtime = _runtime()
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
     text = _script(eom, reduction, scene, table, package)

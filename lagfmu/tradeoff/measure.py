@@ -34,6 +34,7 @@ Tick = Callable[[str, int, int], None]  # what is done, how far, of how many
 class Plan:
     """What to measure: communication steps [s], tolerances, methods; and how long that may take.
 
+    A fixed step is halved `halvings` times.
     A run longer than `limit` [s] ends its method's refinement; after `budget` [s] of timing no
     setting is run again that was run `FEWEST` times.
     """
@@ -41,6 +42,7 @@ class Plan:
     communications: tuple[float, ...]
     tolerances: tuple[float, ...] = tolerances()
     methods: tuple[str, ...] = METHODS
+    halvings: int = 7
     repeats: int = REPEATS
     limit: float = 3.0
     budget: float = 60.0
@@ -196,7 +198,9 @@ def _errors(
     total = len(plan.communications) * len(plan.methods)
     for k, (h, method) in enumerate((h, m) for h in plan.communications for m in plan.methods):
         say(f"errors of {method} every {h:.3g} s", k, total)
-        for setting in dials(method, h, plan.tolerances) if method not in refused else ():
+        for setting in (
+            dials(method, h, plan.tolerances, plan.halvings) if method not in refused else ()
+        ):
             begun = time.perf_counter()
             try:
                 rows.append(weigh(importer, setting, reference, claims))

@@ -48,9 +48,7 @@ def tolerances(decades: int = 2) -> tuple[float, ...]:
     return tuple(float(f"1e-{k}") for k in range(3, 14, decades))
 
 
-def dials(
-    method: str, communication: float, grid: Sequence[float], halvings: int = 7
-) -> list[Setting]:
+def dials(method: str, communication: float, grid: Sequence[float], halvings: int) -> list[Setting]:
     """The settings of one method at one communication step, from coarse to fine.
 
     A fixed step divides the communication step evenly, hence H, H/2, H/4, ...

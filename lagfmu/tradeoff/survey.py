@@ -143,7 +143,7 @@ def _weighed(
                 dropped.append(method)
             continue
         enough = 0
-        for setting in dials(method, importer.step_size, plan.tolerances):
+        for setting in dials(method, importer.step_size, plan.tolerances, plan.halvings):
             begun = time.perf_counter()
             try:
                 row = weigh(importer, setting, reference)

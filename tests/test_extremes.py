@@ -1,0 +1,317 @@
+"""Extremes: masses of 24 decades in one system, any unit of length, mass and time, constraints given
+twice, nearly parallel ones, a coordinate without mass, singular configurations.  Each is either right or
+refused with a reason; nothing is ever not-a-number with fmi2OK."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import mpmath as mp
+import numpy as np
+import pytest
+from conftest import FILES
+from fmi2 import DISCARD
+from fmpy.fmi1 import FMICallException
+from instance import Instance, instance
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu
+from lagfmu.compiler import find_compiler
+from lagfmu.consistency import RedundantConstraintWarning
+from lagfmu.simulate import simulate
+
+g0 = 9.81  # m/s^2
+m, g, L = symbols("m g L", positive=True)
+x, y, z = dynamicsymbols("x y z")
+
+Build = Callable[..., Path]
+
+
+@pytest.fixture(scope="module")
+def build(target: str, tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """build(model): its FMU for the present target, built once."""
+    if target == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine: native FMUs are not tested")
+    folder = tmp_path_factory.mktemp(f"extremes_{target}")
+    made: dict[str, Path] = {}
+
+    def get(model: Model, **scene: Any) -> Path:
+        if model.name not in made:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RedundantConstraintWarning)
+                made[model.name] = build_fmu(model, folder, Scene(model.name, **scene), target=target)
+        return made[model.name]
+
+    return get
+
+
+def why(one: Instance) -> str:
+    """The latest reason in the log."""
+    return next(text for status, _, text in reversed(one.log) if status >= DISCARD)
+
+
+def walk(one: Instance, step: float, count: int) -> tuple[list[dict[str, Any]], str]:
+    """Outputs at each communication point, and the reason why the run ended early ('' if it did not).
+
+    Whatever the FMU answers with fmi2OK is finite."""
+    seen = [one.outputs()]
+    reason = ""
+    for _ in range(count):
+        try:
+            one.step(step)
+        except FMICallException as error:
+            assert error.status == DISCARD
+            reason = why(one)
+            break
+        seen.append(one.outputs())
+    for outputs in seen:
+        assert all(math.isfinite(v) for v in outputs.values()), outputs
+    return seen, reason
+
+
+# ---------------------------------------------------------------------------- masses
+
+
+def chain(n: int) -> Model:
+    """n bobs of their own masses on massless links of 1.25 m, straight to the last bit, which turns."""
+    masses = symbols(f"m1:{n + 1}", positive=True)
+    bobs = [tuple(dynamicsymbols(f"x{k} y{k}")) for k in range(1, n + 1)]
+    ends = [(0, 0), *bobs]
+    links = [(b[0] - a[0], b[1] - a[1]) for a, b in zip(ends, bobs, strict=False)]
+    start = {}
+    for k, (a, b) in enumerate(bobs, 1):
+        start |= {a: 0.75 * k, b: -1.0 * k, a.diff(): 1.0 * k, b.diff(): 0.75 * k}
+    return Model(
+        name=f"Chain{n}",
+        lagrangian=sum(
+            w * (a.diff() ** 2 + b.diff() ** 2) / 2 - w * g * b
+            for w, (a, b) in zip(masses, bobs, strict=True)
+        ),
+        coordinates={q: "m" for bob in bobs for q in bob},
+        constraints=[
+            Holonomic(f"link{k}", dx**2 + dy**2 - L**2) for k, (dx, dy) in enumerate(links, 1)
+        ],
+        parameters=[
+            *(Parameter(w, 1.0, "kg") for w in masses),
+            Parameter(g, g0, "m/s^2"),
+            Parameter(L, 1.25, "m"),
+        ],
+        start=start,
+    )
+
+
+def exact_multipliers(masses: Sequence[float], seen: dict[str, Any]) -> tuple[list[Any], list[Any]]:
+    """lambda of every link at the state that was reported, to 60 digits, and its condition number.
+
+    The condition number is Skeel's (Higham, Accuracy and Stability, eq. 7.11), by component:
+    (|K^-1| (|K| |z| + |r|))_k / |z_k| for K z = r.  It is what rounding in M, G, F and gamma can do to
+    lambda_k in the best of all scalings of rows.
+    """
+    n = len(masses)
+    with mp.workdps(60):
+        q = [[mp.mpf(0)] * 2] + [[mp.mpf(seen[f"{c}{k}"]) for c in "xy"] for k in range(1, n + 1)]
+        v = [[mp.mpf(0)] * 2]
+        v += [[mp.mpf(seen[f"der({c}{k})"]) for c in "xy"] for k in range(1, n + 1)]
+        K, r = mp.zeros(3 * n), mp.zeros(3 * n, 1)
+        for k in range(n):
+            for i in range(2):
+                K[2 * k + i, 2 * k + i] = mp.mpf(masses[k])
+                d = q[k + 1][i] - q[k][i]
+                K[2 * n + k, 2 * k + i] = K[2 * k + i, 2 * n + k] = 2 * d
+                if k > 0:
+                    K[2 * n + k, 2 * k - 2 + i] = K[2 * k - 2 + i, 2 * n + k] = -2 * d
+                r[2 * n + k] -= 2 * (v[k + 1][i] - v[k][i]) ** 2
+            r[2 * k + 1] = -mp.mpf(masses[k]) * mp.mpf(g0)
+        inverse = K**-1
+        exact = inverse * r
+        grown = K.apply(abs) * exact.apply(abs) + r.apply(abs)
+        spread = inverse.apply(abs) * grown
+        rows = range(2 * n, 3 * n)
+        return [-exact[k] for k in rows], [spread[k] / abs(exact[k]) for k in rows]
+
+
+def check_multipliers(masses: Sequence[float], seen: dict[str, Any]) -> float:
+    """Each lambda is right to ten roundings of its condition number, which is returned."""
+    exact, conditions = exact_multipliers(masses, seen)
+    for k, (value, condition) in enumerate(zip(exact, conditions, strict=True), 1):
+        error = abs(mp.mpf(seen[f"lambda.link{k}"]) / value - 1)
+        assert error < 2e-15 * condition, (k, masses, mp.nstr(error), mp.nstr(condition))
+    return float(max(conditions))
+
+
+LIGHT, HEAVY = 1e-12, 1e12
+
+
+@pytest.mark.parametrize(
+    "masses",
+    [
+        (1.0, LIGHT, 1.0),
+        (HEAVY, LIGHT, HEAVY),
+        (LIGHT, HEAVY, LIGHT),
+        (HEAVY, 1.0, LIGHT),
+        (LIGHT, 1.0, HEAVY),
+        (LIGHT, LIGHT, HEAVY),
+        (1e6, 1e-6, 1e6),
+        (1e3, 1e-3, 1e3),
+    ],
+)
+def test_masses_of_24_decades_on_a_straight_chain(build, masses):
+    """A light mass between heavy ones and the other way round: every rod's lambda, pointwise, to ten
+    roundings of its condition number, which is small: the problem is not the one that is ill-conditioned."""
+    with instance(build(chain(3))) as one:
+        one.start({f"m{k}": w for k, w in enumerate(masses, 1)})
+        assert check_multipliers(masses, one.outputs()) < 100
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_masses_at_random_on_a_bent_chain(build, seed):
+    """Six bobs between 1e-12 and 1e12 kg, links in any direction, turning at any speed."""
+    rng = np.random.default_rng(seed)
+    masses = 10.0 ** rng.uniform(-12, 12, 6)
+    angles, spins = rng.uniform(-np.pi, np.pi, 6), rng.uniform(-2, 2, 6)
+    place = np.cumsum([1.25 * np.sin(angles), -1.25 * np.cos(angles)], axis=1)
+    speed = np.cumsum([spins * np.cos(angles), spins * np.sin(angles)], axis=1)
+    values = {f"m{k}": w for k, w in enumerate(masses, 1)}
+    for i, c in enumerate("xy"):
+        values |= {f"{c}{k}": place[i, k - 1] for k in range(1, 7)}
+        values |= {f"der({c}{k})": speed[i, k - 1] for k in range(1, 7)}
+    with instance(build(chain(6))) as one:
+        one.start(values)
+        check_multipliers(masses, one.outputs())
+
+
+@pytest.mark.parametrize(
+    "masses", [(1.0, 1e-3, 1.0), (1.0, 1e-6, 1.0), (HEAVY, LIGHT, HEAVY), (LIGHT, HEAVY, LIGHT)]
+)
+def test_a_light_mass_between_heavy_ones_moves_right_or_is_refused(build, masses):
+    """Between two communication points lambda stays right at every state that is reported, and the
+    energy is conserved; where the light mass would shake too fast to follow the step is refused."""
+    with instance(build(chain(3))) as one:
+        one.start({f"m{k}": w for k, w in enumerate(masses, 1)}, tolerance=1e-9)
+        seen, reason = walk(one, 0.02, 5)
+    assert len(seen) == 6 or "internal steps" in reason or "step size" in reason, reason
+    start = seen[0]["energy.total"]
+    for outputs in seen:
+        check_multipliers(masses, outputs)
+        assert max(abs(outputs[f"residual.link{k}"]) for k in (1, 2, 3)) < 1e-14
+        assert abs(outputs["energy.total"] - start) < 1e-7 * max(masses) * g0
+
+
+# ---------------------------------------------------------------------------- units
+
+
+def exponents(path: Path) -> tuple[dict[str, tuple[float, ...]], dict[str, float]]:
+    """(kg, m, s) exponents of each variable's unit, and the start values of those that can be set."""
+    description = fmpy.read_model_description(str(path))
+    units = {u.name: u.baseUnit for u in description.unitDefinitions}
+    found, starts = {}, {}
+    for v in description.modelVariables:
+        base = units.get(v.unit)
+        found[v.name] = (0, 0, 0) if base is None else (base.kg, base.m, base.s)
+        if v.type == "Real" and v.start is not None and not v.name.startswith("solver."):
+            starts[v.name] = float(v.start)
+    return found, starts
+
+
+def rescaled(path: Path, units: Sequence[float], **options: Any) -> Any:
+    """A run in other units, given back in the old ones."""
+    powers, starts = exponents(path)
+    factor = {n: math.prod(u**e for u, e in zip(units, p, strict=True)) for n, p in powers.items()}
+    stop = options.pop("stop_time")
+    run = simulate(
+        path,
+        start_values={n: value * factor[n] for n, value in starts.items()} | options.pop("also", {}),
+        stop_time=stop * units[2],
+        step_size=stop / 20 * units[2],
+        **options,
+    )
+    back = run.copy()
+    for n in run.dtype.names:
+        if run[n].dtype.kind == "f":
+            back[n] = run[n] / (units[2] if n == "time" else factor[n])
+    return back
+
+
+NANO, GIGA = 2.0**-30, 2.0**30  # 0.93e-9, 1.07e9: rounding is the same in both units
+SCALES = {
+    "masses up": (GIGA, 1, 1),
+    "masses down": (NANO, 1, 1),
+    "lengths up": (1, GIGA, 1),
+    "lengths down": (1, NANO, 1),
+    "times up": (1, 1, GIGA),
+    "times down": (1, 1, NANO),
+    "all": (GIGA, NANO, GIGA),
+    "all back": (NANO, GIGA, NANO),
+}
+# Atwood and KnifeEdge have no length but 0 among starts and parameters to measure errors by: 1 m
+# stands in for it.
+# SliderCrank is stiff: the pivots of radau5's matrix are chosen by size, which is a matter of units.
+IN_ANY_UNIT = sorted(set(FILES) - {"Atwood", "KnifeEdge", "SliderCrank"})
+
+
+@pytest.mark.parametrize("scale", sorted(SCALES))
+@pytest.mark.parametrize("name", IN_ANY_UNIT)
+def test_units_change_nothing_to_the_last_bit(native_fmu, name, scale):
+    """The same system in units of 2^+-30 kg, m and s: lambda, Q, energies, the times of events and the
+    number of steps are the same to the last bit, in the units that the description says."""
+    path = native_fmu(name)
+    plain, other = (rescaled(path, u, stop_time=2.0) for u in ((1, 1, 1), SCALES[scale]))
+    for n in plain.dtype.names:
+        np.testing.assert_array_equal(other[n], plain[n], err_msg=n)
+
+
+def apart(expected: Any, found: Any) -> dict[str, float]:
+    """Largest difference of every output in its own scale; of an energy in that of the largest one, of an
+    acceleration at least in that of the speed over the time of the run."""
+    scale = {n: float(np.abs(expected[n].astype(float)).max()) for n in expected.dtype.names}
+    energy = max((s for n, s in scale.items() if n.startswith("energy.")), default=0.0)
+    for n in scale:
+        if n.startswith("energy."):
+            scale[n] = energy
+        elif n.endswith(",2)"):
+            scale[n] = max(scale[n], scale[n.replace(",2)", ")")])
+    return {
+        n: float(np.abs(found[n].astype(float) - expected[n]).max()) / (s or 1.0)
+        for n, s in scale.items()
+        if not n.startswith("residual.")
+    }
+
+
+DECADES = {
+    "masses": (1e9, 1, 1),
+    "lengths": (1, 1e9, 1),
+    "times": (1, 1, 1e9),
+    "masses and times": (1e-9, 1, 1e9),
+    "all": (1e9, 1e-9, 1e9),
+    "all back": (1e-9, 1e9, 1e-9),
+}
+
+
+@pytest.mark.parametrize("scale", sorted(DECADES))
+@pytest.mark.parametrize("name", sorted(set(FILES) - {"SliderCrank"}))
+def test_lambda_scales_as_its_unit_says(fmu, name, scale):
+    """By 1e+-9, which rounds every number anew: along a run in steps of a fixed part of the motion's own
+    time lambda, Q, energies and the times of events scale as their units say, to 1e-12."""
+    path = fmu(name)
+    run = {"stop_time": 1.5, "also": {"solver.method": "rk4"}}
+    plain, other = (rescaled(path, u, **run) for u in ((1, 1, 1), DECADES[scale]))
+    worst = apart(plain, other)
+    assert max(worst.values()) < 1e-12, sorted(worst.items(), key=lambda a: -a[1])[:3]
+
+
+def test_a_stiff_system_scales_as_far_as_its_spring_lets_it(native_fmu):
+    """The spring's pull is k = 1e6 N/m times a difference of two places of 0.6 m: rounding in them is
+    eps k y/|pull| of the force, and radau5 tells lambda in any unit to ten times that."""
+    path = native_fmu("SliderCrank")
+    plain = rescaled(path, (1, 1, 1), stop_time=0.5)
+    pull = np.abs(plain["der(y,2)"]).max()
+    rounding = np.finfo(float).eps * 1e6 * 0.6 / pull
+    for units in DECADES.values():
+        worst = apart(plain, rescaled(path, units, stop_time=0.5))
+        assert max(worst.values()) < 10 * rounding
