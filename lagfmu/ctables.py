@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import Any
 
-from . import elimination
+from . import csolve, elimination
 from .equations import EquationsOfMotion
 from .model import Constraint, Contact, Nonholonomic
 
@@ -50,9 +50,14 @@ class Tables:
             self._integers("prescribed", prescribed),
             self._integers("dimension", dimension),
             self._integers("extent_dimension", extent),
-            "\n" + self._plan() + "\n",
         ]
         p = self.prefix
+        plan = elimination.plan(eom.n, eom.m, self.mass, self.entries)
+        parts.append("\n" + plan.c_text(f"{p}plan") + "\n")
+        solve = None
+        if self.formulation != "nullspace":
+            solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
+            parts.append(f"{solve}\n" if solve else "")
         fields = {
             "n": eom.n,
             "m": eom.m,
@@ -75,6 +80,7 @@ class Tables:
             "constant_mass": int(self._constant_mass()),
             "separable": int(self._separable()),
             "plan": f"&{p}plan",
+            "solve": f"{p}solve" if solve else "NULL",
             **{
                 name: p + name
                 for name in ("dynamics", "residual", "energies", "restitution", "tangent")
@@ -122,12 +128,6 @@ class Tables:
             for u in (eom.model.units[p.symbol] for p in eom.model.parameters)
         ]
         return of_coordinates, of_parameters or [-1]
-
-    def _plan(self) -> str:
-        eom = self.eom
-        plan = elimination.plan(eom.n, eom.m, self.mass, self.entries)
-        text: str = plan.c_text(f"{self.prefix}plan")
-        return text
 
     def _constant_mass(self) -> bool:
         return _constant_mass(self.eom)

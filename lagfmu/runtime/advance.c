@@ -13,10 +13,8 @@
 #include "rattle.h"
 #include "switch.h"
 
-enum {
-    CHATTER = 200,  /* contact events in next to no time after which the step is given up */
-    PATIENCE = 200  /* steps after which a communication step is judged by its average step */
-};
+enum { CHATTER = 200 }; /* contact events in next to no time after which the step is given up */
+static const double PATIENCE = 200; /* steps after which one is judged by its average step */
 static const double STEP_LIMIT = 1e7; /* internal steps that a communication step may need */
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead */
 

@@ -24,8 +24,10 @@ static Status rate(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
     if (mechanism_motion(&s->stepped, leg_instant(s, t), y, y + n, s->active) != OK) return FAILED;
-    memcpy(dydt, y + n, (size_t)n * sizeof *y);
-    memcpy(dydt + n, s->stepped.vdot, (size_t)n * sizeof *y);
+    for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
+        dydt[j] = y[n + j];
+        dydt[n + j] = s->stepped.vdot[j];
+    }
     return OK;
 }
 

@@ -1,7 +1,7 @@
 /* linear.c -- the ladder:  M x = b + G^T lambda ,  G x = c  on the rows that act.
  *
  * Factoring takes the first rung that is safe at this state; solving climbs on if refinement does
- * not settle.  The dense rungs need (n + m)^2 numbers and are there up to n + m = DENSE_MOST;
+ * not settle.  For a small system with all rows acting the first rung is written out in model.c.  The dense rungs need (n + m)^2 numbers and are there up to n + m = DENSE_MOST;
  * beyond, the Schur complement is refined with residuals in doubled precision, and what that cannot
  * settle is refused. */
 #include "linear.h"
@@ -25,6 +25,8 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     l->active = NULL;
     l->rung = RUNG_SCHUR;
     l->unique = arena_ints(arena, m);
+    l->zero = arena_doubles(arena, n);
+    for (int i = 0; i < n && l->zero != NULL; i++) l->zero[i] = 0;
     schur_layout(l, arena);
     l->dense = NULL;
     l->pivots = NULL;
@@ -107,17 +109,30 @@ static Status climb(Linear *l) {
     return least_norm_factor(l);
 }
 
+/* By the plan's lists, or a rung above. */
+static Status factor_lists(Linear *l) {
+    l->rung = RUNG_SCHUR;
+    return schur_factor(l) ? OK : climb(l);
+}
+
 Status linear_factor(Linear *l, const double *M, const double *G, const int *active) {
+    int all = 1;
     l->M = M;
     l->G = G;
     l->active = active;
-    for (int k = 0; k < l->system->m; k++) l->unique[k] = 1;
+    for (int k = 0; k < l->system->m; k++) {
+        l->unique[k] = 1;
+        all &= active[k];
+    }
+    if (all && l->system->solve != NULL) {
+        l->rung = RUNG_WRITTEN_OUT; /* it factors and solves at once */
+        return OK;
+    }
     if (l->system->formulation == NULLSPACE && l->dense != NULL && nullspace_factor(l)) {
         l->rung = RUNG_NULLSPACE;
         return OK;
     }
-    l->rung = RUNG_SCHUR;
-    return schur_factor(l) ? OK : climb(l);
+    return factor_lists(l);
 }
 
 static Status solve_dense(Linear *l, const double *b, const double *c, double *x, double *lambda) {
@@ -133,6 +148,10 @@ static Status solve_dense(Linear *l, const double *b, const double *c, double *x
 
 Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     if (lambda == NULL) lambda = schur_of(l)->lambda;
+    if (l->rung == RUNG_WRITTEN_OUT) {
+        if (l->system->solve(l->M, b != NULL ? b : l->zero, l->G, c, x, lambda)) return OK;
+        if (factor_lists(l) != OK) return FAILED;
+    }
     Status status = OK;
     if (l->rung != RUNG_SCHUR) {
         status = solve_dense(l, b, c, x, lambda);

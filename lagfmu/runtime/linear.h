@@ -12,7 +12,10 @@
 #include "status.h"
 #include "system.h"
 
-typedef enum { RUNG_SCHUR, RUNG_KKT, RUNG_ORTHOGONAL, RUNG_LEAST_NORM, RUNG_NULLSPACE } Rung;
+typedef enum {
+    RUNG_SCHUR, RUNG_KKT, RUNG_ORTHOGONAL, RUNG_LEAST_NORM, RUNG_NULLSPACE,
+    RUNG_WRITTEN_OUT /* the first, as system->solve */
+} Rung;
 
 typedef struct {
     const System *system;
@@ -21,6 +24,7 @@ typedef struct {
     Rung rung;
     int *unique;          /* (m) 1 where lambda is determined uniquely; 1 for rows that do not act */
     Why *why;
+    double *zero;         /* (n) for b = NULL */
     double *sparse;       /* workspace of schur.c */
     double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
     int *pivots;

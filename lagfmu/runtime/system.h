@@ -42,6 +42,10 @@ struct System {
     int constant_mass;        /* M holds parameters and numbers only */
     int separable;            /* constant mass, forces without velocities, position constraints only */
     const Plan *plan;         /* sparse elimination, found when the FMU was built */
+    /* x (n) and lambda (m) of  M x = b + G^T lambda,  G x = c  with all rows acting, the plan written
+     * out for a small system; 0 where that is not safe: then linear.h decides.  NULL: not there. */
+    int (*solve)(const double *M, const double *b, const double *G, const double *c, double *x,
+                 double *lambda);
 
     void (*dynamics)(double t, const double *q, const double *v, const double *u, const double *p,
                      double *M, double *F, double *G, double *nu, double *gamma);

@@ -26,7 +26,7 @@ from ..closed_form import output
 from ..errors import SimulationError
 from ..proof import Claim
 from ..simulate import Trajectory
-from ..verify import evaluate
+from ..verify import applies, evaluate
 from .importer import Importer
 from .quantities import Quantity, magnitudes, quantities
 from .setting import Setting
@@ -110,7 +110,7 @@ def refer(
         opinion = _opinion(importer, converged, given, wide * h, end)
     checked: float | None = None
     for name, claim, expected in _in_time(claims, importer, given, run):
-        where = _applies(claim, run) & np.isfinite(expected)
+        where = applies(claim, run) & np.isfinite(expected)
         if name not in right or not where.any():
             continue
         miss = float(np.abs(right[name] - expected)[where].max()) / scale[name]
@@ -162,15 +162,6 @@ def _replaced(run: Trajectory, right: Mapping[str, NDArray[np.float64]]) -> Traj
     for name, column in right.items():
         copy[name] = column
     return copy
-
-
-def _applies(claim: Claim, run: Trajectory) -> NDArray[np.bool_]:
-    where = np.ones(len(run), dtype=bool)
-    if claim.while_closed is not None:
-        where &= run[f"contact.{claim.while_closed}"]
-    if claim.while_open is not None:
-        where &= ~run[f"contact.{claim.while_open}"]
-    return where
 
 
 def _in_time(
