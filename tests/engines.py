@@ -146,11 +146,15 @@ def in_fmuloader(job: Job) -> list[list[float]]:
     step, along the derivative that its source tells."""
     from fmuloader import fmi2
 
-    whole_pointers(fmi2)
     slaves = {}
     for instance, fmu in job["fmus"].items():
         slave = slaves[instance] = fmi2.Fmi2Slave(fmu["path"], model_identifier=fmu["identifier"])
-        slave.instantiate(instance, fmi2.Fmi2Type.CO_SIMULATION, guid=fmu["guid"])
+        slave.instantiate(
+            instance,
+            fmi2.Fmi2Type.CO_SIMULATION,
+            guid=fmu["guid"],
+            cannot_use_memory_management_functions=True,  # its own cut pointers to 32 bits
+        )
         slave.setup_experiment(0.0)
         slave.enter_initialization_mode()
         for name, value in job["values"].get(instance, {}).items():
@@ -192,17 +196,6 @@ def in_fmuloader(job: Job) -> list[list[float]]:
         slave.terminate()
         slave.free_instance()
     return rows
-
-
-def whole_pointers(fmi2: Any) -> None:
-    """fmuloader 0.1.2rc0 cuts what its allocateMemory returns to 32 bits, since it does not declare
-    calloc's type: an FMU that takes its memory from the importer then writes to a wrong address."""
-    library = ctypes.CDLL(None)
-    calloc, free = library.calloc, library.free
-    calloc.restype, calloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t, ctypes.c_size_t]
-    free.restype, free.argtypes = None, [ctypes.c_void_p]
-    fmi2._ALLOCATE_FUNC = fmi2._fmi2CallbackAllocateMemory(calloc)
-    fmi2._FREE_FUNC = fmi2._fmi2CallbackFreeMemory(free)
 
 
 # ---------------------------------------------------------------------------- the process

@@ -127,6 +127,7 @@ class Single:
         guid: bytes | None = None,
         logging: bool = True,
         memory: bool = True,
+        half: bool = False,
         room: bool = True,
     ) -> None:
         self.library, self.time = library, 0.0
@@ -137,7 +138,7 @@ class Single:
         self.callbacks = Callbacks(
             LOGGER(self._logged),
             ALLOCATE(self._allocate) if memory else ALLOCATE(0),
-            FREE(self._free) if memory else FREE(0),
+            FREE(self._free) if memory and not half else FREE(0),
         )
         guid = library.description.guid.encode() if guid is None else guid
         self.handle = c_void_p(

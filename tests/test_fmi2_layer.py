@@ -61,7 +61,7 @@ def test_the_library_says_what_it_is(pendulum):
         ({"guid": b"100%s%n"}, "GUID is 100%s%n"),
         ({"name": b""}, "name is empty"),
         ({"name": None}, "name is empty"),
-        ({"memory": False}, "allocateMemory"),
+        ({"half": True}, "freeMemory one is missing"),
         ({"kind": 7}, "neither"),
         ({"room": False}, "no memory"),
     ],
@@ -94,6 +94,20 @@ def test_memory_is_one_block_and_is_given_back(pendulum):
     one.free()
     one.free()
     assert not one.blocks
+
+
+def test_an_importer_may_leave_memory_to_the_fmu(pendulum):
+    """Without the two callbacks it takes and gives back its own, states included, and runs alike."""
+    one, other = pendulum(memory=False).start(), pendulum().start()
+    state = one.saved()
+    for _ in range(3):
+        for each in (one, other):
+            each.step(0.1)
+    assert one.outputs() == other.outputs()
+    assert one.allocations == 0
+    one.does("FreeFMUstate", byref(state))
+    one.does("Terminate")
+    one.free()
 
 
 # ---------------------------------------------------------------------------- life cycle

@@ -16,6 +16,7 @@
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "digits.h"
@@ -176,9 +177,15 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     Why text;
     (void)fmuResourceLocation; /* nothing is read from there */
     (void)visible;
-    if (functions == NULL || functions->allocateMemory == NULL || functions->freeMemory == NULL)
+    if (functions == NULL) return NULL; /* not even a logger */
+    fmi2CallbackFunctions callbacks = *functions;
+    if ((callbacks.allocateMemory == NULL) != (callbacks.freeMemory == NULL))
         return none(functions, instanceName,
-                    "fmi2Instantiate: the callbacks allocateMemory and freeMemory are needed");
+                    "fmi2Instantiate: of the callbacks allocateMemory and freeMemory one is missing");
+    if (callbacks.allocateMemory == NULL) { /* an importer that leaves memory to the FMU */
+        callbacks.allocateMemory = calloc;
+        callbacks.freeMemory = free;
+    }
     if (instanceName == NULL || instanceName[0] == '\0')
         return none(functions, instanceName, "fmi2Instantiate: the instance name is empty");
     if (fmuGUID == NULL || strcmp(fmuGUID, MODEL_GUID) != 0) {
@@ -196,7 +203,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     (void)arena_take(&arena, name_size, 1);
     instance_layout(&draft, &arena);
     const size_t size = arena.used;
-    arena = (Arena){functions->allocateMemory(1, size), 0};
+    arena = (Arena){callbacks.allocateMemory(1, size), 0};
     if (arena.base == NULL) {
         (void)fail(&text, "fmi2Instantiate: no memory for %lu bytes", (unsigned long)size);
         return none(functions, instanceName, text.text);
@@ -206,7 +213,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     char *name = arena_take(&arena, name_size, 1);
     memcpy(name, instanceName, name_size);
     instance_layout(&c->instance, &arena);
-    c->callbacks = *functions;
+    c->callbacks = callbacks;
     c->name = name;
     c->logging = loggingOn ? ~0u : 0u;
     c->instance.tell = told;
