@@ -49,6 +49,9 @@ def first(target: str, platforms: Sequence[str]) -> bool:
 
 
 def main(
+    models: Annotated[
+        list[str] | None, typer.Argument(help="Names of files in models/; all of them if left out.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for python/ and native/NAME.fmu.")] = Path(
         "dist"
     ),
@@ -57,7 +60,7 @@ def main(
         typer.Option(metavar="all|host|NAME...", help="Where native FMUs can run; repeatable."),
     ] = None,
 ) -> None:
-    """Build and verify every model in models/, for both targets."""
+    """Build and verify the models in models/, for both targets."""
     console = Console(width=None if sys.stdout.isatty() else 120)
     places = tuple(platforms or [HOST])
     targets = TARGETS if find_compiler() is not None else ("python",)
@@ -83,7 +86,12 @@ def main(
     table.add_column("verdict")
     problems: list[str] = []
     files: list[ModelFile] = []
+    for name in models or ():
+        if not (MODELS / f"{name}.py").is_file():
+            problems.append(f"there is no models/{name}.py")
     for path in sorted(MODELS.glob("*.py")):
+        if models and path.stem not in models:
+            continue
         try:
             files.append(load(path))
         except LagfmuError as error:

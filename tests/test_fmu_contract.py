@@ -118,7 +118,7 @@ def test_names_are_those_of_the_design(name, xml, prepared):
     assert found == expected
     for c in q:
         shares = [v for v in variables(xml) if re.fullmatch(rf"Q\.({constraints})\.{c}", v)]
-        assert shares or name in ("Hemisphere", "RotatingWire", "KnifeEdge")
+        assert bool(shares) == any(q[j] == c for _, j in prepared(name).equations.G.todok())
 
 
 UNITS = {
@@ -244,6 +244,13 @@ APPROX = {
     "KnifeEdge": {"der(x)", "der(y)"},  # no position constraint; phi is not in the blade's row
     "Atwood": {"x1", "x2", "der(x1)", "der(x2)"},
     "CartPendulum": {"s", "x", "y", "der(s)", "der(x)", "der(y)"},
+    "BouncingBall": {"y", "der(y)"},
+    "Chain": {f(c + str(k)) for c in "xy" for k in (1, 2, 3, 4) for f in (str, "der({})".format)},
+    "DoublePendulum": {f(c + k) for c in "xy" for k in "12" for f in (str, "der({})".format)},
+    "Ladder": {"x", "y", "theta", "der(x)", "der(y)", "der(theta)"},
+    "Loop": {"x", "y", "der(x)", "der(y)"},
+    "RollingSphere": {"r", "der(r)", "der(theta)", "der(phi)"},  # rolling ties velocities alone
+    "SliderCrank": {"phi", "x", "der(phi)", "der(x)"},  # the load y hangs on the spring
 }
 
 
@@ -481,7 +488,7 @@ def test_a_second_experiment_after_reset_gives_the_same_numbers(path):
         one.fmu.terminate()
         one.fmu.reset()
         parameter = one.description.modelVariables[0].name
-        one.start({parameter: 1.25, "solver.method": "rk4"})
+        one.start({parameter: 1.25, "solver.method": "dopri5"})
         assert record(one) != first
         one.fmu.reset()
         one.start()

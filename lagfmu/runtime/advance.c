@@ -80,6 +80,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     if ((watch || i->t > t_end) && leg_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (leg_project(s, i->t, y1) != OK) return FAILED;
+    if (leg_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
     if (watch && events_find(s, y1) != OK) return FAILED;
     integrator_move(i, y1);
     s->state.now.steps += 1;

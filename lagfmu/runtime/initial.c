@@ -112,7 +112,7 @@ static Status project_from_afar(const Start *x, double *q, int *rows) {
         if (count == ITERATIONS) break;
         for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
         if (linear_factor(&b->linear, b->M, b->G, rows) == FAILED) break;
-        if (linear_solve(&b->linear, NULL, f_trial, step, NULL) == FAILED) break;
+        if (linear_nearest(&b->linear, f_trial, step) == FAILED) break;
         double damping = 1;
         int halvings = 0;
         for (; halvings < HALVINGS; halvings++, damping /= 2) {

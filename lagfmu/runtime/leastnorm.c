@@ -117,7 +117,7 @@ static void substitute(Linear *l, const double *b, const double *c, double *x, d
 Status least_norm_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     Whole w = whole_view(l);
     double most = right(l, &w, b, c);
-    for (int i = w.cod.rank; i < w.cod.rows; i++)
+    for (int i = w.cod.rank; i < w.cod.rows && !l->nearest; i++)
         if (fabs(w.z[i]) > CONSISTENT * most)
             return fail(l->why, "the constraints contradict each other at this state");
     substitute(l, b, c, x, lambda);

@@ -11,6 +11,8 @@
 static const double FEWEST_STEPS_RK4 = 100;  /* in one natural time of the motion, 1/rate, ... */
 static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
 static const double SAFETY = 0.25; /* of the tolerance: errors of many steps add up */
+static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may move the state: times the
+                                                  * tolerance, and at least, relative to the state */
 static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the state: it means nothing */
 
 void leg_begin(Solver *s) { system_active(s->system, s->state.closed, s->active); }
@@ -79,6 +81,21 @@ Status leg_prepare_dense(Solver *s, Integrator *i) {
 Status leg_project(Solver *s, double t, double *y) {
     return mechanism_project(&s->stepped, leg_instant(s, t), y, y + s->system->n, s->active,
                              s->state.offset, s->state.size);
+}
+
+Status leg_check_projection(Solver *s, double t, const double *y, const double *projected) {
+    const int n = s->system->n;
+    const double far = fmax(FAR * s->settings.tolerance, LEAST_FAR);
+    if (s->integrator.method->fixed) return OK;
+    for (int j = 0; j < 2 * n; j++) {
+        const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
+        if (!(fabs(projected[j] - y[j]) <= far * fmax(fabs(y[j]), size)))
+            return fail(&s->why,
+                        "the integration stops at t = %.17g s, the projection onto the constraints "
+                        "moves %s by %.3g: the configuration is singular, or nearly so",
+                        t, s->system->coordinates[j % n], projected[j] - y[j]);
+    }
+    return OK;
 }
 
 Status leg_indicators(Solver *s, double t, const double *y, double *values) {

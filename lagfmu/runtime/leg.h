@@ -23,6 +23,10 @@ Status leg_prepare_dense(Solver *s, Integrator *i);
 /* y (2 n) moved onto the constraints. */
 Status leg_project(Solver *s, double t, double *y);
 
+/* FAILED if the projection after an adaptive step moved the state by far more than the step's error
+ * can be: next to a singular configuration the constraints lead to another branch. */
+Status leg_check_projection(Solver *s, double t, const double *y, const double *projected);
+
 /* One a contact: lambda while closed, f - offset while open. */
 Status leg_indicators(Solver *s, double t, const double *y, double *values);
 

@@ -30,6 +30,7 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     schur_layout(l, arena);
     l->dense = NULL;
     l->pivots = NULL;
+    l->nearest = 0;
     if (n + m > DENSE_MOST) return;
     size_t doubles = larger(larger(kkt_doubles(n, m), weighted_doubles(n, m)),
                             least_norm_doubles(n, m));
@@ -163,5 +164,12 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
         status = check_right(l, b, c) != OK
                      ? FAILED
                      : fail(l->why, "the accelerations overflow at this state");
+    return status;
+}
+
+Status linear_nearest(Linear *l, const double *c, double *x) {
+    l->nearest = 1;
+    const Status status = linear_solve(l, NULL, c, x, NULL);
+    l->nearest = 0;
     return status;
 }

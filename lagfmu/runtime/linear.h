@@ -28,6 +28,7 @@ typedef struct {
     double *sparse;       /* workspace of schur.c */
     double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
     int *pivots;
+    int nearest;          /* 1 within linear_nearest() */
 } Linear;
 
 enum { DENSE_MOST = 600 }; /* n + m up to which the dense rungs are there */
@@ -42,5 +43,10 @@ Status linear_factor(Linear *l, const double *M, const double *G, const int *act
 /* x (n) and lambda (m; 0 where a row does not act).  c is read where rows act; b may be NULL (zero).
  * lambda may be NULL.  FAILED: dependent rows contradict each other, or the result overflows. */
 Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+
+/* x (n) of least size in the metric of M with G x = c, for a projection.  Where dependent rows
+ * contradict each other, as those of c do that is nothing but rounding, c is met as nearly as can be
+ * (least squares in rows of comparable units). */
+Status linear_nearest(Linear *l, const double *c, double *x);
 
 #endif

@@ -83,7 +83,7 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
         if ((stale || count == 0) &&
             linear_factor(&b->linear, b->M, b->G, b->fixed) == FAILED)
             return FAILED;
-        if (linear_solve(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
+        if (linear_nearest(&b->linear, b->f, b->dq) == FAILED) return FAILED;
         for (int j = 0; j < b->system->n; j++) q[j] += b->dq[j];
         before = miss.error;
     }
@@ -100,7 +100,7 @@ static Status project_velocities(Mechanism *b, double *v, const int *active) {
     }
     if (rounding) return OK;
     if (linear_factor(&b->linear, b->M, b->G, active) == FAILED) return FAILED;
-    if (linear_solve(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
+    if (linear_nearest(&b->linear, b->f, b->dq) == FAILED) return FAILED;
     for (int j = 0; j < s->n; j++) v[j] += b->dq[j];
     return OK;
 }

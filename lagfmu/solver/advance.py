@@ -31,6 +31,7 @@ from .system import System, Vector
 LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
 DIPS, SHALLOW = 3, 0.1  # parabolas drawn, and how low, of the looks, they must go to be looked into
 ROUNDS = 50  # in which an impact is passed on between contacts that touch
+FAR, LEAST_FAR = 1e3, 1e-6  # how far a projection may move the state: times the tolerance, and at least
 HOPELESS = 1.0  # error of one rk4 step, relative to the state, at which it means nothing
 CHATTER = 200  # contact events in next to no time after which the step is given up
 PATIENCE = 200  # steps after which a communication step is judged by its average step
@@ -118,6 +119,21 @@ class _Leg:
         q, v = self.split(y)
         return np.concatenate(project(self.at(t), q, v, self.rows, self.offset, self.size))
 
+    def check_projection(self, t: float, y: Vector, projected: Vector) -> None:
+        """Raises StepFailureError if the projection after an adaptive step moved the state by far more
+        than the step's error can be: next to a singular configuration it leads to another branch."""
+        far = max(FAR * self.settings.tolerance, LEAST_FAR)
+        unit = np.maximum(np.abs(y), np.concatenate([self.size, self.size * self.state.rate]))
+        moved = np.abs(projected - y)
+        if self.settings.method == "rk4" or (moved <= far * unit).all():
+            return
+        j = int((moved / unit).argmax())
+        raise StepFailureError(
+            f"the integration stops at t = {float(t)!r} s, the projection onto the constraints moves "
+            f"{self.system.coordinates[j % self.system.n]} by {float(projected[j] - y[j]):.3g}: "
+            "the configuration is singular, or nearly so"
+        )
+
     def indicators(self, t: float, y: Vector) -> Vector:
         """One a contact: lambda while closed, f while open."""
         q, v = self.split(y)
@@ -186,6 +202,7 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
         leg.step(solver)
         steps += 1
         y1 = leg.project(solver.t, solver.y)
+        leg.check_projection(solver.t, solver.y, y1)
         if watch:
             event, before = _first_event(leg, solver, t0, y0, y1, before, armed, state.gap)
             if event is not None:

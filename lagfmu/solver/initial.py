@@ -115,7 +115,7 @@ def project_from_afar(
         if (np.abs(f) <= 4 * EPS * unit).all():
             return q
         try:
-            step = solve(M, np.zeros(at.system.n), G[fixed], -f).x
+            step = solve(M, np.zeros(at.system.n), G[fixed], -f, nearest=True).x
         except StepFailureError:
             break
         for damping in 2.0 ** -np.arange(25):

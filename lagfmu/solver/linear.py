@@ -40,14 +40,18 @@ class Solution:
     unique: NDArray[np.bool_]
 
 
-def solve(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
+def solve(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool = False) -> Solution:
     """x (n) and lambda (m) of M x = b + G^T lambda, G x = c.
+
+    `nearest`, for a projection: where dependent rows contradict each other, as those of a c do that is
+    nothing but rounding, c is met as nearly as can be (least squares in rows of comparable units).
 
     Raises StepFailureError if a value is not finite, the mass matrix is singular on the constraint
     surface, or dependent constraints contradict each other.
     """
     _check_finite(M, b, G, c)
-    found = _schur(M, b, G, c) or _kkt(M, b, G, c) or _orthogonal(M, b, G, c)
+    found = _schur(M, b, G, c) or _kkt(M, b, G, c)
+    found = found or _orthogonal(M, b, G, c, nearest)
     if not (np.isfinite(found.x).all() and np.isfinite(found.lam).all()):
         raise StepFailureError("the accelerations overflow at this state")
     return found
@@ -184,10 +188,10 @@ def _kkt(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
     return Solution(z[:n], -z[n:], np.ones(m, dtype=bool))
 
 
-def _orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
+def _orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool) -> Solution:
     factor = _mass_factor(M)
     if factor is None:
-        return _least_norm(M, b, G, c)
+        return _least_norm(M, b, G, c, nearest)
     L, s = factor
     W = _half_solve(L, (G * s).T)
     r = np.sqrt(np.einsum("ij,ij->j", W, W))
@@ -208,7 +212,7 @@ def _orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
     x, lam, right = substitute(b, c)
     size = np.abs(c / r).max(initial=0) + np.abs(right).max(initial=0)
     size += np.abs(_half_solve(L, (b + G.T @ lam) * s)).max(initial=0)
-    if len(null) and np.abs(null @ right).max() > CONSISTENT * size:
+    if not nearest and len(null) and np.abs(null @ right).max() > CONSISTENT * size:
         raise StepFailureError(
             "the constraints contradict each other at this state: dependent rows of G ask for "
             "different accelerations"
@@ -225,7 +229,7 @@ def _orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
     return Solution(x, lam, unique)
 
 
-def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
+def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool) -> Solution:
     """Dependent constraints and a massless coordinate together: the KKT matrix's least norm."""
     n, m = len(b), len(c)
     K = np.block([[M, G.T], [G, np.zeros((m, m))]])
@@ -239,7 +243,8 @@ def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
             "nor a constraint that determines its acceleration"
         )
     right = np.concatenate([b, c]) * d
-    if np.abs(U[:, ~keep].T @ right).max(initial=0) > CONSISTENT * np.abs(right).max():
+    missed = 0.0 if nearest else np.abs(U[:, ~keep].T @ right).max(initial=0)
+    if missed > CONSISTENT * np.abs(right).max():
         raise StepFailureError("the constraints contradict each other at this state")
     z = Vt[keep].T @ ((U[:, keep].T @ right) / sigma[keep]) * d
     return Solution(z[:n], -z[n:], (np.abs(null[:, n:]) < 1e-8).all(axis=0))

@@ -87,7 +87,7 @@ def project(
                 f"{', '.join(map(repr, worst))} (missed by {miss.max():.3g}): take smaller steps"
             )
         before = error
-        q = q + solve(M, np.zeros(at.system.n), G[fixed], -f).x
+        q = q + solve(M, np.zeros(at.system.n), G[fixed], -f, nearest=True).x
         M, _, G, nu, _ = at.evaluate(q, v)
     slip = nu[rows] - G[rows] @ v
-    return q, v + solve(M, np.zeros(at.system.n), G[rows], slip).x
+    return q, v + solve(M, np.zeros(at.system.n), G[rows], slip, nearest=True).x

@@ -1,0 +1,245 @@
+"""The bench on which probes run: instances, natural times, the ordinary run, comparisons.
+
+The natural rate of the motion at a start is the largest of |v|/size and sqrt(|vdot|/size) over the
+coordinates, size being the largest of |q| and the parameters of its unit.  A probe lasts as many natural
+times as the FMU's default experiment does at its default values.
+
+Two runs that must agree are compared with what the problem itself makes of small changes: a third
+run, whose start values are shifted by SHIFT of their size, shows the amplification; a difference is
+right up to SAFETY * tol * max(1, N) times (1 + amplification so far), relative to the largest magnitude of the
+column.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .claims import statements
+from .facts import Facts, facts_of
+from .judge import Check, invariants
+from .player import Drive, Player, RefusalError, Run, Values, play
+
+SHIFT = 1e-6
+SAFETY = 30.0
+REFERENCE = 1e-13
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What came of a probe: its checks, or what refused it; `note` for the reader."""
+
+    checks: tuple[Check, ...]
+    refusal: RefusalError | None = None
+    note: str = ""
+
+
+class Bench:
+    """An FMU unpacked, with one instance for runs.  Use it in a `with` statement."""
+
+    def __init__(self, path: Path, quick: bool) -> None:
+        self.facts: Facts = facts_of(path)
+        self.quick = quick
+        self.forms = statements(self.facts.claims, {i.name for i in self.facts.inputs})
+        self.folder = Path(fmpy.extract(str(path)))
+        self._player: Player | None = None
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._player is not None:
+            self._player.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    @property
+    def player(self) -> Player:
+        """The instance that runs, reset before each."""
+        if self._player is None:
+            self._player = Player(self.facts, self.folder)
+        return self._player
+
+    @contextlib.contextmanager
+    def another(self, name: str) -> Iterator[Player]:
+        """A further instance."""
+        one = Player(self.facts, self.folder, name)
+        try:
+            yield one
+        finally:
+            one.close()
+
+    @property
+    def points(self) -> int:
+        """Communication steps of a run."""
+        return 20 if self.quick or self.facts.target == "python" else 100
+
+    # ------------------------------------------------------------------ natural times
+
+    def first(self, values: Values) -> Mapping[str, Any]:
+        """The outputs after the initialization.  Raises RefusalError."""
+        try:
+            self.player.begin(values, None)
+            return self.player.read()
+        except RefusalError:
+            self.player.renew()
+            raise
+
+    def rate(self, values: Values) -> float:
+        """The natural rate [1/s] of the motion at these start values; 0 at rest.  Raises RefusalError."""
+        seen = self.first(values)
+        known = {p.name: float(values.get(p.name, p.start)) for p in self.facts.parameters}
+        largest = 0.0
+        for q in self.facts.coordinates:
+            size = max(abs(seen[q]), self.facts.same_unit(q, known)) or 1.0
+            v, vdot = abs(seen[f"der({q})"]), abs(seen[f"der({q},2)"])
+            largest = max(largest, v / size, float(np.sqrt(vdot / size)))
+        return largest if np.isfinite(largest) else 0.0
+
+    @cached_property
+    def ordinary_rate(self) -> float:
+        """The natural rate [1/s] at the default values."""
+        return self.rate({}) or 1.0 / self.facts.stop_time
+
+    def span(self, values: Values) -> float:
+        """The time [s] in which at these values happens what the default experiment shows."""
+        rate = self.rate(values)
+        return self.facts.stop_time * (self.ordinary_rate / rate if rate > 0 else 1.0)
+
+    # ------------------------------------------------------------------ runs
+
+    def times(self, stop: float, points: int | None = None) -> list[float]:
+        """0 ... stop in equal steps."""
+        count = points or self.points
+        return [stop * k / count for k in range(count + 1)]
+
+    def run(
+        self,
+        values: Values,
+        times: list[float],
+        tolerance: float | None = None,
+        drive: Drive | None = None,
+    ) -> Run:
+        """A run on the bench's instance."""
+        return play(self.player, values, times, tolerance, drive)
+
+    def checks(self, run: Run, span: float | None = None) -> list[Check]:
+        """The invariants; `span` [s] is what counts as the default experiment at these values."""
+        return invariants(self.facts, run, self.forms, self.elapsed(run, span))
+
+    def elapsed(self, run: Run, span: float | None = None) -> NDArray[np.float64]:
+        """Natural times up to each point, in units of those of the default experiment."""
+        steady = run.rows["time"] / (span or self.facts.stop_time)
+        return np.maximum(steady, self._counted(run) / self._whole)
+
+    @cached_property
+    def _whole(self) -> float:
+        try:
+            count = float(self._counted(self.ordinary)[-1])
+        except RefusalError:
+            count = 0.0
+        return max(count, 1.0)
+
+    def _counted(self, run: Run) -> NDArray[np.float64]:
+        """The integral of the natural rate over time."""
+        rate = np.zeros(len(run.rows))
+        with np.errstate(all="ignore"):
+            for q in self.facts.coordinates:
+                size = np.maximum(np.abs(run.rows[q]), self.facts.same_unit(q, run.values))
+                size = np.where(size > 0, size, 1.0)
+                v, vdot = np.abs(run.rows[f"der({q})"]), np.abs(run.rows[f"der({q},2)"])
+                rate = np.maximum(rate, np.maximum(v / size, np.sqrt(vdot / size)))
+            parts = np.diff(run.rows["time"]) * (rate[1:] + rate[:-1]) / 2
+        return np.nan_to_num(np.concatenate([[0.0], np.cumsum(parts)]))[: len(rate)]
+
+    def judged(self, run: Run, span: float | None = None, note: str = "") -> Finding:
+        """Invariants of what was reached, and the refusal if there was one."""
+        return Finding(tuple(self.checks(run, span)), run.refusal, note)
+
+    @cached_property
+    def ordinary(self) -> Run:
+        """The default experiment.  Raises RefusalError."""
+        run = self.run({}, self.times(self.facts.stop_time))
+        if run.refusal is not None:
+            raise run.refusal
+        return run
+
+    @cached_property
+    def amplification(self) -> NDArray[np.float64]:
+        """Of the default experiment, at its points."""
+        return self.amplified({}, self.ordinary)
+
+    def amplified(self, values: Values, run: Run) -> NDArray[np.float64]:
+        """How much a relative change of the start values by SHIFT has grown, up to each point."""
+        given: dict[str, float | str] = dict(values)
+        seen = {n: run.rows[n][0] for n in run.rows.dtype.names or ()}
+        for k, s in enumerate(self.facts.starts):
+            own = float(seen[s.name])
+            size = max(abs(own), self.facts.same_unit(s.name, run.values))
+            given[s.name] = own + SHIFT * (1 - 0.3 * (k % 3)) * size
+        other = self.run(given, run.rows["time"].tolist(), min(run.tolerance, REFERENCE))
+        growth = np.ones(len(run.rows))
+        common = min(len(other.rows), len(run.rows))
+        if common == 0:
+            return growth
+        for error in self.differences(run, other, common).values():
+            growth[:common] = np.maximum(growth[:common], error / SHIFT)
+        return np.maximum.accumulate(growth)
+
+    def differences(
+        self, run: Run, other: Run, count: int | None = None
+    ) -> dict[str, NDArray[np.float64]]:
+        """Of coordinates, velocities, lambda and Q, relative to the largest magnitude of their unit.
+
+        Where contacts differ beside an event only their own delay is seen: one such point is left out.
+        """
+        facts, found = self.facts, {}
+        n = len(run.rows) if count is None else count
+        a, b = run.rows[:n], other.rows[:n]
+        alike = np.ones(n, dtype=bool)
+        for c in facts.contacts:
+            differ = np.asarray(a[f"contact.{c}"] != b[f"contact.{c}"])
+            alone = differ.copy()
+            alone[1:] &= ~differ[:-1]
+            alone[:-1] &= ~differ[1:]
+            alike &= ~alone
+        groups = [facts.coordinates, [f"der({q})" for q in facts.coordinates]]
+        groups += [[f"lambda.{c}" for c in facts.constraints]]
+        groups += [[f"Q.{q}" for q in facts.coordinates if f"Q.{q}" in facts.variables]]
+        for names in groups:
+            largest = {x: float(np.abs(a[x]).max(initial=0.0)) for x in names}
+            for x in names:
+                peers = [
+                    largest[y] for y in names if facts.dimensions[y] == facts.dimensions[x]
+                ]
+                scale = max(*peers, facts.same_unit(x, run.values)) or 1.0
+                found[x] = np.where(alike, np.abs(a[x] - b[x]), 0.0) / scale
+        return found
+
+    def agreement(
+        self,
+        run: Run,
+        other: Run,
+        growth: NDArray[np.float64],
+        what: str,
+        span: float | None = None,
+    ) -> list[Check]:
+        """Two runs over the same points, with the tolerances that they have."""
+        common = min(len(run.rows), len(other.rows), len(growth))
+        tolerance = max(run.tolerance, other.tolerance)
+        grown = np.maximum(1.0, self.elapsed(run, span)[:common]) * (1 + growth[:common])
+        allowed = SAFETY * max(tolerance, 1e-13) * grown
+        worst = Check(what, 0.0, 1.0)
+        for name, error in self.differences(run, other, common).items():
+            k = int(np.argmax(error / allowed))
+            one = Check(f"{what}: {name}", float(error[k]), float(allowed[k]))
+            worst = max(worst, one, key=lambda c: c.ratio)
+        return [worst]

@@ -1,0 +1,74 @@
+"""Inputs that jump, chatter, are huge or no numbers."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from .bench import Bench, Finding
+from .facts import Facts
+from .judge import Check
+from .player import RefusalError
+from .probe import Probe
+
+FAMILY = "inputs"
+SHAPES = ("jumps", "chatters", "a spike")
+
+
+def probes(facts: Facts, quick: bool) -> list[Probe]:
+    """The probes of this family: none without inputs."""
+    found = []
+    for i in facts.inputs:
+        for shape in SHAPES:
+            for size in (1.0, 1e6) if quick else (1e-9, 1.0, 1e3, 1e6, 1e12):
+                name = f"{i.name} {shape}, {size:g}"
+                found.append(Probe(FAMILY, name, partial(_driven, i.name, shape, size), size > 1))
+        for value in (float("nan"), float("inf"), -float("inf")):
+            found.append(Probe(FAMILY, f"{i.name} = {value:g}", partial(_not_finite, i.name, value)))
+    return found
+
+
+def _driven(name: str, shape: str, size: float, bench: Bench) -> Finding:
+    stop = bench.facts.stop_time
+    times = bench.times(stop, 60)
+    rest = {i.name: i.start for i in bench.facts.inputs}
+
+    def drive(t: float) -> dict[str, float]:
+        k = round(60 * t / stop)
+        value = {
+            "jumps": size * (0, 1, -1)[k // 20 % 3],
+            "chatters": size * (-1.0) ** k,
+            "a spike": size * float(k == 30),
+        }[shape]
+        return rest | {name: value}
+
+    run = bench.run({}, times, None, drive)
+    checks = bench.checks(run)
+    if run.refusal is None:
+        again = bench.run({}, times, None, drive)
+        same = again.rows.tobytes() == run.rows.tobytes()
+        checks.append(Check("same bits again", float(not same), 0.5))
+    return Finding(tuple(checks), run.refusal)
+
+
+def _not_finite(name: str, value: float, bench: Bench) -> Finding:
+    """It must be refused; what goes on is as if it had not been set."""
+    h = bench.facts.step_size
+    with bench.another("untouched") as one:
+        one.begin({}, None)
+        one.step(h)
+        one.step(h)
+        right = one.read()
+    with bench.another("touched") as one:
+        one.begin({}, None)
+        one.step(h)
+        refusal: RefusalError | None = None
+        try:
+            one.set({name: value})
+        except RefusalError as error:
+            refusal = error
+        checks = [Check("refused", 0.0 if refusal else 1.0, 0.5)]
+        if refusal is not None and refusal.status != 4:  # after fmi2Fatal nothing may be called
+            one.step(h)
+            differ = [n for n, v in one.read().items() if v != right[n]]
+            checks.append(Check("as untouched: " + ", ".join(differ), float(len(differ)), 0.5))
+    return Finding(tuple(checks), refusal)

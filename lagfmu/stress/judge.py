@@ -1,0 +1,199 @@
+"""What must hold in every run, whatever its parameters: the invariants of Lagrange's equations.
+
+  finite       every output that came with fmi2OK is a finite number
+  shares       Q.q = sum of Q.c.q over the constraints c, to rounding of the summands
+  residual     |f| (or |G v - nu|) of what acts is at rounding: at most ROUNDING of its own size,
+               the sum over q of |G_q| max(|q| so far, its start, parameters of its unit), with
+               G_q = Q.c.q / lambda.c as the FMU itself reports it
+  push         lambda >= 0 while a contact is closed, within 10 tol of the largest |lambda|
+  no pull      lambda = 0, exactly, while it is open: f lambda = 0
+  outside      f >= 0 while it is open, within the gap of 1e-9 of f's own size in which it touches
+  claims       the closed forms and conserved quantities (claims.py)
+
+Each comes as an error and what is allowed; the run is right if no error exceeds what it is allowed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .claims import Statement, undisturbed
+from .facts import Facts
+from .player import Run
+
+EPS = float(np.finfo(float).eps)
+ROUNDING = 200 * EPS  # of a residual, relative to its own size
+GAP = 4e-9  # of f's own size: nearer than a quarter of that a contact touches
+Column = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Check:
+    """An error, and the largest one that is right."""
+
+    what: str
+    error: float
+    allowed: float
+
+    @property
+    def ratio(self) -> float:
+        """Error over what is allowed: above 1 it is wrong."""
+        if not np.isfinite(self.error):
+            return float("inf")
+        return self.error / self.allowed if self.allowed > 0 else float(self.error > 0) * np.inf
+
+
+def invariants(
+    facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Column
+) -> list[Check]:
+    """All checks of a run, at the points that were reached; `elapsed` as in claims.py."""
+    if len(run.rows) == 0:
+        return []
+    bad = [n for n in run.rows.dtype.names or () if not np.isfinite(run.rows[n]).all()]
+    checks = [Check("finite" + "".join(f" {n}" for n in bad), float(len(bad)), 0.5)]
+    if bad:
+        return checks
+    checks += _shares(facts, run)
+    sizes = {c: _size(facts, run, c) for c in facts.constraints}
+    checks += _residuals(facts, run, sizes)
+    checks += _contacts(facts, run, sizes)
+    if lost(facts, run):
+        return checks
+    before, floors = first_landing(facts, run), magnitudes(facts, run)
+    for form in undisturbed(run, tuple(forms)):
+        error, allowed, points = form.judge(run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors)
+        if points:
+            checks.append(Check(form.claim.name, error, allowed))
+    return checks
+
+
+def lost(facts: Facts, run: Run) -> str:
+    """The coordinate so large that its rounding is above the tolerance of the motion, or nothing.
+
+    There a motion has no digits, and what it should be cannot be said: only what holds at each instant.
+    """
+    for q in facts.coordinates:
+        largest = float(np.abs(run.rows[q]).max(initial=abs(run.values.get(q, 0.0))))
+        angle = facts.dimensions[q][-1] == 1
+        size = 1.0 if angle else facts.same_unit(q, run.values) or facts.usual(q)
+        if EPS * largest > max(run.tolerance, 1e-13) * size:
+            return q
+    return ""
+
+
+def wound(facts: Facts, run: Run) -> Column:
+    """The largest angle so far [rad], at least 1: its error is relative, that of its sine is not."""
+    largest = np.ones(len(run.rows))
+    for q in facts.coordinates:
+        if facts.dimensions[q][-1] == 1:
+            largest = np.maximum(largest, np.maximum.accumulate(np.abs(run.rows[q])))
+    return largest
+
+
+def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
+    """The points before a contact closes again: an impact takes energy, and a start's claims end."""
+    landed = np.zeros(len(run.rows), dtype=bool)
+    for c in facts.contacts:
+        closed = np.asarray(run.rows[f"contact.{c}"], dtype=bool)
+        landed[1:] |= closed[1:] & ~closed[:-1]
+    return ~np.logical_or.accumulate(landed)
+
+
+def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
+    """The magnitude that a coordinate's or velocity's error is relative to, at the least."""
+    found = {}
+    for q in facts.coordinates:
+        found[q] = facts.same_unit(q, run.values)
+        rate = f"der({q})"
+        peers = [f"der({p})" for p in facts.coordinates]
+        found[rate] = max(
+            float(np.abs(run.rows[p]).max())
+            for p in peers
+            if facts.dimensions[p] == facts.dimensions[rate]
+        )
+    return found
+
+
+def _worst(what: str, error: Column, allowed: Column) -> Check:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(error > 0, error / allowed, 0.0)
+    k = int(np.argmax(ratio))
+    return Check(what, float(error[k]), float(allowed[k]))
+
+
+def _shares(facts: Facts, run: Run) -> list[Check]:
+    checks = []
+    for q in facts.coordinates:
+        if f"Q.{q}" not in facts.variables:
+            continue
+        shares = [
+            run.rows[name] for c in facts.constraints if (name := facts.share(c, q)) is not None
+        ]
+        total = sum(shares, np.zeros(len(run.rows)))
+        size = sum((np.abs(s) for s in shares), np.zeros(len(run.rows)))
+        allowed = 4 * (1 + len(shares)) * EPS * size + np.finfo(float).tiny
+        checks.append(_worst(f"shares of Q.{q}", np.abs(run.rows[f"Q.{q}"] - total), allowed))
+    return checks
+
+
+def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
+    """The size of f, or of G v - nu, up to each row; None where lambda never shows G."""
+    rows, lam = run.rows, run.rows[f"lambda.{constraint}"]
+    acting = np.abs(lam) > np.finfo(float).tiny / EPS
+    if not acting.any():
+        return None
+    size = np.zeros(len(rows))
+    for q in facts.coordinates:
+        share = facts.share(constraint, q)
+        if share is None:
+            continue
+        column, name = rows[q], q
+        if facts.rates(constraint):
+            name = f"der({q})"
+            column = rows[name]
+        least = max(facts.same_unit(name, run.values), abs(run.values.get(name, 0.0)))
+        G = np.abs(rows[share] / np.where(acting, lam, 1.0))
+        size += np.where(acting, G, G[acting].max()) * np.maximum(
+            np.maximum.accumulate(np.abs(column)), least
+        )
+    return np.where(size > 0, size, 1.0)
+
+
+def acts(facts: Facts, run: Run, constraint: str) -> NDArray[np.bool_]:
+    """A contact acts while it is closed; what goes with a contact has no multiplier otherwise."""
+    if constraint in facts.contacts:
+        return np.asarray(run.rows[f"contact.{constraint}"], dtype=bool)
+    if facts.contacts:
+        return np.asarray(run.rows[f"lambda.{constraint}"] != 0)
+    return np.ones(len(run.rows), dtype=bool)
+
+
+def _residuals(facts: Facts, run: Run, sizes: Mapping[str, Column | None]) -> list[Check]:
+    checks = []
+    for c in facts.constraints:
+        where, size = acts(facts, run, c), sizes[c]
+        if size is not None and where.any():
+            error = np.where(where, np.abs(run.rows[f"residual.{c}"]), 0.0)
+            checks.append(_worst(f"residual.{c}", error, ROUNDING * size))
+    return checks
+
+
+def _contacts(facts: Facts, run: Run, sizes: Mapping[str, Column | None]) -> list[Check]:
+    checks = []
+    for c in facts.contacts:
+        closed = np.asarray(run.rows[f"contact.{c}"], dtype=bool)
+        lam, f, size = run.rows[f"lambda.{c}"], run.rows[f"residual.{c}"], sizes[c]
+        largest = float(np.abs(lam).max())
+        push = float(np.maximum(-lam[closed], 0.0).max(initial=0.0))
+        allowed = (10 * run.tolerance + 1e-12) * largest + np.finfo(float).tiny
+        checks.append(Check(f"push of {c}", push, allowed))
+        pull = float(np.abs(lam[~closed]).max(initial=0.0))
+        checks.append(Check(f"no pull of {c} in the open", pull, np.finfo(float).tiny))
+        if size is not None and (~closed).any():
+            inside = np.where(closed, 0.0, np.maximum(-f, 0.0))
+            checks.append(_worst(f"outside of {c}", inside, GAP * size))
+    return checks

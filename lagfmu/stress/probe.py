@@ -1,0 +1,69 @@
+"""A probe: one thing that is done to an FMU, and the verdict on what it did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .bench import Bench, Finding
+from .player import RefusalError
+
+RIGHT, REFUSED, WRONG, UNFINISHED = "right", "refused", "wrong", "unfinished"
+
+
+@dataclass(frozen=True)
+class Probe:
+    """`may_refuse`: false for what an FMU has to be able to do, where a refusal is wrong too."""
+
+    family: str
+    name: str
+    do: Callable[[Bench], Finding]
+    may_refuse: bool = True
+
+
+@dataclass(frozen=True)
+class Row:
+    """The verdict on a probe; `closest`: the check that came nearest to its limit, `ratio` of it."""
+
+    family: str
+    probe: str
+    verdict: str
+    detail: str
+    closest: str
+    ratio: float
+    checks: int
+    seconds: float
+
+
+def verdict(probe: Probe, finding: Finding, seconds: float) -> Row:
+    """Wrong if a check fails or a refusal is unclear; else refused, if it was; else right."""
+    worst = max(finding.checks, key=lambda c: c.ratio, default=None)
+    closest, ratio = ("", 0.0) if worst is None else (worst.what, worst.ratio)
+    answer, detail = RIGHT, finding.note
+    if finding.refusal is not None:
+        answer, detail = REFUSED, str(finding.refusal)
+        if not finding.refusal.clear:
+            answer, detail = WRONG, f"refused without a cause: {detail}"
+        elif not probe.may_refuse:
+            answer, detail = WRONG, f"has to be done and is refused: {detail}"
+    elif not finding.checks:
+        answer, detail = WRONG, "nothing could be checked"
+    if worst is not None and not worst.ratio <= 1:
+        failed = [c for c in finding.checks if not c.ratio <= 1]
+        answer = WRONG
+        detail = "; ".join(
+            f"{c.what}: {c.error:.2e}, allowed {c.allowed:.2e}" for c in failed[:4]
+        ) + (f"; and {len(failed) - 4} more" if len(failed) > 4 else "")
+        if finding.refusal is not None:
+            detail += f" (then refused: {finding.refusal})"
+    return Row(
+        probe.family, probe.name, answer, detail, closest, ratio, len(finding.checks), seconds
+    )
+
+
+def attempt(probe: Probe, bench: Bench) -> Finding:
+    """What came of it; a refusal outside a run counts as one."""
+    try:
+        return probe.do(bench)
+    except RefusalError as refusal:
+        return Finding((), refusal)
