@@ -25,6 +25,9 @@ from .prepare import prepare
 from .scene import Scene
 from .show import show as show_prepared
 from .simulate import read_description, simulate
+from .stress.command import LIMIT
+from .stress.command import stress as stress_fmus
+from .stress.probe import WRONG
 from .tradeoff.command import chosen_for, compare
 from .tradeoff.goal import parse
 from .tradeoff.page import section
@@ -254,6 +257,26 @@ def tradeoff(
             repeats,
             scene or (),
         )
+
+
+@app.command()
+def stress(
+    targets: Annotated[
+        list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist/stress"),
+    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Some of the probes only.")] = False,
+    limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = LIMIT,
+) -> None:
+    """Push FMUs to the extremes: each row is right, refused with a clear message, or wrong."""
+    with _plainly():
+        found = stress_fmus(targets, out, console, target.value, scene or (), quick, limit)
+    if any(f.count(WRONG) for f in found):
+        raise typer.Exit(1)
 
 
 def _chosen(file: ModelFile, names: list[str] | None) -> list[Scene]:

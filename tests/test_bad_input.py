@@ -828,13 +828,15 @@ def test_parameters_that_make_the_start_impossible_are_refused_by_name(fmu):
 
 
 def test_bytes_that_are_no_state_are_refused(fmu):
-    """Rubbish and half a state: the instance keeps its own."""
+    """Rubbish, half a state, and one with an altered byte: the instance keeps its own."""
     with instance(fmu("Atwood")) as one:
         one.start()
         one.step(0.1)
         saved = one.fmu.serializeFMUState(one.fmu.getFMUState())
         before = one.outputs()
-        for rubbish in (b"", b"rubbish", b"[]", b"{}", b"\xff\x00", saved[: len(saved) // 2]):
+        middle = len(saved) // 2
+        altered = saved[:middle] + bytes([saved[middle] ^ 1]) + saved[middle + 1 :]
+        for rubbish in (b"", b"rubbish", b"[]", b"{}", b"\xff\x00", saved[:middle], altered):
             for _ in range(3):
                 with refused(one, FATAL, "saved state"):
                     one.fmu.setFMUState(one.fmu.deSerializeFMUstate(rubbish))

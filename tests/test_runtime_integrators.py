@@ -239,6 +239,9 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
     if (lambda) memcpy(lambda, r + n, sizeof(double) * (size_t)s->m);
     return OK;
 }
+Status linear_nearest(Linear *l, const double *c, double *x) {
+    return linear_solve(l, NULL, c, x, NULL);
+}
 
 static void dynamics(double t, const double *q, const double *v, const double *u, const double *p,
                      double *M, double *F, double *G, double *nu, double *gamma) {

@@ -13,6 +13,7 @@ from __future__ import annotations
 import functools
 import json
 import math
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any, TypeVar
@@ -354,11 +355,15 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        return json.dumps(state, sort_keys=True).encode("ascii")
+        text = json.dumps(state, sort_keys=True).encode("ascii")
+        return b"%08x %s" % (zlib.crc32(text), text)
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         try:
-            return dict(json.loads(state.decode("ascii")))
+            check, _, text = state.rstrip(b"\0").partition(b" ")
+            if int(check, 16) != zlib.crc32(text):
+                raise ValueError("their check sum is wrong")
+            return dict(json.loads(text.decode("ascii")))
         except (TypeError, ValueError) as error:  # raised here, it would crash pythonfmu's binary
             return {"refused": f"the bytes are no saved state of an FMU ({error})"}

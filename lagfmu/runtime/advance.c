@@ -93,9 +93,8 @@ static Status take_step(Solver *s, double t_end) {
     const double longest = fmax(AHEAD / s->state.now.rate, t_end - i->t);
     const double t = i->t, h = i->h_next;
     if (step_towards(s, t_end, fmax(t_end, s->stop_time), longest) == OK) return OK;
-    if (!(i->t > t)) return FAILED; /* no step at all could be taken */
-    double *y0 = s->work_advance;
-    memcpy(y0, i->y_old, (size_t)i->ny * sizeof *y0);
+    double *y0 = s->work_advance; /* before the step, if it was taken and could not be used */
+    memcpy(y0, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y0);
     restart(s, t, y0, fmin(h > 0 ? h : t_end - t, t_end - t));
     s->state.now.event_count = 0;
     return step_towards(s, t_end, t_end, HUGE_VAL);

@@ -21,7 +21,7 @@
 #include "residual.h"
 
 static const double EXACT = 4e3;    /* condition up to which lambda is right to 1e-12 as it is */
-static const double LITTLE = 100;   /* cancellation in pivots that does not count: see judge() */
+static const double LITTLE = 1e3;  /* cancellation in pivots that does not count: see judge() */
 static const double PLAIN = 1e6;    /* up to which residuals in working precision will do */
 static const double DOUBLED = 1e10; /* up to which refinement is tried if KKT is at hand */
 static const double PIVOT = 1e-8;   /* smallest pivot of M relative to its diagonal */

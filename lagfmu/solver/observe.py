@@ -21,8 +21,13 @@ def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]
     lambda, Q and the accelerations are solved for at this very state and these inputs, so that they
     are consistent with what the importer reads.  Raises StepFailureError if a value is not finite.
     """
-    with np.errstate(all="ignore"):
-        values = _observe(system, state, u, p)
+    try:
+        with np.errstate(all="ignore"):
+            values = _observe(system, state, u, p)
+    except (ArithmeticError, ValueError) as error:
+        raise StepFailureError(
+            f"the outputs cannot be evaluated at t = {state.t!r} s ({error})"
+        ) from error
     bad = [name for name, value in values.items() if not np.isfinite(value)]
     if bad:
         raise StepFailureError(f"not finite at t = {state.t!r} s: {', '.join(bad)}")

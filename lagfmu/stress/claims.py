@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from ..errors import VerificationError
 from ..proof import Claim
-from ..simulate import Trajectory
 from ..verify import applies
 from .player import Run
 

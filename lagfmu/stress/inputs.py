@@ -23,7 +23,9 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
                 name = f"{i.name} {shape}, {size:g}"
                 found.append(Probe(FAMILY, name, partial(_driven, i.name, shape, size), size > 1))
         for value in (float("nan"), float("inf"), -float("inf")):
-            found.append(Probe(FAMILY, f"{i.name} = {value:g}", partial(_not_finite, i.name, value)))
+            found.append(
+                Probe(FAMILY, f"{i.name} = {value:g}", partial(_not_finite, i.name, value))
+            )
     return found
 
 

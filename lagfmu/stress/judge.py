@@ -47,9 +47,7 @@ class Check:
         return self.error / self.allowed if self.allowed > 0 else float(self.error > 0) * np.inf
 
 
-def invariants(
-    facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Column
-) -> list[Check]:
+def invariants(facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Column) -> list[Check]:
     """All checks of a run, at the points that were reached; `elapsed` as in claims.py."""
     if len(run.rows) == 0:
         return []
@@ -65,7 +63,9 @@ def invariants(
         return checks
     before, floors = first_landing(facts, run), magnitudes(facts, run)
     for form in undisturbed(run, tuple(forms)):
-        error, allowed, points = form.judge(run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors)
+        error, allowed, points = form.judge(
+            run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors
+        )
         if points:
             checks.append(Check(form.claim.name, error, allowed))
     return checks
@@ -104,8 +104,11 @@ def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
 
 
 def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
-    """The magnitude that a coordinate's or velocity's error is relative to, at the least."""
+    """The magnitude that an error is relative to, at the least: of coordinates, velocities, energy."""
     found = {}
+    if "energy.potential" in facts.variables:
+        parts = np.abs(run.rows["energy.kinetic"]) + np.abs(run.rows["energy.potential"])
+        found["energy.total"] = float(parts.max())
     for q in facts.coordinates:
         found[q] = facts.same_unit(q, run.values)
         rate = f"der({q})"

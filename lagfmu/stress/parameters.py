@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -113,8 +112,3 @@ def departures(bench: Bench, run: Run, other: Run, growth: float) -> list[Check]
             allowed = 30 * tolerance * (1 + growth) * float(a["time"])
             checks.append(Check(f"{time} the same", float(np.abs(a[time] - b[time])), allowed))
     return checks
-
-
-def with_tolerance(run: Run, tolerance: float) -> Run:
-    """The run, to be judged with another tolerance."""
-    return replace(run, tolerance=tolerance)

@@ -152,11 +152,11 @@ class Player:
 
     def save(self) -> Any:
         """fmi2GetFMUstate."""
-        return self.call("getFMUState")
+        return self.call("getFMUstate")
 
     def restore(self, state: Any, time: float) -> None:
         """fmi2SetFMUstate; the instance stands at `time` again."""
-        self.call("setFMUState", state)
+        self.call("setFMUstate", state)
         self.time = time
 
 

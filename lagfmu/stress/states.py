@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from .bench import Bench, Finding
 from .facts import Facts
 from .judge import Check
-from .player import Player, table
+from .player import Player, RefusalError, play, table
 from .probe import Probe
 
 FAMILY = "states"
@@ -74,15 +75,15 @@ def _window(bench: Bench, middle: float) -> Finding:
         for _ in range(PARTS):
             one.step(h / PARTS)
         checks += _near(bench, right, one.read(), begin + h)
-        data = one.call("serializeFMUState", state)
+        data = one.call("serializeFMUstate", state)
         two.begin({}, None)
         taken = two.call("deSerializeFMUstate", data)
         two.restore(taken, begin)
         checks.append(_differ(before, two.read(), "as serialized:"))
         two.step(h)
         checks.append(_differ(right, two.read(), "same bits from the bytes:"))
-        one.call("freeFMUState", state)
-        two.call("freeFMUState", taken)
+        one.call("freeFMUstate", state)
+        two.call("freeFMUstate", taken)
     return Finding(tuple(checks), None, f"t = {middle:.6g} s")
 
 
@@ -95,8 +96,6 @@ def _near(bench: Bench, right: dict[str, Any], other: dict[str, Any], time: floa
             rows[name][0] = value
         rows["time"] = time
         runs.append(rows)
-    from dataclasses import replace
-
     base = bench.ordinary
     one, two = (replace(base, rows=rows) for rows in runs)
     grown = np.interp(time, base.rows["time"], bench.amplification)
@@ -111,9 +110,7 @@ def _near(bench: Bench, right: dict[str, Any], other: dict[str, Any], time: floa
 
 
 def _corrupt(bench: Bench) -> Finding:
-    """Bytes that are no state of this FMU are refused, and nothing changes."""
-    from .player import RefusalError
-
+    """Bytes that are no state are refused, when read or when set, and nothing changes."""
     refusal, checks = None, []
     for what in ("cut", "altered", "foreign"):
         with bench.another("corrupted") as one:
@@ -121,8 +118,8 @@ def _corrupt(bench: Bench) -> Finding:
             one.step(bench.facts.step_size)
             before = one.read()
             state = one.save()
-            data = bytearray(one.call("serializeFMUState", state))
-            one.call("freeFMUState", state)
+            data = bytearray(one.call("serializeFMUstate", state))
+            one.call("freeFMUstate", state)
             if what == "cut":
                 data = data[: len(data) // 2]
             elif what == "altered":
@@ -130,7 +127,7 @@ def _corrupt(bench: Bench) -> Finding:
             else:
                 data = bytearray(b"\x01" * len(data))
             try:
-                one.call("deSerializeFMUstate", bytes(data))
+                one.restore(one.call("deSerializeFMUstate", bytes(data)), one.time)
                 checks.append(Check(f"{what} bytes refused", 1.0, 0.5))
             except RefusalError as error:
                 refusal = error if refusal is None or refusal.clear else refusal
@@ -144,8 +141,6 @@ def _reset(bench: Bench) -> Finding:
     times = bench.times(bench.facts.stop_time, 10)
     other = {p.name: p.start * 1.1 for p in bench.facts.parameters if p.allows(p.start * 1.1)}
     with bench.another("fresh") as one:
-        from .player import play
-
         first = play(one, {}, times)
         play(one, other, times[:6])
         again = play(one, {}, times)
@@ -161,7 +156,9 @@ def _interleaved(count: int, bench: Bench) -> Finding:
     values = []
     for k in range(count):
         wanted = {p.name: p.start * (1 + 0.01 * k) for p in facts.parameters}
-        values.append({p.name: wanted[p.name] for p in facts.parameters if p.allows(wanted[p.name])})
+        values.append(
+            {p.name: wanted[p.name] for p in facts.parameters if p.allows(wanted[p.name])}
+        )
     times = bench.times(facts.stop_time, 10)
     alone = [bench.run(v, times) for v in values]
     some: list[Player] = []

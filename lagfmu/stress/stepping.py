@@ -11,7 +11,7 @@ from .bench import REFERENCE, Bench, Finding
 from .facts import Facts
 from .judge import Check
 from .parameters import departures
-from .player import Run
+from .player import RefusalError, Run
 from .probe import Probe
 
 METHODS = ("dop853", "dopri5", "radau5", "rk4", "rattle")
@@ -54,9 +54,7 @@ def _steps(size: float, bench: Bench) -> Finding:
         whole = bench.run({}, [0.0, away, times[-1]])
         ends = _ends(run, 3)
         growth = np.full(3, bench.amplification[-1])
-        checks += bench.agreement(
-            ends, whole, growth, "as in one step", bench.facts.stop_time
-        )
+        checks += bench.agreement(ends, whole, growth, "as in one step", bench.facts.stop_time)
     return Finding(tuple(checks), run.refusal, f"{h:.3g} s")
 
 
@@ -70,9 +68,7 @@ def _against(bench: Bench, run: Run, what: str) -> list[Check]:
     right = bench.run({}, run.rows["time"].tolist(), REFERENCE)
     if right.refusal is not None:
         return []
-    growth = np.interp(
-        run.rows["time"], bench.ordinary.rows["time"], bench.amplification
-    )
+    growth = np.interp(run.rows["time"], bench.ordinary.rows["time"], bench.amplification)
     checks = bench.agreement(run, right, growth, what, bench.facts.stop_time)
     if run.tolerance <= 1e-4:
         checks += departures(bench, run, right, float(growth[-1]))
@@ -88,8 +84,6 @@ def _pieces(count: int, bench: Bench) -> Finding:
 def _bad_step(size: float, bench: Bench) -> Finding:
     """It must be refused, and the next step must be as if nothing had been asked."""
     with bench.another("step") as one:
-        from .player import RefusalError
-
         one.begin({}, None)
         one.step(bench.facts.step_size)
         state = one.save()
@@ -106,7 +100,7 @@ def _bad_step(size: float, bench: Bench) -> Finding:
             one.step(bench.facts.step_size)
             differ = [n for n, v in one.read().items() if v != right[n]]
             checks.append(Check("as before: " + ", ".join(differ), float(len(differ)), 0.5))
-        one.call("freeFMUState", state)
+        one.call("freeFMUstate", state)
     return Finding(tuple(checks), refusal)
 
 
