@@ -1,0 +1,182 @@
+"""A native FMU whose inputs cannot change steps past the communication point and answers from dense
+output: nobody who asks can tell.  Communication steps are powers of two, so that their sums are exact."""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import byref, c_double, c_size_t
+
+import pytest
+from fmi2 import DISCARD, Library
+from sympy import sqrt, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Holonomic, Model, Parameter, build_fmu
+from lagfmu.compiler import find_compiler
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+
+STEPS = [2.0**-k for k in (0, 2, 5, 9, 13)]
+
+
+@pytest.fixture(scope="module")
+def library(native_fmu, tmp_path_factory):
+    """library(NAME): the native FMU's binary."""
+    folder = tmp_path_factory.mktemp("ahead")
+    made: dict[str, Library] = {}
+
+    def get(name: str) -> Library:
+        if name not in made:
+            made[name] = Library(native_fmu(name), folder / name)
+        return made[name]
+
+    return get
+
+
+def integer(one, name: str, kind: str = "Integer") -> int:
+    value = (ctypes.c_int * 1)()
+    one.does(f"Get{kind}", one.references([name]), c_size_t(1), value)
+    return value[0]
+
+
+def run(one, step: float, until: float) -> None:
+    while one.time < until:
+        one.step(step)
+
+
+@pytest.mark.parametrize("method", ["dop853", "dopri5", "radau5"])
+@pytest.mark.parametrize("name", ["PendulumCartesian", "PendulumAngle", "Chain"])
+def test_the_communication_step_changes_nothing_to_the_last_bit(library, name, method):
+    """From 1 s to 0.1 ms: the same internal steps, and at t = 1 s and 2 s the same outputs."""
+    ends = []
+    for step in STEPS:
+        one = library(name)(logging=False).start({"solver.method": method}, 1e-8)
+        seen = []
+        for until in (1.0, 2.0):
+            run(one, step, until)
+            seen.append((one.outputs(), integer(one, "solver.steps")))
+        ends.append(seen)
+        one.free()
+    assert all(end == ends[0] for end in ends)
+    assert ends[0][1][1] < 500  # not one a communication step
+
+
+def test_a_fine_communication_step_sees_the_same_motion_in_between(library):
+    """Dense output is as accurate as the steps: each of 2048 points of the pendulum agrees within the
+    tolerance with a run that stops there, its f with zero to rounding."""
+    names = ["x", "y", "der(x)", "der(y)", "lambda.rod"]
+    tolerance = 1e-8
+    fine, exact = (library("PendulumCartesian")(logging=False) for _ in range(2))
+    fine.start(None, tolerance)
+    exact.start({"solver.maximum_step": 2.0**-9}, 1e-12)  # stands on every point
+    for _ in range(2048):
+        for one in (fine, exact):
+            one.step(2.0**-9)
+        for a, b in zip(fine.reals(names), exact.reals(names), strict=True):
+            assert abs(a - b) < 20 * tolerance
+        assert abs(fine.get("residual.rod")) < 1e-15
+    fine.free()
+    exact.free()
+
+
+@pytest.mark.parametrize("step", STEPS[1:])
+def test_an_event_ahead_is_invisible_until_its_time(library, step):
+    """The particle's departure is found while the integrator stands far ahead.  Until then the contact is
+    closed, pushes, and counts no departure; the departure's time is the same to the last bit whatever the
+    communication step, and lambda is zero from then on."""
+    first = library("Hemisphere")(logging=False).start({"theta": 0.3}, 1e-9)
+    run(first, 1.0, 2.0)
+    (expected,) = first.reals(["departure.surface.time"])
+    first.free()
+    one = library("Hemisphere")(logging=False).start({"theta": 0.3}, 1e-9)
+    for _ in range(int(1 / step)):
+        one.step(step)
+        push, time = one.reals(["lambda.surface", "departure.surface.time"])
+        closed = integer(one, "contact.surface", "Boolean")
+        count = integer(one, "departure.surface.count")
+        if one.time < expected:
+            assert (closed, count, time) == (1, 0, 0.0)
+            assert push > 0
+        else:
+            assert (closed, count, time) == (0, 1, expected)
+            assert push == 0
+    one.free()
+
+
+@pytest.mark.parametrize("name", ["PendulumCartesian", "Hemisphere", "Loop", "DoublePendulum"])
+def test_rollback_within_a_step_ahead_is_exact(library, name):
+    """Saved where dense output answers, in the middle of an internal step: the same future from the state
+    and from its bytes in another instance, to the last bit, asked at other instants in between too."""
+    one = library(name)(logging=False).start(None, 1e-8)
+    run(one, 2.0**-6, 17 / 64)
+    steps = integer(one, "solver.steps")
+    state, moment = one.saved(), one.time
+    data = one.bytes_of(state)
+    run(one, 2.0**-6, 18 / 64)
+    ahead = integer(one, "solver.steps") == steps
+    run(one, 2.0**-6, 1.0)
+    expected = one.outputs()
+
+    one.does("SetFMUstate", state)
+    one.time = moment
+    run(one, 2.0**-6, 1.0)
+    assert one.outputs() == expected
+
+    other = library(name)(logging=False).start({"solver.method": "rk4"}, 1e-4)
+    other.does("SetFMUstate", other.loaded(data))
+    other.time = moment
+    run(other, 2.0**-6, 1.0)
+    assert other.outputs() == expected
+    if name != "Loop":  # whose particle is about to leave
+        assert ahead
+    one.does("FreeFMUstate", byref(state))
+    one.free()
+    other.free()
+
+
+def candle(folder) -> Library:
+    """A bead on a line, driven by a force that ends with a root: nothing is defined after t = T."""
+    t = dynamicsymbols._t
+    x, y = dynamicsymbols("x y")
+    m, P, T = symbols("m P T", positive=True)
+    model = Model(
+        name="Candle",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        forces={x: P * sqrt(1 - t / T)},
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("line", y - x)],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(P, 3.0, "N"), Parameter(T, 1.0, "s")],
+        start={x: 1.0, y: 1.0},
+    )
+    return Library(build_fmu(model, folder, target="native"), folder / "library")
+
+
+@pytest.mark.parametrize("stop", [None, 1.0], ids=["no stop time", "stop time"])
+@pytest.mark.parametrize("step", [1.0, 0.25, 2.0**-10])
+def test_a_failure_ahead_is_invisible_until_its_time(tmp_path, step, stop):
+    """The force is defined until t = 1 s, where it ends: the FMU gets there, with and without being told
+    to stop, and x = 1 + P/(2 m) (t^2/2 - ...) is right; then the step is refused and nothing changes."""
+    one = candle(tmp_path)().start(None, 1e-9, stop)
+    run(one, step, 1.0)
+    speed, place, lam = one.reals(["der(x)", "x", "lambda.line"])
+    assert speed == pytest.approx(3.0 / 2 * 2 / 3, rel=1e-6)  # P/(2 m) (2/3) T
+    assert place == pytest.approx(1 + 3.0 / 2 * (2 / 3 - 4 / 15), rel=1e-6)
+    assert lam == pytest.approx(0.0, abs=1e-9)
+    before = one.outputs()
+    if stop is None:
+        text = one.refuses("DoStep", c_double(1.0), c_double(0.125), 1, status=DISCARD)
+        assert "not finite" in text
+        assert one.outputs() == before
+    one.free()
+
+
+def test_the_stop_time_is_never_passed(tmp_path):
+    """Neither by the integrator, whose stages would meet the undefined force, nor by a sum of steps that
+    exceeds it by rounding: ten steps of 0.1 s."""
+    one = candle(tmp_path)().start(None, 1e-9, 1.0)
+    for _ in range(10):
+        one.step(0.1)
+    (speed,) = one.reals(["der(x)"])
+    assert speed == pytest.approx(1.0, rel=1e-6)
+    assert not [text for status, _, text in one.log if status >= DISCARD]
+    one.free()

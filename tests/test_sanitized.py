@@ -1,0 +1,146 @@
+"""The FMU's own sources under the sanitizers and under valgrind: no byte outside the arrays, nothing
+uninitialized, nothing undefined, nothing left behind, in a life with everything in it (scenario.c)."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import fmpy
+import pytest
+from runtime import RUNTIME, compiler
+from test_extremes import isosceles, swing
+
+from lagfmu import Scene, build_fmu
+from lagfmu.compiler import find_compiler
+
+pytestmark = [
+    pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
+    pytest.mark.filterwarnings("ignore::lagfmu.consistency.RedundantConstraintWarning"),
+]
+SCENARIO = Path(__file__).parent / "scenario.c"
+SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
+FLAGS = ("-std=c99", "-O1", "-g", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
+LIVES = {  # steps that reach the event or the singular point in between
+    "Hemisphere": 0.07,  # a contact that opens
+    "CartPendulum": 0.05,  # an input
+    "PendulumAngle": 0.1,  # an embedding
+    "BouncingBall": 0.1,  # impacts
+    "PendulumNullspace": 0.1,
+    "Swing": 0.1,  # one constraint too many
+    "Isosceles": 0.37,  # a step that fails
+}
+
+
+@pytest.fixture(scope="module")
+def unpacked(native_fmu, tmp_path_factory):
+    """unpacked(NAME): folder of the FMU and its description."""
+    folder = tmp_path_factory.mktemp("sources")
+
+    def get(name: str):
+        if name == "Swing":
+            path = build_fmu(swing(), folder, target="native")
+        elif name == "Isosceles":
+            path = build_fmu(
+                isosceles(), folder, Scene("Isosceles", tolerance=1e-9), target="native"
+            )
+        else:
+            path = native_fmu(name)
+        return Path(fmpy.extract(str(path), str(folder / name))), fmpy.read_model_description(
+            str(path)
+        )
+
+    return get
+
+
+@pytest.fixture(scope="module")
+def objects(tmp_path_factory):
+    """objects(flags): the runtime and scenario.c, compiled once."""
+    made: dict[tuple[str, ...], list[str]] = {}
+
+    def get(flags: tuple[str, ...]) -> list[str]:
+        if flags not in made:
+            folder = tmp_path_factory.mktemp("objects")
+            files = [str(SCENARIO), *sorted(str(p) for p in RUNTIME.glob("*.c"))]
+            command = [compiler(), *FLAGS, *flags, f"-I{RUNTIME}", "-c", *files]
+            run = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+            if run.returncode and "sanitize" in run.stderr:
+                pytest.skip("the compiler has no sanitizers")
+            assert run.returncode == 0, run.stderr[-2000:]
+            made[flags] = sorted(str(p) for p in folder.glob("*.o"))
+        return made[flags]
+
+    return get
+
+
+def program(folder: Path, name: str, flags: tuple[str, ...], objects: list[str]) -> Path:
+    """scenario.c with the FMU's sources: the runtime is the same for every FMU."""
+    sources = folder / "sources"
+    for file in RUNTIME.iterdir():
+        assert (sources / file.name).read_bytes() == file.read_bytes(), file.name
+    target = folder / f"{name}_{len(flags)}"
+    generated = [str(sources / "model.c"), str(sources / "variables.c")]
+    command = [compiler(), *FLAGS, *flags, f"-I{sources}", "-o", str(target), *generated, *objects]
+    run = subprocess.run([*command, "-lm"], capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr[-2000:]
+    return target
+
+
+def arguments(description, step: float) -> list[str]:
+    """The command line of scenario.c."""
+    real = [v for v in description.modelVariables if v.type == "Real"]
+    inputs = [str(v.valueReference) for v in real if v.causality == "input"]
+    outputs = [str(v.valueReference) for v in real if v.causality == "output"]
+    stop = description.defaultExperiment.stopTime
+    sizes = description.numberOfContinuousStates, description.numberOfEventIndicators
+    if description.modelName == "Isosceles":
+        stop, inputs = 3.0, ["-2"]
+    return [
+        description.guid,
+        str(stop),
+        str(step),
+        *map(str, sizes),
+        *(inputs or ["-1"])[:1],
+        *outputs,
+    ]
+
+
+@pytest.mark.parametrize("name", sorted(LIVES))
+def test_nothing_is_undefined_and_no_byte_is_left_behind(unpacked, objects, name):
+    """AddressSanitizer, LeakSanitizer and UndefinedBehaviorSanitizer are silent."""
+    folder, description = unpacked(name)
+    made = program(folder, name, SANITIZE, objects(SANITIZE))
+    run = subprocess.run(
+        [str(made), *arguments(description, LIVES[name])],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={"ASAN_OPTIONS": "detect_leaks=1", "UBSAN_OPTIONS": "print_stacktrace=1"},
+    )
+    assert run.returncode == 0, run.stderr[-3000:]
+    assert run.stderr == ""
+
+
+@pytest.mark.parametrize("name", ["Hemisphere", "CartPendulum", "Isosceles"])
+def test_valgrind_finds_nothing(unpacked, objects, name):
+    """No value is used before it is set, no block is left."""
+    if shutil.which("valgrind") is None:
+        pytest.skip("valgrind is not installed")
+    folder, description = unpacked(name)
+    made = program(folder, name, (), objects(()))
+    run = subprocess.run(
+        [
+            "valgrind",
+            "--quiet",
+            "--error-exitcode=99",
+            "--leak-check=full",
+            "--show-leak-kinds=all",
+            str(made),
+            *arguments(description, LIVES[name]),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert run.returncode == 0, run.stderr[-3000:]
