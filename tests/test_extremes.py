@@ -16,6 +16,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from conftest import FILES
+from coupled_model import absorber
 from fmi2 import DISCARD, ERROR, OK, Library
 from fmpy.fmi1 import FMICallException
 from hypothesis import HealthCheck, given, settings
@@ -684,3 +685,18 @@ def check_invariants(name: str, first: dict[str, float], seen: dict[str, float])
     if allowed is not None:
         size = max(abs(s[n]) for s in (first, seen) for n in s if n.startswith("energy."))
         assert abs(seen["energy.total"] - first["energy.total"]) <= allowed * size + 1e-300
+
+
+def test_a_prescribed_motion_may_jump(target, tmp_path):
+    """A point that is set to a new place at each communication point, its rate left at zero: the mass
+    follows onto the constraint, which is no singular configuration."""
+    if target == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    path = build_fmu(absorber, tmp_path, target=target)
+    with instance(path) as one:
+        one.start()
+        for k in range(1, 6):
+            one.set("u", 1e-3 * k)
+            one.step(0.01)
+            assert abs(one.get("residual.tie")) <= 1e-15
+            assert math.isfinite(one.get("lambda.tie"))

@@ -31,10 +31,7 @@ from .system import System, Vector
 LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
 DIPS, SHALLOW = 3, 0.1  # parabolas drawn, and how low, of the looks, they must go to be looked into
 ROUNDS = 50  # in which an impact is passed on between contacts that touch
-FAR, LEAST_FAR = (
-    1e3,
-    1e-6,
-)  # how far a projection may move the state: times the tolerance, and at least
+FAR, LEAST_FAR = 1e3, 1e-6  # how far a projection may move the state: in tolerances, and at least
 HOPELESS = 1.0  # error of one rk4 step, relative to the state, at which it means nothing
 CHATTER = 200  # contact events in next to no time after which the step is given up
 PATIENCE = 200  # steps after which a communication step is judged by its average step
@@ -205,7 +202,8 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
         leg.step(solver)
         steps += 1
         y1 = leg.project(solver.t, solver.y)
-        leg.check_projection(solver.t, solver.y, y1)
+        if not (leg.system.prescribed and t0 == begun):  # it may have jumped when it was set
+            leg.check_projection(solver.t, solver.y, y1)
         if watch:
             event, before = _first_event(leg, solver, t0, y0, y1, before, armed, state.gap)
             if event is not None:
