@@ -289,7 +289,8 @@ def test_tolerance_order_of_precedence(pendulum):
 
 
 def test_categories_are_switched_one_by_one(pendulum):
-    """Warnings are told if their category is on; errors always; an unknown category is refused."""
+    """Warnings are told if their category is on; switched on, a category is on alone; errors always;
+    an unknown category is refused."""
 
     def warnings(one) -> int:
         one.does("Reset")
@@ -306,6 +307,8 @@ def test_categories_are_switched_one_by_one(pendulum):
     assert warnings(one) == 0
     one.does("SetDebugLogging", 1, c_size_t(0), None)
     assert warnings(one) == 1
+    one.does("SetDebugLogging", 1, c_size_t(1), (c_char_p * 1)(b"logEvents"))
+    assert warnings(one) == 0
     one.does("SetDebugLogging", 0, c_size_t(0), None)
     assert "calculated" in one.refuses("SetReal", *one.set_call("lambda.rod", 1.0))
     assert "'nonsense'" in one.refuses(

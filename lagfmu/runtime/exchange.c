@@ -144,20 +144,6 @@ static Status drift(Instance *x, double *worst) {
     return OK;
 }
 
-Status exchange_step_done(Instance *x, int *event) {
-    Solver *s = &x->solver;
-    double worst;
-    *event = 0;
-    s->state.now.steps += 1;
-    if (s->system->m == 0) return OK;
-    if (drift(x, &worst) != OK) return FAILED;
-    for (int c = 0; c < s->system->contacts; c++)
-        if (!s->state.closed[c] && s->stepped.f[s->system->contact[c]] > s->state.gap[c])
-            s->state.armed[c] = 1;
-    *event = worst > LIMIT;
-    return OK;
-}
-
 /* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated. */
 static Status find_happened(Instance *x, int *any) {
     Solver *s = &x->solver;
@@ -174,6 +160,21 @@ static Status find_happened(Instance *x, int *any) {
             x->happened[c] = b->f[k] + s->state.gap[c] <= 0 && slip(b, k, s->state.v) < 0;
         *any |= x->happened[c];
     }
+    return OK;
+}
+
+Status exchange_step_done(Instance *x, int *event) {
+    Solver *s = &x->solver;
+    double worst;
+    int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
+    *event = 0;
+    if (s->system->m == 0) return OK;
+    if (drift(x, &worst) != OK) return FAILED;
+    for (int c = 0; c < s->system->contacts; c++)
+        if (!s->state.closed[c] && s->stepped.f[s->system->contact[c]] > s->state.gap[c])
+            s->state.armed[c] = 1;
+    if (find_happened(x, &any) != OK) return FAILED;
+    *event = any || worst > LIMIT;
     return OK;
 }
 

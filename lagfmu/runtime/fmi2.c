@@ -155,7 +155,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, s
         }
         chosen |= 1u << found;
     }
-    c->logging = loggingOn ? c->logging | chosen : c->logging & ~chosen;
+    c->logging = loggingOn ? chosen : c->logging & ~(chosen | 1u << ALL); /* only those (2.1.5) */
     return fmi2OK;
 }
 

@@ -194,7 +194,10 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
     Drive *drive = &x->solver.drive;
     const int k = v->index, place = order_in_motion(x->solver.system, k);
     if (place >= 0) { /* its derivatives are inputs themselves */
-        if (place + order <= 2) set_input(x, k + order, value);
+        if (place + order <= 2) {
+            set_input(x, k + order, value);
+            if (!x->running) x->started = x->observed = 0;
+        }
         return;
     }
     renew_input(x, k);
