@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fmi2 import Library
 
 from lagfmu.build import write
 from lagfmu.compiler import find_compiler
@@ -80,6 +81,20 @@ def native_fmu(
     if find_compiler() is None:
         pytest.skip("no C compiler on this machine: native FMUs are not tested")
     return _built(prepared, tmp_path_factory.mktemp("native"), "native")
+
+
+@pytest.fixture(scope="session")
+def library(native_fmu: Fmu, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Library]:
+    """library(NAME): the native FMU's binary, loaded once, for single calls."""
+    folder = tmp_path_factory.mktemp("libraries")
+    made: dict[str, Library] = {}
+
+    def get(name: str) -> Library:
+        if name not in made:
+            made[name] = Library(native_fmu(name), folder / name)
+        return made[name]
+
+    return get
 
 
 @pytest.fixture(scope="session", params=["python", "native"])

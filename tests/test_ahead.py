@@ -19,20 +19,6 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler o
 STEPS = [2.0**-k for k in (0, 2, 5, 9, 13)]
 
 
-@pytest.fixture(scope="module")
-def library(native_fmu, tmp_path_factory):
-    """library(NAME): the native FMU's binary."""
-    folder = tmp_path_factory.mktemp("ahead")
-    made: dict[str, Library] = {}
-
-    def get(name: str) -> Library:
-        if name not in made:
-            made[name] = Library(native_fmu(name), folder / name)
-        return made[name]
-
-    return get
-
-
 def integer(one, name: str, kind: str = "Integer") -> int:
     value = (ctypes.c_int * 1)()
     one.does(f"Get{kind}", one.references([name]), c_size_t(1), value)

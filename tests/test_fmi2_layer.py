@@ -25,20 +25,6 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler o
 MODELS = ("PendulumCartesian", "Hemisphere", "CartPendulum", "InclineDiskMinimal", "KnifeEdge")
 
 
-@pytest.fixture(scope="session")
-def library(native_fmu, tmp_path_factory):
-    """library(NAME): the native FMU's binary, loaded."""
-    folder = tmp_path_factory.mktemp("libraries")
-    made: dict[str, Library] = {}
-
-    def get(name: str) -> Library:
-        if name not in made:
-            made[name] = Library(native_fmu(name), folder / name)
-        return made[name]
-
-    return get
-
-
 @pytest.fixture
 def pendulum(library) -> Library:
     """Cartesian pendulum: x, y under x^2 + y^2 = L^2."""

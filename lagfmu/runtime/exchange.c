@@ -69,15 +69,6 @@ static Status evaluate(Instance *x) {
     return OK;
 }
 
-/* G v - nu of row k at the state evaluated last. */
-static double slip(const Mechanism *b, int k, const double *v) {
-    const System *s = b->system;
-    double sum = -b->nu[k];
-    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
-        sum += b->G[e] * v[s->entry_column[e]];
-    return sum;
-}
-
 /* Adds the accelerations that lead back onto the constraints. */
 static Status stabilize(Instance *x, double *derivatives) {
     Solver *s = &x->solver;
@@ -88,7 +79,7 @@ static Status stabilize(Instance *x, double *derivatives) {
     if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int k = 0; k < s->system->m; k++)
-        c[k] = -alpha * (2 * slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
+        c[k] = -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
     if (linear_solve(&b->linear, NULL, c, a, NULL) != OK) return OK; /* rows contradict each other */
     for (int j = 0; j < s->system->n; j++) derivatives[2 * j + 1] += a[j];
     return OK;
@@ -139,7 +130,7 @@ static Status drift(Instance *x, double *worst) {
         }
         if (system->rows[k].kind != NONHOLONOMIC && size > 0)
             *worst = fmax(*worst, fabs(b->f[k] - s->state.offset[k]) / size);
-        if (speed > 0) *worst = fmax(*worst, fabs(slip(b, k, s->state.v)) / speed);
+        if (speed > 0) *worst = fmax(*worst, fabs(mechanism_slip(b, k, s->state.v)) / speed);
     }
     return OK;
 }
@@ -157,7 +148,7 @@ static Status find_happened(Instance *x, int *any) {
         if (s->state.closed[c])
             x->happened[c] = b->lambda[k] <= 0;
         else
-            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 && slip(b, k, s->state.v) < 0;
+            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 && mechanism_slip(b, k, s->state.v) < 0;
         *any |= x->happened[c];
     }
     return OK;

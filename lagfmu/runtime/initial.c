@@ -182,7 +182,7 @@ static Status check_velocities(const Start *x, const int *active, double *fastes
         fastest[j] = fmax(fmax(fabs(x->v0[j]), fabs(v[j])), fastest[j]);
     for (int k = 0; k < s->m; k++) {
         double unit = mechanism_row_size(b, k, fastest) + fabs(b->nu[k]);
-        if (!active[k] || fabs(mechanism_row(b, k, v) - b->nu[k]) <= 1e-9 * unit) continue;
+        if (!active[k] || fabs(mechanism_slip(b, k, v)) <= 1e-9 * unit) continue;
         if (!missed) fail(&solver->why, "no velocities satisfy the constraints ");
         why_append(&solver->why, "%s'%s'", missed ? ", " : "", s->rows[k].name);
         missed = 1;
@@ -206,7 +206,7 @@ static Status find_velocities(const Start *x) {
     for (int j = 0; j < s->n; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
     for (int c = 0; c < s->contacts; c++) {
         int k = s->contact[c];
-        double speed = mechanism_row(b, k, x->v0) - b->nu[k];
+        double speed = mechanism_slip(b, k, x->v0);
         if (speed > TOUCH * mechanism_row_size(b, k, fastest)) state->closed[c] = 0;
     }
     system_active(s, state->closed, active);

@@ -54,7 +54,7 @@ static Status top_of_rebound(Solver *s, double t, const double *y, const double 
     for (int c = 0; c < system->contacts; c++) {
         const int k = system->contact[c];
         if (s->state.closed[c] || !(values[c] <= s->state.gap[c])) continue;
-        const double speed = mechanism_row(b, k, y + system->n) - b->nu[k];
+        const double speed = mechanism_slip(b, k, y + system->n);
         const double pull = b->gamma[k] - mechanism_row(b, k, b->vdot);
         if (speed > 0 && pull > 0 && speed * speed > 2 * pull * (s->state.gap[c] - values[c]))
             *top = fmin(*top, speed / pull);

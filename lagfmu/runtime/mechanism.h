@@ -39,6 +39,11 @@ static inline double mechanism_row(const Mechanism *b, int k, const double *x) {
     return sum;
 }
 
+/* G v - nu of row k at the state that was evaluated last. */
+static inline double mechanism_slip(const Mechanism *b, int k, const double *v) {
+    return mechanism_row(b, k, v) - b->nu[k];
+}
+
 /* sum_j |G_kj| |x_j|: the size of the terms of mechanism_row(). */
 static inline double mechanism_row_size(const Mechanism *b, int k, const double *x) {
     const System *s = b->system;

@@ -85,7 +85,7 @@ static Status observe_residuals(const Solver *s, Instant at, Mechanism *b, Obser
     if (mechanism_residual(b, at, o->q, o->residual) == FAILED) return FAILED;
     for (int k = 0; k < system->m; k++) {
         if (system->rows[k].kind == NONHOLONOMIC)
-            o->residual[k] = mechanism_row(b, k, o->v) - b->nu[k];
+            o->residual[k] = mechanism_slip(b, k, o->v);
         else
             o->residual[k] -= level(s, k);
     }

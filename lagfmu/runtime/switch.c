@@ -11,11 +11,6 @@
 enum { ROUNDS = 50 }; /* in which an impact is passed on between contacts that touch */
 static const double SLOW = 1e-9; /* speed of a gap, relative to the motion's own, that counts as none */
 
-/* G v - nu of row k at the state evaluated last. */
-static double row_speed(const Mechanism *b, int k, const double *v) {
-    return mechanism_row(b, k, v) - b->nu[k];
-}
-
 /* True if the rebound would not rise above the gap within which contacts touch, v^2 / (2 a) <= gap:
  * without it a ball would bounce infinitely often in a finite time. */
 static Status comes_to_rest(Solver *s, Instant at, const int *closed, int c, int *rests) {
@@ -24,7 +19,7 @@ static Status comes_to_rest(Solver *s, Instant at, const int *closed, int c, int
     const int k = system->contact[c];
     system_active(system, closed, s->active);
     if (mechanism_motion(b, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
-    const double speed = row_speed(b, k, s->state.v);
+    const double speed = mechanism_slip(b, k, s->state.v);
     const double acceleration = mechanism_row(b, k, b->vdot) - b->gamma[k];
     *rests = speed <= 0 ||
              (acceleration < 0 && speed * speed <= -2 * acceleration * s->state.gap[c]);
@@ -46,7 +41,7 @@ static Status pass_on(Solver *s, Instant at, const int *closed) {
         for (int c = 0; c < system->contacts; c++) {
             const int k = system->contact[c];
             const double size = s->state.now.rate * mechanism_row_size(b, k, s->state.size);
-            struck[c] = near[c] && row_speed(b, k, s->state.v) < -SLOW * size;
+            struck[c] = near[c] && mechanism_slip(b, k, s->state.v) < -SLOW * size;
             any |= struck[c];
         }
         if (!any) return OK;
@@ -68,7 +63,7 @@ static Status find_touching(Solver *s, Instant at, const int *closed, int *touch
         const int k = system->contact[c];
         const double size = mechanism_row_size(b, k, s->state.scale + system->n);
         touching[c] = closed[c] || (fabs(b->f[k]) <= s->state.gap[c] &&
-                                    fabs(row_speed(b, k, s->state.v)) <= SLOW * size);
+                                    fabs(mechanism_slip(b, k, s->state.v)) <= SLOW * size);
     }
     return OK;
 }
