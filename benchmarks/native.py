@@ -50,8 +50,7 @@ from programs import (
 )
 from sympy.core.cache import clear_cache
 
-from lagfmu import derive
-from lagfmu.build import build_fmu
+from lagfmu import build_fmu, derive
 from lagfmu.ccode import model_source
 
 TOLERANCES = [10.0**-k for k in range(3, 14)]

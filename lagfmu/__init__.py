@@ -1,11 +1,11 @@
 """Lagrange's equations with multipliers, from SymPy to FMUs that report the forces of constraint."""
 
-from .build import build_fmu
 from .closed_form import ClosedForm, Conserved, departure, initial, output
 from .constraints import classify
 from .convert import from_lagranges_method
 from .equations import EquationsOfMotion, derive
 from .errors import LagfmuError
+from .make import build_fmu
 from .model import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter
 from .scene import Scene
 from .simulate import simulate

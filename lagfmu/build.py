@@ -1,4 +1,4 @@
-"""One model and one scene -> one FMU file.  Nothing is left half-written: a file is replaced whole."""
+"""What is known about a model in a scene -> one FMU file, replaced whole and never half-written."""
 
 from __future__ import annotations
 
@@ -12,31 +12,10 @@ from .compiler import HOST
 from .documentation import page
 from .errors import BuildError
 from .fmu import native, python
-from .model import Model
-from .prepare import Prepared, prepare
+from .prepare import Prepared
 from .proof import pack_closed_forms
-from .scene import Scene
 
 TARGETS = ("python", "native")
-
-
-def build_fmu(
-    model: Model,
-    out: str | os.PathLike[str] = ".",
-    scene: Scene | None = None,
-    closed_forms: Sequence[ClosedForm | Conserved] = (),
-    figures: Sequence[tuple[str, ...]] = (),
-    target: str = "python",
-    platforms: Sequence[str] = (HOST,),
-) -> Path:
-    """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu).
-
-    `target` is 'python' or 'native'; a native FMU has binaries for `platforms`, see compiler.PLATFORMS.
-
-    `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them; `figures` are
-    verification results for its documentation page.  Raises ModelError, DerivationError, BuildError.
-    """
-    return write(prepare(model, scene), out, closed_forms, figures, target, platforms)
 
 
 def write(
@@ -48,14 +27,19 @@ def write(
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
 ) -> Path:
-    """Package what `prepare` made; `choice` is HTML on how the solver settings were chosen."""
+    """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
+
+    `choice` is HTML on how the solver settings were chosen.  For the rest see make.build_fmu.
+    """
     if target not in TARGETS:
         raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
     extra = {
         "documentation/index.html": page(prepared, figures, choice).encode(),
-        "resources/lagfmu.json": pack_closed_forms(prepared.scene, closed_forms, prepared.table),
+        "resources/lagfmu.json": pack_closed_forms(
+            prepared.scene, closed_forms, prepared.table, prepared.numbers, prepared.held
+        ),
     }
-    made = (prepared.equations, prepared.reduction, prepared.scene, prepared.table)
+    made = (prepared.coded, prepared.coded_reduction, prepared.scene, prepared.table)
     if target == "native":
         content = native.build(*made, prepared.system, extra, platforms)
     else:

@@ -39,26 +39,32 @@ HEAD = """/* model.c -- {name}{description}
 """
 
 
-def model_source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str) -> str:
+def model_source(
+    eom: EquationsOfMotion,
+    reduction: Reduction | None,
+    formulation: str,
+    tangents: bool = True,
+) -> str:
     """C text that defines MODEL_SYSTEM, the numeric form of the equations in the given formulation.
+
+    `tangents`: with the derivatives that directional derivatives and radau5 need.
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
     eom = _in_reals(eom)
     index = _index("coordinates", eom.q) + _index("constraints", [c.name for c in eom.constraints])
     if reduction is None:
-        text = _System(eom, "", formulation).text() + _pointer("equations")
+        text = _System(eom, "", formulation, tangents).text() + _pointer("equations")
     else:
         reduced = _in_reals(reduction.reduced)
         index += _index("coordinates that are stepped", reduced.q)
-        text = (
-            _System(eom, "", "multipliers").text()
-            + "\n"
-            + _embedding(eom, reduction, reduced)
-            + "\n"
-            + _System(reduced, "reduced_", "minimal", reduction.rows).text()
-            + _pointer("reduced_equations")
-        )
+        text = "\n".join(
+            [
+                _System(eom, "", "multipliers", tangents).text(),
+                *_embedding(eom, reduction, reduced, tangents),
+                _System(reduced, "reduced_", "minimal", tangents, reduction.rows).text(),
+            ]
+        ) + _pointer("reduced_equations")
     helpers = [code for name, code in {**HELPERS, "fill": FILL}.items() if f"{name}(" in text]
     model = eom.model
     description = f": {model.description}" if model.description else ""
@@ -145,33 +151,34 @@ class _Vocabulary:
         }
 
 
-def _embedding(eom: EquationsOfMotion, reduction: Reduction, reduced: EquationsOfMotion) -> str:
+def _embedding(
+    eom: EquationsOfMotion, reduction: Reduction, reduced: EquationsOfMotion, tangents: bool
+) -> list[str]:
     words = _Vocabulary(reduced, "s", "sdot")
     table = _real([*(s := reduction.reduced).q, *s.v, *s.u, *s.p, TIME])
     q = [sp.sympify(e).xreplace(table) for e in reduction.phi]
     v = [sp.sympify(e).xreplace(table) for e in reduction.vel]
     d = Differential(words.change)
-    return "\n".join(
-        [
-            function(
-                "embed",
-                "q = phi(s, t) and v = J sdot + dphi/dt.",
-                words.state,
-                {"q": _results(q, eom.q), "v": _results(v, eom.v)},
-                words.names,
-            ),
-            function(
-                "embed_tangent",
-                "The change of q and v along the direction (dt, ds, dsdot, du).",
-                words.along,
-                {
-                    "dq": _results([d(e) for e in q], eom.q),
-                    "dv": _results([d(e) for e in v], eom.v),
-                },
-                words.names,
-            ),
-        ]
+    embed = function(
+        "embed",
+        "q = phi(s, t) and v = J sdot + dphi/dt.",
+        words.state,
+        {"q": _results(q, eom.q), "v": _results(v, eom.v)},
+        words.names,
     )
+    if not tangents:
+        return [embed]
+    change = function(
+        "embed_tangent",
+        "The change of q and v along the direction (dt, ds, dsdot, du).",
+        words.along,
+        {
+            "dq": _results([d(e) for e in q], eom.q),
+            "dv": _results([d(e) for e in v], eom.v),
+        },
+        words.names,
+    )
+    return [embed, change]
 
 
 def _results(values: Sequence[Expr], places: Sequence[Any]) -> list[Result]:
@@ -186,9 +193,11 @@ class _System:
         eom: EquationsOfMotion,
         prefix: str,
         formulation: str,
+        tangents: bool,
         rows: Sequence[int] | None = None,
     ) -> None:
         self.eom, self.prefix, self.formulation = eom, prefix, formulation
+        self.tangents = tangents
         chosen = range(len(eom.constraints)) if rows is None else rows
         self.constraints = [eom.constraints[k] for k in chosen]
         mass, jacobian = eom.M.todok(), eom.G.todok()
@@ -200,18 +209,23 @@ class _System:
 
     def text(self) -> str:
         """Functions, then tables."""
+        functions = self._functions()
         tables = Tables(
             self.eom, self.prefix, self.formulation, self.constraints, self.mass, self.entries
         )
-        return "\n".join([*self._functions(), tables.text()])
+        text = tables.of_what_is_read if self.eom.bare else tables.text
+        return "\n".join([*functions.values(), text(set(functions))])
 
-    def _functions(self) -> list[str]:
+    def _functions(self) -> dict[str, str]:
+        """The text of each function of the System that is needed."""
         eom, words = self.eom, self.words
         q, rows = [str(s) for s in eom.q], [c.name for c in self.constraints]
         at_mass = [f"{q[i]}, {q[j]}" for i, j in self.mass]
         at_entry = [f"{rows[k]}, {q[j]}" for k, j in self.entries]
         f = [sp.S.Zero if e is None else e for e in eom.f]
-        energy = [eom.kinetic, sp.S.Zero if eom.potential is None else eom.potential]
+        energy = [sp.S.Zero if e is None else e for e in (eom.kinetic, eom.potential)]
+        if eom.kinetic is None and eom.potential is None:
+            energy = []
         groups = {
             "M": (self.M, at_mass),
             "F": (eom.F, q),
@@ -219,7 +233,7 @@ class _System:
             "nu": (eom.nu, rows),
             "gamma": (eom.gamma, rows),
             "f": (f, rows),
-            "energy": (energy, ("kinetic", "potential")),
+            "energy": (energy, ("kinetic", "potential")[: len(energy)]),
         }
         values = {a: _results(list(e), places) for a, (e, places) in groups.items()}
         d = Differential(words.change)
@@ -235,35 +249,39 @@ class _System:
         def define(name: str, doc: str, arguments: Any, results: Any) -> str:
             return function(self.prefix + name, doc, arguments, results, words.names)
 
-        return [
-            define(
+        found: dict[str, str] = {}
+        if not eom.bare:
+            found["dynamics"] = define(
                 "dynamics",
                 "M (lower triangle), F, G, nu, gamma of  M vdot = F + G^T lambda,  G vdot = gamma.",
                 words.state,
                 {a: values[a] for a in ("M", "F", "G", "nu", "gamma")},
-            ),
-            define(
+            )
+            found["residual"] = define(
                 "residual",
                 "f of each constraint f(q, t) = 0; 0 for a nonholonomic one.",
                 words.still,
                 {"f": values["f"]},
-            ),
-            define(
+            )
+        if energy:
+            found["energies"] = define(
                 "energies",
                 "Kinetic and potential energy [J].",
                 words.state,
                 {"energy": values["energy"]},
-            ),
-            define(
+            )
+        if any(isinstance(c, Contact) for c in self.constraints):
+            found["restitution"] = define(
                 "restitution",
                 "Newton's coefficient of restitution of each row; 0 for one that is no contact.",
                 {"p": words.p},
                 {"e": _results(restitution, rows)},
-            ),
-            define(
+            )
+        if self.tangents and (energy or not eom.bare):
+            found["tangent"] = define(
                 "tangent",
                 "The change of all of these along the direction (dt, dq, dv, du).",
                 words.along,
                 changes,
-            ),
-        ]
+            )
+        return found

@@ -20,6 +20,18 @@ from .compiler import HOST, NAMES
 from .errors import LagfmuError, SimulationError
 from .fmu.native import takes_long
 from .modelfile import ModelFile, load
+from .options import (
+    Contacts,
+    Derivatives,
+    Fixed,
+    Formulation,
+    Inputs,
+    Method,
+    Methods,
+    Name,
+    Outputs,
+    narrowed,
+)
 from .plot import plot
 from .prepare import prepare
 from .scene import Scene
@@ -112,8 +124,18 @@ def build(
             "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
         ),
     ] = None,
+    outputs: Outputs = None,
+    fixed: Fixed = None,
+    inputs: Inputs = None,
+    contacts: Contacts = None,
+    methods: Methods = None,
+    method: Method = None,
+    formulation: Formulation = None,
+    derivatives: Derivatives = None,
+    name: Name = None,
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
+    needs = (outputs, fixed, inputs, contacts, methods, method, formulation, derivatives, name)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -123,11 +145,10 @@ def build(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
         file = load(model)
-        goal = None if accuracy is None else parse(accuracy)
-        for s in _chosen(file, scene):
+        for s in narrowed(_chosen(file, scene), *needs, accuracy):
             choice = ""
-            if goal is not None:
-                chosen = chosen_for(file, s, goal, kind, console)
+            if s.accuracy is not None:
+                chosen = chosen_for(file, s, parse(s.accuracy), kind, console)
                 s, choice = chosen.scene, section(chosen)
             with console.status(f"building {s.name}{_first_time(target, places)}"):
                 prepared = prepare(file.model, s)
@@ -158,11 +179,23 @@ def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
 def show(
     model: ModelPath,
     scene: Annotated[str | None, typer.Option(help="Which FMU of the file.")] = None,
+    outputs: Outputs = None,
+    fixed: Fixed = None,
+    inputs: Inputs = None,
+    contacts: Contacts = None,
+    methods: Methods = None,
+    method: Method = None,
+    formulation: Formulation = None,
+    derivatives: Derivatives = None,
 ) -> None:
-    """Print equations of motion, classification of constraints, degrees of freedom and units."""
+    """Print equations of motion, classification of constraints, degrees of freedom and units.
+
+    Of a scene that needs less than everything, also what was pruned and what that saved.
+    """
+    needs = (outputs, fixed, inputs, contacts, methods, method, formulation, derivatives)
     with _plainly():
         file = load(model)
-        for s in _chosen(file, None if scene is None else [scene]):
+        for s in narrowed(_chosen(file, None if scene is None else [scene]), *needs):
             show_prepared(prepare(file.model, s), console)
 
 

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import random
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from .diagnosis import cause_of_failure
 from .equations import EquationsOfMotion
 from .errors import DerivationError, ModelError
+from .model import Contact
 from .reduction import Reduction
 from .solver.failure import StepFailureError
 from .solver.initial import Start, start
@@ -49,14 +52,22 @@ class Structure:
         return self.n - self.rank
 
 
-def examine(eom: EquationsOfMotion, table: VariableTable, system: System) -> Structure:
+def examine(
+    eom: EquationsOfMotion,
+    table: VariableTable,
+    system: System,
+    numbers: Mapping[Any, Any] | None = None,
+) -> Structure:
     """Check that the model can start, and count its degrees of freedom.
+
+    `numbers`: values of parameters and inputs (plain symbols) that are not the model's own.
 
     Warns of redundant constraints.  Raises ModelError if no configuration satisfies the constraints,
     they contradict each other, or the mass matrix is singular on the constraint surface.
     """
-    p = [float(x.value) for x in eom.model.parameters]
-    u = [float(table[str(s)].start or 0.0) for s in eom.u]
+    given = numbers or {}
+    p = [float(given.get(x.symbol, x.value)) for x in eom.parameters]
+    u = [float(given.get(s, table[str(s)].start or 0.0)) for s in eom.u]
     q0 = [float(table[c].start or 0.0) for c in system.coordinates]
     v0 = [float(table[f"der({c})"].start or 0.0) for c in system.coordinates]
     try:
@@ -90,6 +101,30 @@ def examine(eom: EquationsOfMotion, table: VariableTable, system: System) -> Str
             stacklevel=3,
         )
     return Structure(eom.n, eom.m, rank, redundant, begun)
+
+
+def check_held(system: System, table: VariableTable, eom: EquationsOfMotion) -> None:
+    """Contacts that a scene does not let open are closed at the start.  Raises ModelError naming others.
+
+    `system` and `table` are the model's, with all contacts; `eom` is without those that are held.
+    """
+    kept = {c.name for c in eom.constraints if isinstance(c, Contact)}
+    p = [float(table[name].start or 0.0) for name in system.parameters]
+    u = [float(v.start or 0.0) for v in table.variables if v.role == "input"]
+    q0 = [float(table[c].start or 0.0) for c in system.coordinates]
+    v0 = [float(table[f"der({c})"].start or 0.0) for c in system.coordinates]
+    closed = start(system, Settings(), 0.0, q0, v0, u, p).state.closed
+    names = [system.rows[k].name for k in system.contacts]
+    away = [n for n, shut in zip(names, closed, strict=True) if n not in kept and not shut]
+    if away:
+        raise ModelError(
+            eom.model.name,
+            [
+                f"contact {name!r} is open at the start, but the scene says that it cannot open: name "
+                "it in `contacts`, or start on it"
+                for name in away
+            ],
+        )
 
 
 def check_embedding(eom: EquationsOfMotion, reduction: Reduction) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from textwrap import wrap
 from typing import Any
 
@@ -30,8 +30,16 @@ class Tables:
         self.eom, self.prefix, self.formulation = eom, prefix, formulation
         self.constraints, self.mass, self.entries = constraints, mass, entries
 
-    def text(self) -> str:
-        """The tables, the elimination's plan, and the System."""
+    def of_what_is_read(self, functions: Collection[str]) -> str:
+        """A System of coordinates that are only read: names, and the energies if they are read."""
+        names = self._array("const char *const", "coordinates", [f'"{s}"' for s in self.eom.q])
+        fields = {"n": self.eom.n, "coordinates": f"{self.prefix}coordinates"}
+        fields |= {name: f"{self.prefix}{name}" for name in sorted(functions)}
+        lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
+        return f"{names}static const System {self.prefix}equations = {{\n{lines}}};\n"
+
+    def text(self, functions: Collection[str]) -> str:
+        """The tables, the elimination's plan, and the System with these functions."""
         eom = self.eom
         start = [bisect_left(self.entries, (k,)) for k in range(eom.m + 1)]
         contacts = [k for k, c in enumerate(self.constraints) if isinstance(c, Contact)]
@@ -76,17 +84,16 @@ class Tables:
             "prescribed_count": len(prescribed),
             **{name: p + name for name in ("prescribed", "dimension", "extent_dimension")},
             "formulation": self.formulation.upper(),
-            "has_potential": int(eom.potential is not None),
             "constant_mass": int(self._constant_mass()),
             "separable": int(self._separable()),
             "plan": f"&{p}plan",
             "solve": f"{p}solve" if solve else "NULL",
             **{
-                name: p + name
+                name: p + name if name in functions else "NULL"
                 for name in ("dynamics", "residual", "energies", "restitution", "tangent")
             },
             "embed": "embed" if p else "NULL",
-            "embed_tangent": "embed_tangent" if p else "NULL",
+            "embed_tangent": "embed_tangent" if p and "tangent" in functions else "NULL",
             "full": "&equations" if p else "NULL",
         }
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
@@ -119,13 +126,12 @@ class Tables:
     def _dimensions(self) -> tuple[list[int], list[int]]:
         """One number for each dimension of coordinates; that of each parameter, -1 if it has none."""
         eom = self.eom
-        by_name = {str(eom.plain(s)): unit for s, unit in eom.model.units.items()}
-        units = [by_name[str(q)] for q in eom.q]
+        units = [eom.units[str(q)] for q in eom.q]
         number: dict[Any, int] = {}
         of_coordinates = [number.setdefault(u.exponents, len(number)) for u in units]
         of_parameters = [
             -1 if u.dimensionless else number.get(u.exponents, -1)
-            for u in (eom.model.units[p.symbol] for p in eom.model.parameters)
+            for u in (eom.units[str(p)] for p in eom.p)
         ]
         return of_coordinates, of_parameters or [-1]
 

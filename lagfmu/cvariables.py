@@ -74,14 +74,10 @@ def places(system: System, inputs: list[str], parameters: list[str]) -> dict[str
     }
     found |= {name: ("PARAMETER", k, NONE) for k, name in enumerate(parameters)}
     found |= {name: ("INPUT", k, NONE) for k, name in enumerate(inputs)}
-    for own, letter in (
-        (system, "S"),
-        (full, "Q"),
-    ):  # a coordinate of both is read from the full ones
-        rates = ("Q", "V", "VDOT") if letter == "Q" else ("S", "SDOT", "SDDOT")
-        for j, q in enumerate(own.coordinates):
-            for name, place in zip((q, f"der({q})", f"der({q},2)"), rates, strict=True):
-                found[name] = (place, j, NONE)
+    stepped = _motion(system, ("S", "SDOT", "SDDOT"))
+    read = _motion(full, ("Q", "V", "VDOT"))
+    # a coordinate of both is read from the full ones, unless these have no accelerations
+    found |= stepped | read if full.dynamics is not None else read | stepped
     for k, row in enumerate(full.rows):
         for head in ("lambda", "unique", "residual"):
             found[f"{head}.{row.name}"] = (head.upper(), k, NONE)
@@ -98,6 +94,15 @@ def places(system: System, inputs: list[str], parameters: list[str]) -> dict[str
             found[f"departure.{name}.{q}"] = ("DEPARTURE_Q", j, c)
             found[f"departure.{name}.velocity.{q}"] = ("DEPARTURE_V", j, c)
     return found
+
+
+def _motion(system: System, rates: tuple[str, str, str]) -> dict[str, Place]:
+    """Where coordinates, velocities and accelerations lie."""
+    return {
+        name: (place, j, NONE)
+        for j, q in enumerate(system.coordinates)
+        for name, place in zip((q, f"der({q})", f"der({q},2)"), rates, strict=True)
+    }
 
 
 def _row(v: Variable, place: Place, states: dict[str, int]) -> str:

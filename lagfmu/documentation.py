@@ -18,6 +18,7 @@ from latex2mathml.converter import convert
 from markupsafe import Markup
 
 from .model import Contact, Holonomic, Nonholonomic
+from .savings import savings
 from .typeset import SUPERSCRIPT, typeset
 from .units import Unit
 from .variables import Variable
@@ -72,12 +73,13 @@ def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = (), choice: st
     section on how its solver settings were chosen, in HTML (tradeoff/page.py).
     """
     model, structure, table = prepared.model, prepared.structure, prepared.table
-    sections = typeset(prepared.equations, prepared.reduction, prepared.scene.formulation)
+    acting, whole = prepared.equations.constraints, prepared.whole
+    sections = typeset(prepared.equations, prepared.reduction, prepared.formulation)
     return _template().render(
         name=prepared.scene.name,
         model=model,
         scene=prepared.scene,
-        meaning=MEANING[prepared.scene.formulation],
+        meaning=MEANING[prepared.formulation],
         sections=[
             (s.title, s.remark, [(e.label, mathml(e.latex), e.text) for e in s.equations])
             for s in sections
@@ -89,20 +91,21 @@ def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = (), choice: st
                 KINDS[type(c)],
                 c.description,
                 c.while_closed if not isinstance(c, Contact) else None,
-                shown(table[f"lambda.{c.name}"].unit),
+                shown(whole[f"lambda.{c.name}"].unit),
             )
-            for c in model.constraints
+            for c in acting
         ],
-        contacts=[c for c in model.constraints if isinstance(c, Contact)],
+        contacts=[c for c in acting if isinstance(c, Contact)],
         moved=[
-            (n, f"{given:.6g}", f"{used:.6g}", shown(table[n].unit))
+            (n, f"{given:.6g}", f"{used:.6g}", shown(whole[n].unit))
             for n, given, used in structure.start.moved
         ],
         groups=_grouped(table.variables),
         inputs=[v.name for v in table.variables if v.causality == "input"],
-        prescribed=bool(model.prescribed),
+        prescribed=bool(prepared.system.prescribed),
         tolerance=f"{prepared.scene.tolerance:g}",
         figures=figures,
+        saved=savings(prepared),
         choice=Markup(choice),
     )
 

@@ -13,15 +13,17 @@ symbols that stand in it, so that a chain of n links costs n times as much as on
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from .errors import ModelError
-from .model import Constraint, Model, Nonholonomic, name_of
+from .model import Constraint, Model, Nonholonomic, Parameter, name_of
+from .units import Unit
 
 Expr = Any
 TIME = dynamicsymbols._t
@@ -32,12 +34,16 @@ class EquationsOfMotion:
     """The equations of one model in plain symbols; n coordinates, m constraints.
 
     q, v (n): coordinates and velocities; u: inputs (with derivatives where they are needed);
-    p: parameters.  M (n, n) and G (m, n) are sparse.  F (n) holds all forces without lambda, nu and
-    gamma (m) the right-hand sides of G v = nu and G vdot = gamma, f (m) the residual of a position
-    constraint (None for a nonholonomic one).  `symbols` maps the model's dynamicsymbols to the plain
-    symbols, `rates` a prescribed motion u to der(u) and der(u) to der(u,2).  Energies in joule:
-    `kinetic` is the part of L that is quadratic in v, `potential` minus the part without v; their sum
-    is Jacobi's integral.
+    p: parameters.  M (n, n) and G (m, n) are sparse; `constraints` (m) are those of the rows of G.
+    F (n) holds all forces without lambda, nu and gamma (m) the right-hand sides of G v = nu and
+    G vdot = gamma, f (m) the residual of a position constraint (None for a nonholonomic one).
+    `symbols` maps the model's dynamicsymbols to the plain symbols, `rates` a prescribed motion u to
+    der(u) and der(u) to der(u,2).  Energies in joule: `kinetic` is the part of L that is quadratic in
+    v, `potential` minus the part without v; their sum is Jacobi's integral.
+
+    A scene may need less than the model (prune.py): then some coordinates and constraints are not
+    there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
+    equations are of coordinates that are only read: nothing is solved for them.
     """
 
     model: Model
@@ -55,6 +61,9 @@ class EquationsOfMotion:
     potential: Expr | None
     symbols: dict[Expr, Expr]
     rates: dict[Expr, Expr]
+    constraints: tuple[Constraint, ...]
+    numbers: Mapping[Expr, Expr] = field(default_factory=dict)
+    bare: bool = False
 
     @property
     def n(self) -> int:
@@ -67,13 +76,28 @@ class EquationsOfMotion:
         return len(self.nu)
 
     @property
-    def constraints(self) -> tuple[Constraint, ...]:
-        """The constraints in the order of the rows of G."""
-        return tuple(self.model.constraints)
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters in the order of p."""
+        by_symbol = {p.symbol: p for p in self.model.parameters}
+        return tuple(by_symbol[s] for s in self.p)
+
+    @cached_property
+    def units(self) -> dict[str, Unit]:
+        """The unit of each quantity, by its name in the FMU."""
+        return {str(self.symbols.get(s, s)): unit for s, unit in self.model.units.items()}
+
+    def folded(self, unit: Unit) -> float:
+        """The largest magnitude of that dimension among the parameters that became numbers."""
+        values = [
+            abs(float(self.numbers[p.symbol]))
+            for p in self.model.parameters
+            if p.symbol in self.numbers and self.model.units[p.symbol].same_dimension(unit)
+        ]
+        return 0.0 if unit.dimensionless else max(values, default=0.0)
 
     def plain(self, expression: Expr) -> Expr:
-        """An expression of the model's dynamicsymbols in this object's plain symbols."""
-        return sp.sympify(expression).xreplace(self.symbols)
+        """An expression of the model's dynamicsymbols in this object's plain symbols and numbers."""
+        return sp.sympify(expression).xreplace(self.symbols).xreplace(self.numbers)
 
 
 def plain_symbols(model: Model) -> dict[Expr, Expr]:
@@ -145,6 +169,7 @@ def derive(model: Model) -> EquationsOfMotion:
         potential=potential,
         symbols=table,
         rates=rates,
+        constraints=tuple(model.constraints),
     )
 
 

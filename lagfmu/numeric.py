@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from .equations import TIME, EquationsOfMotion
-from .model import Contact, Nonholonomic, Parameter
+from .model import Contact, Nonholonomic
 from .pycode import function, identifiers
 from .reduction import Reduction
 from .solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
@@ -25,7 +25,7 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
     """
     if reduction is None:
         return _imported(_system(eom, "", formulation) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n")
-    parts = [_system(eom, "", "multipliers")]
+    parts = [_bare_system(eom) if eom.bare else _system(eom, "", "multipliers")]
     names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.u, *eom.p, TIME])
     names[TIME] = "t"
     parts.append(
@@ -126,13 +126,10 @@ def _system(
             names,
         ),
     ]
+    energies = []
     if rows is None:  # the energies of the full system serve the reduced one too
-        energies = [eom.kinetic, eom.potential if eom.potential is not None else sp.S.Zero]
-        parts.append(
-            function(
-                "energies", "Kinetic and potential energy [J].", state, {"energy": energies}, names
-            )
-        )
+        energies = _energies(eom, names)
+    parts += energies
     label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
     parts.append(
         f"{label} = System(\n"
@@ -142,18 +139,51 @@ def _system(
         f"    jacobian={_pattern(jacobian)},\n"
         f"    dynamics={prefix}dynamics,\n"
         f"    residual={prefix}residual,\n"
-        "    energies=energies,\n"
+        f"    energies={'energies' if energies else None},\n"
         f"    restitution={prefix}restitution,\n"
-        f"    has_potential={eom.potential is not None},\n"
         f"    prescribed={_prescribed(eom)!r},\n"
         f"    like={_like(eom)!r},\n"
         f"    extent={_extent(eom)!r},\n"
+        f"    folded={tuple(eom.folded(unit) for unit in _units(eom))!r},\n"
         f"    embedding={embedding},\n"
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
         ")\n"
     )
     return "\n\n".join(parts)
+
+
+def _bare_system(eom: EquationsOfMotion) -> str:
+    """Coordinates that are only read, and the energies of them if these are."""
+    names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
+    names[TIME] = "t"
+    energies = _energies(eom, names)
+    system = (
+        "SYSTEM_OF_COORDINATES = System(\n"
+        f"    coordinates={_strings(eom.q)},\n"
+        "    rows=(),\n"
+        "    mass=((), ()),\n"
+        "    jacobian=((), ()),\n"
+        "    dynamics=None,\n"
+        "    residual=None,\n"
+        f"    energies={'energies' if energies else None},\n"
+        "    restitution=None,\n"
+        f"    parameters={_strings(eom.p)},\n"
+        ")\n"
+    )
+    return "\n\n".join([*energies, system])
+
+
+def _energies(eom: EquationsOfMotion, names: dict[Expr, str]) -> list[str]:
+    """The function that gives the energies which can be read; nothing if none can."""
+    group = {"kinetic": eom.kinetic, "potential": eom.potential}
+    found = {name: e for name, e in group.items() if e is not None}
+    if not found:
+        return []
+    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.u, "p": eom.p}
+    text = f"{' and '.join(found).capitalize()} energy [J]."
+    values = {"energy": [found.get(name, sp.S.Zero) for name in group]}
+    return [function("energies", text, state, values, names)]
 
 
 def _constraints(eom: EquationsOfMotion, rows: Sequence[int] | None) -> list[Any]:
@@ -191,8 +221,7 @@ def _prescribed(eom: EquationsOfMotion) -> tuple[int, ...]:
 
 
 def _units(eom: EquationsOfMotion) -> list[Any]:
-    by_name = {str(eom.plain(s)): unit for s, unit in eom.model.units.items()}
-    return [by_name[str(q)] for q in eom.q]
+    return [eom.units[str(q)] for q in eom.q]
 
 
 def _like(eom: EquationsOfMotion) -> tuple[tuple[int, ...], ...]:
@@ -206,11 +235,7 @@ def _like(eom: EquationsOfMotion) -> tuple[tuple[int, ...], ...]:
 def _extent(eom: EquationsOfMotion) -> tuple[tuple[int, ...], ...]:
     """For each coordinate, the parameters of the same dimension (for an angle: none)."""
 
-    def same(parameter: Parameter, unit: Any) -> bool:
-        own = eom.model.units[parameter.symbol]
-        return not unit.dimensionless and bool(own.same_dimension(unit))
+    def same(parameter: Expr, unit: Any) -> bool:
+        return not unit.dimensionless and bool(eom.units[str(parameter)].same_dimension(unit))
 
-    return tuple(
-        tuple(i for i, p in enumerate(eom.model.parameters) if same(p, unit))
-        for unit in _units(eom)
-    )
+    return tuple(tuple(i for i, p in enumerate(eom.p) if same(p, unit)) for unit in _units(eom))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
@@ -39,6 +39,41 @@ class Claim:
     within: float
     rounding: float
 
+    @property
+    def variables(self) -> set[str]:
+        """The FMU's variables and parameters that it needs."""
+        names = {
+            str(s)
+            for e in (self.actual, self.expected, self.scale)
+            if e is not None
+            for s in sp.sympify(e).free_symbols
+        }
+        read = {n[len("initial(") : -1] if n.startswith("initial(") else n for n in names}
+        contacts = {c for condition in CONDITIONS if (c := getattr(self, condition))}
+        read |= {f"contact.{c}" for c in contacts}
+        left = {c for c in (self.until_departure, self.at_departure) if c}
+        left |= {n.split(".")[1] for n in read if n.startswith("departure.")}
+        return (read | {f"departure.{c}.count" for c in left}) - {"time"}
+
+    def in_scene(self, numbers: Mapping[str, Expr], held: Collection[str]) -> Claim | None:
+        """The same with numbers for parameters, and contacts that stay closed; None if it speaks of
+        such a contact being open."""
+        if {self.while_open, self.at_departure} & set(held):
+            return None
+
+        def put(e: Expr) -> Expr:
+            named = {s: numbers[str(s)] for s in e.free_symbols if str(s) in numbers}
+            return e.xreplace(named)
+
+        return replace(
+            self,
+            actual=put(sp.sympify(self.actual)),
+            expected=None if self.expected is None else put(sp.sympify(self.expected)),
+            scale=None if self.scale is None else put(sp.sympify(self.scale)),
+            while_closed=None if self.while_closed in held else self.while_closed,
+            until_departure=None if self.until_departure in held else self.until_departure,
+        )
+
 
 def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> list[Claim]:
     """The closed forms that apply to this FMU."""
@@ -70,33 +105,40 @@ def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> l
 
 
 def pack_closed_forms(
-    scene: Scene, closed_forms: Sequence[ClosedForm | Conserved], table: VariableTable
+    scene: Scene,
+    closed_forms: Sequence[ClosedForm | Conserved],
+    table: VariableTable,
+    numbers: Mapping[str, Expr] | None = None,
+    held: Collection[str] = (),
 ) -> bytes:
     """JSON with the claims; expressions are indexed symbols, so that any name can be read back.
 
-    Raises ModelError if a claim uses what the FMU does not have.
+    `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
+    closed.  Claims that need a variable which the scene leaves out are left out too.  Raises ModelError
+    if a claim uses what no FMU of the model has.
     """
-    claims = claims_of(scene, closed_forms)
+    claims = [
+        claim
+        for form in claims_of(scene, closed_forms)
+        if (claim := form.in_scene(numbers or {}, held)) is not None
+    ]
     known = {v.name for v in table.variables}
     problems = []
+    kept = []
     for claim in claims:
-        used = {
-            str(s)
-            for e in (claim.actual, claim.expected, claim.scale)
-            if e is not None
-            for s in sp.sympify(e).free_symbols
-        }
-        read = {n[len("initial(") : -1] if n.startswith("initial(") else n for n in used}
-        contacts = {getattr(claim, condition) for condition in CONDITIONS}
-        read |= {f"contact.{c}" for c in contacts if c}
-        for name in sorted(read - known - {"time"}):
-            near = difflib.get_close_matches(name, known, 1)
-            problems.append(
-                f"closed form {claim.name!r} uses {name!r}, which is no variable of the FMU"
-                + (f"; did you mean {near[0]!r}?" if near else "")
-            )
+        missing = sorted(claim.variables - known)
+        if not missing:
+            kept.append(claim)
+        elif scene.complete:
+            for name in missing:
+                near = difflib.get_close_matches(name, known, 1)
+                problems.append(
+                    f"closed form {claim.name!r} uses {name!r}, which is no variable of the FMU"
+                    + (f"; did you mean {near[0]!r}?" if near else "")
+                )
     if problems:
         raise ModelError(scene.name, problems)
+    claims = kept
     packed = []
     for claim in claims:
         entry: dict[str, Any] = {

@@ -18,7 +18,7 @@ import sympy as sp
 
 from .equations import TIME, EquationsOfMotion
 from .errors import DerivationError
-from .model import Holonomic
+from .model import Constraint, Holonomic
 
 Expr = Any
 SMALL = 400  # operations below which a reduced expression is worth simplifying
@@ -39,6 +39,11 @@ class Reduction:
     vel: tuple[Expr, ...]
     reduced: EquationsOfMotion
     rows: tuple[int, ...]
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Those that still act on s."""
+        return tuple(self.reduced.constraints[k] for k in self.rows)
 
 
 def reduce(eom: EquationsOfMotion) -> Reduction:
@@ -116,7 +121,9 @@ def _relations(eom: EquationsOfMotion) -> tuple[dict[Expr, Expr], tuple[Expr, ..
     embedding = eom.model.embedding
     if embedding is not None:
         given = {eom.plain(q): eom.plain(phi) for q, phi in embedding.relations.items()}
-        return given, tuple(embedding.coordinates)
+        given = {q: phi for q, phi in given.items() if q in eom.q}
+        used = set().union(*(phi.free_symbols for phi in given.values())) if given else set()
+        return given, tuple(c for c in embedding.coordinates if eom.plain(c) in used)
     relations: dict[Expr, Expr] = {}
     for constraint, residual in zip(eom.constraints, eom.f, strict=True):
         if not isinstance(constraint, Holonomic) or constraint.while_closed is not None:

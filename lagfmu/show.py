@@ -14,6 +14,7 @@ from .constraints import Classification, classify
 from .documentation import shown
 from .equations import TIME, EquationsOfMotion
 from .model import Contact, Nonholonomic, name_of
+from .savings import Savings, savings
 from .typeset import Notation, typeset
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def show(prepared: Prepared, console: Console) -> None:
         console.print(Text(model.description))
     console.print(Text(f"formulation: {scene.formulation}", style="dim"))
 
-    for section in typeset(prepared.equations, prepared.reduction, scene.formulation):
+    for section in typeset(prepared.equations, prepared.reduction, prepared.formulation):
         if section.equations:
             _heading(console, section.title)
         width = max((len(e.label) for e in section.equations), default=0)
@@ -44,7 +45,7 @@ def show(prepared: Prepared, console: Console) -> None:
             line.append(equation.text)
             console.print(line, soft_wrap=True)
 
-    if model.constraints:
+    if prepared.equations.constraints:
         _heading(console, "Classes of constraints")
         _classes(prepared.equations, console)
 
@@ -55,11 +56,27 @@ def show(prepared: Prepared, console: Console) -> None:
         names = ", ".join(structure.redundant)
         console.print(Text(f"  redundant: {names} (λ is shared with least norm, Q is unique)"))
 
+    saved = savings(prepared)
+    if saved is not None:
+        _heading(console, "What the scene leaves out")
+        _savings(saved, console)
+
     _heading(console, "Units")
     console.print(_units(prepared))
     _heading(console, "Start values")
     _starts(prepared, console)
     console.print()
+
+
+def _savings(saved: Savings, console: Console) -> None:
+    for text in saved.left_out:
+        console.print(Text(f"  {text}"), soft_wrap=True)
+    table = Table(box=None, header_style="dim", padding=(0, 2))
+    for column in ("", "full FMU", "this scene"):
+        table.add_column(column, justify="right" if column else "left")
+    for title, before, after in saved.rows():
+        table.add_row(title, str(before), Text(str(after), style="" if before == after else "bold"))
+    console.print(table)
 
 
 def _heading(console: Console, title: str) -> None:
@@ -120,7 +137,7 @@ def _units(prepared: Prepared) -> Table:
         names += [str(s) for s in prepared.reduction.s if s not in eom.q]
     names += [f"lambda.{c.name}" for c in eom.constraints]
     names += [f"Q.{q}" for q in eom.q if f"Q.{q}" in prepared.table]
-    for name in names:
+    for name in (n for n in names if n in prepared.table):
         v = prepared.table[name]
         table.add_row(Text(name), Text(shown(v.unit) or "1"), Text(v.description))
     return table
@@ -132,6 +149,6 @@ def _starts(prepared: Prepared, console: Console) -> None:
     if not moved:
         console.print(Text("  as given: they satisfy the constraints"))
     for name, given, used in moved:
-        unit = shown(prepared.table[name].unit)
+        unit = shown(prepared.whole[name].unit)
         text = f"  {name} = {given:.10g} is projected to {used:.10g} {unit}".rstrip()
         console.print(Text(text))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,13 +36,15 @@ def simulate(
     start_values: Mapping[str, Any] | None = None,
     inputs: Trajectory | None = None,
     scene: Scene | None = None,
+    besides: Sequence[str] = (),
 ) -> Trajectory:
     """Outputs at every communication point, as a structured array with the FMU's variable names.
 
     `target` is a Model (integrated in this process, in `scene`) or the path of an FMU (simulated by
     fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
     values; `inputs` is a structured array with 'time' and one field an input, interpolated linearly.
-    What is left out comes from the scene, or the FMU's DefaultExperiment.
+    What is left out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables
+    to be recorded too.
 
     Raises ModelError for a model that cannot start, SimulationError if a step fails, and
     VerificationError for a file that is no FMU.
@@ -54,8 +56,8 @@ def simulate(
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared):
-        return _simulate_model(target, stop_time, step_size, tolerance, values, inputs)
-    return _simulate_fmu(Path(target), stop_time, step_size, tolerance, values, inputs)
+        return _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
+    return _simulate_fmu(Path(target), stop_time, step_size, tolerance, values, inputs, besides)
 
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
@@ -73,6 +75,7 @@ def _simulate_model(
     tolerance: float | None,
     values: dict[str, Any],
     inputs: Trajectory | None,
+    besides: Sequence[str],
 ) -> Trajectory:
     scene, table, system = prepared.scene, prepared.table, prepared.system
     known: dict[str, Any] = {v.name: v.start for v in table.variables if v.role != "output"}
@@ -83,11 +86,11 @@ def _simulate_model(
     }
     _check_values(scene.name, limits, values)
     known |= values
-    method = known["solver.method"]
+    method = known.get("solver.method", scene.method)
     settings = Settings(
         method,
         max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
-        known["solver.step"],
+        known.get("solver.step", scene.step),
         known["solver.maximum_step"],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
@@ -105,7 +108,8 @@ def _simulate_model(
     times = communication_points(stop_time or scene.stop_time, step_size or scene.step_size)
     columns: list[tuple[str, Any]] = [("time", np.float64)]
     kinds: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
-    columns += [(v.name, kinds[v.kind]) for v in table.outputs]
+    read = [*table.outputs, *(table[name] for name in besides)]
+    columns += [(v.name, kinds[v.kind]) for v in read]
     result = np.zeros(len(times), dtype=columns)
     try:
         q = [float(known[c]) for c in system.coordinates]
@@ -119,7 +123,7 @@ def _simulate_model(
                 u = system.inputs_at(u, moved.t - state.t)
                 state = moved
             seen = observe(system, state, u, p)
-            result[k] = (t, *(seen[o.name] for o in table.outputs))
+            result[k] = (t, *(seen[o.name] for o in read))
     except StepFailureError as error:
         raise SimulationError(str(error)) from error
     return result
@@ -179,6 +183,7 @@ def _simulate_fmu(
     tolerance: float | None,
     values: dict[str, Any],
     inputs: Trajectory | None,
+    besides: Sequence[str],
 ) -> Trajectory:
     description = read_description(path)
     experiment = description.defaultExperiment
@@ -211,6 +216,8 @@ def _simulate_fmu(
             step_size=step,
             relative_tolerance=tolerance,
             start_values=values,
+            output=[v.name for v in description.modelVariables if v.causality == "output"]
+            + list(besides),
             input=inputs,
             logger=logger,
             debug_logging=True,

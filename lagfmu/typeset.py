@@ -303,7 +303,8 @@ class _Typesetter:
         """(M vdot)_j - (F - Q_nc)_j = Q_nc,j + sum_k lambda_k a_kj."""
         eom, model = self.eom, self.eom.model
         equations = []
-        for j, coordinate in enumerate(islice(model.coordinates, MOST)):
+        known = (c for c in model.coordinates if eom.symbols[c] in eom.q)
+        for j, coordinate in enumerate(islice(known, MOST)):
             given = _tidy(eom.plain(model.forces.get(coordinate, 0)))
             left = self._motion(eom, j, self.vdot, given)
             right = self.terms(given) + self.multiplied(eom.G, range(eom.m), j)

@@ -5,8 +5,9 @@ Names, order, references, causality, units, start values and dependencies are de
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +22,15 @@ from .units import ENERGY, ONE, SECOND, Unit, dimension_of, generalized_force_un
 
 Expr = Any
 Value = float | int | bool | str
+RECORD = re.compile(r"contact\.\w+\Z|departure\.\w+\.count\Z|solver\.steps\Z")
+FIXED = {"rk4", "rattle"}  # methods with a fixed step
+
+
+def menu(methods: Collection[str]) -> str:
+    """The description of solver.method."""
+    remarks = {"rk4": " (fixed step)", "rattle": " (fixed step)", "radau5": " (stiff)"}
+    *most, last = [m + remarks.get(m, "") for m in methods]
+    return f"integrator: {', '.join(most)} or {last}" if most else f"integrator: {last}"
 
 
 @dataclass(frozen=True)
@@ -67,6 +77,44 @@ class VariableTable:
     def reference(self, name: str) -> int:
         """Value reference; the index in modelDescription.xml is one more."""
         return next(k for k, v in enumerate(self.variables) if v.name == name)
+
+    def keeping(self, outputs: Collection[str]) -> VariableTable:
+        """Without the outputs that are not among these.
+
+        Local, if they are not among the outputs, but there are the states, so that their start values
+        can be set, their derivatives for model exchange, and the record of the run: the steps that
+        were taken, and which contacts are closed or have opened, for that says which closed form holds.
+        """
+        moving = {*self.states, *self.derivatives}
+        kept = []
+        for v in self.variables:
+            if v.causality == "output" and v.name not in outputs:
+                if v.name not in moving and not RECORD.match(v.name):
+                    continue
+                v = replace(v, causality="local")
+            kept.append(v)
+        names = {v.name for v in kept}
+        kept = [v if v.derivative_of in names else replace(v, derivative_of=None) for v in kept]
+        return VariableTable(tuple(kept), self.states, self.derivatives)
+
+    def offering(self, methods: Collection[str]) -> VariableTable:
+        """The same, where `solver.method` can only be one of these."""
+        variables = [
+            replace(v, description=menu(methods)) if v.name == "solver.method" else v
+            for v in self.variables
+        ]
+        return replace(self, variables=tuple(variables))
+
+    def without_local_derivatives(self) -> VariableTable:
+        """What co-simulation needs: derivatives that are no outputs serve model exchange only."""
+        gone = {
+            n for n in self.derivatives if self[n].causality == "local" and n not in self.states
+        }
+        return VariableTable(
+            tuple(v for v in self.variables if v.name not in gone),
+            self.states,
+            tuple(name for name in self.derivatives if name not in gone),
+        )
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
@@ -136,7 +184,7 @@ class _Builder:
     def __init__(self, eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene) -> None:
         self.eom, self.reduction, self.scene = eom, reduction, scene
         self.model = eom.model
-        self.units = {str(eom.plain(s)): u for s, u in self.model.units.items()}
+        self.units = eom.units
         self.stepped = eom if reduction is None else reduction.reduced
         self.into = {}
         if reduction is not None:
@@ -164,10 +212,10 @@ class _Builder:
     def _starts(self) -> dict[str, float]:
         model, given = self.model, {}
         for state, value in model.start.items():
-            given[str(self.eom.plain(state))] = float(value)
-        if model.embedding is not None and self.reduction is not None:
+            given[str(self.eom.symbols[state])] = float(value)
+        if model.embedding is not None:
             for state, value in model.embedding.start.items():
-                given[str(self.eom.plain(state))] = float(value)
+                given[str(self.eom.symbols[state])] = float(value)
         return {name: given.get(name, 0.0) for name in self.state_names}
 
     def symbols(self, *expressions: Expr) -> set[str]:
@@ -300,7 +348,7 @@ class _Builder:
                 maximum=p.max,
                 positive=bool(p.symbol.is_positive),
             )
-            for p in self.model.parameters
+            for p in self.eom.parameters
         ]
 
     def solver(self) -> list[Variable]:
@@ -321,13 +369,13 @@ class _Builder:
                 maximum=maximum,
             )
 
+        methods = self.scene.selectable
+        choice = setting("method", self.scene.method, None, menu(methods))
+        step = setting(
+            "step", self.scene.step, SECOND, "largest fixed step of rk4; 0: chosen from the start"
+        )
         return [
-            setting(
-                "method",
-                self.scene.method,
-                None,
-                "integrator: dop853, dopri5, rk4 (fixed step) or radau5 (stiff)",
-            ),
+            *([choice] if len(methods) > 1 else []),
             setting(
                 "tolerance",
                 0.0,
@@ -336,9 +384,7 @@ class _Builder:
                 f"{self.scene.tolerance!r}",
                 1.0,
             ),
-            setting(
-                "step", self.scene.step, SECOND, "largest step of rk4; 0: chosen from the start"
-            ),
+            *([step] if FIXED.intersection(methods) else []),
             setting("maximum_step", 0.0, SECOND, "largest adaptive step; 0: no limit"),
         ]
 
@@ -346,6 +392,8 @@ class _Builder:
         variables = []
         for i in self.model.inputs:
             name = name_of(i.symbol)
+            if name not in self.inputs:
+                continue  # it keeps its start value
             names = [name]
             if i in self.model.prescribed:
                 names += [f"der({name})", f"der({name},2)"]
@@ -384,7 +432,9 @@ class _Builder:
                             s, text, self.units[s], self.symbols(q if of is None else v), "Real", of
                         )
                     )
-            symbols = self.group(coordinate=j)
+            if self.eom.bare and str(q) not in states:
+                continue
+            symbols = self.motion_of_stepped if self.eom.bare else self.group(coordinate=j)
             name = f"der({q},2)"
             variables.append(self.output(name, texts[2], self.units[name], symbols, "Real", str(v)))
         own = {str(q) for q in self.eom.q}
@@ -395,9 +445,15 @@ class _Builder:
             variables.append(self.state(str(q), texts[0], None))
             variables.append(self.state(str(v), texts[1], str(q)))
             name = f"der({q},2)"
-            symbols = self.symbols(*self.stepped.M, *self.stepped.F)
+            symbols = self.motion_of_stepped
             variables.append(self.output(name, texts[2], self.units[name], symbols, "Real", str(v)))
         return variables
+
+    @cached_property
+    def motion_of_stepped(self) -> set[str]:
+        """Symbols behind the accelerations of the stepped coordinates of a reduction."""
+        eom = self.stepped
+        return self.symbols(*eom.M.todok().values(), *eom.F, *eom.G.todok().values(), *eom.gamma)
 
     def _texts(self, name: str) -> tuple[str, str, str]:
         text = self.descriptions.get(name, f"coordinate {name}")
@@ -407,7 +463,7 @@ class _Builder:
         variables = []
         model, jacobian = self.model, self.eom.G.todok()
         entries = self.symbols(*jacobian.values())
-        for k, c in enumerate(model.constraints):
+        for k, c in enumerate(self.eom.constraints):
             what = f"constraint {c.name}" + (f": {c.description}" if c.description else "")
             expression = sp.sympify(c.expression)
             unit = dimension_of(expression, model.units, c.name) or ONE
@@ -424,38 +480,43 @@ class _Builder:
             variables.append(self.output(f"residual.{c.name}", text, unit, behind))
             text = f"true where lambda.{c.name} is determined uniquely"
             variables.append(self.output(f"unique.{c.name}", text, None, entries, "Boolean"))
-        for j, q in enumerate(self.eom.q):
+        for j, q in enumerate(() if self.eom.bare else self.eom.q):
             unit = generalized_force_unit(self.units[str(q)])
             touching = [k for k in range(self.eom.m) if (k, j) in jacobian]
             symbols = self.group(coordinate=j) if touching else set()
             text = f"generalized force of all constraints on {q}"
             variables.append(self.output(f"Q.{q}", text, unit, symbols))
             for k in touching:
-                name = model.constraints[k].name
+                name = self.eom.constraints[k].name
                 text = f"generalized force of constraint {name} on {q}"
                 variables.append(self.output(f"Q.{name}.{q}", text, unit, symbols))
         return variables
 
     def energies(self) -> list[Variable]:
-        kinetic, potential = self.symbols(self.eom.kinetic), self.symbols(self.eom.potential)
-        variables = [self.output("energy.kinetic", "kinetic energy", ENERGY, kinetic)]
-        if self.eom.potential is None:
-            return variables
-        return [
-            *variables,
-            self.output("energy.potential", "potential energy", ENERGY, potential),
-            self.output(
-                "energy.total", "kinetic plus potential energy", ENERGY, kinetic | potential
-            ),
-        ]
+        T, V = self.eom.kinetic, self.eom.potential
+        kinetic, potential = self.symbols(T), self.symbols(V)
+        total = kinetic | potential
+        variables = []
+        if T is not None:
+            variables.append(self.output("energy.kinetic", "kinetic energy", ENERGY, kinetic))
+        if V is not None:
+            variables.append(self.output("energy.potential", "potential energy", ENERGY, potential))
+        if T is not None and V is not None:
+            text = "kinetic plus potential energy"
+            variables.append(self.output("energy.total", text, ENERGY, total))
+        return variables
 
     def contact_outputs(self) -> list[Variable]:
         variables = []
         coordinates = [(str(q), str(v)) for q, v in zip(self.eom.q, self.eom.v, strict=True)]
-        for k, c in enumerate(self.model.constraints):
+        constraints = self.eom.constraints
+        if self.eom.bare and self.reduction is not None:
+            constraints = self.reduction.constraints
+        for k, c in enumerate(constraints):
             if not isinstance(c, Contact):
                 continue
-            names = self.known | self.group(row=k)  # it opens and closes by f, its rate and lambda
+            behind = self.motion_of_stepped if self.eom.bare else self.group(row=k)
+            names = self.known | behind  # it opens and closes by f, its rate and lambda
             head = f"departure.{c.name}"
             tail = f"the latest departure from {c.name}, 0 before the first"
             variables += [

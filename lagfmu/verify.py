@@ -107,7 +107,9 @@ def verify(
     _check_texts(description, start_values or {})
     problems = validate_fmu(str(path))
     begun = time.perf_counter()
-    result = simulate(path, stop_time, step_size, tolerance, start_values)
+    local = {v.name for v in description.modelVariables if v.causality == "local"}
+    besides = sorted(local & set().union(*(claim.variables for claim in claims)))
+    result = simulate(path, stop_time, step_size, tolerance, start_values, besides=besides)
     seconds = time.perf_counter() - begun
     experiment = description.defaultExperiment
     used = tolerance or float(getattr(experiment, "tolerance", None) or 1e-8)

@@ -83,7 +83,7 @@ const int *table_of(int full, int which) {
 int number_of(int full, int which) {
     const System *s = pick(full);
     const int numbers[] = {s->n, s->m, s->contacts, s->inputs, s->parameters, s->masses, s->entries,
-                           s->prescribed_count, s->has_potential, s->constant_mass, s->separable,
+                           s->prescribed_count, s->constant_mass, s->separable,
                            (int)s->formulation};
     return numbers[which];
 }
@@ -95,7 +95,7 @@ int gate_of(int full, int k) { return pick(full)->rows[k].while_closed; }
 TABLES = ("mass_row", "mass_column", "entry_row", "entry_column", "row_start", "contact")
 TABLES += ("prescribed", "dimension", "extent_dimension")
 NUMBERS = ("n", "m", "contacts", "inputs", "parameters", "masses", "entries", "prescribed_count")
-NUMBERS += ("has_potential", "constant_mass", "separable", "formulation")
+NUMBERS += ("constant_mass", "separable", "formulation")
 KINDS = ("holonomic", "nonholonomic", "contact")
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
 
@@ -425,7 +425,6 @@ def test_tables_are_those_of_the_twin(case: Callable[[str], Case], name: str) ->
         assert tuple(native.table("contact", count, full)) == twin.contacts
         count = native.number("prescribed_count", full)
         assert tuple(native.table("prescribed", count, full)) == twin.prescribed
-        assert native.number("has_potential", full) == twin.has_potential
         assert FORMULATIONS[native.number("formulation", full)] == twin.formulation
         library = native.library
         assert tuple(library.coordinate_of(full, j).decode() for j in range(n)) == twin.coordinates

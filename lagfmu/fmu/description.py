@@ -163,10 +163,16 @@ def _structure(root: Element, table: VariableTable, index: Mapping[str, int]) ->
     outputs = SubElement(structure, "Outputs")
     for v in table.outputs:
         unknown(outputs, v.name, v.depends)
-    derivatives = SubElement(structure, "Derivatives")
-    for name in table.derivatives:
-        unknown(derivatives, name, table[name].depends)
-    initial = SubElement(structure, "InitialUnknowns")
-    for v in table.outputs:
-        if v.initial in ("approx", "calculated"):
-            unknown(initial, v.name, v.depends_initially)
+    if table.derivatives:
+        derivatives = SubElement(structure, "Derivatives")
+        for name in table.derivatives:
+            unknown(derivatives, name, table[name].depends)
+    moving = {*table.states, *table.derivatives}  # listed even where they are local
+    found = [
+        v
+        for v in table.variables
+        if (v.causality == "output" or v.name in moving) and v.initial in ("approx", "calculated")
+    ]
+    initial = SubElement(structure, "InitialUnknowns") if found else structure
+    for v in found:
+        unknown(initial, v.name, v.depends_initially)

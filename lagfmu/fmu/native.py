@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from importlib.resources import files
 
 from ..ccode import model_source
@@ -25,12 +24,10 @@ CAPABILITIES = {
     "canNotUseMemoryManagementFunctions": "false",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
-    "providesDirectionalDerivative": "true",
 }
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
     "canInterpolateInputs": "true",
-    "maxOutputDerivativeOrder": "1",
     "canRunAsynchronuously": "false",
 }
 MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "false"}
@@ -50,17 +47,23 @@ def build(
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
     wanted = chosen(platforms)
-    if scene.method == "rattle" and (problems := entanglements(eom, scene.formulation)):
+    formulation = scene.formulation or "multipliers"
+    if scene.method == "rattle" and (problems := entanglements(eom, formulation)):
         raise BuildError(
             f"scene {scene.name!r}: rattle cannot step these equations: {'; '.join(problems)}; choose "
             "another method"
         )
-    table = _with_rattle(table)
     runtime = runtime_files()
     generated = {
-        "model.c": model_source(eom, reduction, scene.formulation).encode(),
+        "model.c": model_source(eom, reduction, formulation, needs_tangents(scene)).encode(),
         "variables.c": variables_source(table, eom, reduction, scene, system).encode(),
     }
+    common = {
+        "modelIdentifier": scene.name,
+        **CAPABILITIES,
+        "providesDirectionalDerivative": "true" if scene.differentiable else "false",
+    }
+    order = {"maxOutputDerivativeOrder": "1" if scene.differentiable else "0"}
     sources = sorted(f for f in {*runtime, *generated} if f.endswith(".c"))
     description = model_description(
         table,
@@ -68,8 +71,8 @@ def build(
         eom.model.description or f"{eom.model.name}: forces of constraint as outputs",
         f"lagfmu {version()}",
         {
-            "ModelExchange": {"modelIdentifier": scene.name, **CAPABILITIES, **MODEL_EXCHANGE},
-            "CoSimulation": {"modelIdentifier": scene.name, **CAPABILITIES, **CO_SIMULATION},
+            "ModelExchange": {**common, **MODEL_EXCHANGE},
+            "CoSimulation": {**common, **CO_SIMULATION, **order},
         },
         b"".join(name.encode() + text for name, text in {**runtime, **generated}.items()),
         sources=sources,
@@ -87,6 +90,11 @@ def build(
     return pack(contents)
 
 
+def needs_tangents(scene: Scene) -> bool:
+    """True if derivatives of the equations are offered, or needed by an implicit method."""
+    return scene.differentiable or "radau5" in scene.selectable
+
+
 def runtime_files() -> dict[str, bytes]:
     """Name -> content of the C files that every native FMU carries."""
     return {
@@ -99,11 +107,3 @@ def runtime_files() -> dict[str, bytes]:
 def takes_long(platforms: Sequence[str]) -> bool:
     """True if the runtime has to be compiled first, which for Windows takes about a minute."""
     return is_first(chosen(platforms), runtime_files())
-
-
-def _with_rattle(table: VariableTable) -> VariableTable:
-    """The same table; `solver.method` also names the method that only this target has."""
-    method = table["solver.method"]
-    text = "integrator: dop853, dopri5, rk4 and rattle (fixed step) or radau5 (stiff)"
-    variables = [replace(v, description=text) if v is method else v for v in table.variables]
-    return replace(table, variables=tuple(variables))

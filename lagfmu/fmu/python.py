@@ -7,7 +7,7 @@ import hashlib
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
 
@@ -62,6 +62,9 @@ class {name}(Fmi2Slave):
     system = SYSTEM
     variables = VARIABLES
     default_tolerance = {tolerance!r}
+    methods = {methods!r}
+    default_method = {method!r}
+    default_step = {step!r}
     identity = {identity!r}
 '''
 
@@ -79,9 +82,11 @@ def build(
             f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
             f"{', '.join(METHODS)}, or the target native"
         )
+    methods = tuple(m for m in scene.selectable if m in METHODS)
+    table = table.offering(methods).without_local_derivatives()
     runtime = _runtime()
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
-    text = _script(eom, reduction, scene, table, package)
+    text = _script(eom, reduction, scene, table, package, methods)
     module = f"{scene.name}_{_digest(text.encode())}"
     description = model_description(
         table,
@@ -115,12 +120,13 @@ def _script(
     scene: Scene,
     table: VariableTable,
     package: str,
+    methods: Sequence[str],
 ) -> str:
     rows = "".join(
         f"    {(v.name, v.kind, v.role, v.start, v.minimum, v.maximum, v.positive)!r},\n"
         for v in table.variables
     )
-    equations = source(eom, reduction, scene.formulation)
+    equations = source(eom, reduction, scene.formulation or "multipliers")
     return SCRIPT.format(
         name=scene.name,
         version=version(),
@@ -128,6 +134,9 @@ def _script(
         equations="\n" + equations,
         variables=rows,
         tolerance=scene.tolerance,
+        methods=tuple(methods),
+        method=scene.method,
+        step=scene.step,
         identity=f"{scene.name} {_digest(equations.encode(), rows.encode(), package.encode())}",
     )
 

@@ -25,7 +25,7 @@ from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import Values, observe
-from ..solver.state import METHODS, SMALLEST_TOLERANCE, Settings, State
+from ..solver.state import SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
 from .references import end_once, keep, keep_module_of
 
@@ -59,12 +59,16 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     """A simulation of `system` behind the FMI functions.
 
     The generated subclass gives `system`, `variables` (name, kind, role, start, min, max, must it be
-    positive; the position is the value reference), `default_tolerance` and `identity`.
+    positive; the position is the value reference), `default_tolerance`, the `methods` that can be
+    chosen, the default method and fixed step, and `identity`.
     """
 
     system: System
     variables: Sequence[tuple[str, str, str, Any, float | None, float | None, bool]]
     default_tolerance: float
+    methods: Sequence[str]
+    default_method: str
+    default_step: float
     identity: str
 
     def __init__(self, **kwargs: Any) -> None:
@@ -222,8 +226,8 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         """Set `solver.method`."""
         for vr, value in zip(vrs, values, strict=True):
             name = self._settable(vr, "String")[0]
-            if value not in METHODS:
-                raise Refused(f"{name!r} = {value!r}, expected one of {', '.join(METHODS)}")
+            if value not in self.methods:
+                raise Refused(f"{name!r} = {value!r}, expected one of {', '.join(self.methods)}")
         self._set(vrs, values)
 
     @guarded
@@ -294,9 +298,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                 f"{SMALLEST_TOLERANCE!r} is used"
             )
         self.settings = Settings(
-            method=value["solver.method"],
+            method=value.get("solver.method", self.default_method),
             tolerance=max(tolerance, SMALLEST_TOLERANCE),
-            step=value["solver.step"],
+            step=value.get("solver.step", self.default_step),
             maximum_step=value["solver.maximum_step"],
         )
         self.p = self._values(self.parameters)

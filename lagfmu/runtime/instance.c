@@ -331,6 +331,8 @@ Status instance_step(Instance *x, double t_end) {
 Status instance_differentiate(Instance *x, Direction d) {
     Solver *s = &x->solver;
     const System *full = s->system->full;
+    if (s->system->tangent == NULL)
+        return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
     const Instant at = {s->state.now.t, s->drive.value, s->p};
     system_active(s->system, s->state.closed, s->active);
@@ -342,6 +344,10 @@ Status instance_differentiate(Instance *x, Direction d) {
     s->system->embed_tangent(at.t, s->state.q, s->state.v, at.u, at.p, d.dt, d.dq, d.dv, d.du,
                              w->dq, w->dv);
     const Direction wide = {d.dt, w->dq, w->dv, d.du};
+    if (full->dynamics == NULL) {
+        sensitivity_of_energies(w, full, at, x->seen.q, x->seen.v, wide);
+        return OK;
+    }
     if (mechanism_motion(&s->full, at, x->seen.q, x->seen.v, s->active_full) != OK)
         return FAILED;
     return sensitivity_along(w, &s->full, at, x->seen.q, x->seen.v, wide);

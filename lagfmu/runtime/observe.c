@@ -50,21 +50,15 @@ static void expand(const Solver *s, double t, const double *q, const double *v, 
     memcpy(full_v, v, bytes);
 }
 
-static Status observe_motion(Solver *s, Instant at, Mechanism *b, Observed *o) {
-    const System *own = s->system;
+/* The coordinates that are stepped, where there are others. */
+static Status observe_stepped(Solver *s, Instant at, Observed *o) {
     const State *state = &s->state;
-    const size_t n = (size_t)own->n * sizeof(double);
-    system_active(own, state->closed, s->active);
-    if (own->embed != NULL) {
-        if (mechanism_motion(&s->stepped, at, state->q, state->v, s->active) == FAILED)
-            return FAILED;
-        memcpy(o->s, state->q, n);
-        memcpy(o->sdot, state->v, n);
-        memcpy(o->sddot, s->stepped.vdot, n);
-        full_active(s);
-    }
-    expand(s, at.t, state->q, state->v, o->q, o->v);
-    return mechanism_motion(b, at, o->q, o->v, own->embed != NULL ? s->active_full : s->active);
+    const size_t n = (size_t)s->system->n * sizeof(double);
+    if (mechanism_motion(&s->stepped, at, state->q, state->v, s->active) == FAILED) return FAILED;
+    memcpy(o->s, state->q, n);
+    memcpy(o->sdot, state->v, n);
+    memcpy(o->sddot, s->stepped.vdot, n);
+    return OK;
 }
 
 /* lambda, whether it is unique, Q and each constraint's share in it. */
@@ -90,6 +84,18 @@ static Status observe_residuals(const Solver *s, Instant at, Mechanism *b, Obser
             o->residual[k] -= level(s, k);
     }
     return OK;
+}
+
+/* Accelerations, lambda, Q and residuals. */
+static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
+    const int *active = s->active;
+    if (s->system->embed != NULL) {
+        full_active(s);
+        active = s->active_full;
+    }
+    if (mechanism_motion(b, at, o->q, o->v, active) == FAILED) return FAILED;
+    observe_forces(b, o);
+    return observe_residuals(s, at, b, o);
 }
 
 static void observe_departures(const Solver *s, Observed *o) {
@@ -165,11 +171,11 @@ Status solver_observe(Solver *s, Observed *o) {
     Mechanism *b = s->system->embed != NULL ? &s->full : &s->stepped;
     drive_at(s->system, &s->drive, s->state.now.t, s->u);
     const Instant at = {s->state.now.t, s->u, s->p};
-    if (observe_motion(s, at, b, o) == FAILED) return FAILED;
-    observe_forces(b, o);
-    if (observe_residuals(s, at, b, o) == FAILED) return FAILED;
-    full->energies(at.t, o->q, o->v, at.u, at.p, o->energy);
-    if (!full->has_potential) o->energy[1] = 0;
+    system_active(s->system, s->state.closed, s->active);
+    if (s->system->embed != NULL && observe_stepped(s, at, o) == FAILED) return FAILED;
+    expand(s, at.t, s->state.q, s->state.v, o->q, o->v);
+    if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;
+    if (full->energies != NULL) full->energies(at.t, o->q, o->v, at.u, at.p, o->energy);
     observe_departures(s, o);
     return check_finite(s, full, o);
 }

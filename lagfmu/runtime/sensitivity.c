@@ -63,6 +63,13 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
     return linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda);
 }
 
+void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
+                             const double *v, Direction d) {
+    if (s->tangent == NULL) return;
+    s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dM, w->dF, w->dG, w->dnu,
+               w->dgamma, w->df, w->denergy);
+}
+
 double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,
                             const double *dv) {
     const System *s = b->system;

@@ -26,6 +26,10 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
 Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
                          const double *v, Direction d);
 
+/* Changes of the energies along a direction, of a system of which coordinates are only read. */
+void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
+                             const double *v, Direction d);
+
 /* The change of row k's residual: df, or of G v - nu for a nonholonomic row. */
 double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,
                             const double *dv);

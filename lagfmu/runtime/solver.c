@@ -42,7 +42,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     mechanism_layout(&s->stepped, scratch, system, &s->why);
     sensitivity_layout(&s->sensitivity, scratch, system);
     s->active_full = NULL;
-    if (system->embed != NULL) {
+    if (system->embed != NULL && system->full->dynamics != NULL) {
         mechanism_layout(&s->full, scratch, system->full, &s->why);
         s->active_full = arena_ints(scratch, system->full->m);
     }

@@ -38,7 +38,6 @@ struct System {
     const int *dimension;        /* (n) coordinates of one physical dimension have one number */
     const int *extent_dimension; /* (parameters) the number of those that it compares to; -1: none */
     Formulation formulation;
-    int has_potential;
     int constant_mass;        /* M holds parameters and numbers only */
     int separable;            /* constant mass, forces without velocities, position constraints only */
     const Plan *plan;         /* sparse elimination, found when the FMU was built */
@@ -51,21 +50,22 @@ struct System {
                      double *M, double *F, double *G, double *nu, double *gamma);
     /* f (m), 0 for a nonholonomic row */
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
-    /* kinetic and potential energy [J] */
+    /* kinetic and potential energy [J]; NULL where they are not read */
     void (*energies)(double t, const double *q, const double *v, const double *u, const double *p,
                      double *energy);
-    /* coefficient of restitution of each row (m) */
+    /* coefficient of restitution of each row (m); NULL without contacts */
     void (*restitution)(const double *p, double *e);
     /* The derivative of all of these along the direction (dt, dq, dv, du): what changes in the values
      * when the state moves that way.  dM (masses), dF (n), dG (entries), dnu, dgamma, df (m),
-     * denergy (2). */
+     * denergy (2).  NULL where nobody asks for derivatives. */
     void (*tangent)(double t, const double *q, const double *v, const double *u, const double *p,
                     double dt, const double *dq, const double *dv, const double *du, double *dM,
                     double *dF, double *dG, double *dnu, double *dgamma, double *df,
                     double *denergy);
 
     /* An embedding q = phi(s, t), v = J sdot + dphi/dt, from the coordinates that this system steps
-     * to those of `full`, from which lambda is recovered; both NULL without one. */
+     * to those of `full`, from which lambda is recovered; both NULL without one.  If nothing that is
+     * solved for is read, `full` has no dynamics, and is nothing but the coordinates that are read. */
     void (*embed)(double t, const double *s, const double *sdot, const double *u, const double *p,
                   double *q, double *v);
     void (*embed_tangent)(double t, const double *s, const double *sdot, const double *u,

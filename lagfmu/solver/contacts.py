@@ -109,6 +109,7 @@ def impact(
     system = at.system
     M, _, G, nu, _ = at.evaluate(q, v)
     struck = system.contacts[landing]
+    assert system.restitution is not None
     e = 0.0 if plastic else system.restitution(at.p)[struck]
     modes = list(closed)
     modes[landing] = True

@@ -31,6 +31,7 @@ class Instant:
 
     def residual(self, q: Vector) -> Vector:
         """f (m): how far each position constraint is missed; 0 for nonholonomic rows."""
+        assert self.system.residual is not None
         try:
             f = self.system.residual(self.t, q.tolist(), self.u, self.p)
         except (ArithmeticError, ValueError) as error:

@@ -37,23 +37,47 @@ def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]
 def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float]) -> Values:
     values: Values = {}
     full, q, v = expand(system, state.t, np.array(state.q), np.array(state.v), u, p)
-    shut = {system.rows[k].name: c for k, c in zip(system.contacts, state.closed, strict=True)}
-    active = full.active([shut[full.rows[k].name] for k in full.contacts])
-    at = Instant(full, state.t, u, p)
-    now = motion(at, q, v, active)
     for j, name in enumerate(full.coordinates):
         values[name] = float(q[j])
         values[f"der({name})"] = float(v[j])
-        values[f"der({name},2)"] = float(now.vdot[j])
+    if full.dynamics is not None:
+        values |= _solved(system, full, state, q, v, u, p)
     if system.embedding is not None:
         stepped = Instant(system, state.t, u, p)
         acting = system.active(state.closed)
         reduced = motion(stepped, np.array(state.q), np.array(state.v), acting)
         for j, name in enumerate(system.coordinates):
-            if name not in values:
-                values[name] = state.q[j]
-                values[f"der({name})"] = state.v[j]
-                values[f"der({name},2)"] = float(reduced.vdot[j])
+            values.setdefault(name, state.q[j])
+            values.setdefault(f"der({name})", state.v[j])
+            values.setdefault(f"der({name},2)", float(reduced.vdot[j]))
+    if full.energies is not None:
+        kinetic, potential = full.energies(state.t, q.tolist(), v.tolist(), u, p)
+        values["energy.kinetic"] = float(kinetic)
+        values["energy.potential"] = float(potential)
+        values["energy.total"] = float(kinetic + potential)
+    for c, k in enumerate(system.contacts):
+        values |= _contact(system, state, c, system.rows[k].name, u, p)
+    values["solver.steps"] = state.steps
+    return values
+
+
+def _solved(
+    system: System,
+    full: System,
+    state: State,
+    q: Vector,
+    v: Vector,
+    u: Sequence[float],
+    p: Sequence[float],
+) -> Values:
+    """Accelerations, lambda, Q and residuals of the full system."""
+    values: Values = {}
+    shut = {system.rows[k].name: c for k, c in zip(system.contacts, state.closed, strict=True)}
+    active = full.active([shut[full.rows[k].name] for k in full.contacts])
+    at = Instant(full, state.t, u, p)
+    now = motion(at, q, v, active)
+    for j, name in enumerate(full.coordinates):
+        values[f"der({name},2)"] = float(now.vdot[j])
     f = at.residual(q)
     slip = now.G @ v - now.nu
     kept = {row.name: level for row, level in zip(system.rows, state.offset, strict=True)}
@@ -67,14 +91,6 @@ def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float
         values[f"Q.{name}"] = float(share[:, j].sum())
     for k, j in zip(*full.jacobian, strict=True):
         values[f"Q.{full.rows[k].name}.{full.coordinates[j]}"] = float(share[k, j])
-    kinetic, potential = full.energies(state.t, q.tolist(), v.tolist(), u, p)
-    values["energy.kinetic"] = float(kinetic)
-    if full.has_potential:
-        values["energy.potential"] = float(potential)
-        values["energy.total"] = float(kinetic + potential)
-    for c, k in enumerate(system.contacts):
-        values |= _contact(system, state, c, system.rows[k].name, u, p)
-    values["solver.steps"] = state.steps
     return values
 
 

@@ -40,21 +40,25 @@ class System:
     one coefficient a row.  `mass` and `jacobian` are the (row, column) indices of the values; M's
     are those of the lower triangle.  `prescribed` are the positions in u where a prescribed motion
     and its two derivatives begin.  `extent` (n) lists for each coordinate the positions in p whose
-    values have the coordinate's dimension.
+    values have the coordinate's dimension, `folded` (n) the largest magnitude among the parameters of
+    that dimension that are numbers in the code.
+
+    `energies` is None where they are not read.  The full system of an embedding may hold coordinates
+    that are only read: then `dynamics`, `residual` and `restitution` are None too.
     """
 
     coordinates: tuple[str, ...]
     rows: tuple[Row, ...]
     mass: tuple[Sequence[int], Sequence[int]]
     jacobian: tuple[Sequence[int], Sequence[int]]
-    dynamics: Callable[..., Any]
-    residual: Callable[..., Any]
-    energies: Callable[..., Any]
-    restitution: Callable[..., Any]
-    has_potential: bool = True
+    dynamics: Callable[..., Any] | None
+    residual: Callable[..., Any] | None
+    energies: Callable[..., Any] | None
+    restitution: Callable[..., Any] | None
     prescribed: tuple[int, ...] = ()
     like: tuple[tuple[int, ...], ...] = ()
     extent: tuple[tuple[int, ...], ...] = ()
+    folded: tuple[float, ...] = ()
     embedding: Embedding | None = None
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
@@ -104,6 +108,7 @@ class System:
         self, t: float, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
     ) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
         """M (n, n), F (n), G (m, n), nu (m), gamma (m) at a state; all constraint rows."""
+        assert self.dynamics is not None
         mass, F, jacobian, nu, gamma = self.dynamics(t, q.tolist(), v.tolist(), u, p)
         M = np.zeros((self.n, self.n))
         i, j = self._mass

@@ -15,7 +15,7 @@ from ..closed_form import ClosedForm, Conserved
 from ..errors import BuildError, LagfmuError
 from ..model import Model
 from ..prepare import prepare
-from ..scene import Scene
+from ..scene import METHODS, Scene
 from ..verify import claims_in
 from .goal import Goal
 from .held_out import Case, held_out
@@ -79,7 +79,7 @@ def pick(
         try:
             chosen = as_scene(measured.scene, option, goal)
             with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-                prepared = prepare(model, chosen)
+                prepared = prepare(model, replace(chosen, methods=METHODS))
                 path = write(prepared, folder, closed_forms, target=measured.target)
                 with Importer(path) as importer:
                     cases = held_out(importer, claims_in(path))

@@ -63,12 +63,13 @@ class Importer:
         self.outputs = [
             v
             for v in self.description.modelVariables
-            if v.causality == "output" and v.type in KINDS
+            if v.causality in ("output", "local") and v.type in KINDS
         ]
         if self.description.coSimulation is None or "solver.method" not in self.variables:
             raise VerificationError(
-                f"{str(fmu)!r} has no parameter 'solver.method': it was not built by lagfmu, and there "
-                "is no setting to vary"
+                f"{str(fmu)!r} has no parameter 'solver.method', so that there is no setting to vary: it "
+                "was not built by lagfmu, or for a scene with one method only (give the scene more of "
+                "them in `methods`)"
             )
         self.folder = fmpy.extract(str(fmu))
         self.slave: Any = None

@@ -7,6 +7,7 @@ is zero throughout, up to rounding, is measured against the largest one of its g
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -32,11 +33,13 @@ class Quantity:
 
 
 def quantities(description: Any) -> tuple[Quantity, ...]:
-    """Every lambda, Q, coordinate and departure time of an FMU (fmpy's ModelDescription)."""
-    units = {v.name: v.unit or "1" for v in description.modelVariables if v.type == "Real"}
-    coordinates = [n for n in units if f"der({n},2)" in units]
+    """Every output of an FMU (fmpy's ModelDescription) that is a lambda, Q, coordinate or departure
+    time."""
+    reals = [v for v in description.modelVariables if v.type == "Real"]
+    units = {v.name: v.unit or "1" for v in reals if v.causality == "output"}
+    coordinates = [n for n in units if re.fullmatch(r"[A-Za-z_]\w*", n)]
     found = [Quantity(n, MULTIPLIER, units[n]) for n in units if n.startswith("lambda.")]
-    found += [Quantity(f"Q.{c}", FORCE, units[f"Q.{c}"]) for c in coordinates if f"Q.{c}" in units]
+    found += [Quantity(n, FORCE, units[n]) for n in units if re.fullmatch(r"Q\.\w+", n)]
     found += [Quantity(c, MOTION, units[c]) for c in coordinates]
     for n in units:
         parts = n.split(".")

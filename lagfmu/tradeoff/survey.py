@@ -19,7 +19,7 @@ from ..closed_form import ClosedForm, Conserved
 from ..errors import LagfmuError, SimulationError
 from ..model import Model
 from ..prepare import prepare
-from ..scene import Scene
+from ..scene import METHODS, Scene
 from ..verify import claims_in
 from .goal import Goal
 from .importer import Importer
@@ -66,8 +66,8 @@ class Survey:
 
 
 def formulations(model: Model, scene: Scene) -> tuple[str, ...]:
-    """Those to try: a scene that names another formulation than the default keeps it."""
-    if scene.formulation != "multipliers":
+    """Those to try: a scene that names its formulation keeps it."""
+    if scene.formulation is not None:
         return (scene.formulation,)
     return ("multipliers", "nullspace") + (("minimal",) if model.embedding is not None else ())
 
@@ -89,17 +89,19 @@ def survey(
     dropped: list[str] = []
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder, contextlib.ExitStack() as stack:
         importers: dict[str, Importer] = {}
-        for formulation in formulations(model, scene):
+        tried = formulations(model, scene)
+        for formulation in tried:
             say(f"building {formulation}", 0, 1)
             try:
-                prepared = prepare(model, replace(scene, formulation=formulation))
+                wide = replace(scene, formulation=formulation, methods=METHODS)
+                prepared = prepare(model, wide)
                 path = write(prepared, Path(folder, formulation), closed_forms, target=target)
                 importers[formulation] = stack.enter_context(Importer(path))
             except LagfmuError as error:
-                if formulation == scene.formulation:
+                if formulation == tried[0]:
                     raise
                 dropped.append(f"{formulation}: {error}")
-        first = importers[scene.formulation]
+        first = importers[tried[0]]
         plan = plan or replace(default_plan(first), budget=BUDGET)
         say("reference", 0, 1)
         reference = refer(first, claims_in(first.path), communication=scene.step_size)

@@ -1,0 +1,42 @@
+"""A model and a scene -> one FMU file, with solver settings that are measured if an accuracy is asked for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from .build import write
+from .closed_form import ClosedForm, Conserved
+from .compiler import HOST
+from .model import Model
+from .prepare import prepare
+from .scene import Scene
+from .tradeoff.choose import choose
+from .tradeoff.goal import parse
+from .tradeoff.page import section
+
+
+def build_fmu(
+    model: Model,
+    out: str | os.PathLike[str] = ".",
+    scene: Scene | None = None,
+    closed_forms: Sequence[ClosedForm | Conserved] = (),
+    figures: Sequence[tuple[str, ...]] = (),
+    target: str = "python",
+    platforms: Sequence[str] = (HOST,),
+) -> Path:
+    """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu).
+
+    `target` is 'python' or 'native'; a native FMU has binaries for `platforms`, see compiler.PLATFORMS.
+    A scene with an `accuracy` takes half a minute more: its settings and formulation are measured.
+
+    `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them; `figures` are
+    verification results for its documentation page.  Raises ModelError, DerivationError, BuildError.
+    """
+    scene = scene or Scene(model.name)
+    choice = ""
+    if scene.accuracy is not None:
+        chosen = choose(model, scene, closed_forms, parse(scene.accuracy), target=target)
+        scene, choice = chosen.scene, section(chosen)
+    return write(prepare(model, scene), out, closed_forms, figures, target, platforms, choice)
