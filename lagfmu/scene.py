@@ -29,7 +29,7 @@ class Scene:
     stop_time: float = 1.0
     step_size: float = 0.01
     tolerance: float = DEFAULT_TOLERANCE
-    method: str = "dop853"
+    method: str = "auto"
     step: float = 0.0
 
     def __post_init__(self) -> None:
