@@ -326,7 +326,8 @@ class _Builder:
                 "method",
                 self.scene.method,
                 None,
-                "integrator: auto (dop853, radau5 where it is stiff), dop853, dopri5, rk4 (fixed step) or radau5 (stiff)",
+                "integrator: auto (dop853, but radau5 where it is stiff), dop853, dopri5, rk4 "
+                "(fixed step) or radau5 (stiff)",
             ),
             setting(
                 "tolerance",

@@ -104,6 +104,9 @@ def takes_long(platforms: Sequence[str]) -> bool:
 def _with_rattle(table: VariableTable) -> VariableTable:
     """The same table; `solver.method` also names the method that only this target has."""
     method = table["solver.method"]
-    text = "integrator: auto (dop853, radau5 where it is stiff), dop853, dopri5, rk4 and rattle (fixed step) or radau5 (stiff)"
+    text = (
+        "integrator: auto (dop853, but radau5 where it is stiff), dop853, dopri5, rk4 and rattle "
+        "(fixed step) or radau5 (stiff)"
+    )
     variables = [replace(v, description=text) if v is method else v for v in table.variables]
     return replace(table, variables=tuple(variables))

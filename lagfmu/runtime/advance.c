@@ -103,7 +103,7 @@ static Status try_step(Solver *s, double t_end) {
     return step_towards(s, t_end, t_end, HUGE_VAL);
 }
 
-/* Of `auto`: the step of dop853 just taken is judged, and the other method takes over if it is due. */
+/* Of `auto`: the step that dop853 took is judged, and the other method takes over if it is due. */
 static void choose(Solver *s) {
     Integrator *i = &s->integrator;
     Choice *choice = &s->state.now.choice;

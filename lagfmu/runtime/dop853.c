@@ -84,7 +84,7 @@ static const double SAFETY = 0.9, LEAST_FACTOR = 1.0 / 3, LARGEST_FACTOR = 6, RE
 
 enum { KEPT = 7 }; /* stages 6 to 12, which the dense output needs */
 
-/* k_2 to k_12, one after the other in k, y1, the increment sum = (y1 - y) / h, and k_12's argument. */
+/* k_2 to k_12, one after the other in k, y1, sum = (y1 - y) / h, and the argument of k_12. */
 static Status stages(const Integrator *i, const Ode *ode, double h, double t_new,
                      double *restrict k, double *restrict y1, double *restrict sum,
                      double *restrict last) {

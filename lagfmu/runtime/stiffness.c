@@ -26,8 +26,8 @@
 static const double STABLE = 6.1; /* h rho beyond which dop853 is unstable */
 static const double SLOWER = 30;  /* rho / sigma, per price of a step, from which on the motion is slow */
 static const double BOUND = 0.1;  /* h rho below which only the motion, or a bound, limits a step */
-static const double ROUNDING = 1e-12; /* changes of velocities and accelerations, relative to them,
-                                       * that say nothing */
+/* Changes of coordinates and velocities, and of accelerations, relative to them, that say nothing. */
+static const double ROUNDING = 1e-14, ROUNDING_FORCE = 1e-12;
 enum {
     STIFF = 15, /* steps that decide, ... */
     OTHER = 6,  /* ... and others in a row after which they are counted anew */
@@ -44,21 +44,21 @@ typedef struct {
     double damped, whole; /* [1/s] |Da| / |Dv| and sqrt(|Da| / |Dq|); 0 where rounding hides them */
 } Rates;
 
+/* (y1 - y0)^2 in units of `size`, 0 if rounding can make it. */
+static double square(double y0, double y1, double size, double rounding) {
+    const double change = fabs(y1 - y0);
+    return change > rounding * fabs(y1) ? change / size * (change / size) : 0;
+}
+
 static Rates rates(int n, const double *size, const double *y0, const double *f0, const double *y1,
                    const double *f1) {
-    double dq = 0, dv = 0, da = 0, v = 0, a = 0;
+    double dq = 0, dv = 0, da = 0;
     for (int j = 0; j < n; j++) {
-        const double unit = 1 / size[j];
-        const double xq = (y1[j] - y0[j]) * unit, xv = (y1[n + j] - y0[n + j]) * unit;
-        const double xa = (f1[n + j] - f0[n + j]) * unit;
-        const double wv = y1[n + j] * unit, wa = f1[n + j] * unit;
-        dq += xq * xq;
-        dv += xv * xv;
-        da += xa * xa;
-        v += wv * wv;
-        a += wa * wa;
+        dq += square(y0[j], y1[j], size[j], ROUNDING);
+        dv += square(y0[n + j], y1[n + j], size[j], ROUNDING);
+        da += square(f0[n + j], f1[n + j], size[j], ROUNDING_FORCE);
     }
-    if (!(dv > ROUNDING * ROUNDING * v && da > ROUNDING * ROUNDING * a)) return (Rates){0, 0};
+    if (!(dv > 0 && da > 0)) return (Rates){0, 0};
     return (Rates){sqrt(da / dv), dq > 0 ? sqrt(sqrt(da / dq)) : HUGE_VAL};
 }
 

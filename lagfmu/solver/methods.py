@@ -48,6 +48,6 @@ def stepper(
 
 
 def last_stage(solver: Any, y0: Vector) -> tuple[Vector, Vector]:
-    """Argument and rate of change of the stage of dop853 that lies at the end of the step from y0."""
+    """Argument and rate of change of dop853's stage at the end of the step from y0."""
     h, k = solver.t - solver.t_old, len(solver.A) - 1
     return y0 + h * (solver.A[k, :k] @ solver.K[:k]), solver.K[k]

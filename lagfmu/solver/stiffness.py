@@ -30,7 +30,7 @@ from .system import Vector
 STABLE = 6.1  # h rho beyond which dop853 is unstable
 SLOWER = 30.0  # rho / sigma, per price of a step, from which on the motion is far slower
 BOUND = 0.1  # h rho below which nothing but the motion, or a bound, limits a step of order 8
-ROUNDING = 1e-12  # changes of velocities and accelerations, relative to them, that say nothing
+ROUNDING, ROUNDING_FORCE = 1e-14, 1e-12  # relative changes (of accelerations) that say nothing
 STIFF, OTHER = 15, 6  # steps that decide; others in a row after which they are counted anew
 SHORT = 6  # steps of radau5 in a row that do not pay, after which dop853 comes back
 PRICE = 1.5  # cost of a step of radau5 in steps of dop853
@@ -85,15 +85,15 @@ class Slope:
         """|Da| / |Dv| and sqrt(|Da| / |Dq|) [1/s]; 0 where rounding hides them."""
         n = len(size)
 
-        def norm(x: Vector) -> float:
-            return float(np.linalg.norm(x / size))
+        def norm(y0: Vector, y1: Vector, rounding: float) -> float:
+            change = np.abs(y1 - y0)
+            seen = np.where(change > rounding * np.abs(y1), change, 0.0)
+            return float(np.linalg.norm(seen / size))
 
-        dq, dv, da = (
-            norm(self.y1[:n] - self.y0[:n]),
-            norm(self.y1[n:] - self.y0[n:]),
-            norm(self.f1[n:] - self.f0[n:]),
-        )
-        if not (dv > ROUNDING * norm(self.y1[n:]) and da > ROUNDING * norm(self.f1[n:])):
+        dq = norm(self.y0[:n], self.y1[:n], ROUNDING)
+        dv = norm(self.y0[n:], self.y1[n:], ROUNDING)
+        da = norm(self.f0[n:], self.f1[n:], ROUNDING_FORCE)
+        if not (dv > 0 and da > 0):
             return 0.0, 0.0
         return da / dv, math.sqrt(da / dq) if dq > 0 else math.inf
 
