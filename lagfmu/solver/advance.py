@@ -229,7 +229,7 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
                 here = replace(state, step=step, steps=steps, armed=tuple(armed), choice=choice)
                 return _switch(leg, here, t0, y0, *event)
         if choice.implicit:
-            choice = implicit_step(choice, solver.t - t0)
+            choice = implicit_step(choice, float(solver.t - t0))
         if solver.t == t_end:
             n = leg.system.n
             step = float(max(solver.h_abs, offered))  # the last step may have been cut short
@@ -249,7 +249,9 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
         if leg.auto and leg.settings.method == "dop853":
             stages = Slope(*last_stage(solver, y0), y1, solver.f)
             passed = Slope(y0, solver.K[0], y1, solver.f)
-            choice = explicit_step(choice, solver.t, solver.t - t0, stages, passed, leg.size)
+            choice = explicit_step(
+                choice, float(solver.t), float(solver.t - t0), stages, passed, leg.size
+            )
         if leg.auto and choice.implicit != (leg.settings.method == "radau5"):
             solver = _take_over(leg, choice, solver.t, y1, t_end)
         done = steps - first

@@ -6,7 +6,7 @@ A State is a value: saving it is keeping it, rolling back is putting it back, bi
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 
 from .stiffness import Choice
 
@@ -59,7 +59,7 @@ class State:
     step: float
     steps: int
     departures: tuple[Departure, ...]
-    choice: Choice = Choice()
+    choice: Choice = field(default_factory=Choice)
 
     def to_json(self) -> str:
         """Text that `from_json` turns into an equal state; floats keep every bit."""

@@ -34,7 +34,10 @@ ROUNDING, ROUNDING_FORCE = 1e-14, 1e-12  # relative changes (of accelerations) t
 STIFF, OTHER = 15, 6  # steps that decide; others in a row after which they are counted anew
 SHORT = 6  # steps of radau5 in a row that do not pay, after which dop853 comes back
 PRICE = 1.5  # cost of a step of radau5 in steps of dop853
-DEARER, MOST = 4, 8  # factor of the stiff steps asked for after radau5 did not pay; its power at most
+DEARER, MOST = (
+    4,
+    8,
+)  # factor of the stiff steps asked for after radau5 did not pay; its power at most
 RETRY, LATEST = 128, 20  # steps of radau5 before dop853 is tried again; doublings of them at most
 
 
