@@ -53,7 +53,7 @@ class Scene:
     stop_time: float = 1.0
     step_size: float = 0.01
     tolerance: float = DEFAULT_TOLERANCE
-    method: str = "dop853"
+    method: str = "auto"
     step: float = 0.0
     outputs: Sequence[str] = EVERYTHING
     fixed: Sequence[str] = ()

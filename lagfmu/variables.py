@@ -28,7 +28,12 @@ FIXED = {"rk4", "rattle"}  # methods with a fixed step
 
 def menu(methods: Collection[str]) -> str:
     """The description of solver.method."""
-    remarks = {"rk4": " (fixed step)", "rattle": " (fixed step)", "radau5": " (stiff)"}
+    remarks = {
+        "auto": " (dop853, but radau5 where it is stiff)",
+        "rk4": " (fixed step)",
+        "rattle": " (fixed step)",
+        "radau5": " (stiff)",
+    }
     *most, last = [m + remarks.get(m, "") for m in methods]
     return f"integrator: {', '.join(most)} or {last}" if most else f"integrator: {last}"
 

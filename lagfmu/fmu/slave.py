@@ -149,6 +149,8 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
             return False
         self._report_events(before, self.state)
+        if self.state.choice.product and not before.choice.product:
+            self.log(self.state.choice.message(), Fmi2Status.ok, "logEvents")
         return True
 
     def _checked(self, current_time: float, step_size: float) -> State:

@@ -19,8 +19,8 @@ static const double STEP_LIMIT = 1e7; /* internal steps that a communication ste
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead */
 
 static const Method *method_of(const Solver *s) {
-    const Method *const menu[METHOD_COUNT] = {&dop853, &dopri5, &rk4, &rattle, &radau5};
-    return menu[s->settings.method];
+    const Method *const menu[METHOD_COUNT] = {&dop853, &dop853, &dopri5, &rk4, &rattle, &radau5};
+    return s->state.now.choice.implicit ? &radau5 : menu[s->settings.method];
 }
 
 /* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not
@@ -65,6 +65,7 @@ static Status set_out(Solver *s) {
     double *y = s->work_advance;
     memcpy(y, x->q, n * sizeof *y);
     memcpy(y + n, x->v, n * sizeof *y);
+    if (stiffness_turn(&x->now.choice)) x->now.step = x->now.choice.longest;
     restart(s, x->now.t, y, x->now.step);
     x->now.ahead = 1;
     x->now.event_count = 0;
@@ -84,10 +85,12 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     if (watch && events_find(s, y1) != OK) return FAILED;
     integrator_move(i, y1);
     s->state.now.steps += 1;
+    if (s->state.now.choice.implicit) stiffness_implicit_step(&s->state.now.choice, i);
     return OK;
 }
 
-static Status take_step(Solver *s, double t_end) {
+/* As far as the communication point, or past it. */
+static Status try_step(Solver *s, double t_end) {
     Integrator *i = &s->integrator;
     if (!runs_ahead(s)) return step_towards(s, t_end, t_end, HUGE_VAL);
     const double longest = fmax(AHEAD / s->state.now.rate, t_end - i->t);
@@ -98,6 +101,33 @@ static Status take_step(Solver *s, double t_end) {
     restart(s, t, y0, fmin(h > 0 ? h : t_end - t, t_end - t));
     s->state.now.event_count = 0;
     return step_towards(s, t_end, t_end, HUGE_VAL);
+}
+
+/* Of `auto`: the step that dop853 took is judged, and the other method takes over if it is due. */
+static void choose(Solver *s) {
+    Integrator *i = &s->integrator;
+    Choice *choice = &s->state.now.choice;
+    if (!choice->implicit && i->t > i->t_old && leg_rate(s, i) == OK)
+        stiffness_explicit_step(choice, i, s->state.size);
+    if (!stiffness_turn(choice)) return;
+    double *y = s->work_advance;
+    memcpy(y, i->y, (size_t)i->ny * sizeof *y);
+    restart(s, i->t, y, choice->longest);
+}
+
+/* Where radau5 fails, dop853 goes on. */
+static Status take_step(Solver *s, double t_end) {
+    Integrator *i = &s->integrator;
+    if (s->settings.method == AUTO) choose(s);
+    const double t = i->t;
+    const Status status = try_step(s, t_end);
+    if (status == OK || !s->state.now.choice.implicit) return status;
+    double *y0 = s->work_advance;
+    memcpy(y0, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y0);
+    stiffness_explicit(&s->state.now.choice, 0);
+    restart(s, t, y0, s->state.now.choice.longest);
+    s->state.now.event_count = 0;
+    return try_step(s, t_end);
 }
 
 static void put(Solver *s, double t, const double *y) {
@@ -131,6 +161,10 @@ static Status meet(Solver *s) {
     if (leg_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     put(s, t, y);
     s->state.now.step = i->t - i->t_old;
+    if (s->state.now.choice.implicit) {
+        s->state.now.step = fmin(s->state.now.step, s->state.now.choice.longest);
+        stiffness_explicit(&s->state.now.choice, 1);
+    }
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
     return switch_modes(s, s->state.event_contacts);

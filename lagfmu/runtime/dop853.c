@@ -84,9 +84,10 @@ static const double SAFETY = 0.9, LEAST_FACTOR = 1.0 / 3, LARGEST_FACTOR = 6, RE
 
 enum { KEPT = 7 }; /* stages 6 to 12, which the dense output needs */
 
-/* k_2 to k_12, one after the other in k, y1 and the increment sum = (y1 - y) / h. */
+/* k_2 to k_12, one after the other in k, y1, sum = (y1 - y) / h, and the argument of k_12. */
 static Status stages(const Integrator *i, const Ode *ode, double h, double t_new,
-                     double *restrict k, double *restrict y1, double *restrict sum) {
+                     double *restrict k, double *restrict y1, double *restrict sum,
+                     double *restrict last) {
     const int n = i->ny;
     const double t = i->t;
     const double *restrict y = i->y, *restrict k1 = i->f;
@@ -131,6 +132,7 @@ static Status stages(const Integrator *i, const Ode *ode, double h, double t_new
                             a12_11 * k11[j]);
     if (ode->rate(ode->context, t_new, y1, k12) != OK) return FAILED;
     for (int j = 0; j < n; j++) {
+        last[j] = y1[j];
         sum[j] = b1 * k1[j] + b6 * k6[j] + b7 * k7[j] + b8 * k8[j] + b9 * k9[j] + b10 * k10[j] +
                  b11 * k11[j] + b12 * k12[j];
         y1[j] = y[j] + h * sum[j];
@@ -171,18 +173,22 @@ static double step_factor(double error) {
 
 static Status dop853_step(Integrator *i, const Ode *ode, const Control *control, double t_bound) {
     const int n = i->ny;
-    double *y1 = i->scratch, *sum = y1 + n, *k = sum + n;
+    double *y1 = i->scratch, *sum = y1 + n, *k = sum + n, *last = k + 11 * n;
     Trial trial;
     Status status = trial_begin(&trial, i, ode, control, t_bound, 7);
     while (status == OK) {
         double error = HUGE_VAL;
-        if (stages(i, ode, trial.h, trial.t_new, k, y1, sum) == OK)
+        if (stages(i, ode, trial.h, trial.t_new, k, y1, sum, last) == OK)
             error = error_norm(i, control, trial.h, k, y1, sum);
         else
             trial.unevaluated = 1;
         double factor = step_factor(error);
         if (error <= 1) {
             for (int j = 0; j < KEPT * n; j++) i->dense[j] = k[4 * n + j];
+            for (int j = 0; j < n; j++) {
+                i->dense[KEPT * n + j] = last[j];
+                i->dense[(KEPT + 1) * n + j] = k[10 * n + j];
+            }
             trial_accept(&trial, i, y1, factor);
             return OK;
         }
@@ -251,7 +257,7 @@ static void dop853_dense(const Integrator *i, double t, double *y) {
 }
 
 static int dop853_doubles(int ny) {
-    return 13 * ny; /* y1, sum, k_2 to k_12 */
+    return 14 * ny; /* y1, sum, k_2 to k_12 and the argument of k_12 */
 }
 
 static int dop853_ints(int ny) {
@@ -261,7 +267,8 @@ static int dop853_ints(int ny) {
 
 const Method dop853 = {
     .name = "dop853",
-    .dense_arrays = KEPT,
+    .dense_arrays = KEPT + 2,
+    .last_stage = KEPT,
     .scratch_doubles = dop853_doubles,
     .scratch_ints = dop853_ints,
     .step = dop853_step,

@@ -317,12 +317,17 @@ Status instance_step(Instance *x, double t_end) {
     if (s->system->prescribed_count > 0) warn_of_jumps(x);
     if (s->system->contacts > 0) note_contacts(x);
     x->observed = x->evaluated = 0;
+    const double product = s->state.now.choice.product;
     if (solver_advance(s, t_end) != OK) {
         instance_restore(x, x->backup);
         return FAILED;
     }
     move_inputs(x, t_end);
     if (s->system->contacts > 0) report_events(x);
+    if (product == 0 && s->state.now.choice.product > 0) {
+        stiffness_message(&s->state.now.choice, x->note, sizeof x->note);
+        x->tell(x->context, NOTE_EVENT, x->note);
+    }
     return OK;
 }
 

@@ -51,6 +51,8 @@ struct Method {
     int (*scratch_doubles)(int ny);
     int (*scratch_ints)(int ny);
     int needs_jacobian;
+    int last_stage; /* arrays in `dense` before two of a stage at t, its argument and its rate, which
+                     * stay as they are; 0: they are not kept */
     int fixed;                        /* a fixed step that divides the way to t_bound evenly */
     /* One accepted step from integrator->t towards t_bound, never past it.  On success t_old,
      * y_old, f_old, t, y, h_next are new, and dense() answers in [t_old, t]; the dense data may be
@@ -63,6 +65,8 @@ struct Method {
     Status (*prepare_dense)(Integrator *i, const Ode *ode);
     void (*dense)(const Integrator *i, double t, double *y);
 };
+
+enum { RADAU5_MOST_STATES = 800 }; /* for which radau5 keeps dense matrices */
 
 extern const Method dop853, dopri5, rk4, radau5;
 

@@ -7,6 +7,7 @@
 
 #include "rattle.h"
 #include "sensitivity.h"
+#include "step_size.h"
 
 static const double FEWEST_STEPS_RK4 = 100;  /* in one natural time of the motion, 1/rate, ... */
 static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
@@ -71,6 +72,11 @@ Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
     const Ode ode = {s, rate, jacobian, &s->why};
     if (i->method->step(i, &ode, &c, t_bound) != OK) return FAILED;
     return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;
+}
+
+Status leg_rate(Solver *s, Integrator *i) {
+    const Ode ode = {s, rate, jacobian, &s->why};
+    return step_size_rate(i, &ode);
 }
 
 Status leg_prepare_dense(Solver *s, Integrator *i) {

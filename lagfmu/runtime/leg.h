@@ -17,6 +17,9 @@ Instant leg_instant(Solver *s, double t);
 /* One accepted step towards t_bound, none longer than `longest` [s]. */
 Status leg_step(Solver *s, Integrator *i, double t_bound, double longest);
 
+/* The rate of change at the integrator's state. */
+Status leg_rate(Solver *s, Integrator *i);
+
 /* Completes the dense output of the step just taken. */
 Status leg_prepare_dense(Solver *s, Integrator *i);
 

@@ -38,8 +38,7 @@ static const double P[3][3] = {
 static const double SAFETY = 0.9, LEAST_FACTOR = 1.0 / 5, LARGEST_FACTOR = 8;
 static const double LEAST_ERROR = 1e-2; /* that the predictive controller remembers */
 enum {
-    ITERATIONS = 7,  /* of Newton's method, at most */
-    MOST_STATES = 800 /* for which dense matrices are kept */
+    ITERATIONS = 7 /* of Newton's method, at most */
 };
 
 /* Where things lie in the scratch. */
@@ -225,11 +224,11 @@ static void accept(Integrator *i, const Trial *trial, Work x, double error, doub
 
 static Status radau5_step(Integrator *i, const Ode *ode, const Control *control, double t_bound) {
     const int n = i->ny;
-    if (n > MOST_STATES)
+    if (n > RADAU5_MOST_STATES)
         return fail(ode->why,
                     "radau5 keeps dense matrices, of %d states at most; this model has %d: choose "
                     "solver.method = dop853",
-                    MOST_STATES, n);
+                    RADAU5_MOST_STATES, n);
     const double whole = step_size_tolerance(control);
     const double tolerance = 0.1 * step_size_root(whole * whole, 3);
     const double enough = fmax(10 * DBL_EPSILON / tolerance, fmin(0.03, sqrt(tolerance)));
@@ -266,7 +265,7 @@ static void radau5_dense(const Integrator *i, double t, double *y) {
 }
 
 static int radau5_doubles(int ny) {
-    return ny > MOST_STATES ? 2 * ny : 4 * ny * ny + 13 * ny;
+    return ny > RADAU5_MOST_STATES ? 2 * ny : 4 * ny * ny + 13 * ny;
 }
 
 static int radau5_ints(int ny) {

@@ -5,10 +5,12 @@
 
 #include "arena.h"
 #include "integrator.h"
+#include "stiffness.h"
 #include "system.h"
 
-typedef enum { DOP853, DOPRI5, RK4, RATTLE, RADAU5 } MethodName; /* in the order of METHOD_NAMES */
-enum { METHOD_COUNT = 5 };
+/* In the order of METHOD_NAMES. */
+typedef enum { AUTO, DOP853, DOPRI5, RK4, RATTLE, RADAU5 } MethodName;
+enum { METHOD_COUNT = 6 };
 extern const char *const METHOD_NAMES[METHOD_COUNT];
 
 /* How to step.  tolerance: relative, a step; step [s]: largest step of rk4 and rattle, 0: chosen;
@@ -39,6 +41,7 @@ typedef struct {
     int event_count;     /* contacts that open or close then */
     double t_old, t_integrator, h_next, error_old; /* of the integrator, when it is ahead */
     int fresh;
+    Choice choice;       /* of the method `auto` */
 } Numbers;
 
 /* ... and its arrays, which lie in one block. */

@@ -23,9 +23,10 @@ from scipy.optimize import brentq
 from .contacts import complementary_modes, impact
 from .failure import StepFailureError
 from .instant import Instant
-from .methods import stepper
+from .methods import last_stage, stepper
 from .motion import EPS, motion, project
 from .state import Departure, Settings, State
+from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step
 from .system import System, Vector
 
 LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
@@ -98,6 +99,14 @@ class _Leg:
         self.scale = np.array(self.state.scale)
         self.size = np.array(self.state.size)
         self.cause = ""
+        self.auto = self.settings.method == "auto"
+        if self.auto:
+            self.choose(self.state.choice)
+
+    def choose(self, choice: Choice) -> None:
+        """The method of `auto` for the steps to come."""
+        method = "radau5" if choice.implicit else "dop853"
+        self.settings = replace(self.settings, method=method)
 
     def at(self, t: float) -> Instant:
         return Instant(self.system, t, self.system.inputs_at(self.u, t - self.begun), self.p)
@@ -193,34 +202,58 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
         raise StepFailureError(leg.cause)
     solver = leg.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
-    steps = state.steps
+    steps, choice = state.steps, state.choice
     watch = bool(leg.system.contacts)
     before = leg.indicators(state.t, y) if watch else np.zeros(0)
     while True:
         t0, y0 = solver.t, solver.y
         offered = solver.h_abs
-        leg.step(solver)
+        try:
+            leg.step(solver)
+            y1 = leg.project(solver.t, solver.y)
+            if not (leg.system.prescribed and t0 == begun):  # it may have jumped when it was set
+                leg.check_projection(solver.t, solver.y, y1)
+        except StepFailureError:
+            if not choice.implicit:
+                raise
+            choice = explicit(choice, paid=False)
+            solver = _take_over(leg, choice, t0, y0, t_end)
+            continue
         steps += 1
-        y1 = leg.project(solver.t, solver.y)
-        if not (leg.system.prescribed and t0 == begun):  # it may have jumped when it was set
-            leg.check_projection(solver.t, solver.y, y1)
         if watch:
             event, before = _first_event(leg, solver, t0, y0, y1, before, armed, state.gap)
             if event is not None:
-                here = replace(state, step=offered, steps=steps, armed=tuple(armed))
+                step = offered
+                if choice.implicit:
+                    choice, step = explicit(choice, paid=True), min(offered, choice.longest)
+                here = replace(state, step=step, steps=steps, armed=tuple(armed), choice=choice)
                 return _switch(leg, here, t0, y0, *event)
+        if choice.implicit:
+            choice = implicit_step(choice, float(solver.t - t0))
         if solver.t == t_end:
             n = leg.system.n
+            step = float(max(solver.h_abs, offered))  # the last step may have been cut short
+            if leg.settings.method == "radau5" and leg.auto and not choice.implicit:
+                step = choice.longest
             return replace(
                 state,
                 t=t_end,
                 q=tuple(y1[:n].tolist()),
                 v=tuple(y1[n:].tolist()),
                 armed=tuple(armed),
-                step=float(max(solver.h_abs, offered)),  # the last step may have been cut short
+                step=step,
                 steps=steps,
+                choice=choice,
             )
         solver.y, solver.f = y1, leg.rate(solver.t, y1)
+        if leg.auto and leg.settings.method == "dop853":
+            stages = Slope(*last_stage(solver, y0), y1, solver.f)
+            passed = Slope(y0, solver.K[0], y1, solver.f)
+            choice = explicit_step(
+                choice, float(solver.t), float(solver.t - t0), stages, passed, leg.size
+            )
+        if leg.auto and choice.implicit != (leg.settings.method == "radau5"):
+            solver = _take_over(leg, choice, solver.t, y1, t_end)
         done = steps - first
         if done >= PATIENCE and done * (t_end - begun) > STEP_LIMIT * (solver.t - begun):
             needed = done * (t_end - begun) / (solver.t - begun)
@@ -228,6 +261,12 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
                 f"the communication step to t = {t_end!r} s would need about {needed:.0e} internal "
                 f"steps, more than {STEP_LIMIT:.0e}: take a shorter one"
             )
+
+
+def _take_over(leg: _Leg, choice: Choice, t: float, y: Vector, t_end: float) -> Any:
+    """The other method of `auto`, at (t, y); it begins with the steps that dop853 took last."""
+    leg.choose(choice)
+    return leg.stepper(t, y, t_end, choice.longest)
 
 
 def _first_event(

@@ -45,3 +45,9 @@ def stepper(
         first_step=None if first_step is None else min(first_step, span),
         max_step=settings.maximum_step or np.inf,
     )
+
+
+def last_stage(solver: Any, y0: Vector) -> tuple[Vector, Vector]:
+    """Argument and rate of change of dop853's stage at the end of the step from y0."""
+    h, k = solver.t - solver.t_old, len(solver.A) - 1
+    return y0 + h * (solver.A[k, :k] @ solver.K[:k]), solver.K[k]

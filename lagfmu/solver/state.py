@@ -6,9 +6,11 @@ A State is a value: saving it is keeping it, rolling back is putting it back, bi
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 
-METHODS = ("dop853", "dopri5", "rk4", "radau5")
+from .stiffness import Choice
+
+METHODS = ("auto", "dop853", "dopri5", "rk4", "radau5")
 DEFAULT_TOLERANCE = 1e-8
 SMALLEST_TOLERANCE = 1e-14
 
@@ -17,7 +19,7 @@ SMALLEST_TOLERANCE = 1e-14
 class Settings:
     """How to step: the method, the relative tolerance, the step [s] of rk4, the largest step [s]."""
 
-    method: str = "dop853"
+    method: str = "auto"
     tolerance: float = DEFAULT_TOLERANCE
     step: float = 0.0
     maximum_step: float = 0.0
@@ -41,7 +43,7 @@ class State:
     constraint keeps which came back with its contact; scale (2 n): the magnitudes below which errors
     in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
     below which a contact touches; step [s]: the next step to try; rate [1/s]: the motion's
-    natural rate at the start.
+    natural rate at the start; choice: what `auto` remembers.
     """
 
     t: float
@@ -57,6 +59,7 @@ class State:
     step: float
     steps: int
     departures: tuple[Departure, ...]
+    choice: Choice = field(default_factory=Choice)
 
     def to_json(self) -> str:
         """Text that `from_json` turns into an equal state; floats keep every bit."""
@@ -73,4 +76,5 @@ class State:
             Departure(d["count"], d["time"], tuple(d["q"]), tuple(d["v"]))
             for d in raw["departures"]
         )
+        raw["choice"] = Choice(**raw["choice"])
         return State(**raw)

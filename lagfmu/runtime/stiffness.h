@@ -1,0 +1,38 @@
+/* stiffness.h -- the method `auto`: dop853, and radau5 where stiffness holds dop853 back. */
+#ifndef LAGFMU_STIFFNESS_H
+#define LAGFMU_STIFFNESS_H
+
+#include "integrator.h"
+
+/* What the choice remembers; all zero at the start. */
+typedef struct {
+    int implicit;     /* 1: radau5 is at work */
+    int turn;         /* 1: the other method takes over before the next step */
+    int stiff, other; /* dop853's stiff steps so far; others in a row */
+    int taken, brief; /* radau5's steps; those in a row that did not pay */
+    int failures;     /* how often in a row radau5 did not pay */
+    int retries;      /* how often dop853 was tried again */
+    double longest;   /* [s] the longest of dop853's stiff steps */
+    double span;      /* [s] covered by radau5's steps */
+    double time;      /* [s] when radau5 first took over, ... */
+    double product;   /* ... h rho then (0: it never did), ... */
+    double ratio;     /* ... and rho / sigma (0: the motion's own rate was not known) */
+} Choice;
+
+/* Judges the step that dop853 has just taken; f at its end is known.  `size`: (ny / 2) magnitudes of
+ * the coordinates. */
+void stiffness_explicit_step(Choice *c, const Integrator *i, const double *size);
+
+/* Judges the step that radau5 has just taken. */
+void stiffness_implicit_step(Choice *c, const Integrator *i);
+
+/* dop853 comes back: at an event, or because radau5 did not pay, or failed. */
+void stiffness_explicit(Choice *c, int paid);
+
+/* 1 if the other method takes over now. */
+int stiffness_turn(Choice *c);
+
+/* What there is to say when radau5 takes over for the first time. */
+void stiffness_message(const Choice *c, char *text, size_t size);
+
+#endif

@@ -1,0 +1,376 @@
+"""`solver.method` = auto: dop853, and radau5 where stiffness holds dop853 back; on FMUs of both targets."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+from conftest import FILES
+from fmi2 import Library
+from instance import instance
+from sympy import sqrt, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Holonomic, Model, Parameter, Scene, build_fmu
+from lagfmu.compiler import find_compiler
+from lagfmu.solver import advance as advancing
+from lagfmu.solver.initial import start
+from lagfmu.solver.state import Settings, State
+from lagfmu.solver.stiffness import DEARER, STIFF, Choice, Slope, explicit, explicit_step
+
+G = 9.81
+x, y = dynamicsymbols("x y")
+m, g, k, c, a = symbols("m g k c a", positive=True)
+LINE = re.compile(
+    r"stiff at t = (\S+) s: .* h rho = (\S+), and not by the motion(.*): going on with"
+)
+
+
+def rail():
+    """A bead on the rail y = x in a viscous fluid, held by a spring: it falls fast to the speed at which
+    the fluid carries it (m/c) and creeps to rest (c/k)."""
+    return Model(
+        name="Rail",
+        kinetic_energy=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        forces={x: -c * x.diff() - k * x, y: -m * g - c * y.diff() - k * y},
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("rail", y - x)],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, G, "m/s^2"),
+            Parameter(c, 1e6, "N.s/m"),
+            Parameter(k, 1e6, "N/m"),
+        ],
+        start={x: 1.0, y: 1.0},
+    )
+
+
+def relaxation():
+    """Van der Pol's oscillator: it creeps for mu, jumps within 1/mu, creeps back."""
+    mu = symbols("mu", positive=True)
+    return Model(
+        name="Relaxation",
+        kinetic_energy=m * x.diff() ** 2 / 2,
+        forces={x: mu * (1 - x**2 / a**2) * x.diff() - k * x},
+        coordinates={x: "m"},
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(a, 1.0, "m"),
+            Parameter(k, 1.0, "N/m"),
+            Parameter(mu, 10.0, "N.s/m"),
+        ],
+        start={x: 2.0},
+    )
+
+
+def elastic():
+    """A pendulum on a spring that is stretched at the start and rings at sqrt(k/m), ten times as fast as
+    it swings."""
+    r = sqrt(x**2 + y**2)
+    return Model(
+        name="Elastic",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y - k * (r - a) ** 2 / 2,
+        coordinates={x: "m", y: "m"},
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, G, "m/s^2"),
+            Parameter(k, 1e3, "N/m"),
+            Parameter(a, 1.0, "m"),
+        ],
+        start={x: 0.8, y: -0.7},
+    )
+
+
+def dropped():
+    """A bead in a fluid that is thick until it has fallen onto the floor y = 0, off which it slides on
+    a level line."""
+    return Model(
+        name="Dropped",
+        kinetic_energy=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        forces={x: -k * x, y: -m * g - c * y.diff()},
+        coordinates={x: "m", y: "m"},
+        constraints=[Contact("floor", y)],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, G, "m/s^2"),
+            Parameter(c, 1e5, "N.s/m"),
+            Parameter(k, 1.0, "N/m"),
+        ],
+        start={x: 1.0, y: 1e-5},
+    )
+
+
+MODELS = {"Rail": rail, "Relaxation": relaxation, "Elastic": elastic, "Dropped": dropped}
+
+
+@pytest.fixture(scope="module")
+def own(target, tmp_path_factory):
+    """own(NAME): the FMU of one of the models above."""
+    if target == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine: native FMUs are not tested")
+    folder = tmp_path_factory.mktemp(target)
+
+    @cache
+    def get(name):
+        return build_fmu(MODELS[name](), folder, Scene(name), target=target)
+
+    return get
+
+
+def lines(one):
+    return [text for status, category, text in one.log if (status, category) == (0, "logEvents")]
+
+
+def creep(t, damping):
+    """x(t) on the rail, from 2 m x'' + 2 c x' + 2 k x = -m g with x(0) = 1, x'(0) = 0 and k = c/s."""
+    rest = -G / (2 * damping)
+    root = np.sqrt(1 - 4 / damping)
+    fast, slow = -damping * (1 + root) / 2, -2 / (1 + root)
+    share = fast / (fast - slow)
+    return rest + (1 - rest) * (share * np.exp(slow * t) + (1 - share) * np.exp(fast * t))
+
+
+# --------------------------------------------------------------------------- stiff
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
+@pytest.mark.parametrize("damping", [1e4, 1e6, 1e9])
+def test_a_bead_creeps_however_thick_the_fluid(own, damping, tolerance):
+    """x = A exp(-t/1 s) within the tolerance, and lambda = m g/2, whether what has died out had a rate of
+    1e4 or 1e9 times that of the motion; radau5 takes over within 200 of the fast times, which is told
+    once."""
+    with instance(own("Rail")) as one:
+        one.start({"c": damping, "k": damping}, tolerance=tolerance)
+        for t in (0.25, 0.5, 1.0):
+            one.step(t - one.time)
+            assert one.get("x") == pytest.approx(creep(t, damping), abs=5 * tolerance)
+            assert one.get("lambda.rail") == pytest.approx(G / 2, abs=1e-14 * damping)
+        assert one.get("solver.steps") < 600
+        [line] = lines(one)
+        time, product, _ = LINE.match(line).groups()
+        assert 0 < float(time) < 200 / damping
+        assert 0.1 < float(product) < 10
+        assert "solver.method = radau5" in line
+
+
+def test_who_asks_for_dop853_gets_nothing_else(own):
+    """dop853 is stable for h < 6.4 m/c and takes no longer steps, however smooth the motion is; where
+    that is 1e8 steps the communication step is refused, and with auto it is not."""
+    with instance(own("Rail")) as one:
+        one.start({"c": 1e4, "k": 1e4, "solver.method": "dop853"}, tolerance=1e-4)
+        one.step(0.25)
+        assert one.get("solver.steps") > 0.25 * 1e4 / 6.5
+        assert lines(one) == []
+    with instance(own("Rail")) as one:
+        one.start({"c": 1e9, "k": 1e9, "solver.method": "dop853"}, tolerance=1e-4)
+        with pytest.raises(Exception, match=r"fmi2DoStep|status|2"):
+            one.step(1.0)
+        assert "internal steps, more than 1e+07" in one.log[-1][2]
+
+
+def test_a_cart_in_ever_thicker_oil_becomes_a_fixed_pivot(fmu):
+    """The cart of the pendulum moves as its friction lets it, so that the distance from where it was
+    falls as 1/c, to 1e8 N s/m."""
+    moved = []
+    for damping in (1e4, 1e6, 1e8):
+        with instance(fmu("CartPendulum")) as one:
+            one.start({"c": damping}, tolerance=1e-8)
+            one.step(1.0)
+            moved.append(abs(one.get("s")))
+            assert one.get("solver.steps") < 1500
+            assert len(lines(one)) == 1
+    assert moved[0] / moved[1] == pytest.approx(100, rel=1e-2)
+    assert moved[1] / moved[2] == pytest.approx(100, rel=1e-2)
+
+
+def test_each_phase_of_a_relaxation_has_its_method(own):
+    """Creeping, van der Pol's oscillator is stiff, jumping it is not: with the method of each phase it
+    takes fewer steps than with either alone, to the same place."""
+    steps, ends = {}, {}
+    for method in ("dop853", "radau5", "auto"):
+        with instance(own("Relaxation")) as one:
+            one.start({"mu": 30.0, "solver.method": method}, tolerance=1e-7)
+            one.step(60.0)
+            steps[method], ends[method] = one.get("solver.steps"), one.get("x")
+            assert len(lines(one)) == (method == "auto")
+    assert steps["auto"] < 0.8 * min(steps["dop853"], steps["radau5"])
+    assert ends["auto"] == pytest.approx(ends["dop853"], abs=1e-5)
+
+
+def test_after_the_landing_nothing_is_stiff_any_more(own):
+    """The bead sinks through 0.01 mm at the speed m g/c and then swings along the floor: x = cos t, in
+    as few steps of dop853 as a swing alone needs."""
+    steps = {}
+    for method in ("auto", "radau5"):
+        with instance(own("Dropped")) as one:
+            one.start({"solver.method": method}, tolerance=1e-9)
+            one.step(1.0)
+            assert one.get("contact.floor")
+            landed = one.get("solver.steps")
+            one.step(9.0)
+            steps[method] = one.get("solver.steps") - landed
+            assert one.get("x") == pytest.approx(np.cos(10.0), abs=1e-6)
+            assert one.get("lambda.floor") == pytest.approx(G, rel=1e-9)
+    assert steps["auto"] < steps["radau5"] / 4
+
+
+# --------------------------------------------------------------------------- not stiff
+
+
+def same_as_dop853(path, values, stop, points, tolerance):
+    """All that an importer can read at the points is the same to the last bit; nothing is told."""
+    seen = []
+    for method in ("auto", "dop853"):
+        with instance(path) as one:
+            one.start({**values, "solver.method": method}, tolerance=tolerance)
+            rows = []
+            for n in range(points):
+                one.step(stop * (n + 1) / points - one.time)
+                rows.append({v: one.get(v) for v in one.variables if v != "solver.method"})
+            assert not [line for line in lines(one) if LINE.match(line)]
+            seen.append(rows)
+    assert seen[0] == seen[1]
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-8, 1e-12])
+@pytest.mark.parametrize("name", sorted(set(FILES) - {"SliderCrank"}))
+def test_where_nothing_is_stiff_auto_is_dop853(fmu, name, tolerance):
+    """The models move at the rates of their equations: the same steps, the same bits."""
+    same_as_dop853(fmu(name), {}, 1.0, 7, tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5, 1e-10])
+def test_an_oscillation_that_has_to_be_resolved_is_not_stiffness(own, tolerance):
+    """A spring that rings ten times while it swings once bounds the step by accuracy, which radau5 does
+    not cure."""
+    same_as_dop853(own("Elastic"), {}, 2.0, 1, tolerance)
+
+
+def test_communication_steps_shorter_than_the_stable_step_need_no_radau5(fmu):
+    """Every 0.1 ms the slider-crank's input may change: that is within dop853's reach."""
+    same_as_dop853(fmu("SliderCrank"), {}, 0.01, 100, 1e-8)
+
+
+# --------------------------------------------------------------------------- states, points
+
+
+def future(one, until, width):
+    rows = []
+    while one.time < until:
+        one.step(width)
+        rows.append(one.outputs())
+    return rows
+
+
+def test_the_choice_belongs_to_the_saved_state(own):
+    """Before the change of method, between two of the steps that are counted, and after it: from each
+    saved state and from its bytes in a fresh instance there is one future, bit for bit."""
+    width = 2.0**-13  # a few steps of dop853
+    with instance(own("Rail")) as one, instance(own("Rail"), "fresh") as fresh:
+        one.start({"c": 1e5, "k": 1e5}, tolerance=1e-6)
+        fresh.start({"c": 1e5, "k": 1e5}, tolerance=1e-6)
+        saved = []
+        for _ in range(24):
+            state = one.fmu.getFMUState()
+            saved.append((one.time, state, one.fmu.serializeFMUState(state), len(lines(one))))
+            one.step(width)
+        told = [count for *_, count in saved]
+        assert told.count(0) > 3
+        assert told.count(1) > 3
+        right = future(one, 0.25, 2.0**-9)
+        for moment, state, data, count in saved[::3]:
+            one.fmu.setFMUState(state)
+            fresh.fmu.setFMUState(fresh.fmu.deSerializeFMUstate(data))
+            for again in (one, fresh):
+                again.time = moment
+                again.log.clear()
+                while again.time < 24 * width:
+                    again.step(width)
+                assert future(again, 0.25, 2.0**-9) == right
+                assert len(lines(again)) == 1 - count
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+def test_the_communication_step_does_not_change_the_choice(tmp_path):
+    """Without inputs a native FMU steps past the communication points: from 1 s to 0.1 ms the method
+    changes at the same step, and all outputs are the same to the last bit.  The bead starts with the
+    speed of its creeping, 1 m/s."""
+    creeping = {"c": 1e5, "k": 1e5, "der(x)": -1.0, "der(y)": -1.0}
+    found = Library(build_fmu(rail(), tmp_path, Scene("Rail"), target="native"), tmp_path / "one")
+    ends = []
+    for width in [2.0**-n for n in (0, 3, 8, 13)]:
+        one = found().start(creeping, 1e-6)
+        while one.time < 1:
+            one.step(width)
+        ends.append((one.outputs(), [text for *_, text in one.log]))
+        one.free()
+    assert all(end == ends[0] for end in ends)
+    assert len(ends[0][1]) == 1
+
+
+# --------------------------------------------------------------------------- the estimate
+
+
+def test_the_rates_of_a_damper_and_of_an_oscillation():
+    """|da|/|dv| is d of v' = -d v, sqrt(|da|/|dq|) is omega of q'' = -omega^2 q wherever in its swing,
+    in any unit of length and with a coordinate at rest beside it."""
+    size = np.array([3.0, 1e6])
+    for phase in (0.1, 0.7, 1.5, 3.0):
+        q, v = np.array([np.cos(phase), 0]), np.array([-1e3 * np.sin(phase), 0])
+        d = 1e-6
+        end = Slope(
+            np.r_[q, v], np.r_[v, -1e6 * q], np.r_[q, v] * (1 + d), np.r_[v, -1e6 * q] * (1 + d)
+        )
+        assert end.rate(size)[1] == pytest.approx(1e3, rel=1e-6)
+    fast = np.array([1e-12, 0.0])  # an eigenvector (1, -d) of J = [0 1; 0 -d]
+    y0, f0 = np.r_[1.0, 5.0, 2.0, 0.0], np.r_[2.0, 0.0, 3.0, 0.0]
+    y1, f1 = y0 + np.r_[0 * fast, -1e7 * fast], f0 + np.r_[-1e7 * fast, 1e14 * fast]
+    damped, whole = Slope(y0, f0, y1, f1).rate(size)
+    assert damped == pytest.approx(1e7, rel=1e-6)
+    assert whole > damped
+
+
+def test_rounding_is_no_rate():
+    """What the last bits of a uniform motion do says nothing about the equations."""
+    y0, f0 = np.array([1.0, 2.0]), np.array([2.0, -9.81])
+    one = Slope(y0, f0, np.nextafter(y0, 9), np.nextafter(f0, 9))
+    assert one.rate(np.ones(1)) == (0.0, 0.0)
+
+
+def test_a_method_that_did_not_pay_has_to_wait_four_times_as_long():
+    """15 stiff steps, then 60, 240, ...: what useless trials cost falls with the length of the run."""
+    size, waits, choice = np.ones(1), [], Choice()
+    stages = Slope(np.array([0, 1.0]), np.array([1.0, 0]), np.array([0, 1.1]), np.array([1.1, 9.0]))
+    for _ in range(3):
+        count = 0
+        while not choice.implicit:
+            choice = explicit_step(choice, count, 1.0, stages, stages, size)
+            count += 1
+        waits.append(count)
+        choice = explicit(choice, paid=False)
+    assert waits == [STIFF, STIFF * DEARER, STIFF * DEARER**2]
+
+
+def test_where_radau5_fails_dop853_goes_on(prepared, monkeypatch):
+    """The slider-crank arrives where dop853 alone takes it although no step of radau5 succeeds."""
+    known = prepared("SliderCrank")
+    system, model = known.system, known.model
+    p = [float(q.value) for q in model.parameters]
+    begun = start(system, Settings(), 0.0, [0.0, 0.4, 0.6], [10.0, 0.0, 0.0], [0.0], p).state
+    right = advancing.advance(system, Settings("dop853"), begun, [0.0], p, 0.02)
+
+    real = advancing.stepper
+
+    def failing(settings, *arguments):
+        made = real(settings, *arguments)
+        if settings.method == "radau5":
+            made.step = lambda: (_ for _ in ()).throw(ValueError("singular"))
+        return made
+
+    monkeypatch.setattr(advancing, "stepper", failing)
+    ended = advancing.advance(system, Settings("auto"), begun, [0.0], p, 0.02)
+    assert ended.choice.failures > 0
+    assert State.from_json(ended.to_json()) == ended
+    np.testing.assert_allclose(ended.q, right.q, rtol=1e-9)
