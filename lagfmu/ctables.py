@@ -44,7 +44,7 @@ class Tables:
         start = [bisect_left(self.entries, (k,)) for k in range(eom.m + 1)]
         contacts = [k for k, c in enumerate(self.constraints) if isinstance(c, Contact)]
         prescribed = [k for k, s in enumerate(eom.u) if eom.rates.get(s) in eom.rates]
-        dimension, extent = self._dimensions()
+        dimension, extent, angles = self._dimensions()
         names = [f'"{s}"' for s in eom.q]
         parts = [
             self._array("const char *const", "coordinates", names),
@@ -59,6 +59,9 @@ class Tables:
             self._integers("dimension", dimension),
             self._integers("extent_dimension", extent),
         ]
+        folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
+        if any(folded):
+            parts.append(self._array("const double", "folded", [repr(x) for x in folded]))
         p = self.prefix
         plan = elimination.plan(eom.n, eom.m, self.mass, self.entries)
         parts.append("\n" + plan.c_text(f"{p}plan") + "\n")
@@ -83,6 +86,8 @@ class Tables:
             },
             "prescribed_count": len(prescribed),
             **{name: p + name for name in ("prescribed", "dimension", "extent_dimension")},
+            "angles": angles,
+            "folded": f"{p}folded" if any(folded) else "NULL",
             "formulation": self.formulation.upper(),
             "constant_mass": int(self._constant_mass()),
             "separable": int(self._separable()),
@@ -123,8 +128,8 @@ class Tables:
             items.append(f'{{"{c.name}", {kind}, {-1 if closed is None else position[closed]}}}')
         return items or ['{"", HOLONOMIC, -1}']
 
-    def _dimensions(self) -> tuple[list[int], list[int]]:
-        """One number for each dimension of coordinates; that of each parameter, -1 if it has none."""
+    def _dimensions(self) -> tuple[list[int], list[int], int]:
+        """One number for each dimension of coordinates; that of each parameter; that of angles; -1: none."""
         eom = self.eom
         units = [eom.units[str(q)] for q in eom.q]
         number: dict[Any, int] = {}
@@ -133,7 +138,8 @@ class Tables:
             -1 if u.dimensionless else number.get(u.exponents, -1)
             for u in (eom.units[str(p)] for p in eom.p)
         ]
-        return of_coordinates, of_parameters or [-1]
+        angles = [k for u, k in zip(units, of_coordinates, strict=True) if u.dimensionless]
+        return of_coordinates, of_parameters or [-1], angles[0] if angles else -1
 
     def _constant_mass(self) -> bool:
         return _constant_mass(self.eom)

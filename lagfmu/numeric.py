@@ -145,6 +145,7 @@ def _system(
         f"    like={_like(eom)!r},\n"
         f"    extent={_extent(eom)!r},\n"
         f"    folded={tuple(eom.folded(unit) for unit in _units(eom))!r},\n"
+        f"    angles={_angles(eom)!r},\n"
         f"    embedding={embedding},\n"
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
@@ -222,6 +223,11 @@ def _prescribed(eom: EquationsOfMotion) -> tuple[int, ...]:
 
 def _units(eom: EquationsOfMotion) -> list[Any]:
     return [eom.units[str(q)] for q in eom.q]
+
+
+def _angles(eom: EquationsOfMotion) -> tuple[int, ...]:
+    """The coordinates without dimension."""
+    return tuple(j for j, unit in enumerate(_units(eom)) if unit.dimensionless)
 
 
 def _like(eom: EquationsOfMotion) -> tuple[tuple[int, ...], ...]:

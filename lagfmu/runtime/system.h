@@ -36,7 +36,10 @@ struct System {
     int prescribed_count;
     const int *prescribed;    /* positions in u where a prescribed motion begins: u, der(u), der(u,2) */
     const int *dimension;        /* (n) coordinates of one physical dimension have one number */
+    const double *folded;        /* (n) the largest magnitude of the dimension among parameters that are
+                                  * numbers in the code; NULL: there are none */
     const int *extent_dimension; /* (parameters) the number of those that it compares to; -1: none */
+    int angles;                  /* the number of those without dimension; -1: none */
     Formulation formulation;
     int constant_mass;        /* M holds parameters and numbers only */
     int separable;            /* constant mass, forces without velocities, position constraints only */

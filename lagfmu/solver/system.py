@@ -39,9 +39,9 @@ class System:
     for a nonholonomic row;  energies(t, q, v, u, p) -> (kinetic, potential) [J];  restitution(p) ->
     one coefficient a row.  `mass` and `jacobian` are the (row, column) indices of the values; M's
     are those of the lower triangle.  `prescribed` are the positions in u where a prescribed motion
-    and its two derivatives begin.  `extent` (n) lists for each coordinate the positions in p whose
-    values have the coordinate's dimension, `folded` (n) the largest magnitude among the parameters of
-    that dimension that are numbers in the code.
+    and its two derivatives begin.  `like` (n) lists for each coordinate those of its dimension,
+    `extent` (n) the positions in p whose values have it, `folded` (n) the largest magnitude of it among
+    the parameters that are numbers in the code; `angles` are those without dimension.
 
     `energies` is None where they are not read.  The full system of an embedding may hold coordinates
     that are only read: then `dynamics`, `residual` and `restitution` are None too.
@@ -59,6 +59,7 @@ class System:
     like: tuple[tuple[int, ...], ...] = ()
     extent: tuple[tuple[int, ...], ...] = ()
     folded: tuple[float, ...] = ()
+    angles: tuple[int, ...] = ()
     embedding: Embedding | None = None
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
