@@ -17,7 +17,7 @@ import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -142,10 +142,12 @@ def compile_libraries(
     generated: Mapping[str, bytes],
     runtime: Mapping[str, bytes],
     platforms: Sequence[Platform],
+    left_out: Collection[str] = (),
 ) -> dict[str, bytes]:
     """Folder -> the library `name` made of the .c files of both; BuildError with the first error.
 
-    The `runtime` files must not depend on the generated ones.
+    The `runtime` files must not depend on the generated ones.  Those in `left_out`, and those of which
+    there is a generated one, are not linked.
     """
     compiler = find_compiler()
     if compiler is None:
@@ -158,7 +160,10 @@ def compile_libraries(
         )
     targets = dict.fromkeys(t for p in platforms for t in (p.targets if compiler.cross else ("",)))
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        jobs = {t: pool.submit(_library, compiler, t, name, generated, runtime) for t in targets}
+        jobs = {
+            t: pool.submit(_library, compiler, t, name, generated, runtime, left_out)
+            for t in targets
+        }
         made = {t: job.result() for t, job in jobs.items()}
     return {
         p.folder: universal([made[t] for t in (p.targets if compiler.cross else ("",))])
@@ -184,15 +189,17 @@ def _library(
     name: str,
     generated: Mapping[str, bytes],
     runtime: Mapping[str, bytes],
+    left_out: Collection[str],
 ) -> bytes:
     objects = _objects(compiler, target, runtime)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         for file, content in {**runtime, **generated}.items():
             if file.endswith(".h") or file in generated:
                 Path(folder, file).write_bytes(content)
-        for made in objects.iterdir():
-            shutil.copy(made, folder)
-        linked = sorted(o.name for o in objects.iterdir())
+        gone = {f"{Path(file).stem}.o" for file in (*left_out, *generated)}
+        linked = sorted(o.name for o in objects.iterdir() if o.name not in gone)
+        for made in linked:
+            shutil.copy(objects / made, folder)
         for file in sorted(f for f in generated if f.endswith(".c")):
             _compile(compiler, target, file, f"{file[:-2]}.o", folder)
             linked.append(f"{file[:-2]}.o")

@@ -140,11 +140,11 @@ Run *run_new(int method, int problem, int ny, const double *y, double t, double 
     r->ode = (Ode){r, rate, jacobian, &r->why};
     for (int k = 0; k < 8; k++) r->scale[k] = 1;
     r->control = (Control){1e-8, r->scale, 0, 0.1};
-    integrator_layout(&r->i, &r->saved, &r->scratch, ny);
+    integrator_layout(&r->i, &r->saved, &r->scratch, ny, METHODS, 4);
     r->saved.base = calloc(1, r->saved.used);
     r->scratch.base = calloc(1, r->scratch.used);
     r->saved.used = r->scratch.used = 0;
-    integrator_layout(&r->i, &r->saved, &r->scratch, ny);
+    integrator_layout(&r->i, &r->saved, &r->scratch, ny, METHODS, 4);
     integrator_start(&r->i, METHODS[method], t, y, h);
     return r;
 }
@@ -282,11 +282,13 @@ static double energy(const Swing *w) {
     const double *y = w->i.y, *p = w->p;
     return p[0] * ((y[2] * y[2] + y[3] * y[3]) / 2 + p[1] * y[1]);
 }
+static const Method *const METHODS_OF_SWING[] = {&rattle};
+
 Swing *swing_new(const double *y, const double *p) {
     Swing *w = calloc(1, sizeof *w);
     for (int pass = 0; pass < 2; pass++) {
         mechanism_layout(&w->b, &w->scratch, &pendulum, &w->why);
-        integrator_layout(&w->i, &w->saved, &w->scratch, 4);
+        integrator_layout(&w->i, &w->saved, &w->scratch, 4, METHODS_OF_SWING, 1);
         if (pass == 1) break;
         w->saved.base = calloc(1, w->saved.used);
         w->scratch.base = calloc(1, w->scratch.used);

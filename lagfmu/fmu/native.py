@@ -7,6 +7,7 @@ from importlib.resources import files
 
 from ..ccode import model_source
 from ..compiler import HOST, chosen, compile_libraries, is_first
+from ..cparts import files_left_out, parts_source
 from ..ctables import entanglements
 from ..cvariables import variables_source
 from ..equations import EquationsOfMotion
@@ -53,11 +54,16 @@ def build(
             f"scene {scene.name!r}: rattle cannot step these equations: {'; '.join(problems)}; choose "
             "another method"
         )
-    runtime = runtime_files()
+    everything = runtime_files()
+    gone = files_left_out(scene, bool(system.contacts))
+    runtime = {file: text for file, text in everything.items() if file not in gone}
     generated = {
         "model.c": model_source(eom, reduction, formulation, needs_tangents(scene)).encode(),
         "variables.c": variables_source(table, eom, reduction, scene, system).encode(),
     }
+    parts = parts_source(scene, bool(system.contacts))
+    if parts is not None:
+        generated["parts.c"] = parts.encode()
     common = {
         "modelIdentifier": scene.name,
         **CAPABILITIES,
@@ -80,7 +86,7 @@ def build(
         reinitialized=table.states if system.rows else (),
     )
     generated["identity.h"] = IDENTITY.format(guid=guid_of(description)).encode()
-    libraries = compile_libraries(scene.name, generated, runtime, wanted)
+    libraries = compile_libraries(scene.name, generated, everything, wanted, gone)
     contents = {"modelDescription.xml": description, **extra}
     for platform in wanted:
         path = f"binaries/{platform.folder}/{scene.name}{platform.suffix}"

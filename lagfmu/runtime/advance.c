@@ -8,11 +8,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "events.h"
 #include "leg.h"
+#include "parts.h"
 #include "magnitudes.h"
-#include "rattle.h"
-#include "switch.h"
 
 enum { CHATTER = 200 }; /* contact events in next to no time after which the step is given up */
 static const double PATIENCE = 200; /* steps after which one is judged by its average step */
@@ -21,8 +19,7 @@ static const double AHEAD = 2;        /* natural times of the motion that a step
 static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 
 static const Method *method_of(const Solver *s) {
-    const Method *const menu[METHOD_COUNT] = {&dop853, &dop853, &dopri5, &rk4, &rattle, &radau5};
-    return s->state.now.choice.implicit ? &radau5 : menu[s->settings.method];
+    return PARTS.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method];
 }
 
 /* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not
@@ -84,7 +81,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (leg_project(s, i->t, y1) != OK) return FAILED;
     if (leg_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
-    if (watch && events_find(s, y1) != OK) return FAILED;
+    if (watch && PARTS.events_find(s, y1) != OK) return FAILED;
     integrator_move(i, y1);
     s->state.now.steps += 1;
     if (s->state.now.choice.implicit) stiffness_implicit_step(&s->state.now.choice, i);
@@ -170,7 +167,7 @@ static Status meet(Solver *s) {
     }
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
-    return switch_modes(s, s->state.event_contacts);
+    return PARTS.switch_modes(s, s->state.event_contacts);
 }
 
 /* To t_end, or to the first event before it. */
@@ -212,7 +209,7 @@ Status solver_advance(Solver *s, double t_end) {
         return fail(&s->why, "a communication step must end after t = %.17g s, got %.17g s", begun,
                     t_end);
     resume(s);
-    if (switch_released(s) != OK) return FAILED;
+    if (s->system->contacts > 0 && PARTS.switch_released(s) != OK) return FAILED;
     if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
     while (now->t < t_end) {
         int met;

@@ -16,7 +16,7 @@
 #include <string.h>
 
 #include "leg.h"
-#include "switch.h"
+#include "parts.h"
 
 static const double GAIN = 3;     /* of the stabilization, in units of the motion's natural rate */
 static const double LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
@@ -175,13 +175,13 @@ Status exchange_event(Instance *x, int *moved) {
     double worst;
     *moved = 0;
     if (instance_start(x) != OK) return FAILED;
-    if (switch_released(s) != OK) return FAILED;
+    if (s->system->contacts > 0 && PARTS.switch_released(s) != OK) return FAILED;
     x->observed = x->evaluated = 0;
     if (find_happened(x, &any) != OK) return FAILED;
     if (any) {
         *moved = 1;
         x->evaluated = 0;
-        return switch_modes(s, x->happened);
+        return PARTS.switch_modes(s, x->happened);
     }
     if (drift(x, &worst) != OK) return FAILED;
     if (!(worst > LIMIT)) return OK;

@@ -22,6 +22,7 @@
 #include "digits.h"
 #include "exchange.h"
 #include "instance.h"
+#include "parts.h"
 
 enum {
     INSTANTIATED = 1,
@@ -443,7 +444,7 @@ fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference vr[]
 
 static int method_called(const char *name) {
     for (int k = 0; name != NULL && k < METHOD_COUNT; k++)
-        if (strcmp(name, METHOD_NAMES[k]) == 0) return k;
+        if (PARTS.methods[k] != NULL && strcmp(name, METHOD_NAMES[k]) == 0) return k;
     return -1;
 }
 
@@ -451,9 +452,13 @@ static fmi2Status valid_method(Component *c, const Variable *v, const char *valu
     Why text;
     const int method = method_called(value);
     if (method < 0) {
-        (void)fail(&text, "'%s' = '%s', expected one of %s", v->name, value == NULL ? "" : value,
-                   METHOD_NAMES[0]);
-        for (int k = 1; k < METHOD_COUNT; k++) why_append(&text, ", %s", METHOD_NAMES[k]);
+        const char *comma = "";
+        (void)fail(&text, "'%s' = '%s', expected one of ", v->name, value == NULL ? "" : value);
+        for (int k = 0; k < METHOD_COUNT; k++) {
+            if (PARTS.methods[k] == NULL) continue;
+            why_append(&text, "%s%s", comma, METHOD_NAMES[k]);
+            comma = ", ";
+        }
         return refuse(c, text.text);
     }
     if (method == RATTLE &&

@@ -10,9 +10,9 @@
 #include <float.h>
 #include <string.h>
 
-#include "contacts.h"
 #include "digits.h"
 #include "magnitudes.h"
+#include "parts.h"
 
 enum { ITERATIONS = 60, HALVINGS = 25 };
 static const double EPS = DBL_EPSILON;
@@ -250,7 +250,8 @@ static Status find_modes(const Start *x) {
     Mechanism *b = &x->s->stepped;
     int *touching = x->s->iwork_initial + s->m;
     memcpy(touching, state->closed, (size_t)s->contacts * sizeof *touching);
-    if (contacts_modes(x->s, x->at, state->q, state->v, state->closed, touching, NULL) == FAILED)
+    if (s->contacts > 0 && PARTS.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
+                                                touching, NULL) == FAILED)
         return refused(x->s);
     system_active(s, state->closed, x->s->active);
     if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,

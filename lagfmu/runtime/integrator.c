@@ -1,13 +1,12 @@
 /* integrator.c -- memory of the integrators, and putting one at a state. */
 #include "integrator.h"
 
-#include "rattle.h"
-
-void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny) {
-    const Method *const methods[] = {&dop853, &dopri5, &rk4, &radau5, &rattle};
+void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
+                       const Method *const *methods, int count) {
     int dense = 0, doubles = 0, ints = 0;
-    for (size_t k = 0; k < sizeof methods / sizeof methods[0]; k++) {
+    for (int k = 0; k < count; k++) {
         const Method *method = methods[k];
+        if (method == NULL) continue;
         int more = method->scratch_doubles(ny), more_ints = method->scratch_ints(ny);
         if (method->dense_arrays > dense) dense = method->dense_arrays;
         if (more > doubles) doubles = more;

@@ -73,9 +73,10 @@ extern const Method dop853, dopri5, rk4, radau5;
 /* rk4: estimate of the error of one component in the step just taken. */
 double rk4_error(const Integrator *i, int component);
 
-/* Takes memory for any of the methods from the arena.  The arrays that must be saved (y, f, y_old,
+/* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
  * f_old, dense) come from `saved`, the scratch from `scratch`. */
-void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny);
+void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
+                       const Method *const *methods, int count);
 
 /* Puts the integrator at (t, y); h: step to try first, 0: to be chosen. */
 void integrator_start(Integrator *i, const Method *method, double t, const double *y, double h);

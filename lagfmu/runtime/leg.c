@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "rattle.h"
+#include "parts.h"
 #include "sensitivity.h"
 #include "step_size.h"
 
@@ -54,7 +54,7 @@ static Status check_fixed_step(Solver *s, const Integrator *i) {
     const int n = s->system->n;
     for (int j = 0; j < 2 * n; j++) {
         const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
-        if (!(fabs(rk4_error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
+        if (!(fabs(PARTS.rk4_error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
             return fail(&s->why,
                         "the integration stops at t = %.17g s, rk4's step of %.3g s is far too "
                         "large: reduce solver.step",
@@ -67,7 +67,8 @@ Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
     const Control c = control(s, longest);
     if (s->settings.method == RATTLE) {
         const Instant at = leg_instant(s, i->t);
-        return rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c, t_bound);
+        return PARTS.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,
+                                 t_bound);
     }
     const Ode ode = {s, rate, jacobian, &s->why};
     if (i->method->step(i, &ode, &c, t_bound) != OK) return FAILED;

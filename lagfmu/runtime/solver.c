@@ -2,6 +2,7 @@
 #include "solver.h"
 
 #include "looks.h"
+#include "parts.h"
 
 static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
     const int n = s->n, contacts = s->contacts;
@@ -21,7 +22,7 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->departure_q = arena_doubles(saved, contacts * n);
     x->departure_v = arena_doubles(saved, contacts * n);
     x->indicator = arena_doubles(saved, contacts);
-    integrator_layout(i, saved, scratch, 2 * n);
+    integrator_layout(i, saved, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
     x->y = i->y;
     x->f = i->f;
     x->y_old = i->y_old;
@@ -38,7 +39,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.first = arena_doubles(saved, system->inputs);
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
-    integrator_layout(&s->probe, scratch, scratch, 2 * n);
+    integrator_layout(&s->probe, scratch, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
     mechanism_layout(&s->stepped, scratch, system, &s->why);
     sensitivity_layout(&s->sensitivity, scratch, system);
     s->active_full = NULL;
