@@ -113,19 +113,16 @@ def _system(
             {"f": [sp.S.Zero if f is None else f for f in eom.f]},
             names,
         ),
-        function(
-            f"{prefix}restitution",
-            "Newton's coefficient of restitution of each row; 0 for one that is no contact.",
-            {"p": eom.p},
-            {
-                "e": [
-                    eom.plain(c.restitution) if isinstance(c, Contact) else sp.S.Zero
-                    for c in _constraints(eom, rows)
-                ]
-            },
-            names,
-        ),
     ]
+    restitution = [
+        eom.plain(c.restitution) if isinstance(c, Contact) else sp.S.Zero
+        for c in _constraints(eom, rows)
+    ]
+    rebounds = any(isinstance(c, Contact) for c in _constraints(eom, rows))
+    if rebounds:
+        text = "Newton's coefficient of restitution of each row; 0 for one that is no contact."
+        arguments, results = {"p": eom.p}, {"e": restitution}
+        parts.append(function(f"{prefix}restitution", text, arguments, results, names))
     energies = []
     if rows is None:  # the energies of the full system serve the reduced one too
         energies = _energies(eom, names)
@@ -140,7 +137,7 @@ def _system(
         f"    dynamics={prefix}dynamics,\n"
         f"    residual={prefix}residual,\n"
         f"    energies={'energies' if energies else None},\n"
-        f"    restitution={prefix}restitution,\n"
+        f"    restitution={f'{prefix}restitution' if rebounds else None},\n"
         f"    prescribed={_prescribed(eom)!r},\n"
         f"    like={_like(eom)!r},\n"
         f"    extent={_extent(eom)!r},\n"

@@ -81,6 +81,8 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
         if coded_reduction is not None:
             coded, coded_reduction = prune.read_only(coded, coded_reduction, outputs)
         numbers |= prune.values(prune.idle(prune.folded(coded, numbers), coded_reduction), model)
+        if scene.method == "auto" and scene.methods is None and not prune.damped(coded, numbers):
+            scene = replace(scene, method="dop853")
     coded = prune.folded(coded, numbers)
     if coded_reduction is not None:
         coded_reduction = prune.folded_reduction(coded_reduction, numbers)

@@ -15,7 +15,7 @@ from typing import Any
 
 import sympy as sp
 
-from .equations import EquationsOfMotion
+from .equations import TIME, EquationsOfMotion
 from .errors import ModelError
 from .model import Constraint, Contact, Holonomic, Model, Parameter, name_of
 from .reduction import Reduction
@@ -74,8 +74,8 @@ def _value(p: Parameter, text: str, problems: list[str]) -> float | None:
     except ValueError:
         problems.append(f"fixed parameter {name!r} = {text!r} is no number")
         return None
-    low = -sp.oo if p.min is None else p.min
-    high = sp.oo if p.max is None else p.max
+    low = float("-inf") if p.min is None else p.min
+    high = float("inf") if p.max is None else p.max
     if not (abs(value) < float("inf") and low <= value <= high):
         problems.append(
             f"fixed parameter {name!r} = {value!r} is outside its bounds [{low}, {high}]"
@@ -172,6 +172,17 @@ def _expressions(eom: EquationsOfMotion) -> list[Expr]:
     flat += [*eom.f, eom.kinetic, eom.potential]
     flat += [eom.plain(c.restitution) for c in eom.constraints if isinstance(c, Contact)]
     return [sp.sympify(e) for e in flat if e is not None]
+
+
+def damped(eom: EquationsOfMotion, numbers: Mapping[Expr, Expr]) -> bool:
+    """True if a force that the user gives holds a velocity.
+
+    What the Lagrangian gives conserves Jacobi's integral: without damping no part of the motion decays
+    fast, which is the stiffness that an implicit method cures.
+    """
+    speeds = {eom.symbols[q.diff(TIME)] for q in eom.model.coordinates}
+    forces = [sp.sympify(f).xreplace(eom.symbols) for f in eom.model.forces.values()]
+    return any(f.xreplace(numbers).free_symbols & speeds for f in forces)
 
 
 # ---------------------------------------------------------------------------- coordinates

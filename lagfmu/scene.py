@@ -91,7 +91,9 @@ class Scene:
             problems += self._listed(what)
         if self.methods is not None:
             wanted = {self.method, *self.methods}
-            object.__setattr__(self, "methods", tuple(m for m in METHODS if m in wanted))
+            chosen = tuple(m for m in METHODS if m in wanted)
+            whole = self.complete and chosen == METHODS
+            object.__setattr__(self, "methods", None if whole else chosen)
         if problems:
             raise ModelError(self.name, problems)
 

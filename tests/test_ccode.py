@@ -342,8 +342,9 @@ def test_c_and_python_compute_the_same(case: Callable[[str], Case], name: str) -
                 for k, x in enumerate(expected.get(label, ())):
                     size = max(magnitude(sp.sympify(e[k]), point.values()), 1e-300)
                     assert abs(found[label][k] - x) <= CLOSE * size, (label, k)
-            rest = one.native.call("restitution_of", {"e": eom.m}, full, p)["e"]
-            assert rest == twin.restitution(p)[: eom.m]
+            if twin.restitution is not None:
+                rest = one.native.call("restitution_of", {"e": eom.m}, full, p)["e"]
+                assert rest == twin.restitution(p)[: eom.m]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,0 +1,412 @@
+"""A scene holds what is asked for and nothing else; what it still reports are the full FMU's numbers."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from conftest import FILES, MODELS
+from typer.testing import CliRunner
+
+from lagfmu import build_fmu, simulate, verify
+from lagfmu.build import write
+from lagfmu.ccode import model_source
+from lagfmu.cli import app
+from lagfmu.errors import LagfmuError, ModelError
+from lagfmu.model import Contact
+from lagfmu.modelfile import ModelFile, load
+from lagfmu.numeric import source
+from lagfmu.prepare import Prepared, prepare
+from lagfmu.savings import savings
+from lagfmu.scene import METHODS, Scene
+from lagfmu.simulate import Trajectory
+
+FORCES = ("lambda.*", "Q.*")
+Make = Callable[..., tuple[Path, Prepared]]
+
+
+def scene_of(name: str) -> tuple[ModelFile, Scene]:
+    """The model file and the scene of an FMU of models/."""
+    file = load(MODELS / f"{FILES[name]}.py")
+    return file, next(s for s in file.scenes if s.name == name)
+
+
+@pytest.fixture
+def make(target: str, tmp_path: Path) -> Make:
+    """make(NAME, **needs): the FMU of a model for a scene that needs less, and what was prepared."""
+
+    def made(name: str, **needs: Any) -> tuple[Path, Prepared]:
+        file, scene = scene_of(name)
+        prepared = prepare(file.model, replace(scene, **needs))
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        return write(prepared, folder, file.closed_forms, target=target), prepared
+
+    return made
+
+
+def largest_difference(one: Trajectory, other: Trajectory, names: Any) -> float:
+    """Of some outputs, relative to the largest magnitude of each."""
+    worst = 0.0
+    for n in names:
+        a, b = np.asarray(one[n], float), np.asarray(other[n], float)
+        scale = np.abs(a).max() or 1.0
+        worst = max(worst, float(np.abs(a - b).max() / scale))
+    return worst
+
+
+def variables(path: Path) -> dict[str, Any]:
+    """The FMU's variables by name."""
+    return {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+
+
+def outputs(path: Path) -> list[str]:
+    """The names of an FMU's outputs."""
+    return [n for n, v in variables(path).items() if v.causality == "output"]
+
+
+# ---------------------------------------------------------------------------- the same numbers
+
+
+@pytest.mark.parametrize("name", ["Hemisphere", "PendulumAngle", "CartPendulum", "SliderCrank"])
+def test_the_full_fmu_is_the_scene_that_asks_for_everything(name: str, make: Make) -> None:
+    """Asking for every output, parameter, input, contact and method by pattern is asking for nothing
+    less: the same bytes."""
+    whole, _ = make(name)
+    asked, _ = make(name, outputs=["*"], inputs=["*"], contacts=["*"], methods=METHODS)
+    assert whole.read_bytes() == asked.read_bytes()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_forces_alone_are_the_same_to_the_last_bit(name: str, fmu: Any, make: Make) -> None:
+    """lambda and Q do not depend on whether anybody reads the coordinates and energies beside them."""
+    _, scene = scene_of(name)
+    path, prepared = make(name, outputs=FORCES, method="dop853", formulation=scene.formulation)
+    full = simulate(fmu(name), start_values={"solver.method": "dop853"})
+    run = simulate(path)
+    names = [n for n in full.dtype.names if n.startswith(("lambda.", "Q."))]
+    assert outputs(path) == names
+    assert prepared.coded.n == len(prepared.model.coordinates)
+    for n in names:
+        assert (run[n] == full[n]).all(), n
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_numbers_in_the_code_are_the_parameters_values(name: str, fmu: Any, make: Make) -> None:
+    """lambda and Q with every parameter folded in differ from the full FMU's by rounding, which a run
+    at the tolerance 1e-11 carries no further than 1e-8 of their size."""
+    path, _ = make(name, outputs=FORCES, fixed=["*"], method="dop853")
+    full = simulate(fmu(name), tolerance=1e-11, start_values={"solver.method": "dop853"})
+    run = simulate(path, tolerance=1e-11)
+    names = [n for n in run.dtype.names if n != "time"]
+    assert largest_difference(full, run, names) < 1e-8
+    settable = {n for n, v in variables(path).items() if v.causality == "parameter"}
+    assert settable == {"solver.tolerance", "solver.maximum_step"}
+    found = verify(path)  # what is left of the closed forms, with the numbers for the parameters
+    assert found.claims > 0
+    assert found.passed, [c for c in found.checks if not c.passed]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_coordinates_alone_follow_the_same_motion(name: str, fmu: Any, make: Make) -> None:
+    """The motion does not depend on the formulation, nor on what is read: coordinates at the tolerance
+    1e-11 agree to 1e-8 of their size."""
+    file, _ = scene_of(name)
+    names = [str(q.func) for q in file.model.coordinates]
+    path, prepared = make(name, outputs=names, method="dop853")
+    full = simulate(fmu(name), tolerance=1e-11, start_values={"solver.method": "dop853"})
+    run = simulate(path, tolerance=1e-11)
+    assert outputs(path) == [n for n in full.dtype.names if n in names]
+    assert largest_difference(full, run, names) < 1e-8
+    if prepared.formulation == "minimal":  # then no constraint is left to solve for
+        assert prepared.system.m == 0
+
+
+# ---------------------------------------------------------------------------- what goes
+
+
+def test_who_only_reads_places_pays_for_no_multiplier() -> None:
+    """The Cartesian pendulum for x and y is the equation of the angle, m L^2 theta'' = -m g L sin theta,
+    and two functions of it: no row, no G, no lambda."""
+    file, scene = scene_of("PendulumCartesian")
+    prepared = prepare(file.model, replace(scene, outputs=["x", "y"]))
+    assert prepared.formulation == "minimal"
+    assert prepared.system.coordinates == ("theta",)
+    assert prepared.system.m == 0
+    assert prepared.coded.bare
+    text = model_source(prepared.coded, prepared.coded_reduction, prepared.formulation, False)
+    assert "lambda[" not in text
+    assert "static void tangent(" not in text
+    again = prepare(file.model, replace(scene, outputs=["x", "lambda.rod"]))
+    assert again.formulation == "multipliers"
+
+
+def test_a_coordinate_on_which_no_output_depends_is_gone() -> None:
+    """The knife edge turns at constant rate whatever its place: for phi alone, x, y and the edge's
+    constraint are not there, nor the mass, gravity and slope behind them."""
+    file, scene = scene_of("KnifeEdge")
+    prepared = prepare(file.model, replace(scene, outputs=["phi"]))
+    assert prepared.system.coordinates == ("phi",)
+    assert prepared.system.rows == ()
+    assert prepared.system.parameters == ("J",)
+    assert set(prepared.numbers) == {"m", "g", "alpha"}
+
+
+def test_a_force_needs_all_that_is_solved_with_it() -> None:
+    """lambda of the knife edge depends on x, y and phi: nothing of the equations can go."""
+    file, scene = scene_of("KnifeEdge")
+    prepared = prepare(file.model, replace(scene, outputs=["lambda.edge"]))
+    assert prepared.system.coordinates == ("x", "y", "phi")
+    assert [v.name for v in prepared.table.outputs] == ["lambda.edge"]
+
+
+def test_a_contact_that_cannot_open_pulls(make: Make) -> None:
+    """A bead on a hoop cannot leave it: lambda = m g (3 cos theta - 2 cos theta0) goes through zero at
+    cos theta = 2/3 cos theta0 and becomes negative, where the particle would have flown."""
+    path, prepared = make("Hemisphere", outputs=["lambda.surface", "theta"], contacts=[])
+    run = simulate(path, tolerance=1e-10)
+    m, g = (float(p.value) for p in prepared.model.parameters[:2])
+    expected = m * g * (3 * np.cos(run["theta"]) - 2 * np.cos(run["theta"][0]))
+    assert run["lambda.surface"].min() < -m * g
+    assert np.abs(run["lambda.surface"] - expected).max() < 1e-8 * m * g
+    assert not [n for n in variables(path) if n.startswith(("contact", "departure"))]
+
+
+def test_a_contact_that_is_open_at_the_start_cannot_be_one_that_never_opens() -> None:
+    """The ball begins above the ground: a scene in which the ground holds it contradicts the start."""
+    file, scene = scene_of("BouncingBall")
+    with pytest.raises(ModelError, match=r"'floor' is open at the start, .* name it in `contacts`"):
+        prepare(file.model, replace(scene, contacts=[]))
+
+
+def test_an_input_that_nothing_drives_is_a_number(fmu: Any, make: Make) -> None:
+    """The cart under no force moves as with F = 0 held, and F is not there."""
+    path, _ = make("CartPendulum", inputs=[], method="dop853")
+    full = simulate(fmu("CartPendulum"), tolerance=1e-11, start_values={"solver.method": "dop853"})
+    run = simulate(path, tolerance=1e-11)
+    assert "F" not in variables(path)
+    assert largest_difference(full, run, ["s", "x", "y", "lambda.rod"]) < 1e-9
+
+
+def test_a_number_can_be_another_than_the_models(make: Make) -> None:
+    """On the moon, g = 1.62 m/s2, the string of the machine pulls with 2 m1 m2 g / (m1 + m2)."""
+    path, prepared = make("Atwood", outputs=["lambda.string"], fixed=["g=1.62"])
+    m1, m2 = (float(p.value) for p in prepared.model.parameters[:2])
+    run = simulate(path)
+    assert run["lambda.string"] == pytest.approx(-2 * m1 * m2 * 1.62 / (m1 + m2), rel=1e-12)
+    assert "g" not in variables(path)
+    assert {"m1", "m2"} <= set(variables(path))
+
+
+def test_start_values_can_be_set_though_nobody_reads_them(make: Make) -> None:
+    """A particle that starts at theta0 = 1 rad with nothing but lambda to be read still leaves where
+    cos theta = 2/3 cos theta0: lambda is m g cos theta0 at the start and zero in flight."""
+    path, _ = make("Hemisphere", outputs=["lambda.surface"], fixed=["m=1", "g=9.81"])
+    assert outputs(path) == ["lambda.surface"]
+    assert variables(path)["theta"].causality == "local"
+    run = simulate(path, start_values={"theta": 1.0}, tolerance=1e-10)
+    assert run["lambda.surface"][0] == pytest.approx(9.81 * np.cos(1.0), rel=1e-12)
+    assert run["lambda.surface"][-1] == 0
+    assert verify(path, {"theta": 1.0}).passed
+
+
+def test_model_exchange_of_a_scene(tmp_path: Path) -> None:
+    """An importer's integrator finds the states and their derivatives of a pruned FMU too, as local
+    variables: the pendulum's x goes the same way."""
+    file, scene = scene_of("PendulumCartesian")
+    prepared = prepare(file.model, replace(scene, outputs=["x"], fixed=["*"], stop_time=2.0))
+    path = write(prepared, tmp_path, target="native")
+    run = fmpy.simulate_fmu(str(path), fmi_type="ModelExchange", relative_tolerance=1e-9)
+    twin = simulate(path, tolerance=1e-10)
+    assert run["x"][-1] == pytest.approx(twin["x"][-1], abs=1e-6)
+
+
+# ---------------------------------------------------------------------------- parts of the runtime
+
+
+def sources(path: Path) -> set[str]:
+    """The files in sources/."""
+    with zipfile.ZipFile(path) as archive:
+        return {n.removeprefix("sources/") for n in archive.namelist() if n.startswith("sources/")}
+
+
+def test_one_integrator_and_no_event_code_are_linked(tmp_path: Path, native_fmu: Any) -> None:
+    """A pendulum has no contact and a scene one method: the other integrators and the search for events
+    are neither in the sources nor in the binary."""
+    file, scene = scene_of("PendulumCartesian")
+    prepared = prepare(file.model, replace(scene, outputs=["lambda.rod"], method="dopri5"))
+    path = write(prepared, tmp_path, target="native")
+    gone = {"dop853.c", "rk4.c", "radau5.c", "rattle.c", "events.c", "contacts.c", "switch.c"}
+    assert not gone & sources(path)
+    assert {"dopri5.c", "parts.c"} <= sources(path)
+    full = native_fmu("PendulumCartesian")
+    assert gone & sources(full) == gone - {"events.c", "contacts.c", "switch.c"}
+    size = {p: zipfile.ZipFile(p).getinfo(_binary(p)).file_size for p in (path, full)}
+    assert size[path] < 0.9 * size[full]
+
+
+def _binary(path: Path) -> str:
+    with zipfile.ZipFile(path) as archive:
+        return next(n for n in archive.namelist() if n.startswith("binaries/"))
+
+
+def test_an_undamped_scene_has_one_integrator_by_default() -> None:
+    """radau5 cures stiffness by damping.  Where no force holds a velocity nothing damps: `auto` is dop853
+    alone; the slider-crank's damper keeps both."""
+    file, scene = scene_of("PendulumCartesian")
+    assert prepare(file.model, replace(scene, outputs=["lambda.rod"])).scene.selectable == (
+        "dop853",
+    )
+    file, scene = scene_of("CartPendulum")
+    assert prepare(file.model, replace(scene, outputs=["lambda.rod"])).scene.selectable == ("auto",)
+    frictionless = prepare(file.model, replace(scene, outputs=["lambda.rod"], fixed=["c=0"]))
+    assert frictionless.scene.selectable == ("dop853",)
+
+
+def test_a_method_that_was_left_out_cannot_be_chosen(make: Make) -> None:
+    """Of two methods the FMU offers these, by name, and refuses a third."""
+    path, _ = make("PendulumCartesian", methods=["dop853", "rk4"], method="dop853")
+    assert variables(path)["solver.method"].description == "integrator: dop853 or rk4 (fixed step)"
+    simulate(path, stop_time=0.1, start_values={"solver.method": "rk4"})
+    with pytest.raises(LagfmuError, match="'radau5'"):
+        simulate(path, stop_time=0.1, start_values={"solver.method": "radau5"})
+
+
+def test_a_scene_of_forces_offers_no_directional_derivatives(tmp_path: Path) -> None:
+    """Unless they are asked for: fmi2GetDirectionalDerivative, and the equations behind it."""
+    file, scene = scene_of("PendulumCartesian")
+    for asked, expected in ((None, False), (True, True)):
+        needs = replace(scene, outputs=["lambda.rod"], derivatives=asked)
+        path = write(prepare(file.model, needs), tmp_path, target="native")
+        description = fmpy.read_model_description(str(path))
+        assert description.coSimulation.providesDirectionalDerivative is expected
+        with zipfile.ZipFile(path) as archive:
+            assert (b"static void tangent(" in archive.read("sources/model.c")) is expected
+
+
+# ---------------------------------------------------------------------------- refusals
+
+
+def test_all_unknown_names_are_told_at_once() -> None:
+    """Each with what it might have meant."""
+    file, scene = scene_of("Hemisphere")
+    needs = replace(
+        scene,
+        outputs=["lamda.surface"],
+        fixed=["M", "g=x", "a=-1"],
+        contacts=["floor"],
+        inputs=["F"],
+    )
+    with pytest.raises(ModelError) as refused:
+        prepare(file.model, needs)
+    text = str(refused.value)
+    for part in (
+        "output 'lamda.surface' is unknown; did you mean 'lambda.surface'",
+        "fixed parameter 'M' is unknown",
+        "fixed parameter 'g' = 'x' is no number",
+        "fixed parameter 'a' = -1.0",
+        "contact 'floor' is unknown; did you mean 'surface'",
+        "input 'F' is unknown; there is none",
+    ):
+        assert part in text
+
+
+def test_a_number_that_the_equations_divide_by_is_refused() -> None:
+    """A pendulum without length has no angle: the folded equations would be 0/0."""
+    file, scene = scene_of("PendulumCartesian")
+    with pytest.raises(LagfmuError, match=r"'L' = 0\.0"):
+        prepare(file.model, replace(scene, fixed=["L=0"]))
+
+
+def test_outputs_without_motion_are_refused() -> None:
+    """The number of steps depends on no coordinate: there would be nothing to integrate."""
+    file, scene = scene_of("Hemisphere")
+    with pytest.raises(ModelError, match="depend on no coordinate"):
+        prepare(file.model, replace(scene, outputs=["solver.steps"]))
+
+
+def test_a_text_is_no_list_of_names() -> None:
+    """outputs='lambda.rod' would be taken letter by letter."""
+    with pytest.raises(ModelError, match=r"outputs = 'lambda.rod', expected a list of names"):
+        Scene("P", outputs="lambda.rod")
+
+
+# ---------------------------------------------------------------------------- what it saved
+
+
+def test_savings_are_counted_on_the_code() -> None:
+    """Places alone halve the pendulum's operations; a full scene saves nothing."""
+    file, scene = scene_of("PendulumCartesian")
+    assert savings(prepare(file.model, scene)) is None
+    found = savings(prepare(file.model, replace(scene, outputs=["x", "y"], fixed=["*"])))
+    assert found is not None
+    assert found.scene.operations < 0.5 * found.full.operations
+    assert found.scene.native_bytes < found.full.native_bytes
+    assert found.full.outputs == len(prepare(file.model, scene).table.outputs)
+    assert (found.full.coordinates, found.scene.coordinates) == (2, 1)
+    assert (found.full.constraints, found.scene.constraints) == (1, 0)
+    assert any("no multiplier is solved for" in text for text in found.left_out)
+    assert any("m = 1 kg" in text for text in found.left_out)
+
+
+def test_show_tells_what_was_left_out() -> None:
+    """lagfmu show MODEL.py --outputs lambda.surface --fixed m,g."""
+    result = CliRunner().invoke(
+        app,
+        ["show", str(MODELS / "hemisphere.py"), "--outputs", "lambda.surface", "--fixed", "m,g"],
+    )
+    assert result.exit_code == 0, result.output
+    text = " ".join(result.output.split())
+    assert "What the scene leaves out" in text
+    assert "parameters that are numbers in the code: m = 1 kg, g = 9.81 m/s2" in text
+    assert "operations of the right-hand side" in text
+
+
+def test_the_command_line_builds_a_scene(tmp_path: Path, target: str) -> None:
+    """lagfmu build --outputs --fixed --name: the pruned FMU passes its closed forms."""
+    arguments = [str(MODELS / "hemisphere.py"), "--outputs", "lambda.*,departure.surface.time"]
+    arguments += ["--fixed", "m,g", "--name", "Normal", "--target", target, "--out", str(tmp_path)]
+    result = CliRunner().invoke(app, ["build", *arguments])
+    assert result.exit_code == 0, result.output
+    path = tmp_path / target / "Normal.fmu"
+    assert outputs(path) == ["lambda.surface", "departure.surface.time"]
+    page = zipfile.ZipFile(path).read("documentation/index.html").decode()
+    assert "What this scene leaves out" in page
+
+
+def test_one_name_for_several_fmus_is_refused(tmp_path: Path) -> None:
+    """The file of the pendulum has three FMUs: --name needs --scene."""
+    result = CliRunner().invoke(
+        app, ["build", str(MODELS / "pendulum.py"), "--name", "P", "--out", str(tmp_path)]
+    )
+    assert result.exit_code == 1
+    assert "choose one of them with --scene" in " ".join(result.output.split())
+
+
+def test_a_scene_may_ask_for_an_accuracy(tmp_path: Path) -> None:
+    """Scene(accuracy='1e-4:lambda.string'): settings are measured, and the FMU holds lambda to that."""
+    file, scene = scene_of("Atwood")
+    needs = replace(scene, accuracy="1e-4:lambda.string", outputs=["lambda.string"])
+    path = build_fmu(file.model, tmp_path, needs, file.closed_forms, target="native")
+    m1, m2, g = (float(p.value) for p in file.model.parameters)
+    run = simulate(path)
+    assert run["lambda.string"] == pytest.approx(-2 * m1 * m2 * g / (m1 + m2), rel=1e-4)
+    page = zipfile.ZipFile(path).read("documentation/index.html").decode()
+    assert 'id="choice"' in page
+
+
+@pytest.mark.parametrize("name", ["Hemisphere", "RollingSphere", "Loop"])
+def test_a_contact_that_holds_is_a_holonomic_constraint(name: str) -> None:
+    """In the equations of a scene without `contacts`, no inequality is left, and what acts while the
+    contact is closed acts always."""
+    file, scene = scene_of(name)
+    prepared = prepare(file.model, replace(scene, contacts=[]))
+    assert not any(isinstance(c, Contact) for c in prepared.equations.constraints)
+    assert prepared.system.contacts == ()
+    assert len(prepared.system.permanent) == prepared.system.m
+    assert "'contact'" not in source(prepared.coded, prepared.coded_reduction, "multipliers")
