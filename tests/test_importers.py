@@ -179,7 +179,7 @@ REFUSED = {
         "PendulumCartesian",
         {"solver.method": "euler"},
         {},
-        "expected one of dop853",
+        "expected one of auto, dop853",
     ),
     "a start far off": ("PendulumCartesian", {"x": 0.0, "y": 0.0}, {}, "cannot be projected"),
     "an input that is none": ("CartPendulum", {}, {"F": [1.0, float("nan")]}, "'F' = nan"),

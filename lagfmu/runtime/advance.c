@@ -107,7 +107,7 @@ static Status try_step(Solver *s, double t_end) {
 static void choose(Solver *s) {
     Integrator *i = &s->integrator;
     Choice *choice = &s->state.now.choice;
-    if (!choice->implicit && i->t > i->t_old && leg_rate(s, i) == OK)
+    if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && leg_rate(s, i) == OK)
         stiffness_explicit_step(choice, i, s->state.size);
     if (!stiffness_turn(choice)) return;
     double *y = s->work_advance;

@@ -29,6 +29,7 @@ static const double BOUND = 0.1;  /* h rho below which only the motion, or a bou
 /* Changes of coordinates and velocities, and of accelerations, relative to them, that say nothing. */
 static const double ROUNDING = 1e-14, ROUNDING_FORCE = 1e-12;
 enum {
+    EVERY = 3,  /* steps of dop853 of which one is judged while none was stiff */
     STIFF = 15, /* steps that decide, ... */
     OTHER = 6,  /* ... and others in a row after which they are counted anew */
     BRIEF = 6,  /* steps of radau5 in a row that do not pay, after which dop853 comes back */
@@ -60,6 +61,13 @@ static Rates rates(int n, const double *size, const double *y0, const double *f0
     }
     if (!(dv > 0 && da > 0)) return (Rates){0, 0};
     return (Rates){sqrt(da / dv), dq > 0 ? sqrt(sqrt(da / dq)) : HUGE_VAL};
+}
+
+int stiffness_due(Choice *c) {
+    c->unseen += 1;
+    if (c->stiff == 0 && c->unseen < EVERY) return 0;
+    c->unseen = 0;
+    return 1;
 }
 
 void stiffness_explicit_step(Choice *c, const Integrator *i, const double *size) {

@@ -8,7 +8,8 @@
 typedef struct {
     int implicit;     /* 1: radau5 is at work */
     int turn;         /* 1: the other method takes over before the next step */
-    int stiff, other; /* dop853's stiff steps so far; others in a row */
+    int unseen;       /* dop853's steps since one was judged */
+    int stiff, other; /* of them, its stiff steps so far; others in a row */
     int taken, brief; /* radau5's steps; those in a row that did not pay */
     int failures;     /* how often in a row radau5 did not pay */
     int retries;      /* how often dop853 was tried again */
@@ -18,6 +19,9 @@ typedef struct {
     double product;   /* ... h rho then (0: it never did), ... */
     double ratio;     /* ... and rho / sigma (0: the motion's own rate was not known) */
 } Choice;
+
+/* 1 if the step that dop853 has just taken is to be judged: one in three, each from a stiff one on. */
+int stiffness_due(Choice *c);
 
 /* Judges the step that dop853 has just taken; f at its end is known.  `size`: (ny / 2) magnitudes of
  * the coordinates. */

@@ -27,7 +27,15 @@ from .magnitudes import complete, is_incomplete
 from .methods import last_stage, stepper
 from .motion import EPS, motion, project
 from .state import Departure, Settings, State
-from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step
+from .stiffness import (
+    Choice,
+    Slope,
+    explicit,
+    explicit_step,
+    implicit_step,
+    is_due,
+    unjudged_step,
+)
 from .system import System, Vector
 
 LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
@@ -251,11 +259,7 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
             )
         solver.y, solver.f = y1, leg.rate(solver.t, y1)
         if leg.auto and leg.settings.method == "dop853":
-            stages = Slope(*last_stage(solver, y0), y1, solver.f)
-            passed = Slope(y0, solver.K[0], y1, solver.f)
-            choice = explicit_step(
-                choice, float(solver.t), float(solver.t - t0), stages, passed, leg.size
-            )
+            choice = _judged(leg, choice, solver, t0, y0)
         if leg.auto and choice.implicit != (leg.settings.method == "radau5"):
             solver = _take_over(leg, choice, solver.t, y1, t_end)
         done = steps - first
@@ -265,6 +269,15 @@ def _travel(leg: _Leg, state: State, t_end: float, begun: float, first: int) -> 
                 f"the communication step to t = {t_end!r} s would need about {needed:.0e} internal "
                 f"steps, more than {STEP_LIMIT:.0e}: take a shorter one"
             )
+
+
+def _judged(leg: _Leg, choice: Choice, solver: Any, t0: float, y0: Vector) -> Choice:
+    """The choice after the step that dop853 has just taken."""
+    if not is_due(choice):
+        return unjudged_step(choice)
+    stages = Slope(*last_stage(solver, y0), solver.y, solver.f)
+    step = Slope(y0, solver.K[0], solver.y, solver.f)
+    return explicit_step(choice, float(solver.t), float(solver.t - t0), stages, step, leg.size)
 
 
 def _take_over(leg: _Leg, choice: Choice, t: float, y: Vector, t_end: float) -> Any:

@@ -31,6 +31,7 @@ STABLE = 6.1  # h rho beyond which dop853 is unstable
 SLOWER = 30.0  # rho / sigma, per price of a step, from which on the motion is far slower
 BOUND = 0.1  # h rho below which nothing but the motion, or a bound, limits a step of order 8
 ROUNDING, ROUNDING_FORCE = 1e-14, 1e-12  # relative changes (of accelerations) that say nothing
+EVERY = 3  # steps of dop853 of which one is judged while none was stiff
 STIFF, OTHER = 15, 6  # steps that decide; others in a row after which they are counted anew
 SHORT = 6  # steps of radau5 in a row that do not pay, after which dop853 comes back
 PRICE = 1.5  # cost of a step of radau5 in steps of dop853
@@ -45,14 +46,16 @@ RETRY, LATEST = 128, 20  # steps of radau5 before dop853 is tried again; doublin
 class Choice:
     """What the choice between dop853 and radau5 remembers.
 
-    implicit: radau5 is at work; stiff, other: steps counted; longest [s]: the longest of dop853's
-    stiff steps; taken, span [s], short: radau5's steps, the time that they covered, and those in a
-    row that did not pay; failures: how often in a row radau5 did not pay; retries: how often dop853
-    was tried again; time [s], product, ratio: when radau5 first took over, h rho and rho / sigma
-    then (product 0: it never did; ratio 0: the motion's own rate was not known).
+    implicit: radau5 is at work; unseen: dop853's steps since one was judged; stiff, other: its stiff
+    steps, and others in a row; longest [s]: the longest of the stiff ones; taken, span [s], short:
+    radau5's steps, the time that they covered, and those in a row that did not pay; failures: how
+    often in a row radau5 did not pay; retries: how often dop853 was tried again; time [s], product,
+    ratio: when radau5 first took over, h rho and rho / sigma then (product 0: it never did; ratio 0:
+    the motion's own rate was not known).
     """
 
     implicit: bool = False
+    unseen: int = 0
     stiff: int = 0
     other: int = 0
     longest: float = 0.0
@@ -101,10 +104,21 @@ class Slope:
         return da / dv, math.sqrt(da / dq) if dq > 0 else math.inf
 
 
+def is_due(choice: Choice) -> bool:
+    """True if the next step of dop853 is to be judged."""
+    return choice.stiff > 0 or choice.unseen + 1 >= EVERY
+
+
+def unjudged_step(choice: Choice) -> Choice:
+    """The choice after a step of dop853 that was not due."""
+    return replace(choice, unseen=choice.unseen + 1)
+
+
 def explicit_step(
     choice: Choice, t: float, h: float, stages: Slope, step: Slope, size: Vector
 ) -> Choice:
     """The choice after a step of dop853 of length h [s] that ended at t [s]."""
+    choice = replace(choice, unseen=0)
     rho, sigma = min(stages.rate(size)), step.rate(size)[1]
     slow = sigma > 0 and rho > SLOWER * PRICE * sigma
     if not (h * rho > STABLE or (h * rho > BOUND and slow)):
