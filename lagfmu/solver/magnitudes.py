@@ -60,7 +60,10 @@ def is_incomplete(state: State) -> bool:
 
 
 def complete(at: Instant, settings: Settings, state: State, span: float) -> State:
-    """Sizes, rate, scales and gaps as far as they can be known; scales only grow.  span [s]: of the first step, or 0."""
+    """Sizes, rate, scales, gaps as far as they can be known; scales only grow.
+
+    span [s]: of the first step, or 0 while there is none.
+    """
     system = at.system
     q, v = np.array(state.q), np.array(state.v)
     now = motion(at, q, v, system.active(state.closed))
