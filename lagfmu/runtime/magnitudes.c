@@ -22,8 +22,8 @@
 #include <float.h>
 
 const double TOUCH = 1e-9;
-static const double LOST = 1e3 * DBL_EPSILON; /* a place this small after projection, relative to
-                                               * the one before, is rounding */
+static const double LOST = 1e3 * DBL_EPSILON; /* what is left of a place by a projection, or of
+                                               * forces that cancel, is rounding */
 static const double PART = 1e-3;  /* of the first step, in which a motion without scale is measured */
 static const double TINY = 1e-100; /* scale of what neither moves nor is pushed: anything that moves
                                     * exceeds it */
@@ -135,7 +135,8 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
         if (!(own[j] > 0)) continue;
         const double speed = largest_alike(system, j, s->state.v);
         double acceleration = largest_alike(system, j, b->vdot);
-        if (!(acceleration > 0)) acceleration = largest_alike(system, j, felt);
+        const double pull = largest_alike(system, j, felt);
+        if (acceleration <= LOST * pull) acceleration = pull; /* at rest: the rest is rounding */
         s->state.size[j] = larger(speed / own[j], acceleration / own[j] / own[j]);
         taken = 1;
     }

@@ -33,7 +33,7 @@ from .system import System, Vector
 Mask = NDArray[np.bool_]
 
 TOUCH = 1e-9  # |f| below this, in units of the constraint's own size, counts as touching
-LOST = 1e3 * EPS  # a place this small after projection, relative to the one before, is rounding
+LOST = 1e3 * EPS  # what is left of a place by a projection, or of forces that cancel, is rounding
 PART = 1e-3  # of the first communication step, in which a motion without any scale is measured
 TINY = 1e-100  # scale of what neither moves nor is pushed: anything that moves exceeds it
 
@@ -64,9 +64,9 @@ def is_incomplete(state: State) -> bool:
 
 
 def complete(at: Instant, settings: Settings, state: State, span: float) -> State:
-    """Sizes, rate, scales and gaps as far as they can be known; scales only grow.
+    """Sizes, rate, scales, gaps as far as they can be known; scales only grow.
 
-    span [s]: of the first communication step, or 0.
+    span [s]: of the first step, or 0 while there is none.
     """
     system = at.system
     q, v = np.array(state.q), np.array(state.v)
@@ -79,7 +79,9 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
     for j in np.flatnonzero(~found):
         like = list(system.like[j]) if system.like else [j]
         speed, pull = np.abs(v[like]).max(), felt[like].max()
-        acceleration = np.abs(now.vdot[like]).max() or pull
+        acceleration = np.abs(now.vdot[like]).max()
+        if acceleration <= LOST * pull:
+            acceleration = pull  # at rest: what is left is rounding of forces that cancel
         own[j] = max(steady, pull / speed if speed > 0 else 0.0)
         natural = max(natural, own[j])
         if own[j] == 0 and span > 0:
