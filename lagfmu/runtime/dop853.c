@@ -191,7 +191,9 @@ static Status dop853_step(Integrator *i, const Ode *ode, const Control *control,
     return FAILED;
 }
 
-/* Replaces k_6 to k_12 in i->dense by the polynomial's coefficients r_1 to r_7 (eq. II.10.20). */
+/* Replaces k_6 to k_12 in i->dense by the polynomial's coefficients r_1 to r_7 (eq. II.10.20), but r_2
+ * by h k_1 = r_1 + r_2:  r_1 + z (r_2 + s p) = z h k_1 + s (r_1 + z p)  without the cancellation of r_1
+ * that would leave no digits early in a very long step. */
 static Status dop853_prepare(Integrator *i, const Ode *ode) {
     const int n = i->ny;
     const double h = i->t - i->t_old;
@@ -215,7 +217,7 @@ static Status dop853_prepare(Integrator *i, const Ode *ode) {
                             a16_9 * k9[j] + a16_13 * k13[j] + a16_14 * k14[j] + a16_15 * k15[j]);
     if (ode->rate(ode->context, i->t_old + c16 * h, y, k16) != OK) return FAILED;
     for (int j = 0; j < n; j++) {
-        double r1 = i->y[j] - y0[j], r2 = h * k1[j] - r1, r3 = r1 - h * k13[j] - r2;
+        double r1 = i->y[j] - y0[j], r2 = h * k1[j], r3 = r1 - h * k13[j] - (r2 - r1);
         double r4 = h * (d4_1 * k1[j] + d4_6 * k6[j] + d4_7 * k7[j] + d4_8 * k8[j] +
                          d4_9 * k9[j] + d4_10 * k10[j] + d4_11 * k11[j] + d4_12 * k12[j] +
                          d4_13 * k13[j] + d4_14 * k14[j] + d4_15 * k15[j] + d4_16 * k16[j]);
@@ -246,7 +248,7 @@ static void dop853_dense(const Integrator *i, double t, double *y) {
     const double *r6 = r5 + n, *r7 = r6 + n;
     for (int j = 0; j < n; j++) {
         double tail = r4[j] + s * (r5[j] + z * (r6[j] + s * r7[j]));
-        y[j] = i->y_old[j] + s * (r1[j] + z * (r2[j] + s * (r3[j] + z * tail)));
+        y[j] = i->y_old[j] + s * (z * r2[j] + s * (r1[j] + z * (r3[j] + z * tail)));
     }
 }
 

@@ -20,8 +20,10 @@ from ..build import write, write_whole
 from ..errors import BuildError, LagfmuError
 from ..modelfile import load
 from ..prepare import prepare
+from ..proof import pack_closed_forms
 from ..tradeoff.command import progress
-from .facts import facts_of
+from .facts import beside, facts_of
+from .lagrange import lagrange
 from .probe import UNFINISHED, WRONG, Row
 from .report import MEANING, Stressed, as_json, as_markdown, summary, table
 
@@ -76,7 +78,10 @@ def _fmus(
         if not scenes or scene.name in scenes:
             with console.status(f"building {scene.name}"):
                 prepared = prepare(file.model, scene)
-                built.append(write(prepared, folder, file.closed_forms, target=target))
+                fmu = write(prepared, folder, file.closed_forms, target=target)
+                forms = lagrange(file.model, frozenset(v.name for v in prepared.table.variables))
+                beside(fmu).write_bytes(pack_closed_forms(scene, forms, prepared.table))
+                built.append(fmu)
     return built
 
 

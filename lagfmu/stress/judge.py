@@ -59,10 +59,11 @@ def invariants(facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Colu
     sizes = {c: _size(facts, run, c) for c in facts.constraints}
     checks += _residuals(facts, run, sizes)
     checks += _contacts(facts, run, sizes)
-    if lost(facts, run):
-        return checks
+    digits = not lost(facts, run)
     before, floors = first_landing(facts, run), magnitudes(facts, run)
     for form in undisturbed(run, tuple(forms)):
+        if not (digits or form.instantaneous):
+            continue
         error, allowed, points = form.judge(
             run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors
         )
@@ -95,11 +96,15 @@ def wound(facts: Facts, run: Run) -> Column:
 
 
 def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
-    """The points before a contact closes again: an impact takes energy, and a start's claims end."""
+    """The points before a contact closes again: an impact takes energy, and a start's claims end.
+
+    One that closes and opens between two points has departed once more than it was closed.
+    """
     landed = np.zeros(len(run.rows), dtype=bool)
     for c in facts.contacts:
         closed = np.asarray(run.rows[f"contact.{c}"], dtype=bool)
-        landed[1:] |= closed[1:] & ~closed[:-1]
+        departed = np.diff(run.rows[f"departure.{c}.count"])
+        landed[1:] |= (closed[1:] & ~closed[:-1]) | (departed > closed[:-1])
     return ~np.logical_or.accumulate(landed)
 
 
