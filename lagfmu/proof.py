@@ -18,6 +18,7 @@ from .variables import VariableTable
 
 Expr = Any
 FORMAT = 1
+EXPRESSIONS = ("actual", "expected", "scale", "when")
 CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 
 
@@ -38,6 +39,7 @@ class Claim:
     scale: Expr | None
     within: float
     rounding: float
+    when: Expr | None = None
 
 
 def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> list[Claim]:
@@ -64,6 +66,7 @@ def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> l
                 scale=scale,
                 within=form.within,
                 rounding=form.rounding,
+                when=None if form.when is None else in_variables(form.when),
             )
         )
     return claims
@@ -82,7 +85,7 @@ def pack_closed_forms(
     for claim in claims:
         used = {
             str(s)
-            for e in (claim.actual, claim.expected, claim.scale)
+            for e in (claim.actual, claim.expected, claim.scale, claim.when)
             if e is not None
             for s in sp.sympify(e).free_symbols
         }
@@ -103,7 +106,7 @@ def pack_closed_forms(
             key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
         }
         names: dict[Expr, str] = {}
-        for key in ("actual", "expected", "scale"):
+        for key in EXPRESSIONS:
             e = getattr(claim, key)
             entry[key] = None if e is None else _text(sp.sympify(e), names)
         entry["symbols"] = {short: str(symbol) for symbol, short in names.items()}
@@ -133,7 +136,7 @@ def _text(e: Expr, names: dict[Expr, str]) -> str:
 
 def _claim(entry: dict[str, Any]) -> Claim:
     symbols = {short: output(name) for short, name in entry.pop("symbols").items()}
-    for key in ("actual", "expected", "scale"):
-        if entry[key] is not None:
+    for key in EXPRESSIONS:
+        if entry.get(key) is not None:
             entry[key] = parse_expr(entry[key], local_dict=symbols)
     return Claim(**entry)

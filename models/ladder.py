@@ -9,7 +9,7 @@ let go, then falls to the floor and lies there, sliding on.
 from math import cos as cosine
 from math import sin as sine
 
-from sympy import Piecewise, cos, sin, symbols
+from sympy import Heaviside, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -65,8 +65,8 @@ square = rate0**2 + 3 * g * (sin(theta0) - sin(theta)) / l
 wall = m * cos(theta) * (3 * g * sin(theta) / 4 - l * square / 2)
 floor = m * g - m * (3 * g * cos(theta) ** 2 / 4 + l * sin(theta) * square / 2)
 highest = 2 * sin(theta0) / 3 + 2 * l * rate0**2 / (9 * g)  # sin(theta) where the wall's force ends
-lifts = output("departure.floor.count")
-slid = Piecewise((initial(output("contact.floor")), lifts < 1), (0, True))  # 1: on the floor all along
+# That is so if it slid on the floor all along:
+slid = initial(output("contact.floor")) * Heaviside(-output("departure.floor.count"), 1)
 
 # Without the wall x' stays and gravity turns nothing: an end that is alone on the floor (side = 1: the
 # lower end, -1: the upper) is pushed by  lambda  with  I theta'' = -side (l/2) cos(theta) lambda  and
@@ -93,36 +93,29 @@ falling = m * (g - l * sin(theta) * slide / (2 * arm)) / arm
 free = departure("wall", x) + departure("wall", x.diff()) * (t - departure("wall"))
 
 closed_forms = [
-    ClosedForm(
-        "lambda.wall",
-        actual=slid * output("lambda.wall"),
-        expected=slid * wall,
-        until_departure="wall",
-    ),
-    ClosedForm(
-        "lambda.floor",
-        actual=slid * output("lambda.floor"),
-        expected=slid * floor,
-        until_departure="wall",
-    ),
+    ClosedForm("lambda.wall", wall, until_departure="wall", when=slid),
+    ClosedForm("lambda.floor", floor, until_departure="wall", when=slid),
     ClosedForm(
         "sin(theta) at the departure",
-        actual=slid * sin(angle),
-        expected=slid * highest,
+        actual=sin(angle),
+        expected=highest,
         at_departure="wall",
+        when=slid,
     ),
     ClosedForm(
         "der(theta)^2 at the departure",
-        actual=slid * rate**2,
-        expected=slid * (rate0**2 + 3 * g * (sin(theta0) - highest) / l),
+        actual=rate**2,
+        expected=rate0**2 + 3 * g * (sin(theta0) - highest) / l,
         at_departure="wall",
+        when=slid,
     ),
     ClosedForm("x without the wall", free, actual=x, while_open="wall"),
     ClosedForm(
         "lambda.floor without the wall",
-        actual=slid * output("lambda.floor"),
-        expected=slid * ((1 - on_top) * falling + on_top * m * g / 2),
+        actual=output("lambda.floor"),
+        expected=(1 - on_top) * falling + on_top * m * g / 2,
         while_open="wall",
+        when=slid,
         scale=m * g,
     ),
     ClosedForm(

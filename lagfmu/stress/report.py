@@ -14,15 +14,21 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from .probe import REFUSED, RIGHT, UNFINISHED, WRONG, Row
+from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Row
 
 FORMAT = 1
-VERDICTS = (RIGHT, REFUSED, WRONG, UNFINISHED)
-COLOURS = {RIGHT: "green", REFUSED: "cyan", WRONG: "bold red", UNFINISHED: "yellow"}
-TEXTS = {RIGHT: "right", REFUSED: "refused", WRONG: "**wrong**", UNFINISHED: "unfinished"}
+VERDICTS = (RIGHT, CONSISTENT, REFUSED, WRONG, UNFINISHED)
+COLOURS = {
+    RIGHT: "green",
+    CONSISTENT: "green",
+    REFUSED: "cyan",
+    WRONG: "bold red",
+    UNFINISHED: "yellow",
+}
 MEANING = (
-    "right: every check held. refused: discard or error, with a message that names the cause, and "
-    "everything before it right. wrong: a check failed, the process was taken down, or a refusal had "
+    "right: every check held. consistent: so did Lagrange's equations and the constraints at each "
+    "instant, but nothing could be said of the course of the motion. refused: discard or error, with a "
+    "message that names the cause, and everything before it right. wrong: a check failed, the process was taken down, or a refusal had "
     "no cause. unfinished: still at work at the time limit; nothing is known. Ratio: the error of the "
     "check that came nearest to its limit, over that limit."
 )
@@ -126,7 +132,7 @@ def as_markdown(found: Stressed) -> str:
     if found.quick:
         lines += ["A quick run: some of the probes only.", ""]
     lines += [MEANING, ""]
-    lines += ["| family | probes | " + " | ".join(VERDICTS) + " |", "| --- |" + " ---: |" * 5]
+    lines += ["| family | probes | " + " | ".join(VERDICTS) + " |", "| --- |" + " ---: |" * (1 + len(VERDICTS))]
     for family in found.families:
         counts = [found.count(v, family) for v in VERDICTS]
         lines.append(_cells(family, sum(counts), *counts))
@@ -141,7 +147,7 @@ def as_markdown(found: Stressed) -> str:
     lines += ["| family | probe | verdict | checks | ratio | nearest to its limit, or reason |"]
     lines += ["| --- | --- | --- | ---: | ---: | --- |"]
     for r in found.rows:
-        lines.append(_cells(r.family, r.probe, TEXTS[r.verdict], r.checks, _ratio(r), _text(r)))
+        lines.append(_cells(r.family, r.probe, f"**{WRONG}**" if r.verdict == WRONG else r.verdict, r.checks, _ratio(r), _text(r)))
     return "\n".join(lines) + "\n"
 
 
