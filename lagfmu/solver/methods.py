@@ -18,7 +18,6 @@ from .state import Settings
 from .system import Vector
 
 
-
 class Dop853(DOP853):  # type: ignore[misc]
     """SciPy's, whose error norm squares rates of change: at 1e155 and more it overflows and accepts."""
 

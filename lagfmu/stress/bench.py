@@ -102,8 +102,8 @@ class Bench:
         known = {p.name: float(values.get(p.name, p.start)) for p in self.facts.parameters}
         largest = 0.0
         for q in self.facts.coordinates:
-            asked = abs(float(values.get(q, 0.0)))
-            place = abs(seen[q]) if abs(seen[q]) > EPS * asked else 0.0  # projected to 0, but for rounding
+            rounding = EPS * abs(float(values.get(q, 0.0)))  # of a start that was projected onto 0
+            place = abs(seen[q]) if abs(seen[q]) > rounding else 0.0
             size = max(place, self.facts.same_unit(q, known)) or 1.0
             v, vdot = abs(seen[f"der({q})"]), abs(seen[f"der({q},2)"])
             largest = max(largest, v / size, float(np.sqrt(vdot / size)))

@@ -13,16 +13,26 @@ constraint, to  sum_j |a_j| |terms of equation j| / M_jj .
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import sympy as sp
 
 from ..closed_form import TIME, ClosedForm, in_variables, output
 from ..model import Contact, Model, Nonholonomic, name_of
+from ..prepare import Prepared
+from ..proof import pack_closed_forms
 from .claims import magnitude
+from .facts import beside
 
 Expr = Any
 ROUNDING = 1e-13  # relative to those terms; see claims.LEEWAY
+
+
+def lay_beside(fmu: Path, prepared: Prepared) -> None:
+    """Write the equations to where the judge of the FMU looks for them."""
+    forms = lagrange(prepared.model, frozenset(v.name for v in prepared.table.variables))
+    beside(fmu).write_bytes(pack_closed_forms(prepared.scene, forms, prepared.table))
 
 
 def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
