@@ -26,9 +26,10 @@ class ClosedForm:
     `name` is an output's name (then `actual` may be left out) or a label.  `while_closed`,
     `while_open`: only while that contact is so.  `until_departure`: only as long as that contact, closed
     at the start, has not opened; `at_departure`: only once, when it has first opened, to be used with
-    the `departure` symbols.  Errors are measured relative to `scale` (default: the largest magnitude of
-    `expected` along the run) and allowed up to `within` times the solver's tolerance, but at least
-    `rounding`.  `only`: the FMUs that it applies to.
+    the `departure` symbols.  `when`: only where this expression of outputs, initial values and time is
+    not 0 (contacts and counts are numbers in it).  Errors are measured relative to `scale` (default: the
+    largest magnitude of `expected` along the run) and allowed up to `within` times the solver's
+    tolerance, but at least `rounding`.  `only`: the FMUs that it applies to.
     """
 
     name: str
@@ -38,6 +39,7 @@ class ClosedForm:
     while_open: str | None = None
     until_departure: str | None = None
     at_departure: str | None = None
+    when: Expr | None = None
     scale: Expr | None = None
     within: float = 10.0
     rounding: float = 1e-12
@@ -53,6 +55,7 @@ class Conserved:
     while_closed: str | None = None
     while_open: str | None = None
     until_departure: str | None = None
+    when: Expr | None = None
     scale: Expr | None = None
     within: float = 10.0
     rounding: float = 1e-12

@@ -18,6 +18,7 @@ from .variables import VariableTable
 
 Expr = Any
 FORMAT = 1
+EXPRESSIONS = ("actual", "expected", "scale", "when")
 CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 
 
@@ -38,13 +39,14 @@ class Claim:
     scale: Expr | None
     within: float
     rounding: float
+    when: Expr | None = None
 
     @property
     def variables(self) -> set[str]:
         """The FMU's variables and parameters that it needs."""
         names = {
             str(s)
-            for e in (self.actual, self.expected, self.scale)
+            for e in (self.actual, self.expected, self.scale, self.when)
             if e is not None
             for s in sp.sympify(e).free_symbols
         }
@@ -57,19 +59,25 @@ class Claim:
 
     def in_scene(self, numbers: Mapping[str, Expr], held: Collection[str]) -> Claim | None:
         """The same with numbers for parameters, and contacts that stay closed; None if it speaks of
-        such a contact being open."""
+        such a contact being open, or never holds with these numbers."""
         if {self.while_open, self.at_departure} & set(held):
             return None
 
         def put(e: Expr) -> Expr:
-            named = {s: numbers[str(s)] for s in e.free_symbols if str(s) in numbers}
-            return e.xreplace(named)
+            if e is None:
+                return None
+            e = sp.sympify(e)
+            return e.xreplace({s: numbers[str(s)] for s in e.free_symbols if str(s) in numbers})
 
+        when = put(self.when)
+        if when == sp.false:
+            return None
         return replace(
             self,
-            actual=put(sp.sympify(self.actual)),
-            expected=None if self.expected is None else put(sp.sympify(self.expected)),
-            scale=None if self.scale is None else put(sp.sympify(self.scale)),
+            actual=put(self.actual),
+            expected=put(self.expected),
+            scale=put(self.scale),
+            when=None if when == sp.true else when,
             while_closed=None if self.while_closed in held else self.while_closed,
             until_departure=None if self.until_departure in held else self.until_departure,
         )
@@ -99,6 +107,7 @@ def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> l
                 scale=scale,
                 within=form.within,
                 rounding=form.rounding,
+                when=None if form.when is None else in_variables(form.when),
             )
         )
     return claims
@@ -145,7 +154,7 @@ def pack_closed_forms(
             key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
         }
         names: dict[Expr, str] = {}
-        for key in ("actual", "expected", "scale"):
+        for key in EXPRESSIONS:
             e = getattr(claim, key)
             entry[key] = None if e is None else _text(sp.sympify(e), names)
         entry["symbols"] = {short: str(symbol) for symbol, short in names.items()}
@@ -175,7 +184,7 @@ def _text(e: Expr, names: dict[Expr, str]) -> str:
 
 def _claim(entry: dict[str, Any]) -> Claim:
     symbols = {short: output(name) for short, name in entry.pop("symbols").items()}
-    for key in ("actual", "expected", "scale"):
-        if entry[key] is not None:
+    for key in EXPRESSIONS:
+        if entry.get(key) is not None:
             entry[key] = parse_expr(entry[key], local_dict=symbols)
     return Claim(**entry)

@@ -210,6 +210,8 @@ def applies(claim: Claim, result: Trajectory) -> NDArray[np.bool_]:
         closed = result[f"contact.{claim.until_departure}"]
         left = result[f"departure.{claim.until_departure}.count"] > 0
         chosen &= np.logical_and.accumulate(closed & ~left)
+    if claim.when is not None:
+        chosen &= evaluate(claim.when, result, result, {}, claim.name) != 0
     if claim.at_departure is not None:
         left = result[f"departure.{claim.at_departure}.count"] > 0
         chosen &= (np.cumsum(left) == 1) & result[f"contact.{claim.at_departure}"][0]

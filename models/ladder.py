@@ -9,7 +9,7 @@ let go, then falls to the floor and lies there, sliding on.
 from math import cos as cosine
 from math import sin as sine
 
-from sympy import cos, sin, symbols
+from sympy import Heaviside, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -65,40 +65,66 @@ square = rate0**2 + 3 * g * (sin(theta0) - sin(theta)) / l
 wall = m * cos(theta) * (3 * g * sin(theta) / 4 - l * square / 2)
 floor = m * g - m * (3 * g * cos(theta) ** 2 / 4 + l * sin(theta) * square / 2)
 highest = 2 * sin(theta0) / 3 + 2 * l * rate0**2 / (9 * g)  # sin(theta) where the wall's force ends
+# That is so if it slid on the floor all along:
+slid = initial(output("contact.floor")) * Heaviside(-output("departure.floor.count"), 1)
 
-# Without the wall x' stays, y = (l/2) sin(theta) and  I theta'' = -(l/2) cos(theta) lambda.floor, so
-#     (1 + 3 cos(theta)^2) lambda.floor = m g - m (l/2) sin(theta) theta'^2
-# with  (1 + 3 cos(theta)^2) theta'^2 + 12 (g/l) sin(theta)  constant.  Lying, it rests on both ends.
-angle, rate = departure("wall", theta), departure("wall", theta.diff())
+# Without the wall x' stays and gravity turns nothing: an end that is alone on the floor (side = 1: the
+# lower end, -1: the upper) is pushed by  lambda  with  I theta'' = -side (l/2) cos(theta) lambda  and
+# m y'' = lambda - m g  in  y = side (l/2) sin(theta),  so that
+#     (1 + 3 cos(theta)^2) lambda = m g - side m (l/2) sin(theta) theta'^2 ,
+# and at the wall  lambda = m g - m (3 g cos(theta)^2/4 + side (l/2) sin(theta) theta'^2).  On both ends
+# it lies, and each carries half of it.
+at_wall, on_floor, on_top = (output(f"contact.{c}") for c in ("wall", "floor", "top"))  # 0 or 1
 arm = 1 + 3 * cos(theta) ** 2
+
+
+def pushed(side, other):
+    """The force on an end that touches the floor; `other`: the other end does, too."""
+    turning = side * l * sin(theta) * theta.diff() ** 2 / 2
+    free = m * (g - turning) / arm
+    held = m * (g - 3 * g * cos(theta) ** 2 / 4 - turning)
+    return other * m * g / 2 + (1 - other) * (at_wall * held + (1 - at_wall) * free)
+
+
+# From the departure on  (1 + 3 cos(theta)^2) theta'^2 + 12 (g/l) sin(theta)  is constant until it lies.
+angle, rate = departure("wall", theta), departure("wall", theta.diff())
 slide = (1 + 3 * cos(angle) ** 2) * rate**2 + 12 * g * (sin(angle) - sin(theta)) / l
 falling = m * (g - l * sin(theta) * slide / (2 * arm)) / arm
-lying = output("contact.top")  # 0 or 1
 free = departure("wall", x) + departure("wall", x.diff()) * (t - departure("wall"))
 
 closed_forms = [
-    ClosedForm("lambda.wall", wall, until_departure="wall"),
-    ClosedForm("lambda.floor", floor, until_departure="wall"),
+    ClosedForm("lambda.wall", wall, until_departure="wall", when=slid),
+    ClosedForm("lambda.floor", floor, until_departure="wall", when=slid),
     ClosedForm(
         "sin(theta) at the departure",
         actual=sin(angle),
         expected=highest,
         at_departure="wall",
+        when=slid,
     ),
     ClosedForm(
         "der(theta)^2 at the departure",
         actual=rate**2,
         expected=rate0**2 + 3 * g * (sin(theta0) - highest) / l,
         at_departure="wall",
+        when=slid,
     ),
     ClosedForm("x without the wall", free, actual=x, while_open="wall"),
     ClosedForm(
         "lambda.floor without the wall",
         actual=output("lambda.floor"),
-        expected=(1 - lying) * falling + lying * m * g / 2,
+        expected=(1 - on_top) * falling + on_top * m * g / 2,
         while_open="wall",
+        when=slid,
         scale=m * g,
     ),
-    ClosedForm("lambda.top", m * g / 2, while_closed="top"),
+    ClosedForm(
+        "lambda.floor from the state",
+        pushed(1, on_top),
+        actual=output("lambda.floor"),
+        while_closed="floor",
+        scale=m * g,
+    ),
+    ClosedForm("lambda.top", pushed(-1, on_floor), while_closed="top", scale=m * g),
     Conserved("energy until it lies", output("energy.total"), while_open="top"),
 ]

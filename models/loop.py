@@ -6,7 +6,7 @@ bottom the particle stays on all the way round if v0^2 >= 5 g a, swings to and f
 otherwise leaves the loop, flies a parabola, and meets the loop again.
 """
 
-from sympy import symbols
+from sympy import Heaviside, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -59,6 +59,10 @@ xd, yd = departure("loop", x), departure("loop", y)
 vx, vy = departure("loop", x.diff()), departure("loop", y.diff())
 tau = t - departure("loop")
 
+# Let go inside of the loop it flies a parabola from there (1: it has not touched the loop yet).
+flies = (1 - initial(output("contact.loop"))) * Heaviside(-output("departure.loop.count"), 1)
+fall = y0 + initial(y.diff()) * t - g * t**2 / 2
+
 closed_forms = [
     ClosedForm("lambda.loop", force, until_departure="loop"),
     ClosedForm(
@@ -81,5 +85,21 @@ closed_forms = [
     ClosedForm("v^2 at the departure", actual=vx**2 + vy**2, expected=g * yd, at_departure="loop"),
     ClosedForm("x in flight", xd + vx * tau, actual=x, while_open="loop", scale=a),
     ClosedForm("y in flight", yd + vy * tau - g * tau**2 / 2, actual=y, while_open="loop", scale=a),
+    ClosedForm(
+        "x from a start in flight",
+        actual=x,
+        expected=initial(x) + initial(x.diff()) * t,
+        while_open="loop",
+        when=flies,
+        scale=a,
+    ),
+    ClosedForm(
+        "y from a start in flight",
+        actual=y,
+        expected=fall,
+        while_open="loop",
+        when=flies,
+        scale=a,
+    ),
     Conserved("energy until it leaves", output("energy.total"), until_departure="loop"),
 ]

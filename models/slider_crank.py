@@ -7,7 +7,7 @@ the crank.  Once the slider has set out, the spring's own motion dies within m c
 0.6 s for a turn of the crank: that is what no explicit method can step over.
 """
 
-from sympy import cos, sin, sqrt, symbols
+from sympy import Piecewise, cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import ClosedForm, Holonomic, Input, Model, Parameter, Scene, output
@@ -55,8 +55,9 @@ model = Model(
 
 scenes = [Scene("SliderCrank", method="radau5", stop_time=1.0, step_size=0.01)]
 
-# Geometry: the slider's place and speed are those of the crank's angle.
-rod = sqrt(l**2 - r**2 * sin(phi) ** 2)
+# Geometry: the slider's place and speed are those of the crank's angle, on either side of the crank's
+# pin: it changes sides only where the rod stands across, at |sin(phi)| = l/r.
+rod = Piecewise((1, x > r * cos(phi)), (-1, True)) * sqrt(l**2 - r**2 * sin(phi) ** 2)
 place = r * cos(phi) + rod
 speed = -r * sin(phi) * (1 + r * cos(phi) / rod) * phi.diff()
 

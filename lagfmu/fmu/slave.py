@@ -46,6 +46,7 @@ def guarded(method: Call) -> Call:
             return method(self, *arguments)
         except Exception as error:
             keep(self, type(self), self.log_queue)
+            self.log_queue.clear()  # what waits to be logged would take the exception's text with it
             text = str(error).encode("ascii", "backslashreplace").decode()
             text = text.replace("%", "%%")  # the importer's logger reads it as a format of printf
             if isinstance(error, (Refused, StepFailureError)):

@@ -153,14 +153,14 @@ static double error_norm(const Integrator *i, const Control *control, double h, 
         double fifth = e1 * k1[j] + e6 * k6[j] + e7 * k7[j] + e8 * k8[j] + e9 * k9[j] +
                        e10 * k10[j] + e11 * k11[j] + e12 * k12[j];
         double third = sum[j] - bh1 * k1[j] - bh9 * k9[j] - bh12 * k12[j];
-        double unit = 1 / step_size_weight(tolerance, y[j], y1[j], scale[j]);
+        double unit = h / step_size_weight(tolerance, y[j], y1[j], scale[j]); /* h before squaring */
         fifth *= unit;
         third *= unit;
         square5 += fifth * fifth + 0 * y1[j];
         square3 += third * third;
     }
     double denominator = square5 + 0.01 * square3;
-    return denominator == 0 ? 0 : h * square5 / sqrt(denominator * n);
+    return denominator == 0 ? 0 : square5 / sqrt(denominator * n);
 }
 
 /* h_new / h = 0.9 err^(-1/8), within limits (eq. II.4.13). */
@@ -197,7 +197,9 @@ static Status dop853_step(Integrator *i, const Ode *ode, const Control *control,
     return FAILED;
 }
 
-/* Replaces k_6 to k_12 in i->dense by the polynomial's coefficients r_1 to r_7 (eq. II.10.20). */
+/* Replaces k_6 to k_12 in i->dense by the polynomial's coefficients r_1 to r_7 (eq. II.10.20), but r_2
+ * by h k_1 = r_1 + r_2:  r_1 + z (r_2 + s p) = z h k_1 + s (r_1 + z p)  without the cancellation of r_1
+ * that would leave no digits early in a very long step. */
 static Status dop853_prepare(Integrator *i, const Ode *ode) {
     const int n = i->ny;
     const double h = i->t - i->t_old;
@@ -221,7 +223,7 @@ static Status dop853_prepare(Integrator *i, const Ode *ode) {
                             a16_9 * k9[j] + a16_13 * k13[j] + a16_14 * k14[j] + a16_15 * k15[j]);
     if (ode->rate(ode->context, i->t_old + c16 * h, y, k16) != OK) return FAILED;
     for (int j = 0; j < n; j++) {
-        double r1 = i->y[j] - y0[j], r2 = h * k1[j] - r1, r3 = r1 - h * k13[j] - r2;
+        double r1 = i->y[j] - y0[j], r2 = h * k1[j], r3 = r1 - h * k13[j] - (r2 - r1);
         double r4 = h * (d4_1 * k1[j] + d4_6 * k6[j] + d4_7 * k7[j] + d4_8 * k8[j] +
                          d4_9 * k9[j] + d4_10 * k10[j] + d4_11 * k11[j] + d4_12 * k12[j] +
                          d4_13 * k13[j] + d4_14 * k14[j] + d4_15 * k15[j] + d4_16 * k16[j]);
@@ -252,7 +254,7 @@ static void dop853_dense(const Integrator *i, double t, double *y) {
     const double *r6 = r5 + n, *r7 = r6 + n;
     for (int j = 0; j < n; j++) {
         double tail = r4[j] + s * (r5[j] + z * (r6[j] + s * r7[j]));
-        y[j] = i->y_old[j] + s * (r1[j] + z * (r2[j] + s * (r3[j] + z * tail)));
+        y[j] = i->y_old[j] + s * (z * r2[j] + s * (r1[j] + z * (r3[j] + z * tail)));
     }
 }
 

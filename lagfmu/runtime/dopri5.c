@@ -98,7 +98,8 @@ static Status dopri5_step(Integrator *i, const Ode *ode, const Control *control,
     return FAILED;
 }
 
-/* Replaces k_3 to k_6 in i->dense by the polynomial's coefficients r_1 to r_4. */
+/* Replaces k_3 to k_6 in i->dense by the polynomial's coefficients r_1 to r_4, but r_2 by h k_1 = r_1 +
+ * r_2 (why: dop853.c). */
 static Status dopri5_prepare(Integrator *i, const Ode *ode) {
     const int n = i->ny;
     const double h = i->t - i->t_old;
@@ -106,7 +107,7 @@ static Status dopri5_prepare(Integrator *i, const Ode *ode) {
     double *k3 = i->dense, *k4 = k3 + n, *k5 = k4 + n, *k6 = k5 + n;
     (void)ode;
     for (int j = 0; j < n; j++) {
-        double r1 = i->y[j] - i->y_old[j], r2 = h * k1[j] - r1, r3 = r1 - h * k7[j] - r2;
+        double r1 = i->y[j] - i->y_old[j], r2 = h * k1[j], r3 = r1 - h * k7[j] - (r2 - r1);
         double r4 = h * (d1 * k1[j] + d3 * k3[j] + d4 * k4[j] + d5 * k5[j] + d6 * k6[j] +
                          d7 * k7[j]);
         k3[j] = r1;
@@ -122,7 +123,7 @@ static void dopri5_dense(const Integrator *i, double t, double *y) {
     const double s = (t - i->t_old) / (i->t - i->t_old), z = 1 - s;
     const double *r1 = i->dense, *r2 = r1 + n, *r3 = r2 + n, *r4 = r3 + n;
     for (int j = 0; j < n; j++)
-        y[j] = i->y_old[j] + s * (r1[j] + z * (r2[j] + s * (r3[j] + z * r4[j])));
+        y[j] = i->y_old[j] + s * (z * r2[j] + s * (r1[j] + z * (r3[j] + z * r4[j])));
 }
 
 static int dopri5_doubles(int ny) {

@@ -68,7 +68,7 @@ static int vertex(const double *t, const double *y, double *lowest, double *dept
     const double bend = (right - left) / (t[2] - t[0]);
     const double slope = left + bend * (t[1] - t[0]); /* at t[1] */
     *lowest = t[1] - slope / (2 * bend);
-    *depth = y[1] - slope * slope / (4 * bend);
+    *depth = y[1] - slope * (slope / (4 * bend));
     return bend > 0;
 }
 

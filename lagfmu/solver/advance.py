@@ -414,7 +414,7 @@ def _vertex(t: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     if not bend > 0:
         return float("nan"), float("nan")
     slope = left + bend * (t[1] - t[0])  # at t[1]
-    return t[1] - slope / (2 * bend), y[1] - slope**2 / (4 * bend)
+    return t[1] - slope / (2 * bend), y[1] - slope * (slope / (4 * bend))
 
 
 def _locate(

@@ -1,6 +1,7 @@
 """The closed forms that an FMU carries, compiled once, with the error that each is allowed.
 
-A claim `actual = expected` may be off by
+A claim `actual = expected` that follows the motion (it knows the start, the time or a departure, or says
+that something is conserved) may be off by
 
     LEEWAY * within * tol * max(1, N) * A * size,    at least    LEEWAY * rounding * max(1, N) * A * size
 
@@ -10,6 +11,9 @@ the largest over the run of the claim's scale and of the sum of the magnitudes o
 tol in a state is one of tol * |term| in each term, and no sum can be better than its terms.  A is the
 largest angle so far [rad], at least 1: its error is tol * |angle|, that of its sine too.  LEEWAY, because
 `within` holds at the default tolerance, and errors are proportional to the tolerance only roughly.
+
+A claim among the outputs of one instant has nothing to do with the integration: whatever the tolerance,
+it may be off by  LEEWAY * rounding * size,  with the size at that instant.
 """
 
 from __future__ import annotations
@@ -85,7 +89,10 @@ class Compiled:
 
 @dataclass(frozen=True)
 class Statement:
-    """A claim ready to be judged; `pointwise`: it holds at each instant, whatever the inputs did."""
+    """A claim ready to be judged; `pointwise`: it holds at each instant, whatever the inputs did.
+
+    `instantaneous`: it relates the outputs of one instant, so that no error of the integration enters.
+    """
 
     claim: Claim
     actual: Compiled
@@ -122,33 +129,45 @@ class Statement:
             known &= np.isfinite(s)
         if not known.any():
             return 0.0, 1.0, 0
-        size = max(float(s[known].max(initial=0.0)) for s in sizes)
-        relative = LEEWAY * max(self.claim.within * run.tolerance, self.claim.rounding)
-        allowed = relative * growth[chosen] * size + np.finfo(float).tiny
+        size = np.maximum.reduce(sizes)
+        relative = np.full(len(actual), LEEWAY * self.claim.rounding)
+        if not self.instantaneous:
+            size = np.full(len(actual), size[known].max())
+            tolerance = LEEWAY * self.claim.within * run.tolerance
+            relative = np.maximum(relative, tolerance) * growth[chosen]
+        allowed = relative * size + np.finfo(float).tiny
         error = np.abs(actual - expected)
         worst = int(np.argmax(np.where(known, error / allowed, -1.0)))
         return float(error[worst]), float(allowed[worst]), int(known.sum())
 
 
 def statements(claims: tuple[Claim, ...], inputs: set[str]) -> tuple[Statement, ...]:
-    """Every claim, compiled."""
+    """Every closed form, compiled."""
     found = []
     for c in claims:
         parts = [c.actual] + ([] if c.expected is None else [c.expected])
         used = {str(s) for e in parts for s in sp.sympify(e).free_symbols}
-        integral = c.expected is None or any(u == "time" or u.startswith("initial(") for u in used)
-        sizes = [magnitude(sp.sympify(e)) for e in parts] + ([] if c.scale is None else [c.scale])
-        found.append(
-            Statement(
-                c,
-                Compiled(c.actual, c.name),
-                None if c.expected is None else Compiled(c.expected, c.name),
-                tuple(Compiled(e, c.name) for e in sizes),
-                not integral or not inputs,
-                not integral,
-            )
-        )
+        follows = any(u == "time" or u.startswith(("initial(", "departure.")) for u in used)
+        found.append(_statement(c, c.expected is not None and not follows, inputs))
     return tuple(found)
+
+
+def laws(claims: tuple[Claim, ...]) -> tuple[Statement, ...]:
+    """Lagrange's equations (lagrange.py), compiled: instantaneous even where time stands in them."""
+    return tuple(_statement(c, True, set()) for c in claims)
+
+
+def _statement(c: Claim, instantaneous: bool, inputs: set[str]) -> Statement:
+    parts = [c.actual] + ([] if c.expected is None else [c.expected])
+    sizes = [magnitude(sp.sympify(e)) for e in parts] + ([] if c.scale is None else [c.scale])
+    return Statement(
+        c,
+        Compiled(c.actual, c.name),
+        None if c.expected is None else Compiled(c.expected, c.name),
+        tuple(Compiled(e, c.name) for e in sizes),
+        instantaneous or not inputs,
+        instantaneous,
+    )
 
 
 def undisturbed(run: Run, found: tuple[Statement, ...]) -> tuple[Statement, ...]:

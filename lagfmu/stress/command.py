@@ -22,8 +22,10 @@ from ..modelfile import load
 from ..prepare import prepare
 from ..tradeoff.command import progress
 from .facts import facts_of
+from .lagrange import lay_beside
 from .probe import UNFINISHED, WRONG, Row
 from .report import MEANING, Stressed, as_json, as_markdown, summary, table
+from .summary import as_summary
 
 LIMIT = 60.0  # [s] for one probe
 START = 120.0  # [s] for the process to begin with the first one
@@ -39,7 +41,7 @@ def stress(
     quick: bool = False,
     limit: float = LIMIT,
 ) -> list[Stressed]:
-    """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json and .md.
+    """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json, .md, and OUT/TARGET.md.
 
     Raises LagfmuError with the causes for what cannot be built or read, when the rest is done.
     """
@@ -59,11 +61,20 @@ def stress(
     if found:
         console.print(summary(found))
         console.print(MEANING, highlight=False)
+        _file(found, out, console)
     if problems:
         raise BuildError("\n".join(problems))
     if not found:
         raise BuildError(f"no FMU is called {', '.join(scenes) or 'anything'}")
     return found
+
+
+def _file(found: Sequence[Stressed], out: Path, console: Console) -> None:
+    """OUT/TARGET.md: one summary over all FMUs of a target."""
+    for target in dict.fromkeys(f.target for f in found):
+        path = out / f"{target}.md"
+        write_whole(path, as_summary([f for f in found if f.target == target]).encode())
+        console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
 
 
 def _fmus(
@@ -76,7 +87,9 @@ def _fmus(
         if not scenes or scene.name in scenes:
             with console.status(f"building {scene.name}"):
                 prepared = prepare(file.model, scene)
-                built.append(write(prepared, folder, file.closed_forms, target=target))
+                fmu = write(prepared, folder, file.closed_forms, target=target)
+                lay_beside(fmu, prepared)
+                built.append(fmu)
     return built
 
 
@@ -84,7 +97,7 @@ def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> S
     facts = facts_of(fmu)
     rows = _probe(fmu, console, quick, limit)
     digest = hashlib.sha256(fmu.read_bytes()).hexdigest()
-    one = Stressed(facts.name, facts.target, digest, quick, tuple(rows))
+    one = Stressed(facts.name, facts.target, digest, quick, limit, bool(facts.laws), tuple(rows))
     console.print(table(one))
     stem = out / one.target / one.name
     write_whole(stem.with_suffix(".json"), as_json(one).encode())

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import VerificationError
-from ..proof import Claim
+from ..proof import Claim, unpack_closed_forms
 from ..simulate import read_description
 from ..verify import claims_in
 
@@ -49,6 +49,7 @@ class Facts:
     constraints: tuple[str, ...]
     contacts: tuple[str, ...]
     claims: tuple[Claim, ...]
+    laws: tuple[Claim, ...]
     dimensions: Mapping[str, Dimension]
     stop_time: float
     step_size: float
@@ -129,12 +130,23 @@ def facts_of(path: Path) -> Facts:
         constraints=tuple(v.name[len("lambda.") :] for v in reals if v.name.startswith("lambda.")),
         contacts=tuple(n[len("contact.") :] for n in variables if n.startswith("contact.")),
         claims=tuple(claims),
+        laws=_laws(path),
         dimensions={v.name: bases.get(v.unit, (0,) * len(BASE)) for v in reals}
         | {"time": (0, 0, 1) + (0,) * (len(BASE) - 3)},
         stop_time=stop,
         step_size=float(getattr(experiment, "stepSize", None) or stop / 500),
         tolerance=float(getattr(experiment, "tolerance", None) or 1e-8),
     )
+
+
+def beside(path: Path) -> Path:
+    """Where the command that has the model writes Lagrange's equations for the judge."""
+    return path.with_suffix(".lagrange.json")
+
+
+def _laws(path: Path) -> tuple[Claim, ...]:
+    file = beside(path)
+    return tuple(unpack_closed_forms(file.read_bytes(), str(file))) if file.exists() else ()
 
 
 def _settable(v: Any) -> Settable:

@@ -16,7 +16,7 @@ Each comes as an error and what is allowed; the run is right if no error exceeds
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +33,12 @@ Column = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Check:
-    """An error, and the largest one that is right."""
+    """An error, and the largest one that is right; `instant`: it knows nothing of the motion's course."""
 
     what: str
     error: float
     allowed: float
+    instant: bool = False
 
     @property
     def ratio(self) -> float:
@@ -59,15 +60,17 @@ def invariants(facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Colu
     sizes = {c: _size(facts, run, c) for c in facts.constraints}
     checks += _residuals(facts, run, sizes)
     checks += _contacts(facts, run, sizes)
-    if lost(facts, run):
-        return checks
+    checks = [replace(c, instant=True) for c in checks]
+    digits = not lost(facts, run)
     before, floors = first_landing(facts, run), magnitudes(facts, run)
     for form in undisturbed(run, tuple(forms)):
+        if not (digits or form.instantaneous):
+            continue
         error, allowed, points = form.judge(
             run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors
         )
         if points:
-            checks.append(Check(form.claim.name, error, allowed))
+            checks.append(Check(form.claim.name, error, allowed, form.instantaneous))
     return checks
 
 
@@ -79,7 +82,8 @@ def lost(facts: Facts, run: Run) -> str:
     for q in facts.coordinates:
         largest = float(np.abs(run.rows[q]).max(initial=abs(run.values.get(q, 0.0))))
         angle = facts.dimensions[q][-1] == 1
-        size = 1.0 if angle else facts.same_unit(q, run.values) or facts.usual(q)
+        way = float(np.ptp(run.rows[q])) if len(run.rows) else 0.0
+        size = 1.0 if angle else max(facts.same_unit(q, run.values) or facts.usual(q), way)
         if EPS * largest > max(run.tolerance, 1e-13) * size:
             return q
     return ""
@@ -95,11 +99,22 @@ def wound(facts: Facts, run: Run) -> Column:
 
 
 def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
-    """The points before a contact closes again: an impact takes energy, and a start's claims end."""
+    """The points before a contact closes again: an impact takes energy, and a start's claims end.
+
+    One that closes and opens again between two points is seen by its departure; one that is thrown back
+    at once, by f, which was on the way through 0 and is positive.
+    """
+    before = np.diff(run.rows["time"])[:-1]
+    after = np.diff(run.rows["time"])[1:]
     landed = np.zeros(len(run.rows), dtype=bool)
     for c in facts.contacts:
         closed = np.asarray(run.rows[f"contact.{c}"], dtype=bool)
-        landed[1:] |= closed[1:] & ~closed[:-1]
+        departed = np.diff(run.rows[f"departure.{c}.count"])
+        landed[1:] |= (closed[1:] & ~closed[:-1]) | (departed > closed[:-1])
+        f = run.rows[f"residual.{c}"]
+        with np.errstate(all="ignore"):
+            ahead = f[1:-1] + np.diff(f)[:-1] * (after / before)
+        landed[2:] |= ~closed[:-2] & ~closed[1:-1] & ~closed[2:] & (ahead < 0)
     return ~np.logical_or.accumulate(landed)
 
 

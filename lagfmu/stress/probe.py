@@ -9,6 +9,7 @@ from .bench import Bench, Finding
 from .player import RefusalError
 
 RIGHT, REFUSED, WRONG, UNFINISHED = "right", "refused", "wrong", "unfinished"
+CONSISTENT = "consistent"  # right at each instant; nothing could be said of the motion's course
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,10 @@ class Row:
 
 
 def verdict(probe: Probe, finding: Finding, seconds: float) -> Row:
-    """Wrong if a check fails or a refusal is unclear; else refused, if it was; else right."""
+    """Wrong if a check fails or a refusal is unclear; else refused, if it was; else right.
+
+    Where nothing but single instants could be judged it is only consistent.
+    """
     worst = max(finding.checks, key=lambda c: c.ratio, default=None)
     closest, ratio = ("", 0.0) if worst is None else (worst.what, worst.ratio)
     answer, detail = RIGHT, finding.note
@@ -48,6 +52,8 @@ def verdict(probe: Probe, finding: Finding, seconds: float) -> Row:
             answer, detail = WRONG, f"has to be done and is refused: {detail}"
     elif not finding.checks:
         answer, detail = WRONG, "nothing could be checked"
+    elif all(c.instant for c in finding.checks):
+        answer = CONSISTENT
     if worst is not None and not worst.ratio <= 1:
         failed = [c for c in finding.checks if not c.ratio <= 1]
         answer = WRONG

@@ -14,28 +14,41 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from .probe import REFUSED, RIGHT, UNFINISHED, WRONG, Row
+from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Row
 
 FORMAT = 1
-VERDICTS = (RIGHT, REFUSED, WRONG, UNFINISHED)
-COLOURS = {RIGHT: "green", REFUSED: "cyan", WRONG: "bold red", UNFINISHED: "yellow"}
-TEXTS = {RIGHT: "right", REFUSED: "refused", WRONG: "**wrong**", UNFINISHED: "unfinished"}
+VERDICTS = (RIGHT, CONSISTENT, REFUSED, WRONG, UNFINISHED)
+COLOURS = {
+    RIGHT: "green",
+    CONSISTENT: "green",
+    REFUSED: "cyan",
+    WRONG: "bold red",
+    UNFINISHED: "yellow",
+}
 MEANING = (
-    "right: every check held. refused: discard or error, with a message that names the cause, and "
-    "everything before it right. wrong: a check failed, the process was taken down, or a refusal had "
-    "no cause. unfinished: still at work at the time limit; nothing is known. Ratio: the error of the "
-    "check that came nearest to its limit, over that limit."
+    "right: every check held. consistent: so did Lagrange's equations and the constraints at each "
+    "instant, but nothing could be said of the course of the motion. refused: discard or error, with a "
+    "message that names the cause, and everything before it right. wrong: a check failed, the process "
+    "was taken down, or a refusal had no cause. unfinished: still at work at the time limit; nothing is "
+    "known. Ratio: the error of the check that came nearest to its limit, over that limit."
+)
+WITHOUT = (
+    "An FMU without its model file: judged by the closed forms and invariants that it carries, not by "
+    "Lagrange's equations."
 )
 
 
 @dataclass(frozen=True)
 class Stressed:
-    """The verdicts on one FMU; `digest`: SHA-256 of the file."""
+    """The verdicts on one FMU; `digest`: SHA-256 of the file; `limit` [s] of each probe; `laws`: it was
+    held against Lagrange's equations of its model, too."""
 
     name: str
     target: str
     digest: str
     quick: bool
+    limit: float
+    laws: bool
     rows: tuple[Row, ...]
 
     def count(self, verdict: str, family: str | None = None) -> int:
@@ -106,6 +119,8 @@ def as_json(found: Stressed) -> str:
         "target": found.target,
         "sha256": found.digest,
         "quick": found.quick,
+        "limit": found.limit,
+        "lagrange": found.laws,
         "machine": {
             "system": platform.system(),
             "processor": platform.machine(),
@@ -123,15 +138,18 @@ def as_markdown(found: Stressed) -> str:
     """A summary by family, what is wrong first, then every row."""
     lines = [f"# Stress of {found.name} ({found.target})", ""]
     lines += [f"SHA-256 of the FMU: `{found.digest}`.", ""]
+    if not found.laws:
+        lines += [WITHOUT, ""]
     if found.quick:
         lines += ["A quick run: some of the probes only.", ""]
     lines += [MEANING, ""]
-    lines += ["| family | probes | " + " | ".join(VERDICTS) + " |", "| --- |" + " ---: |" * 5]
+    lines.append(cells("family", "probes", *VERDICTS))
+    lines.append("| --- |" + " ---: |" * (1 + len(VERDICTS)))
     for family in found.families:
         counts = [found.count(v, family) for v in VERDICTS]
-        lines.append(_cells(family, sum(counts), *counts))
+        lines.append(cells(family, sum(counts), *counts))
     counts = [found.count(v) for v in VERDICTS]
-    lines += [_cells("all", sum(counts), *counts), ""]
+    lines += [cells("all", sum(counts), *counts), ""]
     for title, verdict in (("Wrong", WRONG), ("Unfinished", UNFINISHED)):
         bad = [r for r in found.rows if r.verdict == verdict]
         if bad:
@@ -141,9 +159,11 @@ def as_markdown(found: Stressed) -> str:
     lines += ["| family | probe | verdict | checks | ratio | nearest to its limit, or reason |"]
     lines += ["| --- | --- | --- | ---: | ---: | --- |"]
     for r in found.rows:
-        lines.append(_cells(r.family, r.probe, TEXTS[r.verdict], r.checks, _ratio(r), _text(r)))
+        answer = f"**{WRONG}**" if r.verdict == WRONG else r.verdict
+        lines.append(cells(r.family, r.probe, answer, r.checks, _ratio(r), _text(r)))
     return "\n".join(lines) + "\n"
 
 
-def _cells(*cells: object) -> str:
-    return "| " + " | ".join(str(c).replace("|", "\\|") for c in cells) + " |"
+def cells(*contents: object) -> str:
+    """A row of a Markdown table."""
+    return "| " + " | ".join(str(c).replace("|", "\\|") for c in contents) + " |"
