@@ -95,7 +95,10 @@ def facts_of(path: Path) -> Facts:
     claims = claims_in(path)
     variables = {v.name: v for v in description.modelVariables}
     if description.coSimulation is None or "solver.method" not in variables:
-        raise VerificationError(f"{str(path)!r} was not built by lagfmu: nothing to judge it by")
+        raise VerificationError(
+            f"{str(path)!r} was not built by lagfmu, or for a scene that leaves out what it would be "
+            "judged by: stress the model's full FMU"
+        )
     with zipfile.ZipFile(path) as archive:
         python = "resources/slavemodule.txt" in archive.namelist()
     reals = [v for v in description.modelVariables if v.type == "Real"]

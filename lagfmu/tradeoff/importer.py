@@ -54,7 +54,8 @@ class Importer:
         self.path = fmu
         self.description = read_description(fmu)
         with zipfile.ZipFile(fmu) as archive:
-            python = "resources/slavemodule.txt" in archive.namelist()
+            files = set(archive.namelist())
+        python = "resources/slavemodule.txt" in files
         self.target = "python" if python else "native"
         experiment = self.description.defaultExperiment
         self.stop_time = float(getattr(experiment, "stopTime", None) or 1.0)
@@ -65,11 +66,10 @@ class Importer:
             for v in self.description.modelVariables
             if v.causality in ("output", "local") and v.type in KINDS
         ]
-        if self.description.coSimulation is None or "solver.method" not in self.variables:
+        if self.description.coSimulation is None or "solver.tolerance" not in self.variables:
             raise VerificationError(
-                f"{str(fmu)!r} has no parameter 'solver.method', so that there is no setting to vary: it "
-                "was not built by lagfmu, or for a scene with one method only (give the scene more of "
-                "them in `methods`)"
+                f"{str(fmu)!r} has no parameter 'solver.tolerance': it was not built by lagfmu, and "
+                "there is no setting to vary"
             )
         self.folder = fmpy.extract(str(fmu))
         self.slave: Any = None

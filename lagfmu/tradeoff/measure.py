@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import LagfmuError, SimulationError
+from ..errors import LagfmuError, SimulationError, VerificationError
 from ..proof import Claim
 from ..verify import check_claim, claims_in
 from .front import front
@@ -154,6 +154,11 @@ def measure(
     say = tick or (lambda *_: None)
     claims = _claims(fmu)
     with Importer(fmu) as importer:
+        if "solver.method" not in importer.variables:
+            raise VerificationError(
+                f"{str(fmu)!r} has no parameter 'solver.method': it was built for a scene with one "
+                "method, and there is none to compare with (give the scene more of them in `methods`)"
+            )
         plan = plan or default_plan(importer)
         plan = replace(plan, repeats=repeats or plan.repeats)
         say("reference", 0, 1)
