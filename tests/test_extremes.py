@@ -628,6 +628,7 @@ def test_whatever_is_set_is_simulated_right_or_refused(library, name, data):
     binary = library(name)
     one = binary()
     one.does("SetupExperiment", 1, c_double(1e-9), c_double(0), 0, c_double(0))
+    drawn: dict[str, float] = {}
     for n, v in binary.variables.items():
         if v.type != "Real" or v.start is None or n.startswith("solver."):
             continue
@@ -636,6 +637,7 @@ def test_whatever_is_set_is_simulated_right_or_refused(library, name, data):
         else:
             value = data.draw(NUMBERS | st.just(float(v.start)), label=n)
         one.set(n, value)
+        drawn[n] = value
     going = one.call("EnterInitializationMode") == OK and one.call("ExitInitializationMode") == OK
     names = [n for n, v in binary.variables.items() if v.type == "Real" and v.causality == "output"]
     first = None
@@ -649,7 +651,8 @@ def test_whatever_is_set_is_simulated_right_or_refused(library, name, data):
         seen = dict(zip(names, values, strict=True))
         assert all(math.isfinite(v) for v in seen.values()), seen
         first = first or seen
-        check_invariants(name, first, seen, 0.05 * k)
+        weight = drawn["g"] * sum(w for n, w in drawn.items() if n.startswith("m"))
+        check_invariants(name, first, seen, 0.05 * k, weight)
         going = one.call("DoStep", c_double(0.05 * k), c_double(0.05), 1) == OK
     if not going:
         assert any(status in (DISCARD, ERROR) and text for status, _, text in one.log)
@@ -657,10 +660,10 @@ def test_whatever_is_set_is_simulated_right_or_refused(library, name, data):
 
 
 def check_invariants(
-    name: str, first: dict[str, float], seen: dict[str, float], time: float
+    name: str, first: dict[str, float], seen: dict[str, float], time: float, weight: float
 ) -> None:
-    """f is rounding of its terms; the energy is what it was, of the energies that go to and fro: its error
-    grows linearly with the angle through which the motion goes, beyond the first 1e4 rad."""
+    """f is rounding of its terms; the energy is what it was, of the energies that go to and fro, weight
+    times height among them: to the same part of it for 1e4 rad, then in proportion to the angle."""
     reach = max(abs(v) for n, v in seen.items() if n in ("x", "y", "r") or n[1:].isdigit())
     for n, f in seen.items():
         if n.startswith("residual.") and name not in ("Hemisphere", "Loop"):
@@ -668,6 +671,7 @@ def check_invariants(
     allowed = ANYTHING[name]
     if allowed is not None:
         size = max(abs(s[n]) for s in (first, seen) for n in s if n.startswith("energy."))
+        size = max(size, weight * reach)
         speed = max(abs(s[n]) for s in (first, seen) for n in s if n.endswith(")") and "," not in n)
         pull = max(abs(s[n]) for s in (first, seen) for n in s if n.endswith(",2)"))
         turned = time * max(speed / reach, math.sqrt(pull / reach)) if reach > 0 else 0.0
