@@ -8,8 +8,7 @@ They hold at each instant, whatever the parameters, the inputs and the tolerance
 determine the accelerations, lambda and Q: nothing of the FMU's own derivation, code and linear algebra stands
 in them.  A solution of linear equations that is stable fulfils them to rounding, however badly they
 are conditioned (Higham, Accuracy and Stability of Numerical Algorithms, sect. 7.1), in the metric of
-M: relative to  sqrt(M_jj) sum_k |terms of equation k| / sqrt(M_kk)  and, as the forces accelerate the
-constraint, to  sum_j |a_j| |terms of equation j| / M_jj .
+M: relative to  sqrt(M_jj) S  and  S sum_j |a_j| / sqrt(M_jj) ,  S = sum_k |terms of equation k| / sqrt(M_kk).
 """
 
 from __future__ import annotations
@@ -53,7 +52,9 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
         ]
         scale = sp.Add(terms[q], *others)
         forms.append(_form(f"Lagrange's equation of {name_of(q)}", inertia, force, scale, None))
-    forms += _of_constraints(model, {q: terms[q] / masses[q] for q in sides if masses[q] != 0})
+    heavy = [q for q in sides if masses[q] != 0]
+    total = sp.Add(*(terms[q] / sp.sqrt(masses[q]) for q in heavy))
+    forms += _of_constraints(model, {q: total / sp.sqrt(masses[q]) for q in heavy})
     forms += _of_shares(model, variables)
     return [form for form in forms if _names(form) <= variables]
 
