@@ -4,24 +4,58 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import shutil
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import FILES, MODELS
 from rich.console import Console
 
+import lagfmu
+from lagfmu.model import name_of
 from lagfmu.stress import command, worker
 from lagfmu.stress.bench import Bench, Finding
 from lagfmu.stress.claims import magnitude
 from lagfmu.stress.command import stress
-from lagfmu.stress.judge import Check
+from lagfmu.stress.judge import Check, first_landing
+from lagfmu.stress.lagrange import lay_beside
 from lagfmu.stress.player import RefusalError
-from lagfmu.stress.probe import REFUSED, RIGHT, UNFINISHED, WRONG, Probe, attempt, verdict
+from lagfmu.stress.probe import (
+    CONSISTENT,
+    REFUSED,
+    RIGHT,
+    UNFINISHED,
+    WRONG,
+    Probe,
+    Row,
+    attempt,
+    verdict,
+)
+from lagfmu.stress.report import VERDICTS, Stressed
+from lagfmu.stress.summary import as_summary
 
 
 @pytest.fixture(scope="module")
-def bench(native_fmu):
-    with Bench(native_fmu("Hemisphere"), quick=True) as one:
+def lawful(native_fmu, prepared, tmp_path_factory):
+    """lawful(NAME): a native FMU with Lagrange's equations of its model beside it."""
+
+    def get(name):
+        path = tmp_path_factory.mktemp("lawful") / f"{name}.fmu"
+        shutil.copy(native_fmu(name), path)
+        lay_beside(path, prepared(name))
+        return path
+
+    return get
+
+
+@pytest.fixture(scope="module")
+def bench(lawful):
+    with Bench(lawful("Hemisphere"), quick=True) as one:
         yield one
 
 
@@ -42,7 +76,8 @@ def test_the_hemisphere_is_never_wrong(native_fmu, tmp_path):
     families = {"parameters", "scaling", "starts", "communication step", "tolerance", "long run"}
     assert families | {"rollback", "instances"} <= set(found.families)
     data = json.loads((tmp_path / "native" / "Hemisphere.json").read_text())
-    assert data["verdicts"] == {v: found.count(v) for v in (RIGHT, REFUSED, WRONG, UNFINISHED)}
+    assert data["verdicts"] == {v: found.count(v) for v in VERDICTS}
+    assert "| Hemisphere | " in (tmp_path / "native.md").read_text()
     page = (tmp_path / "native" / "Hemisphere.md").read_text()
     assert f"`{data['sha256']}`" in page
     assert "| parameters | m = " in page
@@ -58,11 +93,16 @@ def test_the_default_run_passes_every_check(bench):
     [
         ("Q.r", 1 + 1e-12, "shares of Q.r"),
         ("lambda.surface", 1 + 1e-5, "lambda.surface"),
+        ("Q.r", 1 + 1e-10, "Lagrange's equation of r"),
+        ("der(theta,2)", 1 + 1e-10, "Lagrange's equation of theta"),
+        ("der(theta)", 1 + 1e-9, "Lagrange's equation of r"),
+        ("Q.surface.r", 1 + 1e-12, "Q.surface.r"),
         ("energy.total", 1.001, "energy"),
     ],
 )
 def test_a_small_error_of_an_output_is_found(bench, column, factor, what):
-    """Q that is not the sum of its shares by 1e-12, lambda off by 1e-5, energy that drifts."""
+    """Q that is not the sum of its shares by 1e-12; Q, an acceleration or a velocity that does not fulfil
+    Lagrange's equations by 1e-10; lambda off its closed form by 1e-5; energy that drifts."""
 
     def change(rows):
         rows[column][len(rows) // 2] *= factor
@@ -88,6 +128,112 @@ def test_a_surface_that_pulls_is_found(bench):
             rows[column][row] = value
 
         assert what in judged(bench, change), what
+
+
+@pytest.mark.parametrize("name", ["RotatingWire", "KnifeEdge", "CartPendulum", "PendulumAngle"])
+def test_lagranges_equations_hold_at_every_tolerance(lawful, prepared, name):
+    """M vdot = F + Q and d2f/dt2 = 0 are no matter of the integration: at a tolerance of 1e-1 they hold
+    to rounding, with a drive that depends on time, a rolling constraint, forces, or an embedding."""
+    with Bench(lawful(name), quick=True) as one:
+        run = one.run({}, one.times(one.facts.stop_time), 1e-1)
+        checks = {c.what: c for c in one.checks(run)}
+        laws = [checks[claim.name] for claim in one.facts.laws]
+        names = {c.what for c in laws}
+        for q in prepared(name).model.coordinates:
+            assert f"Lagrange's equation of {name_of(q)}" in names
+        for c in one.facts.constraints:
+            assert {f"d2/dt2 of {c}", f"residual.{c}"} <= names
+        assert all(c.instant for c in laws)
+        assert max(c.ratio for c in laws) < 1
+
+
+def test_what_is_judged_at_instants_only_is_not_called_right():
+    """Without a check that follows the motion a row is consistent; a failed one is wrong all the same."""
+    instant, course = Check("f", 0.0, 1.0, True), Check("energy", 0.0, 1.0)
+    probe = Probe("", "", lambda bench: None)
+    assert verdict(probe, Finding((instant,)), 0.0).verdict == CONSISTENT
+    assert verdict(probe, Finding((instant, course)), 0.0).verdict == RIGHT
+    assert verdict(probe, Finding((Check("f", 2.0, 1.0, True),)), 0.0).verdict == WRONG
+
+
+def test_a_landing_between_two_points_is_seen(lawful):
+    """A ladder let go in the air loses energy when its lower end hits the floor and is thrown back at
+    once: the contact is open at every point, and still the energy is not asked for afterwards."""
+    with Bench(lawful("Ladder"), quick=False) as one:
+        values = {"l": 0.2}
+        run = one.run(values, one.times(one.span(values)))
+        energy = run.rows["energy.total"]
+        hit = int(np.argmax(np.abs(np.diff(energy)) > 0.1 * energy[0])) + 1
+        assert not run.rows["contact.floor"][: hit + 3].any()
+        before = first_landing(one.facts, run)
+        assert before[:hit].all()
+        assert not before[hit:].any()
+
+
+MUTANTS = {
+    "lambda": ("observe.c", "b->lambda, (size_t)s->m * sizeof *o->lambda);", "LAMBDA"),
+    "projection": ("project.c", "    if (!acting) return OK;", "    return OK;"),
+    "departure": ("leg.c", "values[c] = b->lambda[system->contact[c]];", "DEPARTURE"),
+    "method": ("dop853.c", "b1 = 0.054293734116568765", "b1 = 0.054293744116568765"),
+}
+CHANGED = {
+    "LAMBDA": "b->lambda, (size_t)s->m * sizeof *o->lambda);\n"
+    "    for (int k = 0; k < s->m; k++) o->lambda[k] *= 1 + 1e-6;",
+    "DEPARTURE": "values[c] = b->lambda[system->contact[c]] + 1e-4;",
+}
+
+
+@pytest.mark.parametrize("mutant", MUTANTS)
+def test_a_solver_that_is_slightly_wrong_is_found(mutant, tmp_path):
+    """lambda too large by 1e-6 as it is shown, states that are not projected, a departure 1e-4 N early,
+    a weight of the integration method off by 1e-8: each is wrong in some row of a quick run."""
+    root = Path(lagfmu.__file__).parent.parent
+    shutil.copytree(
+        root / "lagfmu", tmp_path / "lagfmu", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    file, old, new = MUTANTS[mutant]
+    source = tmp_path / "lagfmu" / "runtime" / file
+    text = source.read_text()
+    assert text.count(old) == 1
+    source.write_text(text.replace(old, CHANGED.get(new, new)))
+    name = "Hemisphere" if mutant == "departure" else "PendulumCartesian"
+    model = [str(MODELS / f"{FILES[name]}.py"), "--scene", name]
+    arguments = ["stress", *model, "--target", "native", "--quick", "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, "-m", "lagfmu", *arguments],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 1
+    data = json.loads((tmp_path / "out" / "native" / f"{name}.json").read_text())
+    assert data["verdicts"][WRONG] > 0
+
+
+def test_the_summary_names_what_is_not_right(lawful, tmp_path):
+    """One page over all FMUs: versions, counts by FMU and family, and each row that is not right."""
+    refused = "setReal: error: 'm' = {}, expected a finite number"
+    rows = (
+        Row("parameters", "m = 1", RIGHT, "", "energy", 0.1, 9, 0.1),
+        Row(
+            "parameters", "m = 2", WRONG, "energy: 2.0e+00, allowed 1.0e+00", "energy", 2.0, 9, 0.1
+        ),
+        *(
+            Row("bounds", f"m = {x}", REFUSED, refused.format(x), "", 0, 0, 0.1)
+            for x in ("nan", "inf")
+        ),
+    )
+    page = as_summary([Stressed(n, "native", "ab" * 32, False, 60.0, True, rows) for n in "AB"])
+    assert "lagfmu " in page
+    assert "scipy " in page
+    assert "| parameters | 4 | 2 | 0 | 0 | 2 | 0 | 36 |" in page
+    assert "| all | 8 | 2 | 0 | 4 | 2 | 0 | 36 |" in page
+    assert "## Wrong: 2" in page
+    assert "- B, parameters, m = 2: energy: 2.0e+00, allowed 1.0e+00" in page
+    assert "## Unfinished: none" in page
+    assert "| 4 | '...' = #, expected a finite number |" in page
 
 
 def test_a_refusal_needs_a_cause():

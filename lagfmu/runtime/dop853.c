@@ -153,9 +153,9 @@ static double error_norm(const Integrator *i, const Control *control, double h, 
         double fifth = e1 * k1[j] + e6 * k6[j] + e7 * k7[j] + e8 * k8[j] + e9 * k9[j] +
                        e10 * k10[j] + e11 * k11[j] + e12 * k12[j];
         double third = sum[j] - bh1 * k1[j] - bh9 * k9[j] - bh12 * k12[j];
-        double unit = h / step_size_weight(tolerance, y[j], y1[j], scale[j]); /* h before squaring */
-        fifth *= unit;
-        third *= unit;
+        double unit = 1 / step_size_weight(tolerance, y[j], y1[j], scale[j]);
+        fifth = h * fifth * unit; /* h first: a rate is too large, or a unit too small, to be squared */
+        third = h * third * unit;
         square5 += fifth * fifth + 0 * y1[j];
         square3 += third * third;
     }

@@ -124,7 +124,8 @@ class Statement:
         known = np.isfinite(expected) & np.isfinite(actual)  # elsewhere the form is not defined
         if not known.any():
             return 0.0, 1.0, 0
-        sizes = [np.abs(expected), *(np.abs(s.at(chosen, run, floors)) for s in self.sizes)]
+        least = None if self.instantaneous else floors
+        sizes = [np.abs(expected), *(np.abs(s.at(chosen, run, least)) for s in self.sizes)]
         for s in sizes:
             known &= np.isfinite(s)
         if not known.any():

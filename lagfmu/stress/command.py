@@ -177,8 +177,9 @@ class _Job:
                 self.waited = time.monotonic() - since
                 if ended:
                     break
-                if self.waited > (limit if self.latest is not None else max(limit, START)):
-                    self.cut = (UNFINISHED, f"no answer within {limit:g} s")
+                probing = self.latest is not None and not done
+                if self.waited > (limit if probing else max(limit, START)):
+                    self.cut = None if done else (UNFINISHED, f"no answer within {limit:g} s")
                     break
                 time.sleep(0.05)
         finally:

@@ -2,13 +2,13 @@
 
     d/dt dL/dv_j - dL/dq_j = Q_nc,j + Q_j                  for each coordinate
     d^2 f/dt^2 = 0   or   d/dt (sum a_j v_j + a_0) = 0     for each constraint, while it acts
+    Q_cj = lambda_c a_cj ,   residual_c = f   or   sum a_j v_j + a_0
 
 They hold at each instant, whatever the parameters, the inputs and the tolerance, and together they
-determine the accelerations and Q: nothing of the FMU's own derivation, code and linear algebra stands
+determine the accelerations, lambda and Q: nothing of the FMU's own derivation, code and linear algebra stands
 in them.  A solution of linear equations that is stable fulfils them to rounding, however badly they
 are conditioned (Higham, Accuracy and Stability of Numerical Algorithms, sect. 7.1), in the metric of
-M: relative to  sqrt(M_jj) sum_k |terms of equation k| / sqrt(M_kk)  and, as the forces accelerate the
-constraint, to  sum_j |a_j| |terms of equation j| / M_jj .
+M: relative to  sqrt(M_jj) S  and  S sum_j |a_j| / sqrt(M_jj) ,  S = sum_k |terms of equation k| / sqrt(M_kk).
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from .facts import beside
 
 Expr = Any
 ROUNDING = 1e-13  # relative to those terms; see claims.LEEWAY
+GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps
 
 
 def lay_beside(fmu: Path, prepared: Prepared) -> None:
@@ -51,8 +52,26 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
         ]
         scale = sp.Add(terms[q], *others)
         forms.append(_form(f"Lagrange's equation of {name_of(q)}", inertia, force, scale, None))
-    forms += _of_constraints(model, {q: terms[q] / masses[q] for q in sides if masses[q] != 0})
+    heavy = [q for q in sides if masses[q] != 0]
+    total = sp.Add(*(terms[q] / sp.sqrt(masses[q]) for q in heavy))
+    forms += _of_constraints(model, {q: total / sp.sqrt(masses[q]) for q in heavy})
+    forms += _of_shares(model, variables)
     return [form for form in forms if _names(form) <= variables]
+
+
+def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
+    found = []
+    for c in model.constraints:
+        f, lam = sp.sympify(c.expression), output(f"lambda.{c.name}")
+        contact = c.name if isinstance(c, Contact) else c.while_closed
+        for q in model.coordinates:
+            a = f.diff(q.diff(TIME)) if isinstance(c, Nonholonomic) else f.diff(q)
+            share = f"Q.{c.name}.{name_of(q)}"
+            if share in variables:
+                found.append(ClosedForm(share, lam * a, output(share), rounding=ROUNDING))
+        rounding, residual = ROUNDING if contact is None else GAP, f"residual.{c.name}"
+        found.append(ClosedForm(residual, f, output(residual), rounding=rounding))
+    return found
 
 
 def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[ClosedForm]:

@@ -12,7 +12,9 @@ from .facts import Facts
 from .probe import Probe
 
 FAMILY = "starts"
-LONGEST = 1e3  # default experiments: at an equilibrium nothing but rounding gives the motion a rate
+LONGEST = (
+    100.0  # default experiments: at an equilibrium nothing but rounding gives the motion a rate
+)
 ANGLES = {"0": 0.0, "pi/2": math.pi / 2, "pi": math.pi, "-pi/2": -math.pi / 2, "1e6": 1e6}
 
 
