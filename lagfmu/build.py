@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from .closed_form import ClosedForm, Conserved
@@ -33,6 +34,8 @@ def write(
     """
     if target not in TARGETS:
         raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
+    if target == "python":  # it has no model exchange
+        prepared = replace(prepared, table=prepared.table.without_local_derivatives())
     extra = {
         "documentation/index.html": page(prepared, figures, choice).encode(),
         "resources/lagfmu.json": pack_closed_forms(

@@ -452,7 +452,13 @@ class _Builder:
             name = f"der({q},2)"
             symbols = self.motion_of_stepped
             variables.append(self.output(name, texts[2], self.units[name], symbols, "Real", str(v)))
-        return variables
+        return sorted(variables, key=self._place) if self.eom.bare else variables
+
+    def _place(self, v: Variable) -> int:
+        """Where the coordinate stands in the model; those of an embedding come last."""
+        order = [str(self.eom.symbols[c]) for c in self.model.coordinates]
+        name = v.name.removeprefix("der(").removesuffix(")").removesuffix(",2")
+        return order.index(name) if name in order else len(order)
 
     @cached_property
     def motion_of_stepped(self) -> set[str]:

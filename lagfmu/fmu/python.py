@@ -83,7 +83,7 @@ def build(
             f"{', '.join(METHODS)}, or the target native"
         )
     methods = tuple(m for m in scene.selectable if m in METHODS)
-    table = table.offering(methods).without_local_derivatives()
+    table = table.offering(methods)
     runtime = _runtime()
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
     text = _script(eom, reduction, scene, table, package, methods)
