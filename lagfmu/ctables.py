@@ -36,7 +36,7 @@ class Tables:
         start = [bisect_left(self.entries, (k,)) for k in range(eom.m + 1)]
         contacts = [k for k, c in enumerate(self.constraints) if isinstance(c, Contact)]
         prescribed = [k for k, s in enumerate(eom.u) if eom.rates.get(s) in eom.rates]
-        dimension, extent = self._dimensions()
+        dimension, extent, angles = self._dimensions()
         names = [f'"{s}"' for s in eom.q]
         parts = [
             self._array("const char *const", "coordinates", names),
@@ -75,6 +75,7 @@ class Tables:
             },
             "prescribed_count": len(prescribed),
             **{name: p + name for name in ("prescribed", "dimension", "extent_dimension")},
+            "angles": angles,
             "formulation": self.formulation.upper(),
             "has_potential": int(eom.potential is not None),
             "constant_mass": int(self._constant_mass()),
@@ -116,8 +117,8 @@ class Tables:
             items.append(f'{{"{c.name}", {kind}, {-1 if closed is None else position[closed]}}}')
         return items or ['{"", HOLONOMIC, -1}']
 
-    def _dimensions(self) -> tuple[list[int], list[int]]:
-        """One number for each dimension of coordinates; that of each parameter, -1 if it has none."""
+    def _dimensions(self) -> tuple[list[int], list[int], int]:
+        """One number for each dimension of coordinates; that of each parameter; that of angles; -1: none."""
         eom = self.eom
         by_name = {str(eom.plain(s)): unit for s, unit in eom.model.units.items()}
         units = [by_name[str(q)] for q in eom.q]
@@ -127,7 +128,8 @@ class Tables:
             -1 if u.dimensionless else number.get(u.exponents, -1)
             for u in (eom.model.units[p.symbol] for p in eom.model.parameters)
         ]
-        return of_coordinates, of_parameters or [-1]
+        angles = [k for u, k in zip(units, of_coordinates, strict=True) if u.dimensionless]
+        return of_coordinates, of_parameters or [-1], angles[0] if angles else -1
 
     def _constant_mass(self) -> bool:
         return _constant_mass(self.eom)

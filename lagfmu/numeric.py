@@ -148,6 +148,7 @@ def _system(
         f"    prescribed={_prescribed(eom)!r},\n"
         f"    like={_like(eom)!r},\n"
         f"    extent={_extent(eom)!r},\n"
+        f"    angles={_angles(eom)!r},\n"
         f"    embedding={embedding},\n"
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
@@ -193,6 +194,11 @@ def _prescribed(eom: EquationsOfMotion) -> tuple[int, ...]:
 def _units(eom: EquationsOfMotion) -> list[Any]:
     by_name = {str(eom.plain(s)): unit for s, unit in eom.model.units.items()}
     return [by_name[str(q)] for q in eom.q]
+
+
+def _angles(eom: EquationsOfMotion) -> tuple[int, ...]:
+    """The coordinates without dimension."""
+    return tuple(j for j, unit in enumerate(_units(eom)) if unit.dimensionless)
 
 
 def _like(eom: EquationsOfMotion) -> tuple[tuple[int, ...], ...]:

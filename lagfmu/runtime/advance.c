@@ -10,13 +10,15 @@
 
 #include "events.h"
 #include "leg.h"
+#include "magnitudes.h"
 #include "rattle.h"
 #include "switch.h"
 
 enum { CHATTER = 200 }; /* contact events in next to no time after which the step is given up */
 static const double PATIENCE = 200; /* steps after which one is judged by its average step */
 static const double STEP_LIMIT = 1e7; /* internal steps that a communication step may need */
-static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead */
+static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
+static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 
 static const Method *method_of(const Solver *s) {
     const Method *const menu[METHOD_COUNT] = {&dop853, &dopri5, &rk4, &rattle, &radau5};
@@ -90,7 +92,8 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
 static Status take_step(Solver *s, double t_end) {
     Integrator *i = &s->integrator;
     if (!runs_ahead(s)) return step_towards(s, t_end, t_end, HUGE_VAL);
-    const double longest = fmax(AHEAD / s->state.now.rate, t_end - i->t);
+    const double reach = fmin(AHEAD / s->state.now.rate, FAR_AHEAD * (t_end - s->state.now.t));
+    const double longest = fmax(reach, t_end - i->t);
     const double t = i->t, h = i->h_next;
     if (step_towards(s, t_end, fmax(t_end, s->stop_time), longest) == OK) return OK;
     double *y0 = s->work_advance; /* before the step, if it was taken and could not be used */
@@ -158,6 +161,13 @@ static Status travel(Solver *s, double t_end, double begun, int first, int *met)
     }
 }
 
+static Status complete_magnitudes(Solver *s, double span) {
+    leg_begin(s);
+    const Instant at = leg_instant(s, s->state.now.t);
+    if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
+    return magnitudes_complete(s, span);
+}
+
 Status solver_advance(Solver *s, double t_end) {
     Numbers *now = &s->state.now;
     const double begun = now->t;
@@ -169,6 +179,7 @@ Status solver_advance(Solver *s, double t_end) {
                     t_end);
     resume(s);
     if (switch_released(s) != OK) return FAILED;
+    if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
     while (now->t < t_end) {
         int met;
         if (travel(s, t_end, begun, first, &met) != OK) return FAILED;

@@ -1,5 +1,5 @@
-/* initial.c -- a consistent start: scales, projection of start values onto the constraints,
- * contact modes.
+/* initial.c -- a consistent start: projection of start values onto the constraints, contact modes,
+ * magnitudes.
  *
  *   M dq = G^T mu ,  G dq = -f     damped Newton's method from afar (Deuflhard, Newton Methods for
  *                                  Nonlinear Problems, sect. 3.1), the step halved until |f| falls
@@ -12,11 +12,11 @@
 
 #include "contacts.h"
 #include "digits.h"
-#include "solver.h"
+#include "magnitudes.h"
 
 enum { ITERATIONS = 60, HALVINGS = 25 };
 static const double EPS = DBL_EPSILON;
-static const double TOUCH = 1e-9; /* |f| below this, relative to its own terms: touching */
+static const double LARGEST_ANGLE = 1e-3 / DBL_EPSILON; /* [rad] neighbouring numbers are 1e-3 apart */
 
 /* The start of a simulation: the state that is being found, and where it began. */
 typedef struct {
@@ -30,48 +30,34 @@ static Status refused(Solver *s) {
     return fail(&s->why, "the start is refused: %s", cause.text);
 }
 
-/* For each coordinate the largest magnitude of its dimension among start values and parameters; 1
- * (in the coordinate's own unit) where there is none, as for an angle that starts at zero. */
-static void find_sizes(const Start *x) {
+/* allowed (m): `factor` roundings of each constraint's terms at q, no smaller than those of `least`. */
+static void find_allowed(const Start *x, const double *q, const double *least, double factor,
+                         double *reach, double *allowed) {
     const System *s = x->s->system;
-    double *largest = x->s->work_initial; /* by the number of the dimension */
-    for (int j = 0; j < s->n; j++) largest[j] = 0;
-    for (int j = 0; j < s->n; j++)
-        largest[s->dimension[j]] = fmax(largest[s->dimension[j]], fabs(x->q0[j]));
-    for (int i = 0; i < s->parameters; i++) {
-        int d = s->extent_dimension[i];
-        if (d >= 0) largest[d] = fmax(largest[d], fabs(x->at.p[i]));
-    }
-    for (int j = 0; j < s->n; j++) {
-        double size = largest[s->dimension[j]];
-        x->s->state.size[j] = size > 0 ? size : 1;
-    }
-}
-
-/* unit (m): the size of each constraint's terms at q, in its own unit. */
-static void find_units(const Start *x, const double *q, double *reach, double *unit) {
-    const System *s = x->s->system;
-    for (int j = 0; j < s->n; j++) reach[j] = fmax(fabs(q[j]), x->s->state.size[j]);
-    for (int k = 0; k < s->m; k++) unit[k] = mechanism_row_size(&x->s->stepped, k, reach);
-}
-
-/* 1 if every |f| on the rows is below `factor` roundings. */
-static int rounding_only(const System *s, const int *rows, const double *f, const double *unit,
-                         double factor) {
+    for (int j = 0; j < s->n; j++) reach[j] = fmax(fabs(q[j]), least[j]);
     for (int k = 0; k < s->m; k++)
-        if (rows[k] && !(fabs(f[k]) <= factor * EPS * unit[k])) return 0;
+        allowed[k] = factor * EPS * mechanism_row_size(&x->s->stepped, k, reach);
+}
+
+static int arrived(const System *s, const int *rows, const double *f, const double *allowed) {
+    for (int k = 0; k < s->m; k++)
+        if (rows[k] && !(fabs(f[k]) <= allowed[k])) return 0;
     return 1;
 }
 
-static double norm(const System *s, const int *rows, const double *f, const double *unit) {
+/* |f| on the rows in units of what may be left; of f0 where nothing may. */
+static double norm(const System *s, const int *rows, const double *f, const double *allowed,
+                   const double *f0) {
     double sum = 0;
-    for (int k = 0; k < s->m; k++)
-        if (rows[k]) sum += f[k] / unit[k] * (f[k] / unit[k]);
+    for (int k = 0; k < s->m; k++) {
+        double unit = allowed[k] > 0 ? allowed[k] : f0[k] != 0 ? fabs(f0[k]) : 1;
+        if (rows[k]) sum += f[k] / unit * (f[k] / unit);
+    }
     return sqrt(sum);
 }
 
 static Status cannot_be_projected(const Start *x, const int *rows, const double *f,
-                                  const double *unit) {
+                                  const double *allowed) {
     const System *s = x->s->system;
     Why *why = &x->s->why;
     const char *comma = "";
@@ -82,7 +68,7 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
     }
     why_append(why, " cannot be projected onto the constraints (missed: ");
     for (int k = 0; k < s->m; k++)
-        if (rows[k] && !(fabs(f[k]) <= 1e3 * EPS * unit[k])) {
+        if (rows[k] && !(fabs(f[k]) <= allowed[k])) {
             why_append(why, "%s'%s' by %.3g", comma, s->rows[k].name, f[k]);
             comma = ", ";
         }
@@ -91,25 +77,31 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
     return FAILED;
 }
 
-/* Damped Newton's method for f = 0 on the rows, weighted by M, from anywhere; q is moved. */
+/* Damped Newton's method for f = 0 on the rows, weighted by M, from anywhere; q is moved.
+ *
+ * It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
+ * since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
+ * of at the start (`size`).  While it falls on and on, there is nothing to arrive at. */
 static Status project_from_afar(const Start *x, double *q, int *rows) {
     const System *s = x->s->system;
     const size_t bytes = (size_t)s->n * sizeof *q;
     Mechanism *b = &x->s->stepped;
-    double *step = x->s->work_initial, *trial = step + s->n;
-    double *f = trial + s->n, *f_trial = f + s->m, *unit = f_trial + s->m;
+    double *step = x->s->work_initial, *trial = step + s->n, *least = trial + s->n;
+    double *f = least + s->n, *f_trial = f + s->m, *allowed = f_trial + s->m;
     int any = 0;
     for (int k = 0; k < s->m; k++) {
         if (s->rows[k].kind == NONHOLONOMIC) rows[k] = 0;
         any |= rows[k];
     }
     if (!any) return OK;
+    magnitudes_extents(s, x->at.p, least);
     if (mechanism_residual(b, x->at, q, f) == FAILED) return refused(x->s);
-    for (int count = 0; count <= ITERATIONS; count++) {
+    for (int count = 0;; count++) {
         if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return refused(x->s);
-        find_units(x, q, trial, unit);
-        if (rounding_only(s, rows, f, unit, 4)) return OK;
-        if (count == ITERATIONS) break;
+        find_allowed(x, q, least, 4, trial, allowed);
+        if (arrived(s, rows, f, allowed)) return OK;
+        if (count == ITERATIONS) return cannot_be_projected(x, rows, f, allowed);
+        find_allowed(x, q, x->s->state.size, 1e3, trial, allowed);
         for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
         if (linear_factor(&b->linear, b->M, b->G, rows) == FAILED) break;
         if (linear_nearest(&b->linear, f_trial, step) == FAILED) break;
@@ -118,13 +110,44 @@ static Status project_from_afar(const Start *x, double *q, int *rows) {
         for (; halvings < HALVINGS; halvings++, damping /= 2) {
             for (int j = 0; j < s->n; j++) trial[j] = q[j] + damping * step[j];
             if (mechanism_residual(b, x->at, trial, f_trial) == FAILED) continue;
-            if (norm(s, rows, f_trial, unit) < (1 - 0.1 * damping) * norm(s, rows, f, unit)) break;
+            if (norm(s, rows, f_trial, allowed, f) <
+                (1 - 0.1 * damping) * norm(s, rows, f, allowed, f))
+                break;
         }
         if (halvings == HALVINGS) break;
         memcpy(q, trial, bytes);
         memcpy(f, f_trial, (size_t)s->m * sizeof *f);
     }
-    return rounding_only(s, rows, f, unit, 1e3) ? OK : cannot_be_projected(x, rows, f, unit);
+    return arrived(s, rows, f, allowed) ? OK : cannot_be_projected(x, rows, f, allowed);
+}
+
+/* An angle whose neighbouring numbers are no neighbouring directions is refused. */
+static Status check_angles(const Start *x) {
+    const System *s = x->s->system;
+    const double *q = x->s->state.q;
+    for (int j = 0; j < s->n; j++) {
+        if (s->dimension[j] != s->angles || fabs(q[j]) <= LARGEST_ANGLE) continue;
+        return fail(&x->s->why,
+                    "the start is refused: the angle %s = %s rad has no digits left for a "
+                    "direction, expected at most %.1e rad either way: take off whole turns",
+                    s->coordinates[j], digits(q[j]).text, LARGEST_ANGLE);
+    }
+    return OK;
+}
+
+/* A mass that a double holds to a few digits only is refused. */
+static Status check_masses(const Start *x) {
+    const Mechanism *b = &x->s->stepped;
+    const System *s = b->system;
+    for (int e = 0; e < s->masses; e++) {
+        if (s->mass_row[e] != s->mass_column[e]) continue;
+        if (!(b->M[e] > 0 && b->M[e] < DBL_MIN)) continue;
+        return fail(&x->s->why,
+                    "the start is refused: the mass of %s is %s, expected 0 or at least %.3g (in SI "
+                    "units), below which numbers lose their digits: choose larger units of mass",
+                    s->coordinates[s->mass_row[e]], digits(b->M[e]).text, DBL_MIN);
+    }
+    return OK;
 }
 
 /* Positions on the constraints; contacts that touch or were penetrated are closed, for now. */
@@ -132,7 +155,7 @@ static Status find_positions(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
-    double *moved = x->s->work_initial + 2 * s->n + 3 * s->m, *unit = moved + s->n;
+    double *moved = x->s->work_initial + 3 * s->n + 3 * s->m, *unit = moved + s->n;
     int *rows = x->s->iwork_initial;
     memcpy(state->q, x->q0, (size_t)s->n * sizeof *state->q);
     memset(state->closed, 0, (size_t)s->contacts * sizeof *state->closed);
@@ -156,6 +179,8 @@ static Status find_positions(const Start *x) {
         if (still) break;
         memcpy(state->q, moved, (size_t)s->n * sizeof *moved);
     }
+    if (check_angles(x) == FAILED) return FAILED;
+    magnitudes_sizes(x->s, state->q);
     return OK;
 }
 
@@ -202,6 +227,7 @@ static Status find_velocities(const Start *x) {
     int *active = x->s->iwork_initial;
     memcpy(state->v, x->v0, (size_t)s->n * sizeof *state->v);
     if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return refused(x->s);
+    if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
     for (int j = 0; j < s->n; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
     for (int c = 0; c < s->contacts; c++) {
@@ -235,28 +261,14 @@ static Status find_modes(const Start *x) {
     return OK;
 }
 
-/* Error scales of q and v, and the motion's natural rate.  A start value is its own scale, so that
- * a start at theta0 = 1e-6 is resolved, but no smaller than what rounding in values of the
- * coordinate's size allows at this tolerance. */
-static Status find_scales(Solver *s) {
+/* A start value is its own scale, so that a start at theta0 = 1e-6 is resolved. */
+static Status find_magnitudes(Solver *s) {
     const int n = s->system->n;
-    State *state = &s->state;
-    const double floor = fmax(1e-8, 10 * EPS / s->settings.tolerance);
-    double rate = 0;
     for (int j = 0; j < n; j++) {
-        rate = fmax(rate, fabs(state->v[j]) / state->size[j]);
-        rate = fmax(rate, sqrt(fabs(s->stepped.vdot[j]) / state->size[j]));
+        s->state.scale[j] = fabs(s->state.q[j]);
+        s->state.scale[n + j] = fabs(s->state.v[j]);
     }
-    state->now.rate = rate > 0 ? rate : 1;
-    for (int j = 0; j < n; j++) {
-        double least = floor * state->size[j];
-        state->scale[j] = fmax(fabs(state->q[j]), least);
-        state->scale[n + j] = fmax(fabs(state->v[j]), least * state->now.rate);
-        if (!(state->scale[j] <= DBL_MAX && state->scale[n + j] <= DBL_MAX))
-            return fail(&s->why, "the start is refused: the scale of %s is not finite",
-                        s->system->coordinates[j]);
-    }
-    return OK;
+    return magnitudes_complete(s, 0);
 }
 
 static void tell_moved(const Start *x, Moved moved, void *context) {
@@ -299,12 +311,12 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, Mov
     clear(s, t);
     drive_at(s->system, &s->drive, t, s->u);
     const Start x = {s, {t, s->u, s->p}, q0, v0};
-    find_sizes(&x);
+    magnitudes_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;
     if (find_velocities(&x) == FAILED) return FAILED;
     if (find_modes(&x) == FAILED) return FAILED;
     for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];
-    if (find_scales(s) == FAILED) return FAILED;
+    if (find_magnitudes(s) == FAILED) return FAILED;
     if (moved != NULL) tell_moved(&x, moved, context);
     return OK;
 }

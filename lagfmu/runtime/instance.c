@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "magnitudes.h"
 
 static const double SMALLEST_TOLERANCE = 1e-14;
 
@@ -240,6 +241,8 @@ Status instance_start(Instance *x) {
     s->stop_time = x->stop_time;
     s->drive.since = x->start_time;
     if (solver_start(s, x->start_time, x->q0, x->v0, tell_moved, x) != OK) return FAILED;
+    /* model exchange has no communication step: 1 s stands in for it */
+    if (x->exchange && magnitudes_incomplete(s) && magnitudes_complete(s, 1) != OK) return FAILED;
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     x->started = 1;
     x->observed = x->evaluated = 0;

@@ -20,7 +20,7 @@ typedef struct {
     Sensitivity sensitivity;   /* of `stepped` */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
-    double *work_initial;      /* (5 n + 3 m) of initial.c */
+    double *work_initial;      /* (5 n + 3 m) of initial.c and magnitudes.c */
     int *iwork_initial;        /* (m + contacts) */
     double *work_contacts;     /* (2 n + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */

@@ -37,6 +37,7 @@ struct System {
     const int *prescribed;    /* positions in u where a prescribed motion begins: u, der(u), der(u,2) */
     const int *dimension;        /* (n) coordinates of one physical dimension have one number */
     const int *extent_dimension; /* (parameters) the number of those that it compares to; -1: none */
+    int angles;                  /* the number of those without dimension; -1: none */
     Formulation formulation;
     int has_potential;
     int constant_mass;        /* M holds parameters and numbers only */

@@ -23,6 +23,7 @@ from scipy.optimize import brentq
 from .contacts import complementary_modes, impact
 from .failure import StepFailureError
 from .instant import Instant
+from .magnitudes import complete, is_incomplete
 from .methods import stepper
 from .motion import EPS, motion, project
 from .state import Departure, Settings, State
@@ -55,7 +56,10 @@ def advance(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
         )
     with np.errstate(all="ignore"):
-        state = _released(Instant(system, state.t, system.inputs_at(u, 0.0), p), state)
+        at = Instant(system, state.t, system.inputs_at(u, 0.0), p)
+        state = _released(at, state)
+        if is_incomplete(state):
+            state = complete(at, settings, state, t_end - state.t)
         while state.t < t_end:
             leg = _Leg(system, settings, state, u, p, begun)
             state = _travel(leg, state, t_end, begun, first)

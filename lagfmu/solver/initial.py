@@ -1,4 +1,4 @@
-"""A consistent start: scales, projection of start values onto the constraints, contact modes.
+"""A consistent start: projection of start values onto the constraints, contact modes, magnitudes.
 
 Order: positions are projected, weighted by M, onto the constraints that always act and onto contacts
 that are penetrated (f < -gap); then velocities onto G v = nu; then the contacts that touch are closed
@@ -16,12 +16,14 @@ from .contacts import complementary_modes
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
-from .motion import EPS, motion, project
+from .magnitudes import TOUCH, complete, extents, sizes
+from .motion import EPS, project
 from .state import Departure, Settings, State
-from .system import NONHOLONOMIC, System, Vector
+from .system import NONHOLONOMIC, Matrix, System, Vector
 
 ITERATIONS = 60
-TOUCH = 1e-9  # |f| below this, in units of the constraint's own size, counts as touching
+LARGEST_ANGLE = 1e-3 / EPS  # [rad] beyond which neighbouring numbers are more than 1e-3 rad apart
+SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def start(
 
 def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
     system = at.system
-    size = _sizes(system, q0, at.p)
+    size = sizes(system, q0, at.p, np.zeros(system.n))
     none = np.zeros(system.m)
     q = project_from_afar(at, q0, v0, list(system.permanent), size)
     gap = np.array([])
@@ -68,12 +70,12 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
         if (np.abs(moved - q) <= 4 * EPS * size).all():
             break
         q = moved
+    _check_angles(system, q)
+    size = sizes(system, q, at.p, size)
     q, v, closed = _velocities(at, q, v0, closed, size)
     touching = [c for c, shut in enumerate(closed) if shut]
     modes = complementary_modes(at, q, v, closed, touching)
     q, v = project(at, q, v, system.active(modes), none, size)
-    vdot = motion(at, q, v, system.active(modes)).vdot
-    scale, rate = _scales(settings, size, q, v, vdot)
     nothing = Departure(0, 0.0, (0.0,) * system.n, (0.0,) * system.n)
     state = State(
         t=at.t,
@@ -82,15 +84,39 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
         closed=modes,
         armed=tuple(not c for c in modes),
         offset=tuple(none.tolist()),
-        scale=tuple(scale.tolist()),
+        scale=(*np.abs(q).tolist(), *np.abs(v).tolist()),
         size=tuple(size.tolist()),
         gap=tuple(gap.tolist()),
-        rate=rate,
+        rate=0.0,
         step=0.0,
         steps=0,
         departures=(nothing,) * len(system.contacts),
     )
-    return Start(state, _moved(system, q0, v0, q, v, size, scale))
+    # a start value is its own scale: a start at theta0 = 1e-6 is resolved
+    state = complete(at, settings, state, 0.0)
+    return Start(state, _moved(system, q0, v0, state))
+
+
+def _check_angles(system: System, q: Vector) -> None:
+    """Raises StartFailureError for an angle whose neighbouring numbers are no neighbouring directions."""
+    for j in system.angles:
+        if not abs(q[j]) <= LARGEST_ANGLE:
+            raise StartFailureError(
+                f"the start is refused: the angle {system.coordinates[j]} = {float(q[j])!r} rad has "
+                f"no digits left for a direction, expected at most {LARGEST_ANGLE:.1e} rad either "
+                "way: take off whole turns"
+            )
+
+
+def _check_masses(system: System, M: Matrix) -> None:
+    """Raises StartFailureError for a mass that a double holds to a few digits only."""
+    for name, mass in zip(system.coordinates, M.diagonal().tolist(), strict=True):
+        if 0 < mass < SMALLEST_MASS:
+            raise StartFailureError(
+                f"the start is refused: the mass of {name} is {mass!r}, expected 0 or at least "
+                f"{SMALLEST_MASS:.3g} (in SI units), below which numbers lose their digits: choose "
+                "larger units of mass"
+            )
 
 
 def project_from_afar(
@@ -102,18 +128,26 @@ def project_from_afar(
 ) -> Vector:
     """Damped Newton's method for f = 0 on the rows, weighted by M, from anywhere.
 
-    Raises StartFailureError naming the constraints that remain violated and by how much.
+    It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
+    since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
+    of at the start (`size`).  While it falls on and on, there is nothing to arrive at.  Raises
+    StartFailureError naming the constraints that remain violated and by how much.
     """
     fixed = [k for k in rows if at.system.rows[k].kind != NONHOLONOMIC]
     q = q0
     if not fixed:
         return q
+    least = extents(at.system, at.p)
     M, _, G, _, _ = at.evaluate(q, v0)
     f = at.residual(q)[fixed]
+    allowed = np.zeros(len(fixed))
     for _ in range(ITERATIONS):
-        unit = np.abs(G[fixed]) @ np.maximum(np.abs(q), size)
-        if (np.abs(f) <= 4 * EPS * unit).all():
+        allowed = 4 * EPS * (np.abs(G[fixed]) @ np.maximum(np.abs(q), least))
+        if (np.abs(f) <= allowed).all():
             return q
+        unit = np.abs(G[fixed]) @ np.maximum(np.abs(q), size)
+        unit = np.where(unit > 0, unit, np.where(f != 0, np.abs(f), 1.0))
+        allowed = 1e3 * EPS * (np.abs(G[fixed]) @ np.maximum(np.abs(q), size))
         try:
             step = solve(M, np.zeros(at.system.n), G[fixed], -f, nearest=True).x
         except StepFailureError:
@@ -130,13 +164,13 @@ def project_from_afar(
             break
         q, f = trial, f_trial
         M, _, G, _, _ = at.evaluate(q, v0)
-    unit = np.abs(G[fixed]) @ np.maximum(np.abs(q), size)
-    if (np.abs(f) <= 1e3 * EPS * unit).all():
+        allowed = 4 * EPS * (np.abs(G[fixed]) @ np.maximum(np.abs(q), least))
+    if (np.abs(f) <= allowed).all():
         return q
     missed = ", ".join(
         f"{at.system.rows[k].name!r} by {a:.3g}"
-        for k, a, s in zip(fixed, f, unit, strict=True)
-        if abs(a) > 1e3 * EPS * s
+        for k, a, b in zip(fixed, f, allowed, strict=True)
+        if not abs(a) <= b
     )
     values = ", ".join(
         f"{n} = {x!r}" for n, x in zip(at.system.coordinates, q0.tolist(), strict=True)
@@ -157,6 +191,7 @@ def _velocities(
     """Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open."""
     system = at.system
     M, F, G, nu, _ = at.evaluate(q, v0)
+    _check_masses(system, M)
     natural = np.sqrt(size * np.abs(F) / np.where(M.diagonal() > 0, M.diagonal(), np.inf))
     unit = np.abs(G) @ np.maximum(np.abs(v0), natural)
     speed = G @ v0 - nu
@@ -178,43 +213,12 @@ def _velocities(
     return q, v, shut
 
 
-def _sizes(system: System, q0: Vector, p: Sequence[float]) -> Vector:
-    """For each coordinate the largest magnitude of its dimension among start values and parameters.
-
-    1 (in the coordinate's own unit) where there is none, as for an angle that starts at zero.
-    """
-    sizes = []
-    for j in range(system.n):
-        same = system.like[j] if system.like else (j,)
-        values = [abs(q0[i]) for i in same]
-        values += [abs(p[i]) for i in (system.extent[j] if system.extent else ())]
-        sizes.append(max(values) or 1.0)
-    return np.array(sizes)
-
-
-def _scales(
-    settings: Settings, size: Vector, q: Vector, v: Vector, vdot: Vector
-) -> tuple[Vector, float]:
-    """Error scales of q and v (2 n), and the motion's natural rate [1/s].
-
-    A start value is its own scale, so that a start at theta0 = 1e-6 is resolved, but no smaller than
-    what rounding in values of the coordinate's size allows at this tolerance.
-    """
-    rates = np.maximum(np.abs(v) / size, np.sqrt(np.abs(vdot) / size))
-    rate = float(rates.max(initial=0.0)) or 1.0
-    floor = max(1e-8, 10 * EPS / settings.tolerance)
-    scale = np.concatenate(
-        [np.maximum(np.abs(q), floor * size), np.maximum(np.abs(v), floor * size * rate)]
-    )
-    return scale, rate
-
-
 def _moved(
-    system: System, q0: Vector, v0: Vector, q: Vector, v: Vector, size: Vector, scale: Vector
+    system: System, q0: Vector, v0: Vector, state: State
 ) -> tuple[tuple[str, float, float], ...]:
     names = [*system.coordinates, *(f"der({c})" for c in system.coordinates)]
-    given, used = np.concatenate([q0, v0]), np.concatenate([q, v])
-    unit = np.maximum(np.concatenate([size, scale[system.n :]]), np.abs(given))
+    given, used = np.concatenate([q0, v0]), np.array(state.q + state.v)
+    unit = np.maximum(np.array(state.size + state.scale[system.n :]), np.abs(given))
     return tuple(
         (name, float(a), float(b))
         for name, a, b, s in zip(names, given, used, unit, strict=True)

@@ -39,8 +39,8 @@ class System:
     for a nonholonomic row;  energies(t, q, v, u, p) -> (kinetic, potential) [J];  restitution(p) ->
     one coefficient a row.  `mass` and `jacobian` are the (row, column) indices of the values; M's
     are those of the lower triangle.  `prescribed` are the positions in u where a prescribed motion
-    and its two derivatives begin.  `extent` (n) lists for each coordinate the positions in p whose
-    values have the coordinate's dimension.
+    and its two derivatives begin.  `like` (n) lists for each coordinate those of its dimension,
+    `extent` (n) the positions in p whose values have it; `angles` are those without dimension.
     """
 
     coordinates: tuple[str, ...]
@@ -55,6 +55,7 @@ class System:
     prescribed: tuple[int, ...] = ()
     like: tuple[tuple[int, ...], ...] = ()
     extent: tuple[tuple[int, ...], ...] = ()
+    angles: tuple[int, ...] = ()
     embedding: Embedding | None = None
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())

@@ -1,0 +1,125 @@
+"""What is large and what is small in a motion: sizes, natural rate, error scales.  No unit counts.
+
+    size   of a coordinate: |q|, or the largest parameter of its dimension; of angles at most 1 rad
+    rate   [1/s] of the motion: the largest |v| / size and sqrt(|vdot| / size)
+    scale  below which an error is absolute: |q| and |v| of the start, or what rounding leaves of size
+
+A coordinate at 0 of whose dimension there is no parameter has no size: its 0 is a mark on a ruler.
+There the motion itself tells what is large, V tau and A tau^2 with V and A the largest speed and
+acceleration of its dimension: tau is the shortest time in which anything changes, 1/rate of the
+coordinates that have a size, or V/A.  Too small a size is safe, an error is then measured by the
+motion reached so far; too large a one hides errors.  Hence parameters and angles alone give that
+rate (a place may be far away, and says nothing), and V/A the forces before they cancel.
+
+Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the only time
+is the importer's: tau is PART of the first communication step.  Were the motion a million times
+faster than that step, its size would be taken for at most 1e6 times what it is, which the floor of the
+scale, below 1e-6, still forgives.  `complete` does this, at the start and once more as a step begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .instant import Instant
+from .motion import EPS, Motion, motion
+from .state import Settings, State
+from .system import System, Vector
+
+Mask = NDArray[np.bool_]
+
+TOUCH = 1e-9  # |f| below this, in units of the constraint's own size, counts as touching
+LOST = 1e3 * EPS  # what is left of a place by a projection, or of forces that cancel, is rounding
+PART = 1e-3  # of the first communication step, in which a motion without any scale is measured
+TINY = 1e-100  # scale of what neither moves nor is pushed: anything that moves exceeds it
+
+
+def extents(system: System, p: Sequence[float]) -> Vector:
+    """For each coordinate the largest magnitude among the parameters of its dimension; angles: 0."""
+    parts = system.extent or ((),) * system.n
+    return np.array([max((abs(p[i]) for i in part), default=0.0) for part in parts])
+
+
+def sizes(system: System, q: Vector, p: Sequence[float], before: Vector) -> Vector:
+    """The coordinates' sizes (n); 0 where there is none.  `before` (n): sizes before a projection."""
+    place = np.where(np.abs(q) > LOST * before, np.abs(q), 0.0)
+    size = np.maximum(place, extents(system, p))
+    angles = list(system.angles)
+    if angles:
+        size[angles] = min(place[angles].max(), 1.0) or 1.0
+    return size
+
+
+def is_incomplete(state: State) -> bool:
+    """True while a size, or the rate, is not known."""
+    return state.rate == 0 or 0.0 in state.size
+
+
+def complete(at: Instant, settings: Settings, state: State, span: float) -> State:
+    """Sizes, rate, scales, gaps as far as they can be known; scales only grow.
+
+    span [s]: of the first step, or 0 while there is none.
+    """
+    system = at.system
+    q, v = np.array(state.q), np.array(state.v)
+    now = motion(at, q, v, system.active(state.closed))
+    felt = _felt(now)
+    size, found = np.array(state.size), np.array(state.size) > 0
+    own = np.zeros(system.n)  # rate [1/s] by which a size is taken from the motion
+    natural = 0.0
+    steady = _rate(system, size, np.abs(v), felt, found & _measured(system, at.p))
+    for j in np.flatnonzero(~found):
+        like = list(system.like[j]) if system.like else [j]
+        speed, pull = np.abs(v[like]).max(), felt[like].max()
+        acceleration = np.abs(now.vdot[like]).max()
+        if acceleration <= LOST * pull:
+            acceleration = pull  # at rest: what is left is rounding of forces that cancel
+        own[j] = max(steady, pull / speed if speed > 0 else 0.0)
+        natural = max(natural, own[j])
+        if own[j] == 0 and span > 0:
+            own[j] = 1 / (PART * span)
+        if own[j] > 0:
+            size[j] = max(speed / own[j], acceleration / own[j] / own[j])
+    rate = state.rate or max(_rate(system, size, np.abs(v), np.abs(now.vdot), found), natural)
+    rate = rate or _rate(system, size, np.abs(v), felt, found) or (1 / span if span > 0 else 0.0)
+    floor = max(1e-8, 10 * EPS / settings.tolerance)
+    speed_scale = floor * size * np.where(own > 0, own, rate)
+    scale = np.maximum(state.scale, np.concatenate([floor * size, speed_scale]))
+    gap = np.array(state.gap)
+    if not found.all():
+        reach = np.abs(now.G) @ np.maximum(np.abs(q), size)
+        gap = np.maximum(gap, TOUCH * reach[list(system.contacts)])
+    return replace(
+        state,
+        size=tuple(size.tolist()),
+        rate=float(rate),
+        scale=tuple(np.where(scale > 0, scale, TINY).tolist()),
+        gap=tuple(gap.tolist()),
+    )
+
+
+def _measured(system: System, p: Sequence[float]) -> Mask:
+    """True for angles and for coordinates of a dimension that parameters have."""
+    has: Mask = extents(system, p) > 0
+    has[list(system.angles)] = True
+    return has
+
+
+def _felt(now: Motion) -> Vector:
+    """Accelerations (n) before forces cancel: at least what each coordinate's forces give it alone."""
+    mass = now.M.diagonal()
+    forces = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
+    alone: Vector = forces / np.where(mass > 0, mass, np.inf)
+    return np.maximum(np.abs(now.vdot), alone)
+
+
+def _rate(system: System, size: Vector, speed: Vector, pull: Vector, counted: Mask) -> float:
+    """The largest speed / size and sqrt(pull / size) of those that count; an angle's speed by 1 rad."""
+    unit = size.copy()
+    unit[list(system.angles)] = 1.0
+    rates = np.maximum(speed[counted] / unit[counted], np.sqrt(pull[counted] / size[counted]))
+    return float(rates.max(initial=0.0))

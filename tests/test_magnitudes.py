@@ -1,0 +1,105 @@
+"""What is large and what is small at a start: no unit counts, no far place, no lost digits."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from fmpy.fmi1 import FMICallException
+from instance import instance
+
+g = 9.81  # m/s^2
+
+
+def refusal(path, values) -> str:
+    """Why the start is refused."""
+    with instance(path) as one:
+        with pytest.raises(FMICallException):
+            one.start(values)
+        return " ".join(text for status, _, text in one.log if status >= 2)
+
+
+@pytest.mark.parametrize("omega", [1e-3, 1.0, 1e6, 1e9])
+def test_a_skate_draws_its_cycloid_however_small(fmu, omega):
+    """From rest at x = y = 0, with no length given anywhere, x = G sin(w t)^2/(2 w^2), which is 1e-18 m at
+    w = 1e9/s, and lambda = -2 m G sin(w t): each to 1e-6 of its own size, G = g sin(alpha)."""
+    G = g / 2
+    with instance(fmu("KnifeEdge")) as one:
+        one.start({"der(phi)": omega})
+        for k in range(1, 6):
+            one.step(0.7 / omega)
+            phase = 0.7 * k
+            x = G * math.sin(phase) ** 2 / (2 * omega**2)
+            y = G * (phase - math.sin(2 * phase) / 2) / (2 * omega**2)
+            assert abs(one.get("x") - x) < 1e-6 * G / omega**2
+            assert abs(one.get("y") - y) < 1e-6 * G / omega**2
+            assert abs(one.get("lambda.edge") + 2 * G * math.sin(phase)) < 1e-6 * G
+
+
+@pytest.mark.parametrize("step", [1e-12, 1e-2, 1e6])
+def test_a_fall_from_rest_looks_the_same_on_every_scale(fmu, step):
+    """Atwood's masses, from 0 at rest, fall by a t^2/2 with a = g/3 in any communication step: nothing but
+    that step says what is long and what is short."""
+    with instance(fmu("Atwood")) as one:
+        one.start()
+        for k in range(1, 4):
+            one.step(step)
+            fallen = g / 3 * (k * step) ** 2 / 2
+            assert one.get("x1") == pytest.approx(fallen, rel=1e-9)
+            assert one.get("x2") == pytest.approx(-fallen, rel=1e-9)
+
+
+def test_a_ball_thrown_from_the_floor_comes_back_to_it(fmu):
+    """From y = 0 with v, the height v^2/(2 g) is the only length: thrown at 1 nm/s or 1 km/s, it is back
+    after 2 v/g and leaves with e v, to the same relative accuracy."""
+    for v in (1e-9, 1.0, 1e3):
+        with instance(fmu("BouncingBall")) as one:
+            one.start({"y": 0.0, "der(y)": v})
+            one.step(1.0 * v / g)
+            assert one.get("y") == pytest.approx(v**2 / (2 * g), rel=1e-9)
+            one.step(1.5 * v / g)  # half a v/g after the bounce
+            rise = 0.7 * v * 0.5 * v / g - g * (0.5 * v / g) ** 2 / 2
+            assert one.get("y") == pytest.approx(rise, rel=1e-7)
+
+
+def test_an_angle_without_digits_for_a_direction_is_refused(fmu):
+    """Neighbours of 1e300 are 1e284 rad apart: no direction.  A million turns leave ten digits."""
+    for name, angle in (("RollingSphere", "phi"), ("KnifeEdge", "phi"), ("Ladder", "theta")):
+        text = refusal(fmu(name), {angle: 1e300})
+        assert f"the angle {angle} = 1e+300 rad" in text
+        assert "whole turns" in text
+    with instance(fmu("RollingSphere")) as one:
+        one.start({"phi": 2e6 * math.pi})
+        # far turned itself, it presses on as if it were not: lambda = m g cos(theta) at rest
+        assert one.get("lambda.surface") == pytest.approx(g * math.cos(0.05), rel=1e-12)
+
+
+def test_a_far_place_is_no_size_of_another_coordinate(fmu):
+    """A ladder at x = 1e300 m lets its upper end fall as one at x = 1 m does, in front of no wall: the end is
+    1.86 m above the floor, does not touch it, and lambda.floor = m g/(1 + 3 cos(theta)^2)."""
+    with instance(fmu("Ladder")) as one:
+        one.start({"x": 1e300})
+        assert not one.get("contact.top")
+        push = 10.0 * g / (1 + 3 * math.cos(1.2) ** 2)
+        assert one.get("lambda.floor") == pytest.approx(push, rel=1e-9)
+        one.step(0.1)
+        assert one.get("residual.top") < 1.86
+
+
+def test_a_rod_that_newtons_method_never_reaches_is_refused(fmu):
+    """L^2 = 1e-600 m^2 is no number: from 0.1 m away the bob cannot be put at |q| = L = 1e-300 m, and is not
+    left at some smaller |q|.  At 1e-12 m it can, to rounding."""
+    path = fmu("PendulumCartesian")
+    text = refusal(path, {"L": 1e-300, "x": 0.1, "y": 0.0})
+    assert "cannot be projected" in text
+    assert "'rod'" in text
+    with instance(path) as one:
+        one.start({"L": 1e-12, "x": 0.06, "y": -0.08})
+        assert math.hypot(one.get("x"), one.get("y")) == pytest.approx(1e-12, rel=1e-14)
+
+
+def test_a_mass_that_has_lost_its_digits_is_refused(fmu):
+    """Below 2.2e-308 a double has fewer digits: 5e-324 kg times 9.81 m/s^2 would be 10 times 5e-324."""
+    text = refusal(fmu("BouncingBall"), {"m": 5e-324})
+    assert "the mass of y is 5e-324" in text
+    assert "at least 2.23e-308" in text
