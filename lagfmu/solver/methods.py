@@ -18,11 +18,11 @@ from .state import Settings
 from .system import Vector
 
 
-class Dop853(DOP853):  # type: ignore[misc]
+class Dop853(DOP853):
     """SciPy's, whose error norm squares rates of change: at 1e155 and more it overflows and accepts."""
 
     def _estimate_error_norm(self, K: Any, h: float, scale: Vector) -> Any:
-        return super()._estimate_error_norm(K * h, 1.0, scale)
+        return super()._estimate_error_norm(K * h, 1.0, scale)  # type: ignore[misc]
 
 
 ADAPTIVE: dict[str, Any] = {"dop853": Dop853, "dopri5": RK45, "radau5": Radau}
