@@ -92,6 +92,10 @@ slide = (1 + 3 * cos(angle) ** 2) * rate**2 + 12 * g * (sin(angle) - sin(theta))
 falling = m * (g - l * sin(theta) * slide / (2 * arm)) / arm
 free = departure("wall", x) + departure("wall", x.diff()) * (t - departure("wall"))
 
+# No end has struck wall or floor: what is closed was so at the start.
+unstruck = Heaviside(initial(at_wall) - at_wall, 1) * Heaviside(initial(on_floor) - on_floor, 1)
+unstruck *= Heaviside(-output("departure.floor.count"), 1)
+
 closed_forms = [
     ClosedForm("lambda.wall", wall, until_departure="wall", when=slid),
     ClosedForm("lambda.floor", floor, until_departure="wall", when=slid),
@@ -126,5 +130,5 @@ closed_forms = [
         scale=m * g,
     ),
     ClosedForm("lambda.top", pushed(-1, on_floor), while_closed="top", scale=m * g),
-    Conserved("energy until it lies", output("energy.total"), while_open="top"),
+    Conserved("energy until it lies", output("energy.total"), while_open="top", when=unstruck),
 ]

@@ -894,6 +894,27 @@ def test_a_log_with_letters_that_are_not_ascii_arrives(fmu):
         one.step(0.1)
 
 
+def test_a_refusal_behind_a_projected_start_keeps_its_cause(fmu):
+    """A disk at 1e300 m/s: theta' is projected onto the rolling, which is to be logged, and then the
+    energy is no double: the refusal says so."""
+    with instance(fmu("InclineDisk")) as one:
+        one.fmu.setupExperiment()
+        one.set("der(y)", 1e300)
+        one.fmu.enterInitializationMode()
+        with refused(one, FATAL, "not finite" if one.native else "cannot be evaluated"):
+            one.fmu.exitInitializationMode()
+
+
+def test_an_inertia_that_no_double_holds_is_refused(fmu):
+    """A disk of radius 1e-300 m has the inertia 5e-601 kg m^2: not 0, which would be another motion."""
+    with instance(fmu("InclineDisk")) as one:
+        one.fmu.setupExperiment()
+        one.set("R", 1e-300)
+        one.fmu.enterInitializationMode()
+        with refused(one, FATAL, "overflow" if one.native else "too small for a double"):
+            one.fmu.exitInitializationMode()
+
+
 def test_a_percent_sign_in_a_refused_value_is_no_format(fmu):
     """An importer's logger prints like printf: a refused '%s%n' comes out of it as it went in."""
     with instance(fmu("Atwood")) as one:

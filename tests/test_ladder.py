@@ -8,6 +8,8 @@ import pytest
 from instance import instance
 from scipy.integrate import quad, solve_ivp
 
+from lagfmu import verify
+
 G = 9.81
 CASES = {  # m [kg], l [m], theta0 [rad], share of the rate at which it would leave the wall at once
     "default": (10.0, 2.0, 1.2, 0.0),
@@ -158,3 +160,16 @@ def test_upright_it_stands(fmu):
     np.testing.assert_allclose(result["lambda.floor"], 10 * G, rtol=1e-12)
     assert np.abs(result["lambda.wall"]).max() < 1e-12
     np.testing.assert_allclose(result["theta"], np.pi / 2, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "start",
+    [{"theta": 1e-8 - np.pi / 2}, {"l": 0.002}, {"theta": 2.0}],
+    ids=["on its upper end", "dropped from 465 lengths", "leaning the other way"],
+)
+def test_its_forces_from_the_state_in_every_mode(fmu, start):
+    """Standing on either end alone, at the wall or off it, and lying: the closed forms hold."""
+    found = verify(fmu("Ladder"), start_values=start)
+    assert found.passed, [c for c in found.checks if not c.passed]
+    points = {c.name: c.points for c in found.checks}
+    assert points["lambda.top"] + points["lambda.floor from the state"] > 50

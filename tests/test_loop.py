@@ -9,6 +9,8 @@ from instance import instance
 from scipy.integrate import quad, solve_ivp
 from scipy.special import ellipk
 
+from lagfmu import verify
+
 WORLDS = {  # m [kg], g [m/s^2], a [m]
     "earth": {"m": 1.0, "g": 9.81, "a": 1.0},
     "moon": {"m": 3e-3, "g": 1.62, "a": 25.0},
@@ -162,3 +164,11 @@ def test_the_way_up_takes_as_long_as_the_angle_alone_says(fmu):
         result = run(fmu("Loop"), WORLDS["earth"], square, 1e-12, 4.0, points)
         first = result[result["departure.loop.count"] == 1]
         assert first["departure.loop.time"][0] == pytest.approx(alone.t_events[0][0], abs=1e-10)
+
+
+def test_let_go_inside_it_flies_a_parabola_until_it_lands(fmu):
+    """From (0.1, 0.2) m at (1, -1) m/s the flight's closed forms hold, up to the landing."""
+    start = {"x": 0.1, "y": 0.2, "der(x)": 1.0, "der(y)": -1.0}
+    found = verify(fmu("Loop"), start_values=start, stop_time=0.25)
+    assert found.passed, [c for c in found.checks if not c.passed]
+    assert {c.name: c.points for c in found.checks}["y from a start in flight"] > 20

@@ -10,6 +10,8 @@ import pytest
 from instance import instance
 from scipy.integrate import simpson, solve_ivp
 
+from lagfmu import verify
+
 DEFAULT = {"J": 0.1, "m": 1.0, "M": 1.0, "r": 0.1, "l": 0.3, "s": 0.2, "k": 1e6, "c": 1e4}
 
 
@@ -118,3 +120,9 @@ def test_an_explicit_method_pays_for_the_stiffness(fmu):
     assert steps["dop853", 1e-4] > 1e4 / 8
     assert steps["dop853", 1e-7] == pytest.approx(steps["dop853", 1e-4], rel=0.05)
     assert steps["radau5", 1e-4] < steps["dop853", 1e-4] / 15
+
+
+def test_on_the_other_side_of_the_crank(fmu):
+    """With the slider at r - l, behind the crank, its place and speed follow the other root."""
+    found = verify(fmu("SliderCrank"), start_values={"x": -0.2, "y": 0.0})
+    assert found.passed, [c for c in found.checks if not c.passed]

@@ -8,7 +8,7 @@ if their multiplier is positive.  Every value that was moved is reported.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,6 +119,27 @@ def _check_masses(system: System, M: Matrix) -> None:
             )
 
 
+def _check_underflow(at: Instant, q: Vector, v0: Vector, M: Matrix) -> None:
+    """Raises StartFailureError for a mass that is 0 only because its factors are too small to multiply.
+
+    Then a parameter of the order of 1 in place of a small one makes it positive, and a double does not
+    hold it; one that vanishes with a parameter that is 0, or at this place, is what the model says.
+    """
+    entries = zip(*at.system.mass, strict=True)
+    absent = [j for j, k in entries if j == k and M[j, j] == 0]
+    for i, value in enumerate(at.p if absent else ()):
+        if not 0 < abs(value) < 1:
+            continue
+        larger = replace(at, p=[*at.p[:i], float(np.copysign(1.0, value)), *at.p[i + 1 :]])
+        there = larger.evaluate(q, v0)[0]
+        for j in absent:
+            if there[j, j] > 0:
+                raise StartFailureError(
+                    f"the start is refused: the mass of {at.system.coordinates[j]} is too small for a "
+                    f"double, with a parameter of {value!r} (in SI units): choose smaller units"
+                )
+
+
 def project_from_afar(
     at: Instant,
     q0: Vector,
@@ -192,6 +213,7 @@ def _velocities(
     system = at.system
     M, F, G, nu, _ = at.evaluate(q, v0)
     _check_masses(system, M)
+    _check_underflow(at, q, v0, M)
     natural = np.sqrt(size * np.abs(F) / np.where(M.diagonal() > 0, M.diagonal(), np.inf))
     unit = np.abs(G) @ np.maximum(np.abs(v0), natural)
     speed = G @ v0 - nu
