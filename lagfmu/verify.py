@@ -219,11 +219,13 @@ def applies(claim: Claim, result: Trajectory) -> NDArray[np.bool_]:
 
 
 def _departures(claim: Claim) -> list[str]:
-    """Contacts whose departure the claim speaks of."""
+    """Contacts whose departure the claim speaks of, if its `when` does not count them itself."""
     symbols = {
         str(s) for e in (claim.actual, claim.expected) if e is not None for s in e.free_symbols
     }
-    return sorted({s.split(".")[1] for s in symbols if s.startswith("departure.")})
+    counted = set() if claim.when is None else {str(s) for s in claim.when.free_symbols}
+    told = {s.split(".")[1] for s in symbols if s.startswith("departure.")}
+    return sorted(c for c in told if f"departure.{c}.count" not in counted)
 
 
 def evaluate(

@@ -59,9 +59,12 @@ xd, yd = departure("loop", x), departure("loop", y)
 vx, vy = departure("loop", x.diff()), departure("loop", y.diff())
 tau = t - departure("loop")
 
-# Let go inside of the loop it flies a parabola from there (1: it has not touched the loop yet).
-flies = (1 - initial(output("contact.loop"))) * Heaviside(-output("departure.loop.count"), 1)
-fall = y0 + initial(y.diff()) * t - g * t**2 / 2
+# So it does from the start if it is let go inside of the loop, until it has left it (1) for the first time.
+left = Heaviside(output("departure.loop.count") - 1, 1)
+across = left * (xd + vx * tau) + (1 - left) * (initial(x) + initial(x.diff()) * t)
+up = left * (yd + vy * tau - g * tau**2 / 2)
+up += (1 - left) * (y0 + initial(y.diff()) * t - g * t**2 / 2)
+flight = left + 1 - initial(output("contact.loop"))  # not 0: from one or the other
 
 closed_forms = [
     ClosedForm("lambda.loop", force, until_departure="loop"),
@@ -83,23 +86,7 @@ closed_forms = [
         scale=a,
     ),
     ClosedForm("v^2 at the departure", actual=vx**2 + vy**2, expected=g * yd, at_departure="loop"),
-    ClosedForm("x in flight", xd + vx * tau, actual=x, while_open="loop", scale=a),
-    ClosedForm("y in flight", yd + vy * tau - g * tau**2 / 2, actual=y, while_open="loop", scale=a),
-    ClosedForm(
-        "x from a start in flight",
-        actual=x,
-        expected=initial(x) + initial(x.diff()) * t,
-        while_open="loop",
-        when=flies,
-        scale=a,
-    ),
-    ClosedForm(
-        "y from a start in flight",
-        actual=y,
-        expected=fall,
-        while_open="loop",
-        when=flies,
-        scale=a,
-    ),
+    ClosedForm("x in flight", across, actual=x, while_open="loop", when=flight, scale=a),
+    ClosedForm("y in flight", up, actual=y, while_open="loop", when=flight, scale=a),
     Conserved("energy until it leaves", output("energy.total"), until_departure="loop"),
 ]

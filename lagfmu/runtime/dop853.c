@@ -154,7 +154,7 @@ static double error_norm(const Integrator *i, const Control *control, double h, 
                        e10 * k10[j] + e11 * k11[j] + e12 * k12[j];
         double third = sum[j] - bh1 * k1[j] - bh9 * k9[j] - bh12 * k12[j];
         double unit = 1 / step_size_weight(tolerance, y[j], y1[j], scale[j]);
-        fifth = h * fifth * unit; /* h first: a rate is too large, or a unit too small, to be squared */
+        fifth = h * fifth * unit; /* h first: rates and units may be too large to be squared */
         third = h * third * unit;
         square5 += fifth * fifth + 0 * y1[j];
         square3 += third * third;
@@ -197,9 +197,9 @@ static Status dop853_step(Integrator *i, const Ode *ode, const Control *control,
     return FAILED;
 }
 
-/* Replaces k_6 to k_12 in i->dense by the polynomial's coefficients r_1 to r_7 (eq. II.10.20), but r_2
- * by h k_1 = r_1 + r_2:  r_1 + z (r_2 + s p) = z h k_1 + s (r_1 + z p)  without the cancellation of r_1
- * that would leave no digits early in a very long step. */
+/* Replaces k_6 to k_12 in i->dense by the polynomial's coefficients r_1 to r_7 (eq. II.10.20), but
+ * r_2 by h k_1 = r_1 + r_2:  r_1 + z (r_2 + s p) = z h k_1 + s (r_1 + z p)  without the cancellation
+ * of r_1 that would leave no digits early in a very long step. */
 static Status dop853_prepare(Integrator *i, const Ode *ode) {
     const int n = i->ny;
     const double h = i->t - i->t_old;

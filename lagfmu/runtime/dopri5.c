@@ -98,8 +98,8 @@ static Status dopri5_step(Integrator *i, const Ode *ode, const Control *control,
     return FAILED;
 }
 
-/* Replaces k_3 to k_6 in i->dense by the polynomial's coefficients r_1 to r_4, but r_2 by h k_1 = r_1 +
- * r_2 (why: dop853.c). */
+/* Replaces k_3 to k_6 in i->dense by the polynomial's coefficients r_1 to r_4, but r_2 by
+ * h k_1 = r_1 + r_2 (why: dop853.c). */
 static Status dopri5_prepare(Integrator *i, const Ode *ode) {
     const int n = i->ny;
     const double h = i->t - i->t_old;

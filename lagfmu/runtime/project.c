@@ -20,7 +20,7 @@
 #include "digits.h"
 
 enum { ITERATIONS = 10 };
-static const double SMALL = 1e-9;     /* relative residual that rounding may leave */
+static const double SMALL = 1e-12;    /* relative residual that rounding may leave */
 static const double CONTRACTS = 1e-4; /* reduction of the error for which factors are kept */
 
 /* How far the positions are off: `error` is the largest |f - offset| relative to its own terms. */

@@ -15,7 +15,7 @@ from .system import NONHOLONOMIC, Matrix, Vector
 
 EPS = float(np.finfo(float).eps)
 ITERATIONS = 10
-SMALL = 1e-9  # residual, relative to the constraint's own size, that rounding may leave
+SMALL = 1e-12  # residual, relative to the constraint's own size, that rounding may leave
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,8 @@ class Compiled:
 class Statement:
     """A claim ready to be judged; `pointwise`: it holds at each instant, whatever the inputs did.
 
-    `instantaneous`: it relates the outputs of one instant, so that no error of the integration enters.
+    `instantaneous`: it relates the outputs of one instant, so that no error of the integration enters;
+    `law`: an equation that is solved at that instant, so that nothing but its own terms is its size.
     """
 
     claim: Claim
@@ -100,6 +101,7 @@ class Statement:
     sizes: tuple[Compiled, ...]
     pointwise: bool
     instantaneous: bool
+    law: bool
 
     def judge(
         self,
@@ -124,7 +126,7 @@ class Statement:
         known = np.isfinite(expected) & np.isfinite(actual)  # elsewhere the form is not defined
         if not known.any():
             return 0.0, 1.0, 0
-        least = None if self.instantaneous else floors
+        least = None if self.law else floors
         sizes = [np.abs(expected), *(np.abs(s.at(chosen, run, least)) for s in self.sizes)]
         for s in sizes:
             known &= np.isfinite(s)
@@ -149,16 +151,16 @@ def statements(claims: tuple[Claim, ...], inputs: set[str]) -> tuple[Statement, 
         parts = [c.actual] + ([] if c.expected is None else [c.expected])
         used = {str(s) for e in parts for s in sp.sympify(e).free_symbols}
         follows = any(u == "time" or u.startswith(("initial(", "departure.")) for u in used)
-        found.append(_statement(c, c.expected is not None and not follows, inputs))
+        found.append(_statement(c, c.expected is not None and not follows, False, inputs))
     return tuple(found)
 
 
 def laws(claims: tuple[Claim, ...]) -> tuple[Statement, ...]:
     """Lagrange's equations (lagrange.py), compiled: instantaneous even where time stands in them."""
-    return tuple(_statement(c, True, set()) for c in claims)
+    return tuple(_statement(c, True, True, set()) for c in claims)
 
 
-def _statement(c: Claim, instantaneous: bool, inputs: set[str]) -> Statement:
+def _statement(c: Claim, instantaneous: bool, law: bool, inputs: set[str]) -> Statement:
     parts = [c.actual] + ([] if c.expected is None else [c.expected])
     sizes = [magnitude(sp.sympify(e)) for e in parts] + ([] if c.scale is None else [c.scale])
     return Statement(
@@ -168,6 +170,7 @@ def _statement(c: Claim, instantaneous: bool, inputs: set[str]) -> Statement:
         tuple(Compiled(e, c.name) for e in sizes),
         instantaneous or not inputs,
         instantaneous,
+        law,
     )
 
 
