@@ -22,6 +22,7 @@ from lagfmu import LagfmuError, Verification, verify
 from lagfmu.build import TARGETS, write
 from lagfmu.compiler import HOST, find_compiler
 from lagfmu.fmu.native import takes_long
+from lagfmu.make import settled
 from lagfmu.modelfile import ModelFile, load
 from lagfmu.prepare import prepare
 from lagfmu.scene import Scene
@@ -35,11 +36,12 @@ def build_one(
 ) -> tuple[Path, float, Verification, float]:
     """The FMU, seconds to build it, its verification, seconds to simulate it."""
     begun = time.perf_counter()
+    scene, choice = settled(file.model, scene, file.closed_forms, target)
     prepared = prepare(file.model, scene)
-    path = write(prepared, out, file.closed_forms, target=target, platforms=platforms)
+    path = write(prepared, out, file.closed_forms, (), target, platforms, choice)
     built = time.perf_counter() - begun
     runs = [verify(path) for _ in range(RUNS)]
-    write(prepared, out, file.closed_forms, runs[0].rows(), target, platforms)
+    write(prepared, out, file.closed_forms, runs[0].rows(), target, platforms, choice)
     return path, built, runs[0], statistics.median(r.seconds for r in runs)
 
 

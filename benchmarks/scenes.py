@@ -106,7 +106,17 @@ def show(entries: list[Entry]) -> None:
     table = Table(box=SIMPLE_HEAD)
     for head in ("FMU", "scene"):
         table.add_column(head)
-    for head in ("operations", "Python", "C", "binary", "FMU native", "python", "µs/s", "native", "µs/s"):
+    for head in (
+        "operations",
+        "Python",
+        "C",
+        "binary",
+        "FMU native",
+        "python",
+        "µs/s",
+        "native",
+        "µs/s",
+    ):
         table.add_column(head, justify="right")
     before = ""
     for e in entries:
@@ -115,7 +125,11 @@ def show(entries: list[Entry]) -> None:
             whole, before = e, e.model
         row = [e.model if e is whole else "", e.scene, str(e.cost.operations)]
         row += [str(e.cost.python_bytes), str(e.cost.native_bytes)]
-        row += [f"{e.binary / 1e3:.1f}", f"{e.sizes['native'] / 1e3:.0f}", f"{e.sizes['python'] / 1e3:.0f}"]
+        row += [
+            f"{e.binary / 1e3:.1f}",
+            f"{e.sizes['native'] / 1e3:.0f}",
+            f"{e.sizes['python'] / 1e3:.0f}",
+        ]
         simulated = e.importers["native"].stop_time
         own = {t: net(e, t) for t in TARGETS}
         full = {t: net(whole, t) for t in TARGETS}

@@ -34,9 +34,15 @@ def build_fmu(
     `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them; `figures` are
     verification results for its documentation page.  Raises ModelError, DerivationError, BuildError.
     """
-    scene = scene or Scene(model.name)
-    choice = ""
-    if scene.accuracy is not None:
-        chosen = choose(model, scene, closed_forms, parse(scene.accuracy), target=target)
-        scene, choice = chosen.scene, section(chosen)
+    scene, choice = settled(model, scene or Scene(model.name), closed_forms, target)
     return write(prepare(model, scene), out, closed_forms, figures, target, platforms, choice)
+
+
+def settled(
+    model: Model, scene: Scene, closed_forms: Sequence[ClosedForm | Conserved], target: str
+) -> tuple[Scene, str]:
+    """The scene with the settings that hold its accuracy, and HTML on how they were chosen."""
+    if scene.accuracy is None:
+        return scene, ""
+    chosen = choose(model, scene, closed_forms, parse(scene.accuracy), target=target)
+    return chosen.scene, section(chosen)
