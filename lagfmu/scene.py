@@ -102,7 +102,8 @@ class Scene:
         value = getattr(self, what)
         if isinstance(value, str) or not all(isinstance(x, str) for x in value):
             return [f"{what} = {value!r}, expected a list of names, e.g. {what}=['m']"]
-        object.__setattr__(self, what, tuple(value))
+        whole = "*" in value and what != "fixed"
+        object.__setattr__(self, what, EVERYTHING if whole else tuple(value))
         return []
 
     @property
