@@ -910,7 +910,7 @@ for path in sys.argv[1:]:
     file = load(Path(path))
     for scene in file.scenes:
         p = prepare(file.model, scene)
-        digest.update(model_source(p.equations, p.reduction, scene.formulation).encode())
+        digest.update(model_source(p.equations, p.reduction, p.formulation).encode())
         digest.update(
             variables_source(p.table, p.equations, p.reduction, scene, p.system).encode()
         )
