@@ -1,6 +1,6 @@
 """Variable table -> variables.c: the FMU's variables as runtime/variables.h declares them.
 
-Position = value reference.  Names are those of variables.py; where each value lies follows from the
+Position = value reference.  Names are those of table.py; where each value lies follows from the
 name, by the same rules as in solver/observe.py.
 """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from . import prune
+from . import fold, prune
 from .consistency import Structure, check_embedding, check_held, examine
 from .equations import EquationsOfMotion, derive
 from .errors import DerivationError, ModelError
@@ -15,7 +15,8 @@ from .reduction import Reduction, reduce
 from .scene import Scene
 from .selection import select
 from .solver.system import System
-from .variables import VariableTable, variable_table
+from .table import variable_table
+from .variables import VariableTable
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
     problems: list[str] = []
     derived = derive(model)
     equations = prune.held(derived, scene, problems)
-    numbers = prune.numbers_of(derived, scene, problems)
+    numbers = fold.numbers_of(derived, scene, problems)
     scene, reduction, outputs = _asked(equations, scene, problems)
     if problems:
         raise ModelError(scene.name, problems)
@@ -73,19 +74,19 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
         check_held(lower(derived), variable_table(derived, None, scene), equations)
     coded, coded_reduction = equations, reduction
     if not scene.complete:
-        coordinates, rows = prune.needed(prune.folded(equations, numbers), reduction, outputs)
+        coordinates, rows = prune.needed(fold.folded(equations, numbers), reduction, outputs)
         equations = prune.only(equations, coordinates, rows)
         if reduction is not None and equations is not coded:
             reduction = reduce(equations)
         coded, coded_reduction = prune.silent(equations, outputs), reduction
         if coded_reduction is not None:
             coded, coded_reduction = prune.read_only(coded, coded_reduction, outputs)
-        numbers |= prune.values(prune.idle(prune.folded(coded, numbers), coded_reduction), model)
-        if scene.method == "auto" and scene.methods is None and not prune.damped(coded, numbers):
+        numbers |= fold.values(fold.idle(fold.folded(coded, numbers), coded_reduction), model)
+        if scene.method == "auto" and scene.methods is None and not fold.damped(coded, numbers):
             scene = replace(scene, method="dop853")
-    coded = prune.folded(coded, numbers)
+    coded = fold.folded(coded, numbers)
     if coded_reduction is not None:
-        coded_reduction = prune.folded_reduction(coded_reduction, numbers)
+        coded_reduction = fold.folded_reduction(coded_reduction, numbers)
     if reduction is not None:
         check_embedding(equations, reduction)
     table = variable_table(coded, coded_reduction, scene)

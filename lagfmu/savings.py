@@ -12,9 +12,9 @@ from .ccode import model_source
 from .elimination import plan
 from .equations import EquationsOfMotion
 from .fmu.native import needs_tangents
+from .fold import idle as idle_parameters
 from .numeric import source
 from .prepare import Prepared, prepare
-from .prune import idle as idle_parameters
 from .units import Unit
 
 Expr = Any

@@ -1,7 +1,7 @@
 """What one FMU must show, and so what it must hold: the full FMU is the scene that asks for everything.
 
 `outputs`, `fixed`, `inputs` and `contacts` say what an importer will read, change, drive and see open;
-prune.py takes everything else away before code is printed.
+prune.py and fold.py take everything else away before code is printed.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 /* variables.h -- the FMU's variables as fmi2.c sees them; variables.c is generated from the same table
- * as modelDescription.xml (variables.py).  The position is the value reference. */
+ * as modelDescription.xml (table.py).  The position is the value reference. */
 #ifndef LAGFMU_VARIABLES_H
 #define LAGFMU_VARIABLES_H
 

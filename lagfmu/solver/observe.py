@@ -1,4 +1,4 @@
-"""A state -> everything that the FMU reports, by the names that variables.py gave."""
+"""A state -> everything that the FMU reports, by the names that table.py gave."""
 
 from __future__ import annotations
 
