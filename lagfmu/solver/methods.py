@@ -18,7 +18,7 @@ from .state import Settings
 from .system import Vector
 
 
-class Dop853(DOP853):
+class Dop853(DOP853):  # type: ignore[misc]
     """SciPy's, whose error norm squares rates of change: at 1e155 and more it overflows and accepts."""
 
     def _estimate_error_norm(self, K: Any, h: float, scale: Vector) -> Any:
