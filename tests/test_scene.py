@@ -268,6 +268,17 @@ def test_an_undamped_scene_has_one_integrator_by_default() -> None:
     assert frictionless.scene.selectable == ("dop853",)
 
 
+def test_a_stiff_scene_of_forces_goes_on_with_radau5(fmu: Any, make: Make) -> None:
+    """A cart in syrup, c = 1e6 N s/m, is stiff for its pendulum beside it: of a scene that reads lambda
+    alone `auto` still takes the implicit method, with its Jacobian, and few steps."""
+    path, prepared = make("CartPendulum", outputs=["lambda.rod"], fixed=["c=1e6"])
+    assert prepared.scene.selectable == ("auto",)
+    full = simulate(fmu("CartPendulum"), 1.0, start_values={"c": 1e6}, besides=())
+    run = simulate(path, 1.0, besides=["solver.steps"])
+    assert run["solver.steps"][-1] < 5000
+    assert largest_difference(full, run, ["lambda.rod"]) < 1e-6
+
+
 def test_a_method_that_was_left_out_cannot_be_chosen(make: Make) -> None:
     """Of two methods the FMU offers these, by name, and refuses a third."""
     path, _ = make("PendulumCartesian", methods=["dop853", "rk4"], method="dop853")
