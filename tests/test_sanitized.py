@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -30,11 +31,17 @@ LIVES = {  # steps that reach the event or the singular point in between
     "PendulumNullspace": 0.1,
     "Swing": 0.1,  # one constraint too many
     "Isosceles": 0.37,  # a step that fails
+    "Normal": 0.07,  # a scene: lambda of the hemisphere alone, numbers for m and g
+    "Places": 0.1,  # a scene: coordinates that are only read, nothing is solved for lambda
+}
+SCENES = {  # FMU, outputs, numbers
+    "Normal": ("Hemisphere", ["lambda.surface"], ["m", "g"]),
+    "Places": ("PendulumCartesian", ["x", "der(y)", "energy.total"], ["*"]),
 }
 
 
 @pytest.fixture(scope="module")
-def unpacked(native_fmu, tmp_path_factory):
+def unpacked(native_fmu, prepared, tmp_path_factory):
     """unpacked(NAME): folder of the FMU and its description."""
     folder = tmp_path_factory.mktemp("sources")
 
@@ -45,6 +52,10 @@ def unpacked(native_fmu, tmp_path_factory):
             path = build_fmu(
                 isosceles(), folder, Scene("Isosceles", tolerance=1e-9), target="native"
             )
+        elif name in SCENES:
+            model, outputs, numbers = SCENES[name]
+            scene = replace(prepared(model).asked, name=name, outputs=outputs, fixed=numbers)
+            path = build_fmu(prepared(model).model, folder, scene, target="native")
         else:
             path = native_fmu(name)
         return Path(fmpy.extract(str(path), str(folder / name))), fmpy.read_model_description(
