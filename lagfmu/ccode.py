@@ -105,29 +105,14 @@ def _in_reals(eom: EquationsOfMotion) -> EquationsOfMotion:
     table = _real([*eom.q, *eom.v, *eom.u, *eom.p, TIME])
 
     def real(e: Expr) -> Expr:
-        return None if e is None else sp.sympify(e).xreplace(table)
-
-    def each(group: Sequence[Expr]) -> tuple[Expr, ...]:
-        return tuple(real(e) for e in group)
-
-    def sparse(matrix: Expr) -> Expr:
-        values = {ij: real(e) for ij, e in matrix.todok().items()}
-        return sp.ImmutableSparseMatrix(matrix.rows, matrix.cols, values)
+        return e.xreplace(table)
 
     return replace(
-        eom,
-        q=each(eom.q),
-        v=each(eom.v),
-        u=each(eom.u),
-        p=each(eom.p),
-        M=sparse(eom.M),
-        F=each(eom.F),
-        G=sparse(eom.G),
-        nu=each(eom.nu),
-        gamma=each(eom.gamma),
-        f=each(eom.f),
-        kinetic=real(eom.kinetic),
-        potential=real(eom.potential),
+        eom.mapped(real),
+        q=tuple(map(real, eom.q)),
+        v=tuple(map(real, eom.v)),
+        u=tuple(map(real, eom.u)),
+        p=tuple(map(real, eom.p)),
         symbols={s: real(e) for s, e in eom.symbols.items()} | table,
     )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import random
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,6 @@ import numpy as np
 from .diagnosis import cause_of_failure
 from .equations import EquationsOfMotion
 from .errors import DerivationError, ModelError
-from .model import Contact
 from .reduction import Reduction
 from .solver.failure import StepFailureError
 from .solver.initial import Start, start
@@ -65,18 +64,7 @@ def examine(
     Warns of redundant constraints.  Raises ModelError if no configuration satisfies the constraints,
     they contradict each other, or the mass matrix is singular on the constraint surface.
     """
-    given = numbers or {}
-    p = [float(given.get(x.symbol, x.value)) for x in eom.parameters]
-    u = [float(given.get(s, table[str(s)].start or 0.0)) for s in eom.u]
-    q0 = [float(table[c].start or 0.0) for c in system.coordinates]
-    v0 = [float(table[f"der({c})"].start or 0.0) for c in system.coordinates]
-    try:
-        begun = start(system, Settings(), 0.0, q0, v0, u, p)
-        observe(system, begun.state, u, p)
-    except StepFailureError as error:
-        at = Instant(system, 0.0, system.inputs_at(u, 0.0), p)
-        cause = cause_of_failure(at, np.array(q0), np.array(v0)) or str(error)
-        raise ModelError(eom.model.name, [cause]) from error
+    begun, u, p = _begun(eom, table, system, numbers or {})
     generator = random.Random(1)
     ranks = []
     for trial in range(TRIALS):
@@ -103,17 +91,36 @@ def examine(
     return Structure(eom.n, eom.m, rank, redundant, begun)
 
 
-def check_held(system: System, table: VariableTable, eom: EquationsOfMotion) -> None:
-    """Contacts that a scene does not let open are closed at the start.  Raises ModelError naming others.
-
-    `system` and `table` are the model's, with all contacts; `eom` is without those that are held.
-    """
-    kept = {c.name for c in eom.constraints if isinstance(c, Contact)}
-    p = [float(table[name].start or 0.0) for name in system.parameters]
-    u = [float(v.start or 0.0) for v in table.variables if v.role == "input"]
+def _begun(
+    eom: EquationsOfMotion, table: VariableTable, system: System, numbers: Mapping[Any, Any]
+) -> tuple[Start, list[float], list[float]]:
+    """The start with the values of the table and `numbers`, the inputs and the parameters then."""
+    p = [float(numbers.get(x.symbol, x.value)) for x in eom.parameters]
+    u = [float(numbers.get(s, table[str(s)].start or 0.0)) for s in eom.u]
     q0 = [float(table[c].start or 0.0) for c in system.coordinates]
     v0 = [float(table[f"der({c})"].start or 0.0) for c in system.coordinates]
-    closed = start(system, Settings(), 0.0, q0, v0, u, p).state.closed
+    try:
+        begun = start(system, Settings(), 0.0, q0, v0, u, p)
+        observe(system, begun.state, u, p)
+    except StepFailureError as error:
+        at = Instant(system, 0.0, system.inputs_at(u, 0.0), p)
+        cause = cause_of_failure(at, np.array(q0), np.array(v0)) or str(error)
+        raise ModelError(eom.model.name, [cause]) from error
+    return begun, u, p
+
+
+def check_held(
+    eom: EquationsOfMotion,
+    table: VariableTable,
+    system: System,
+    numbers: Mapping[Any, Any],
+    kept: Collection[str],
+) -> None:
+    """Contacts that a scene does not let open are closed at the start.  Raises ModelError naming others.
+
+    The equations, `table` and `system` are the model's, with all contacts; `kept` may open.
+    """
+    closed = _begun(eom, table, system, numbers)[0].state.closed
     names = [system.rows[k].name for k in system.contacts]
     away = [n for n, shut in zip(names, closed, strict=True) if n not in kept and not shut]
     if away:

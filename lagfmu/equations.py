@@ -13,8 +13,8 @@ symbols that stand in it, so that a chain of n links costs n times as much as on
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -94,6 +94,30 @@ class EquationsOfMotion:
             if p.symbol in self.numbers and self.model.units[p.symbol].same_dimension(unit)
         ]
         return 0.0 if unit.dimensionless else max(values, default=0.0)
+
+    def mapped(self, change: Callable[[Expr], Expr]) -> EquationsOfMotion:
+        """The same with `change` done to every expression of the equations and energies."""
+
+        def each(group: tuple[Expr, ...]) -> tuple[Expr, ...]:
+            return tuple(None if e is None else change(sp.sympify(e)) for e in group)
+
+        def sparse(matrix: Expr) -> Expr:
+            entries = matrix.todok().items()
+            values = {ij: e for ij, a in entries if (e := change(a)) != 0}
+            return sp.ImmutableSparseMatrix(matrix.rows, matrix.cols, values)
+
+        kinetic, potential = each((self.kinetic, self.potential))
+        return replace(
+            self,
+            M=sparse(self.M),
+            F=each(self.F),
+            G=sparse(self.G),
+            nu=each(self.nu),
+            gamma=each(self.gamma),
+            f=each(self.f),
+            kinetic=kinetic,
+            potential=potential,
+        )
 
     def plain(self, expression: Expr) -> Expr:
         """An expression of the model's dynamicsymbols in this object's plain symbols and numbers."""

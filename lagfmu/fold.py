@@ -69,30 +69,10 @@ def folded(eom: EquationsOfMotion, numbers: Mapping[Expr, Expr]) -> EquationsOfM
     if not numbers:
         return eom
 
-    def put(e: Expr) -> Expr:
-        return None if e is None else _settled(sp.sympify(e).xreplace(numbers))
-
-    def each(group: Iterable[Expr]) -> tuple[Expr, ...]:
-        return tuple(put(e) for e in group)
-
-    def sparse(matrix: Expr) -> Expr:
-        values = {ij: put(e) for ij, e in matrix.todok().items()}
-        return sp.ImmutableSparseMatrix(
-            matrix.rows, matrix.cols, {ij: e for ij, e in values.items() if e != 0}
-        )
-
     made = replace(
-        eom,
+        eom.mapped(lambda e: _settled(e.xreplace(numbers))),
         u=tuple(s for s in eom.u if s not in numbers),
         p=tuple(s for s in eom.p if s not in numbers),
-        M=sparse(eom.M),
-        F=each(eom.F),
-        G=sparse(eom.G),
-        nu=each(eom.nu),
-        gamma=each(eom.gamma),
-        f=each(eom.f),
-        kinetic=put(eom.kinetic),
-        potential=put(eom.potential),
         rates={s: r for s, r in eom.rates.items() if s not in numbers},
         numbers={**eom.numbers, **numbers},
     )

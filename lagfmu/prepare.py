@@ -71,7 +71,9 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
     if problems:
         raise ModelError(scene.name, problems)
     if equations is not derived:
-        check_held(lower(derived), variable_table(derived, None, scene), equations)
+        may_open = {c.name for c in equations.constraints if isinstance(c, Contact)}
+        every = variable_table(derived, None, scene)
+        check_held(derived, every, lower(derived), numbers, may_open)
     coded, coded_reduction = equations, reduction
     if not scene.complete:
         coordinates, rows = prune.needed(fold.folded(equations, numbers), reduction, outputs)

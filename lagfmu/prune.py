@@ -66,7 +66,9 @@ def needed(
             if own & coordinates or own_rows & rows:
                 coordinates |= own | others
                 rows |= own_rows
-        rows |= {names.index(w) for k in rows if (w := _gate(eom.constraints[k])) is not None}
+        rows |= {
+            names.index(w) for k in rows if (w := getattr(eom.constraints[k], "while_closed", None))
+        }
         grown = (len(coordinates), len(rows)) != before
     if not coordinates:
         raise ModelError(
@@ -109,10 +111,6 @@ def subjects(
         for name in (f"{s}", f"der({s})", f"der({s},2)"):
             found.setdefault(name, (moved, none))
     return found
-
-
-def _gate(c: Constraint) -> str | None:
-    return None if isinstance(c, Contact) else c.while_closed
 
 
 def _behind(eom: EquationsOfMotion, coordinates: Indices, rows: Indices) -> set[Expr]:

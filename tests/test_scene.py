@@ -184,6 +184,14 @@ def test_a_contact_that_is_open_at_the_start_cannot_be_one_that_never_opens() ->
         prepare(file.model, replace(scene, contacts=[]))
 
 
+def test_a_number_may_open_a_contact_at_the_start() -> None:
+    """At r = 1 m the particle hovers over a hemisphere of 0.5 m: that the contact holds contradicts the
+    radius that the scene gives, not the model's own."""
+    file, scene = scene_of("Hemisphere")
+    with pytest.raises(ModelError, match=r"'surface' is open at the start"):
+        prepare(file.model, replace(scene, contacts=[], fixed=["a=0.5"]))
+
+
 def test_an_input_that_nothing_drives_is_a_number(fmu: Any, make: Make) -> None:
     """The cart under no force moves as with F = 0 held, and F is not there."""
     path, _ = make("CartPendulum", inputs=[], method="dop853")
