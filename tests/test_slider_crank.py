@@ -126,3 +126,21 @@ def test_on_the_other_side_of_the_crank(fmu):
     """With the slider at r - l, behind the crank, its place and speed follow the other root."""
     found = verify(fmu("SliderCrank"), start_values={"x": -0.2, "y": 0.0})
     assert found.passed, [c for c in found.checks if not c.passed]
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.1, 2.0])
+def test_at_rest_it_stays_at_rest_and_costs_nothing(fmu, phi):
+    """Without a torque slider and load rest anywhere, the spring at its length to the last bit or the bits
+    beside it: what k = 1e6 N/m makes of a rounding, 1e-10 N, is nothing to be resolved."""
+    slider = 0.1 * np.cos(phi) + np.sqrt(0.09 - 0.01 * np.sin(phi) ** 2)
+    for method in ("radau5", "auto"):
+        for bits in (-1, 0, 1):
+            with instance(fmu("SliderCrank")) as one:
+                load = (slider + 0.2) * (1 + bits * np.finfo(float).eps)
+                values = {"phi": phi, "x": slider, "y": load, "der(phi)": 0.0}
+                one.start({**values, "solver.method": method})
+                one.step(1.0)
+                assert abs(one.get("phi") - phi) < 1e-14
+                assert abs(one.get("der(x)")) < 1e-13
+                assert abs(one.get("lambda.rod")) < 1e-9
+                assert one.get("solver.steps") < 60, (method, bits)

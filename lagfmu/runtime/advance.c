@@ -196,7 +196,7 @@ static Status complete_magnitudes(Solver *s, double span) {
     leg_begin(s);
     const Instant at = leg_instant(s, s->state.now.t);
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
-    return magnitudes_complete(s, span);
+    return magnitudes_complete(s, at, span);
 }
 
 Status solver_advance(Solver *s, double t_end) {

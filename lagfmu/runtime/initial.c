@@ -263,13 +263,14 @@ static Status find_modes(const Start *x) {
 }
 
 /* A start value is its own scale, so that a start at theta0 = 1e-6 is resolved. */
-static Status find_magnitudes(Solver *s) {
+static Status find_magnitudes(const Start *x) {
+    Solver *s = x->s;
     const int n = s->system->n;
     for (int j = 0; j < n; j++) {
         s->state.scale[j] = fabs(s->state.q[j]);
         s->state.scale[n + j] = fabs(s->state.v[j]);
     }
-    return magnitudes_complete(s, 0);
+    return magnitudes_complete(s, x->at, 0);
 }
 
 static void tell_moved(const Start *x, Moved moved, void *context) {
@@ -317,7 +318,7 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, Mov
     if (find_velocities(&x) == FAILED) return FAILED;
     if (find_modes(&x) == FAILED) return FAILED;
     for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];
-    if (find_magnitudes(s) == FAILED) return FAILED;
+    if (find_magnitudes(&x) == FAILED) return FAILED;
     if (moved != NULL) tell_moved(&x, moved, context);
     return OK;
 }

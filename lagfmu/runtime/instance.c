@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "leg.h"
 #include "magnitudes.h"
 
 static const double SMALLEST_TOLERANCE = 1e-14;
@@ -242,7 +243,9 @@ Status instance_start(Instance *x) {
     s->drive.since = x->start_time;
     if (solver_start(s, x->start_time, x->q0, x->v0, tell_moved, x) != OK) return FAILED;
     /* model exchange has no communication step: 1 s stands in for it */
-    if (x->exchange && magnitudes_incomplete(s) && magnitudes_complete(s, 1) != OK) return FAILED;
+    if (x->exchange && magnitudes_incomplete(s) &&
+        magnitudes_complete(s, leg_instant(s, x->start_time), 1) != OK)
+        return FAILED;
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     x->started = 1;
     x->observed = x->evaluated = 0;

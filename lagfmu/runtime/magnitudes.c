@@ -13,6 +13,10 @@
  * alone give that rate (a place may be far away, and says nothing), and V/A the forces before they
  * cancel.
  *
+ * At rest on springs that balance, what is left of the acceleration is rounding of forces that
+ * cancel, and the natural rate is that of small oscillations: sqrt(|dvdot| / size), with dvdot what a
+ * displacement by the size would give.
+ *
  * Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the
  * only time is the importer's: tau is PART of the first communication step.  Were the motion a
  * million times faster than that step, its size would be taken for at most 1e6 times what it is,
@@ -20,11 +24,14 @@
 #include "magnitudes.h"
 
 #include <float.h>
+#include <string.h>
 
 const double TOUCH = 1e-9;
 static const double LOST = 1e3 * DBL_EPSILON; /* what is left of a place by a projection, or of
                                                * forces that cancel, is rounding */
 static const double PART = 1e-3;  /* of the first step, in which a motion without scale is measured */
+static const double SHIFT = 0x1p-20; /* of its size, by which a coordinate is displaced to see what
+                                      * holds it */
 static const double TINY = 1e-100; /* scale of what neither moves nor is pushed: anything that moves
                                     * exceeds it */
 
@@ -115,10 +122,41 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
     return natural;
 }
 
-static double find_rate(const Solver *s, double span, const double *felt, double natural) {
+/* pull (n): accelerations; at a state without speed, where they are rounding, those with which it
+ * comes back if each coordinate in turn is displaced by its size, linearly.  `stepped` is at the
+ * state before and after. */
+static Status find_pull(Solver *s, Instant at, double *pull) {
+    const int n = s->system->n;
+    const size_t bytes = (size_t)n * sizeof *pull;
+    State *state = &s->state;
+    Mechanism *b = &s->stepped;
+    double *vdot = s->work_initial, *back = pull + n;
+    int moves = 0, evaluated = 1, rounding = 1;
+    memcpy(vdot, b->vdot, bytes);
+    for (int j = 0; j < n; j++) {
+        moves |= state->v[j] != 0;
+        pull[j] = fabs(vdot[j]);
+        back[j] = 0;
+    }
+    if (moves) return OK;
+    for (int j = 0; j < n && evaluated; j++) {
+        const double q = state->q[j];
+        if (!(state->size[j] > 0)) continue;
+        state->q[j] += SHIFT * state->size[j];
+        evaluated = mechanism_motion(b, at, state->q, state->v, s->active) == OK;
+        state->q[j] = q;
+        for (int i = 0; i < n; i++) back[i] += fabs(b->vdot[i] - vdot[i]) / SHIFT;
+    }
+    for (int j = 0; j < n; j++) rounding &= pull[j] <= LOST * back[j];
+    if (evaluated && rounding) memcpy(pull, back, bytes);
+    return mechanism_motion(b, at, state->q, state->v, s->active);
+}
+
+static double find_rate(const Solver *s, double span, const double *felt, const double *pull,
+                        double natural) {
     double rate = natural, forced = 0;
     for (int j = 0; j < s->system->n; j++) {
-        rate = larger(rate, rate_of(s, j, s->stepped.vdot[j]));
+        rate = larger(rate, rate_of(s, j, pull[j]));
         forced = larger(forced, rate_of(s, j, felt[j]));
     }
     if (!(rate > 0)) rate = forced;
@@ -164,11 +202,15 @@ static Status find_scales(Solver *s, const double *own) {
     return OK;
 }
 
-Status magnitudes_complete(Solver *s, double span) {
-    double *felt = s->work_initial + s->system->n, *own = felt + s->system->n;
+Status magnitudes_complete(Solver *s, Instant at, double span) {
+    const int n = s->system->n;
+    double *felt = s->work_initial + n, *own = felt + n, *pull = own + n;
     find_felt(&s->stepped, felt);
     const double natural = find_own(s, span, felt, own);
-    if (!(s->state.now.rate > 0)) s->state.now.rate = find_rate(s, span, felt, natural);
+    if (!(s->state.now.rate > 0)) {
+        if (find_pull(s, at, pull) != OK) return FAILED;
+        s->state.now.rate = find_rate(s, span, felt, pull, natural);
+    }
     take_sizes(s, felt, own);
     return find_scales(s, own);
 }

@@ -16,7 +16,8 @@ void magnitudes_sizes(Solver *s, const double *q);
 int magnitudes_incomplete(const Solver *s);
 
 /* Sizes, rate, scales and gaps as far as they can be known; scales only grow.  `stepped` holds the
- * motion at the state; span [s]: of the first step, or 0 while there is none.  FAILED if one is not finite. */
-Status magnitudes_complete(Solver *s, double span);
+ * motion at the state and instant; span [s]: of the first step, or 0 while there is none.  FAILED if one
+ * is not finite. */
+Status magnitudes_complete(Solver *s, Instant at, double span);
 
 #endif

@@ -11,6 +11,10 @@ coordinates that have a size, or V/A.  Too small a size is safe, an error is the
 motion reached so far; too large a one hides errors.  Hence parameters and angles alone give that
 rate (a place may be far away, and says nothing), and V/A the forces before they cancel.
 
+At rest on springs that balance, what is left of the acceleration is rounding of forces that cancel, and
+the natural rate is that of small oscillations: sqrt(|dvdot| / size), with dvdot what a displacement by
+the size would give.
+
 Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the only time
 is the importer's: tau is PART of the first communication step.  Were the motion a million times
 faster than that step, its size would be taken for at most 1e6 times what it is, which the floor of the
@@ -25,6 +29,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .failure import StepFailureError
 from .instant import Instant
 from .motion import EPS, Motion, motion
 from .state import Settings, State
@@ -35,6 +40,7 @@ Mask = NDArray[np.bool_]
 TOUCH = 1e-9  # |f| below this, in units of the constraint's own size, counts as touching
 LOST = 1e3 * EPS  # what is left of a place by a projection, or of forces that cancel, is rounding
 PART = 1e-3  # of the first communication step, in which a motion without any scale is measured
+SHIFT = 2.0**-20  # of its size, by which a coordinate is displaced to see what holds it
 TINY = 1e-100  # scale of what neither moves nor is pushed: anything that moves exceeds it
 
 
@@ -72,7 +78,8 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
     q, v = np.array(state.q), np.array(state.v)
     now = motion(at, q, v, system.active(state.closed))
     felt = _felt(now)
-    size, found = np.array(state.size), np.array(state.size) > 0
+    known = np.array(state.size)
+    size, found = known.copy(), known > 0
     own = np.zeros(system.n)  # rate [1/s] by which a size is taken from the motion
     natural = 0.0
     steady = _rate(system, size, np.abs(v), felt, found & _measured(system, at.p))
@@ -88,7 +95,10 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
             own[j] = 1 / (PART * span)
         if own[j] > 0:
             size[j] = max(speed / own[j], acceleration / own[j] / own[j])
-    rate = state.rate or max(_rate(system, size, np.abs(v), np.abs(now.vdot), found), natural)
+    rate = state.rate
+    if rate == 0:
+        pull = np.abs(now.vdot) if v.any() else _held(at, state, now)
+        rate = max(_rate(system, known, np.abs(v), pull, found), natural)
     rate = rate or _rate(system, size, np.abs(v), felt, found) or (1 / span if span > 0 else 0.0)
     floor = max(1e-8, 10 * EPS / settings.tolerance)
     speed_scale = floor * size * np.where(own > 0, own, rate)
@@ -119,6 +129,21 @@ def _felt(now: Motion) -> Vector:
     forces = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
     alone: Vector = forces / np.where(mass > 0, mass, np.inf)
     return np.maximum(np.abs(now.vdot), alone)
+
+
+def _held(at: Instant, state: State, now: Motion) -> Vector:
+    """Accelerations (n) at a state without speed; where they are rounding, those with which it comes back
+    if each coordinate in turn is displaced by its size, linearly."""
+    active = at.system.active(state.closed)
+    pull, back = np.abs(now.vdot), np.zeros(at.system.n)
+    for j in np.flatnonzero(state.size):
+        moved = np.array(state.q)
+        moved[j] += SHIFT * state.size[j]
+        try:
+            back += np.abs(motion(at, moved, np.array(state.v), active).vdot - now.vdot) / SHIFT
+        except StepFailureError:
+            return pull  # at the edge of what the equations describe
+    return back if (pull <= LOST * back).all() else pull
 
 
 def _rate(system: System, size: Vector, speed: Vector, pull: Vector, counted: Mask) -> float:
