@@ -88,6 +88,15 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     return OK;
 }
 
+/* To where the integrator stood at t, before a step that failed or cannot be used; h: to try next. */
+static void take_back(Solver *s, double t, double h) {
+    const Integrator *i = &s->integrator;
+    double *y = s->work_advance;
+    memcpy(y, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y);
+    restart(s, t, y, h);
+    s->state.now.event_count = 0;
+}
+
 /* As far as the communication point, or past it. */
 static Status try_step(Solver *s, double t_end) {
     Integrator *i = &s->integrator;
@@ -96,10 +105,7 @@ static Status try_step(Solver *s, double t_end) {
     const double longest = fmax(reach, t_end - i->t);
     const double t = i->t, h = i->h_next;
     if (step_towards(s, t_end, fmax(t_end, s->stop_time), longest) == OK) return OK;
-    double *y0 = s->work_advance; /* before the step, if it was taken and could not be used */
-    memcpy(y0, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y0);
-    restart(s, t, y0, fmin(h > 0 ? h : t_end - t, t_end - t));
-    s->state.now.event_count = 0;
+    take_back(s, t, fmin(h > 0 ? h : t_end - t, t_end - t));
     return step_towards(s, t_end, t_end, HUGE_VAL);
 }
 
@@ -117,16 +123,12 @@ static void choose(Solver *s) {
 
 /* Where radau5 fails, dop853 goes on. */
 static Status take_step(Solver *s, double t_end) {
-    Integrator *i = &s->integrator;
     if (s->settings.method == AUTO) choose(s);
-    const double t = i->t;
+    const double t = s->integrator.t;
     const Status status = try_step(s, t_end);
     if (status == OK || !s->state.now.choice.implicit) return status;
-    double *y0 = s->work_advance;
-    memcpy(y0, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y0);
     stiffness_explicit(&s->state.now.choice, 0);
-    restart(s, t, y0, s->state.now.choice.longest);
-    s->state.now.event_count = 0;
+    take_back(s, t, s->state.now.choice.longest);
     return try_step(s, t_end);
 }
 
