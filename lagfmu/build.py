@@ -46,7 +46,7 @@ def write(
     if target == "native":
         content = native.build(*made, prepared.system, extra, platforms)
     else:
-        content = python.build(*made, extra)
+        content = python.build(*made, prepared.system, extra)
     path = Path(out)
     if path.suffix != ".fmu":
         path = path / f"{prepared.scene.name}.fmu"

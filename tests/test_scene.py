@@ -258,6 +258,33 @@ def test_one_integrator_and_no_event_code_are_linked(tmp_path: Path, native_fmu:
     assert size[path] < 0.9 * size[full]
 
 
+def test_one_integrator_and_no_event_code_travel(tmp_path: Path, python_fmu: Any) -> None:
+    """The same of a python FMU: its solver consists of what the scene needs, and a full FMU of a pendulum
+    has nothing for contacts either."""
+
+    def solver(path: Path) -> dict[str, str]:
+        with zipfile.ZipFile(path) as archive:
+            names = [n for n in archive.namelist() if "/solver/" in n]
+            return {n.split("/")[-1]: archive.read(n).decode() for n in names}
+
+    file, scene = scene_of("PendulumCartesian")
+    events = {"events.py", "looks.py", "switch.py", "contacts.py"}
+    full, contacts = (solver(python_fmu(name)) for name in ("PendulumCartesian", "Hemisphere"))
+    assert contacts.keys() - full.keys() == events
+    assert "from .events" not in full["at_contacts.py"]
+    for method in ("dop853", "dopri5", "rk4", "radau5"):
+        asked = replace(scene, outputs=["lambda.rod"], method=method, step=1e-3)
+        path = write(prepare(file.model, asked), tmp_path / method, target="python")
+        held = solver(path)
+        others = {"dop853.py", "rk4.py"} - {f"{method}.py"}
+        assert full.keys() - held.keys() == others
+        assert f'INTEGRATORS = {{"{method}":' in held["integrators.py"]
+        twin = python_fmu("PendulumCartesian")
+        start = {"solver.method": method, "solver.step": 1e-3}
+        run, whole = simulate(path, 0.5), simulate(twin, 0.5, start_values=start)
+        assert (run["lambda.rod"] == whole["lambda.rod"]).all()
+
+
 def _binary(path: Path) -> str:
     with zipfile.ZipFile(path) as archive:
         return next(n for n in archive.namelist() if n.startswith("binaries/"))

@@ -16,9 +16,11 @@ from pythonfmu.builder import FmuBuilder
 from ..equations import EquationsOfMotion
 from ..errors import BuildError
 from ..numeric import source
+from ..pyparts import files_left_out, files_of_its_own
 from ..reduction import Reduction
 from ..scene import Scene
 from ..solver.state import METHODS
+from ..solver.system import System
 from ..variables import VariableTable
 from .archive import pack, version
 from .description import model_description
@@ -74,6 +76,7 @@ def build(
     reduction: Reduction | None,
     scene: Scene,
     table: VariableTable,
+    system: System,
     extra: Mapping[str, bytes],
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
@@ -84,7 +87,7 @@ def build(
         )
     methods = tuple(m for m in scene.selectable if m in METHODS)
     table = table.offering(methods)
-    runtime = _runtime()
+    runtime = _runtime(scene, bool(system.contacts))
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
     text = _script(eom, reduction, scene, table, package, methods)
     module = f"{scene.name}_{_digest(text.encode())}"
@@ -141,9 +144,11 @@ def _script(
     )
 
 
-def _runtime() -> dict[str, bytes]:
+def _runtime(scene: Scene, contacts: bool) -> dict[str, bytes]:
     """Relative path -> content of the files of lagfmu that the FMU carries."""
     root = files("lagfmu")
+    gone = files_left_out(scene, contacts)
+    own = {k: text.encode() for k, text in files_of_its_own(scene, contacts).items()}
     found = {"__init__.py": b"", "fmu/__init__.py": b""}
     for entry in SHIPPED:
         place = root.joinpath(entry)
@@ -151,8 +156,8 @@ def _runtime() -> dict[str, bytes]:
             found[entry] = place.read_bytes()
             continue
         for file in place.iterdir():
-            if file.name.endswith(".py"):
-                found[f"{entry}/{file.name}"] = file.read_bytes()
+            if file.name.endswith(".py") and file.name not in gone:
+                found[f"{entry}/{file.name}"] = own.get(file.name) or file.read_bytes()
     return dict(sorted(found.items()))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .contacts import complementary_modes
+from . import at_contacts
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
@@ -73,8 +73,10 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
     _check_angles(system, q)
     size = sizes(system, q, at.p, size)
     q, v, closed = _velocities(at, q, v0, closed, size)
-    touching = [c for c, shut in enumerate(closed) if shut]
-    modes = complementary_modes(at, q, v, closed, touching)
+    modes: tuple[bool, ...] = ()
+    if system.contacts:
+        touching = [c for c, shut in enumerate(closed) if shut]
+        modes = at_contacts.complementary_modes(at, q, v, closed, touching)
     q, v = project(at, q, v, system.active(modes), none, size)
     nothing = Departure(0, 0.0, (0.0,) * system.n, (0.0,) * system.n)
     state = State(

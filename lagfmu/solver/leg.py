@@ -1,0 +1,139 @@
+"""A stretch of time in which the contact modes do not change: the index-1 equations
+
+    q' = v ,   v' = vdot(t, q, v)   with   M vdot = F + G^T lambda ,  G vdot = gamma
+
+as an ordinary differential equation, and its projection onto f = 0 and G v = nu after each accepted step
+(Hairer & Wanner II, sect. VII.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .failure import StepFailureError
+from .instant import Instant
+from .methods import stepper
+from .motion import motion, project
+from .state import Settings, State
+from .stiffness import Choice
+from .system import System, Vector
+
+FAR, LEAST_FAR = 1e3, 1e-6  # how far a projection may move the state: in tolerances, and at least
+HOPELESS = 1.0  # error of one rk4 step, relative to the state, at which it means nothing
+FEWEST_STEPS = 100  # rk4's steps in one natural time of the motion, unless solver.step is set
+
+
+@dataclass
+class Leg:
+    """From one event to the next; `begun` [s]: the communication step began, from which inputs run on."""
+
+    system: System
+    settings: Settings
+    state: State
+    u: Sequence[float]
+    p: Sequence[float]
+    begun: float
+
+    def __post_init__(self) -> None:
+        self.rows = self.system.active(self.state.closed)
+        self.offset = np.array(self.state.offset)
+        self.scale = np.array(self.state.scale)
+        self.size = np.array(self.state.size)
+        self.cause = ""
+        self.auto = self.settings.method == "auto"
+        if self.auto:
+            self.choose(self.state.choice)
+
+    def choose(self, choice: Choice) -> None:
+        """The method of `auto` for the steps to come."""
+        method = "radau5" if choice.implicit else "dop853"
+        self.settings = replace(self.settings, method=method)
+
+    def at(self, t: float) -> Instant:
+        return Instant(self.system, t, self.system.inputs_at(self.u, t - self.begun), self.p)
+
+    def split(self, y: Vector) -> tuple[Vector, Vector]:
+        return y[: self.system.n], y[self.system.n :]
+
+    def rate(self, t: float, y: Vector) -> Vector:
+        """y' (2 n); not a number where the equations cannot be evaluated: the step is cut there."""
+        q, v = self.split(y)
+        try:
+            now = motion(self.at(t), q, v, self.rows)
+        except StepFailureError as error:
+            self.cause = str(error)
+            return np.full_like(y, np.nan)
+        return np.concatenate([v, now.vdot])
+
+    def project(self, t: float, y: Vector) -> Vector:
+        q, v = self.split(y)
+        return np.concatenate(project(self.at(t), q, v, self.rows, self.offset, self.size))
+
+    def check_projection(self, t: float, y: Vector, projected: Vector) -> None:
+        """Raises StepFailureError if the projection after an adaptive step moved the state by far more
+        than the step's error can be: next to a singular configuration it leads to another branch."""
+        far = max(FAR * self.settings.tolerance, LEAST_FAR)
+        unit = np.maximum(np.abs(y), np.concatenate([self.size, self.size * self.state.rate]))
+        moved = np.abs(projected - y)
+        if self.settings.method == "rk4" or (moved <= far * unit).all():
+            return
+        j = int((moved / unit).argmax())
+        raise StepFailureError(
+            f"the integration stops at t = {float(t)!r} s, the projection onto the constraints moves "
+            f"{self.system.coordinates[j % self.system.n]} by {float(projected[j] - y[j]):.3g}: "
+            "the configuration is singular, or nearly so"
+        )
+
+    def indicators(self, t: float, y: Vector) -> Vector:
+        """One a contact: lambda while closed, f while open."""
+        q, v = self.split(y)
+        at = self.at(t)
+        contacts = list(self.system.contacts)
+        values = at.residual(q)[contacts]
+        if any(self.state.closed):
+            lam = motion(at, q, v, self.rows).lam[contacts]
+            values = np.where(self.state.closed, lam, values)
+        return values
+
+    def stepper(self, t: float, y: Vector, t_bound: float, first_step: float | None) -> Any:
+        if self.settings.method == "rk4" and not self.settings.step:
+            first_step = 1 / (FEWEST_STEPS * self.state.rate)
+        elif self.settings.method == "rk4":
+            first_step = self.settings.step
+        return stepper(self.settings, self.rate, t, y, t_bound, self.scale, first_step)
+
+    def step(self, solver: Any) -> None:
+        """One accepted step, or the reason why there is none."""
+        try:
+            message = solver.step()
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+            raise self.failure(solver.t, str(error)) from error
+        if solver.status == "failed" or not np.isfinite(solver.y).all():
+            raise self.failure(solver.t, message or "the state is not finite")
+        if self.settings.method == "rk4":
+            speed = self.size * self.state.rate
+            unit = np.maximum(np.abs(solver.y), np.concatenate([self.size, speed]))
+            if not (np.abs(solver.error) <= HOPELESS * unit).all():
+                raise self.failure(
+                    solver.t,
+                    f"rk4's step of {solver.h_abs:.3g} s is far too large: reduce solver.step",
+                )
+
+    def failure(self, t: float, message: str) -> StepFailureError:
+        if "step size" in message:
+            message = "step size underflow"
+        cause = f": {self.cause}" if self.cause else ""
+        return StepFailureError(f"the integration stops at t = {float(t)!r} s, {message}{cause}")
+
+    def reach(self, t: float, y: Vector, t1: float) -> Vector:
+        """The state at t1, integrated from (t, y) and projected."""
+        if t1 <= t:
+            return y
+        solver = self.stepper(t, y, t1, t1 - t)
+        while solver.status == "running":
+            self.step(solver)
+        return self.project(t1, solver.y)

@@ -1,0 +1,127 @@
+"""What happens at contacts: impacts by Newton's law of restitution, rest, and the modes of all contacts
+together (contacts.py; Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chs. 4, 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .contacts import complementary_modes, impact
+from .instant import Instant
+from .leg import Leg
+from .motion import motion, project
+from .state import Departure, State
+from .system import Vector
+
+ROUNDS = 50  # in which an impact is passed on between contacts that touch
+
+
+def released(at: Instant, state: State) -> State:
+    """Contacts opened that a jump of a prescribed motion has left a gap in."""
+    if not (at.system.prescribed and any(state.closed)):
+        return state
+    f = at.residual(np.array(state.q))[list(at.system.contacts)]
+    gone = [shut and a > g for shut, a, g in zip(state.closed, f, state.gap, strict=True)]
+    return replace(
+        state,
+        closed=tuple(bool(c and not g) for c, g in zip(state.closed, gone, strict=True)),
+        armed=tuple(bool(a or g) for a, g in zip(state.armed, gone, strict=True)),
+    )
+
+
+def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, contacts: list[int]) -> State:
+    """The state right after the event at t: contacts opened or struck, modes settled together."""
+    system, at = leg.system, leg.at(t)
+    q, v = leg.split(leg.reach(t0, y0, t))
+    closed, armed = list(state.closed), list(state.armed)
+    offset = np.array(state.offset)
+    leaving = [c for c in contacts if closed[c]]
+    landing = [c for c in contacts if not closed[c]]
+    for c in leaving:
+        closed[c] = False
+        armed[c] = False
+    for c in landing:
+        k = system.contacts[c]
+        v = impact(at, q, v, closed, c)
+        closed[c] = _comes_to_rest(at, q, v, closed, c, state.gap[c])
+        armed[c] = False
+        if closed[c]:
+            f = at.residual(q)
+            for j, row in enumerate(system.rows):
+                if row.while_closed == k:
+                    offset[j] = f[j]
+    if landing:
+        v = _pass_on(at, q, v, closed, state)
+    touching = _touching(at, q, v, state, closed)
+    modes = complementary_modes(at, q, v, closed, touching, leaving)
+    q, v = project(at, q, v, system.active(modes), offset, leg.size)
+    departures = list(state.departures)
+    for c, (old, new) in enumerate(zip(leg.state.closed, modes, strict=True)):
+        if old and not new:
+            count = departures[c].count + 1
+            departures[c] = Departure(count, t, tuple(q.tolist()), tuple(v.tolist()))
+    return replace(
+        state,
+        t=t,
+        q=tuple(q.tolist()),
+        v=tuple(v.tolist()),
+        closed=modes,
+        armed=tuple(armed),
+        offset=tuple(offset.tolist()),
+        departures=tuple(departures),
+    )
+
+
+def _pass_on(at: Instant, q: Vector, v: Vector, closed: Sequence[bool], state: State) -> Vector:
+    """An impact passed on through contacts that touch: each that is approached is struck in turn.
+
+    After `ROUNDS` rounds the rest is taken as one plastic impact.
+    """
+    system = at.system
+    f = at.residual(q)
+    near = [c for c, k in enumerate(system.contacts) if not closed[c] and abs(f[k]) <= state.gap[c]]
+    for count in range(ROUNDS):
+        _, _, G, nu, _ = at.evaluate(q, v)
+        speed = {c: G[system.contacts[c]] @ v - nu[system.contacts[c]] for c in near}
+        size = np.abs(G) @ (np.array(state.size) * state.rate)
+        struck = [c for c in near if speed[c] < -1e-9 * size[system.contacts[c]]]
+        if not struck:
+            return v
+        plastic = count == ROUNDS - 1
+        for c in struck:
+            v = impact(at, q, v, closed, c, plastic)
+    return v
+
+
+def _comes_to_rest(
+    at: Instant, q: Vector, v: Vector, closed: Sequence[bool], contact: int, gap: float
+) -> bool:
+    """True if the rebound would not rise above the gap within which contacts touch, v^2/(2a) <= gap.
+
+    Without it a ball would bounce infinitely often in a finite time.
+    """
+    free = motion(at, q, v, at.system.active(closed))
+    k = at.system.contacts[contact]
+    speed = free.G[k] @ v - free.nu[k]
+    acceleration = free.G[k] @ free.vdot - free.gamma[k]
+    return bool(speed <= 0 or (acceleration < 0 and speed**2 <= -2 * acceleration * gap))
+
+
+def _touching(
+    at: Instant,
+    q: Vector,
+    v: Vector,
+    state: State,
+    closed: Sequence[bool],
+) -> list[int]:
+    """Contacts with f and df/dt at zero: those whose mode the accelerations decide."""
+    _, _, G, nu, _ = at.evaluate(q, v)
+    f = at.residual(q)
+    size = np.abs(G) @ np.array(state.scale[at.system.n :])
+    return [
+        c
+        for c, k in enumerate(at.system.contacts)
+        if closed[c] or (abs(f[k]) <= state.gap[c] and abs(G[k] @ v - nu[k]) <= 1e-9 * size[k])
+    ]
