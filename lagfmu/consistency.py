@@ -22,8 +22,8 @@ from .reduction import Reduction
 from .solver.failure import StepFailureError
 from .solver.initial import Start, start
 from .solver.instant import Instant
-from .solver.linear import RANK
 from .solver.observe import expand, observe
+from .solver.solution import RANK
 from .solver.state import Settings
 from .solver.system import System, Vector
 from .variables import VariableTable

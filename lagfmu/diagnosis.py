@@ -12,7 +12,7 @@ import numpy as np
 from .solver.failure import StepFailureError
 from .solver.initial import project_from_afar
 from .solver.instant import Instant
-from .solver.linear import RANK
+from .solver.solution import RANK
 from .solver.system import Matrix, System, Vector
 
 SEARCHES = 40  # other start values that are tried before constraints are called unsatisfiable

@@ -15,7 +15,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from instance import instance
 from pythonfmu.builder import FmuBuilder
-from sympy import Eq, cos, sin, sqrt, symbols
+from sympy import Eq, cos, exp, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -825,6 +825,32 @@ def test_parameters_that_make_the_start_impossible_are_refused_by_name(fmu):
             one.fmu.exitInitializationMode()
             one.step(0.1)
             assert math.isfinite(one.get("lambda.rod"))
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_what_cannot_be_computed_is_said_in_plain_words(tmp_path, target):
+    """exp(1e4) is no double, and sqrt(x) no real number at x = -1: neither Python's errno nor a NaN."""
+    x = dynamicsymbols("x")
+    m, k, a = symbols("m k a", positive=True)
+    for name, potential, place, words in (
+        ("Steep", exp(x / a), 1e4, "beyond 1.8e308"),
+        ("Root", sqrt(x / a), -1.0, "outside of its domain"),
+    ):
+        model = Model(
+            name=name,
+            lagrangian=m * x.diff() ** 2 / 2 - k * potential,
+            coordinates={x: "m"},
+            parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1.0, "J"), Parameter(a, 1.0, "m")],
+            start={x: 1.0},
+        )
+        path = build_fmu(model, tmp_path, target=target)
+        with instance(path) as one:
+            one.fmu.setupExperiment()
+            one.fmu.enterInitializationMode()
+            one.set("x", place)
+            words = words if target == "python" else "not finite"
+            with refused(one, FATAL, "cannot be evaluated at t = 0.0 s", words):
+                one.fmu.exitInitializationMode()
 
 
 def test_bytes_that_are_no_state_are_refused(fmu):

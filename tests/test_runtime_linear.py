@@ -21,11 +21,13 @@ from runtime import compile_library, compiler
 
 from lagfmu.elimination import plan
 from lagfmu.solver.failure import StepFailureError
-from lagfmu.solver.linear import Solution, solve
+from lagfmu.solver.linear import solve
+from lagfmu.solver.solution import Solution
 
 SOURCES = [
     "cod.c",
     "condition.c",
+    "dependent.c",
     "kkt.c",
     "ldlt.c",
     "leastnorm.c",

@@ -12,9 +12,11 @@ import fmpy
 import numpy as np
 import pytest
 from conftest import FILES, MODELS
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
-from lagfmu import build_fmu, simulate, verify
+from lagfmu import Model, Parameter, build_fmu, simulate, verify
 from lagfmu.build import write
 from lagfmu.ccode import model_source
 from lagfmu.cli import app
@@ -283,6 +285,32 @@ def test_one_integrator_and_no_event_code_travel(tmp_path: Path, python_fmu: Any
         start = {"solver.method": method, "solver.step": 1e-3}
         run, whole = simulate(path, 0.5), simulate(twin, 0.5, start_values=start)
         assert (run["lambda.rod"] == whole["lambda.rod"]).all()
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_without_constraints_there_are_no_rungs_for_them(tmp_path: Path, target: str) -> None:
+    """A pendulum of which only its place is read is one angle, and no multiplier: what solves for dependent
+    rows is not there, as in the FMU of a spring and a mass; which without its mass is still refused."""
+    file, scene = scene_of("PendulumAngle")
+    place = write(prepare(file.model, replace(scene, outputs=["x"])), tmp_path, target=target)
+    x = dynamicsymbols("x")
+    m, k = symbols("m k", nonnegative=True)
+    spring = Model(
+        name="Spring",
+        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
+        coordinates={x: "m"},
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1.0, "N/m")],
+        start={x: 1.0},
+    )
+    path = build_fmu(spring, tmp_path, target=target)
+    for fmu in (place, path):
+        with zipfile.ZipFile(fmu) as archive:
+            held = {Path(n).stem for n in archive.namelist() if n.endswith((".c", ".py"))}
+        assert not {"orthogonal", "nullspace", "weighted", "cod", "leastnorm"} & held
+        assert {"kkt", "schur"} <= held
+    assert simulate(path, 1.0)["x"][-1] == pytest.approx(np.cos(1.0), rel=1e-7)
+    with pytest.raises(LagfmuError, match="the mass matrix is singular"):
+        simulate(path, 0.1, start_values={"m": 0.0})
 
 
 def _binary(path: Path) -> str:

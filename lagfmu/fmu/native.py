@@ -55,13 +55,13 @@ def build(
             "another method"
         )
     everything = runtime_files()
-    gone = files_left_out(scene, bool(system.contacts))
+    gone = files_left_out(scene, system)
     runtime = {file: text for file, text in everything.items() if file not in gone}
     generated = {
         "model.c": model_source(eom, reduction, formulation, needs_tangents(scene)).encode(),
         "variables.c": variables_source(table, eom, reduction, scene, system).encode(),
     }
-    parts = parts_source(scene, bool(system.contacts))
+    parts = parts_source(scene, system)
     if parts is not None:
         generated["parts.c"] = parts.encode()
     common = {

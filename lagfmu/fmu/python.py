@@ -87,7 +87,7 @@ def build(
         )
     methods = tuple(m for m in scene.selectable if m in METHODS)
     table = table.offering(methods)
-    runtime = _runtime(scene, bool(system.contacts))
+    runtime = _runtime(scene, system)
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
     text = _script(eom, reduction, scene, table, package, methods)
     module = f"{scene.name}_{_digest(text.encode())}"
@@ -144,11 +144,11 @@ def _script(
     )
 
 
-def _runtime(scene: Scene, contacts: bool) -> dict[str, bytes]:
+def _runtime(scene: Scene, system: System) -> dict[str, bytes]:
     """Relative path -> content of the files of lagfmu that the FMU carries."""
     root = files("lagfmu")
-    gone = files_left_out(scene, contacts)
-    own = {k: text.encode() for k, text in files_of_its_own(scene, contacts).items()}
+    gone = files_left_out(scene, system)
+    own = {k: text.encode() for k, text in files_of_its_own(scene, system).items()}
     found = {"__init__.py": b"", "fmu/__init__.py": b""}
     for entry in SHIPPED:
         place = root.joinpath(entry)

@@ -1,19 +1,16 @@
 /* linear.c -- the ladder:  M x = b + G^T lambda ,  G x = c  on the rows that act.
  *
  * Factoring takes the first rung that is safe at this state; solving climbs on if refinement does
- * not settle.  For a small system with all rows acting the first rung is written out in model.c.  The dense rungs need (n + m)^2 numbers and are there up to n + m = DENSE_MOST;
- * beyond, the Schur complement is refined with residuals in doubled precision, and what that cannot
- * settle is refused. */
+ * not settle.  For a small system with all rows acting the first rung is written out in model.c.  The
+ * dense rungs need (n + m)^2 numbers and are there up to n + m = DENSE_MOST; beyond, the Schur
+ * complement is refined with residuals in doubled precision, and what that cannot settle is refused. */
 #include "linear.h"
 
 #include <math.h>
 
+#include "dependent.h"
 #include "kkt.h"
-#include "leastnorm.h"
-#include "nullspace.h"
-#include "orthogonal.h"
 #include "schur.h"
-#include "weighted.h"
 
 static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
 
@@ -32,10 +29,11 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     l->pivots = NULL;
     l->nearest = 0;
     if (n + m > DENSE_MOST) return;
-    size_t doubles = larger(larger(kkt_doubles(n, m), weighted_doubles(n, m)),
-                            least_norm_doubles(n, m));
-    size_t ints = larger(larger((size_t)kkt_ints(n, m), (size_t)weighted_ints(n, m)),
-                         (size_t)least_norm_ints(n, m));
+    size_t doubles = kkt_doubles(n, m), ints = (size_t)kkt_ints(n, m);
+    if (DEPENDENT != NULL) {
+        doubles = larger(doubles, DEPENDENT->doubles(n, m));
+        ints = larger(ints, DEPENDENT->ints(n, m));
+    }
     l->dense = arena_take(arena, doubles, sizeof(double));
     l->pivots = arena_take(arena, ints, sizeof(int));
 }
@@ -102,12 +100,8 @@ static Status climb(Linear *l) {
         l->rung = RUNG_KKT;
         return OK;
     }
-    if (orthogonal_factor(l)) {
-        l->rung = RUNG_ORTHOGONAL;
-        return OK;
-    }
-    l->rung = RUNG_LEAST_NORM;
-    return least_norm_factor(l);
+    if (DEPENDENT != NULL) return DEPENDENT->factor(l);
+    return fail(l->why, "the mass matrix is singular at this state: a coordinate has no mass");
 }
 
 /* By the plan's lists, or a rung above. */
@@ -129,21 +123,16 @@ Status linear_factor(Linear *l, const double *M, const double *G, const int *act
         l->rung = RUNG_WRITTEN_OUT; /* it factors and solves at once */
         return OK;
     }
-    if (l->system->formulation == NULLSPACE && l->dense != NULL && nullspace_factor(l)) {
-        l->rung = RUNG_NULLSPACE;
+    if (l->system->formulation == NULLSPACE && l->dense != NULL && DEPENDENT != NULL &&
+        DEPENDENT->nullspace(l))
         return OK;
-    }
     return factor_lists(l);
 }
 
 static Status solve_dense(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     if (check_right(l, b, c) != OK) return FAILED;
-    if (l->rung == RUNG_ORTHOGONAL) return orthogonal_solve(l, b, c, x, lambda);
-    if (l->rung == RUNG_LEAST_NORM) return least_norm_solve(l, b, c, x, lambda);
-    if (l->rung == RUNG_NULLSPACE)
-        nullspace_solve(l, b, c, x, lambda);
-    else
-        kkt_solve(l, b, c, x, lambda);
+    if (l->rung != RUNG_KKT) return DEPENDENT->solve(l, b, c, x, lambda);
+    kkt_solve(l, b, c, x, lambda);
     return OK;
 }
 

@@ -4,7 +4,7 @@
  * The ladder (linear.c) takes the first rung that is safe at this state:
  *   1. schur.c       sparse Cholesky of the Schur complement, guarded by its condition estimate
  *   2. kkt.c         LU of the scaled KKT matrix, with refinement
- *   3. orthogonal.c  complete orthogonal decomposition weighted by M: dependent rows */
+ *   3. orthogonal.c  complete orthogonal decomposition weighted by M: dependent rows (dependent.h) */
 #ifndef LAGFMU_LINEAR_H
 #define LAGFMU_LINEAR_H
 

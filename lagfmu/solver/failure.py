@@ -9,3 +9,15 @@ class StepFailureError(Exception):
 
 class StartFailureError(StepFailureError):
     """Start values from which no consistent state can be reached."""
+
+
+def plain(error: Exception) -> str:
+    """What Python, NumPy or SciPy could not compute, in words for who does not know them."""
+    if isinstance(error, OverflowError):
+        return "a number beyond 1.8e308"
+    if isinstance(error, ZeroDivisionError):
+        return "a division by zero"
+    text = str(error)
+    if "domain" in text or "expected a" in text:  # the words of math, before and after Python 3.14
+        return "a function outside of its domain"
+    return "a value that is not finite" if "infs or NaNs" in text else text

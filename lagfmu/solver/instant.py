@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .failure import StepFailureError
+from .failure import StepFailureError, plain
 from .system import Matrix, System, Vector
 
 
@@ -26,7 +26,7 @@ class Instant:
             return self.system.assemble(self.t, q, v, self.u, self.p)
         except (ArithmeticError, ValueError) as error:
             raise StepFailureError(
-                f"the equations cannot be evaluated at t = {float(self.t)!r} s ({error})"
+                f"the equations cannot be evaluated at t = {float(self.t)!r} s ({plain(error)})"
             ) from error
 
     def residual(self, q: Vector) -> Vector:
@@ -36,6 +36,6 @@ class Instant:
             f = self.system.residual(self.t, q.tolist(), self.u, self.p)
         except (ArithmeticError, ValueError) as error:
             raise StepFailureError(
-                f"the constraints cannot be evaluated at t = {float(self.t)!r} s ({error})"
+                f"the constraints cannot be evaluated at t = {float(self.t)!r} s ({plain(error)})"
             ) from error
         return np.array(f, dtype=float)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .failure import StepFailureError
+from .failure import StepFailureError, plain
 from .instant import Instant
 from .methods import stepper
 from .motion import motion, project
@@ -111,7 +111,7 @@ class Leg:
         try:
             message = solver.step()
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-            raise self.failure(solver.t, str(error)) from error
+            raise self.failure(solver.t, plain(error)) from error
         if solver.status == "failed" or not np.isfinite(solver.y).all():
             raise self.failure(solver.t, message or "the state is not finite")
         if self.settings.method == "rk4":

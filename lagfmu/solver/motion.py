@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from .failure import StepFailureError
 from .instant import Instant
-from .linear import Solution, solve, solve_nullspace
+from .linear import solve, solve_nullspace
+from .solution import Solution
 from .system import NONHOLONOMIC, Matrix, Vector
 
 EPS = float(np.finfo(float).eps)

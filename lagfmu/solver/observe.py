@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .failure import StepFailureError
+from .failure import StepFailureError, plain
 from .instant import Instant
 from .motion import motion
 from .state import State
@@ -26,7 +26,7 @@ def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]
             values = _observe(system, state, u, p)
     except (ArithmeticError, ValueError) as error:
         raise StepFailureError(
-            f"the outputs cannot be evaluated at t = {state.t!r} s ({error})"
+            f"the outputs cannot be evaluated at t = {state.t!r} s ({plain(error)})"
         ) from error
     bad = [name for name, value in values.items() if not np.isfinite(value)]
     if bad:

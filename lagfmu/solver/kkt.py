@@ -1,0 +1,45 @@
+"""LU of the scaled KKT matrix [[M, G^T], [G, 0]] with refinement in extended precision.
+
+Right for extreme mass ratios, and for a coordinate without mass of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import lapack
+
+from .solution import Solution
+from .system import Matrix, Vector
+
+
+def kkt(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
+    """None where the matrix is singular to working precision."""
+    n, m = len(b), len(c)
+    K = np.zeros((n + m, n + m))
+    K[:n, :n] = M
+    K[:n, n:] = G.T
+    K[n:, :n] = G
+    d = np.ones(n + m)
+    A = K.copy()
+    for _ in range(20):  # symmetric equilibration (Ruiz 2001)
+        largest = np.abs(A).max(axis=1)
+        if not (largest > 0).all():
+            return None
+        d /= 2.0 ** np.round(np.log2(largest) / 2)  # powers of two: scaling rounds nothing
+        A = K * d * d[:, None]
+        if (np.abs(np.log2(largest)) <= 1).all():
+            break
+    lu, pivots, info = lapack.dgetrf(A)
+    if info != 0:
+        return None
+    rcond, _ = lapack.dgecon(lu, np.abs(A).sum(axis=0).max())
+    if rcond < 1e-14:
+        return None
+    right = np.concatenate([b, c]) * d
+    z = lapack.dgetrs(lu, pivots, right)[0]
+    wide, exact = A.astype(np.longdouble), z.astype(np.longdouble)
+    for _ in range(3):
+        rest = (right - wide @ exact).astype(float)
+        exact += lapack.dgetrs(lu, pivots, rest)[0]
+    z = (exact * d).astype(float)
+    return Solution(z[:n], -z[n:], np.ones(m, dtype=bool))
