@@ -135,8 +135,9 @@ def panel(axis: Any, found: Tradeoff, h: float, group: str, factor: float) -> No
     if not _near(found):
         axis.annotate(
             f"fmpy's own calls: {factor * found.floor[h]:.2g}",
-            (0.01, 0.01),
+            (0.01, 0.985),  # the cheap and coarse points are below
             xycoords="axes fraction",
+            verticalalignment="top",
             fontsize=8,
             color="#777777",
         )
