@@ -3,7 +3,7 @@
  *   size   of a coordinate: |q|, or the largest parameter of its dimension; of angles at most 1 rad
  *   rate   [1/s] of the motion: the largest |v| / size and sqrt(|vdot| / size)
  *   scale  below which an error is absolute: |q| and |v| of the start, or what rounding leaves of
- *          size
+ *          size, and of v what forces make of the rounding of q
  *
  * A coordinate at 0 of whose dimension there is no parameter has no size: its 0 is a mark on a
  * ruler.  There the motion itself tells what is large, V tau and A tau^2 with V and A the largest
@@ -13,9 +13,11 @@
  * alone give that rate (a place may be far away, and says nothing), and V/A the forces before they
  * cancel.
  *
- * At rest on springs that balance, what is left of the acceleration is rounding of forces that
- * cancel, and the natural rate is that of small oscillations: sqrt(|dvdot| / size), with dvdot what a
- * displacement by the size would give.
+ * A displacement of each coordinate in turn tells what holds it: dvdot, were it displaced by its
+ * size.  The rate of small oscillations is omega = sqrt(|dvdot| / size), and rounding of q shakes v by
+ * eps |dvdot| (|q| / size) / omega: on stiff springs that is more than rounding of v itself, and no step
+ * could be small enough to resolve it.  At rest on springs that balance, what is left of the
+ * acceleration is such rounding, and omega is the natural rate.
  *
  * Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the
  * only time is the importer's: tau is PART of the first communication step.  Were the motion a
@@ -122,38 +124,48 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
     return natural;
 }
 
-/* pull (n): accelerations; at a state without speed, where they are rounding, those with which it
- * comes back if each coordinate in turn is displaced by its size, linearly.  `stepped` is at the
- * state before and after. */
-static Status find_pull(Solver *s, Instant at, double *pull) {
+/* back (n): accelerations with which the state comes back if each coordinate in turn is displaced by
+ * its size, linearly; shaken (n): the speeds by which rounding of the coordinates shakes it.  Both 0 at
+ * the edge of what the equations describe.  `stepped` is at the state before and after. */
+static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
     const int n = s->system->n;
-    const size_t bytes = (size_t)n * sizeof *pull;
     State *state = &s->state;
     Mechanism *b = &s->stepped;
-    double *vdot = s->work_initial, *back = pull + n;
-    int moves = 0, evaluated = 1, rounding = 1;
-    memcpy(vdot, b->vdot, bytes);
-    for (int j = 0; j < n; j++) {
-        moves |= state->v[j] != 0;
-        pull[j] = fabs(vdot[j]);
-        back[j] = 0;
-    }
-    if (moves) return OK;
+    double *vdot = s->work_initial, omega = 0;
+    int evaluated = 1;
+    memcpy(vdot, b->vdot, (size_t)n * sizeof *vdot);
+    for (int i = 0; i < n; i++) back[i] = shaken[i] = 0;
     for (int j = 0; j < n && evaluated; j++) {
-        const double q = state->q[j];
-        if (!(state->size[j] > 0)) continue;
-        state->q[j] += SHIFT * state->size[j];
+        const double q = state->q[j], size = state->size[j];
+        if (!(size > 0)) continue;
+        state->q[j] += SHIFT * size;
         evaluated = mechanism_motion(b, at, state->q, state->v, s->active) == OK;
         state->q[j] = q;
-        for (int i = 0; i < n; i++) back[i] += fabs(b->vdot[i] - vdot[i]) / SHIFT;
+        for (int i = 0; i < n; i++) {
+            const double change = fabs(b->vdot[i] - vdot[i]) / SHIFT;
+            back[i] += change;
+            shaken[i] += DBL_EPSILON * change * (fabs(q) / size);
+        }
     }
-    for (int j = 0; j < n; j++) rounding &= pull[j] <= LOST * back[j];
-    if (evaluated && rounding) memcpy(pull, back, bytes);
+    for (int i = 0; i < n; i++)
+        if (state->size[i] > 0) omega = larger(omega, sqrt(back[i] / state->size[i]));
+    for (int i = 0; i < n; i++) {
+        if (!evaluated) back[i] = shaken[i] = 0;
+        if (omega > 0) shaken[i] /= omega;
+    }
     return mechanism_motion(b, at, state->q, state->v, s->active);
 }
 
-static double find_rate(const Solver *s, double span, const double *felt, const double *pull,
+/* 1 if nothing moves and the accelerations are what rounding leaves of forces that cancel. */
+static int is_resting(const Solver *s, const double *back) {
+    for (int j = 0; j < s->system->n; j++)
+        if (s->state.v[j] != 0 || !(fabs(s->stepped.vdot[j]) <= LOST * back[j])) return 0;
+    return 1;
+}
+
+static double find_rate(const Solver *s, double span, const double *felt, const double *back,
                         double natural) {
+    const double *pull = is_resting(s, back) ? back : s->stepped.vdot;
     double rate = natural, forced = 0;
     for (int j = 0; j < s->system->n; j++) {
         rate = larger(rate, rate_of(s, j, pull[j]));
@@ -186,7 +198,7 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
 }
 
 /* No smaller than what rounding in values of the coordinate's size allows at this tolerance. */
-static Status find_scales(Solver *s, const double *own) {
+static Status find_scales(Solver *s, const double *own, const double *shaken) {
     const int n = s->system->n;
     State *state = &s->state;
     const double floor = larger(1e-8, 10 * DBL_EPSILON / s->settings.tolerance);
@@ -194,7 +206,8 @@ static Status find_scales(Solver *s, const double *own) {
         const double least = floor * state->size[j];
         const double rate = own[j] > 0 ? own[j] : state->now.rate;
         state->scale[j] = positive(larger(state->scale[j], least));
-        state->scale[n + j] = positive(larger(state->scale[n + j], least * rate));
+        const double speed = larger(least * rate, 10 / s->settings.tolerance * shaken[j]);
+        state->scale[n + j] = positive(larger(state->scale[n + j], speed));
         if (!(state->scale[j] <= DBL_MAX && state->scale[n + j] <= DBL_MAX))
             return fail(&s->why, "the start is refused: the scale of %s is not finite",
                         s->system->coordinates[j]);
@@ -204,13 +217,11 @@ static Status find_scales(Solver *s, const double *own) {
 
 Status magnitudes_complete(Solver *s, Instant at, double span) {
     const int n = s->system->n;
-    double *felt = s->work_initial + n, *own = felt + n, *pull = own + n;
+    double *felt = s->work_initial + n, *own = felt + n, *back = own + n, *shaken = back + n;
     find_felt(&s->stepped, felt);
     const double natural = find_own(s, span, felt, own);
-    if (!(s->state.now.rate > 0)) {
-        if (find_pull(s, at, pull) != OK) return FAILED;
-        s->state.now.rate = find_rate(s, span, felt, pull, natural);
-    }
+    if (find_held(s, at, back, shaken) != OK) return FAILED;
+    if (!(s->state.now.rate > 0)) s->state.now.rate = find_rate(s, span, felt, back, natural);
     take_sizes(s, felt, own);
-    return find_scales(s, own);
+    return find_scales(s, own, shaken);
 }

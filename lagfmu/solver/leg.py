@@ -20,10 +20,11 @@ from .methods import stepper
 from .motion import motion, project
 from .state import Settings, State
 from .stiffness import Choice
-from .system import System, Vector
+from .system import Matrix, System, Vector
 
 FAR, LEAST_FAR = 1e3, 1e-6  # how far a projection may move the state: in tolerances, and at least
 HOPELESS = 1.0  # error of one rk4 step, relative to the state, at which it means nothing
+SHIFT = 2.0**-26  # of a size, for a difference quotient: half of a double's digits
 FEWEST_STEPS = 100  # rk4's steps in one natural time of the motion, unless solver.step is set
 
 
@@ -69,6 +70,18 @@ class Leg:
             return np.full_like(y, np.nan)
         return np.concatenate([v, now.vdot])
 
+    def jacobian(self, t: float, y: Vector) -> Matrix:
+        """d(y')/dy (2 n, 2 n) by differences over a part of each coordinate's size and natural speed."""
+        n, f = self.system.n, self.rate(t, y)
+        natural = np.concatenate([self.size, self.size * self.state.rate])
+        found = np.zeros((2 * n, 2 * n))
+        found[:n, n:] = np.eye(n)
+        for j in np.flatnonzero(np.maximum(np.abs(y), natural)):
+            moved = y.copy()
+            moved[j] += SHIFT * max(abs(y[j]), natural[j])
+            found[n:, j] = ((self.rate(t, moved) - f) / (moved[j] - y[j]))[n:]
+        return found
+
     def project(self, t: float, y: Vector) -> Vector:
         q, v = self.split(y)
         return np.concatenate(project(self.at(t), q, v, self.rows, self.offset, self.size))
@@ -104,7 +117,8 @@ class Leg:
             first_step = 1 / (FEWEST_STEPS * self.state.rate)
         elif self.settings.method == "rk4":
             first_step = self.settings.step
-        return stepper(self.settings, self.rate, t, y, t_bound, self.scale, first_step)
+        slope = (self.rate, self.jacobian)
+        return stepper(self.settings, slope, t, y, t_bound, self.scale, first_step)
 
     def step(self, solver: Any) -> None:
         """One accepted step, or the reason why there is none."""

@@ -2,7 +2,8 @@
 
     size   of a coordinate: |q|, or the largest parameter of its dimension; of angles at most 1 rad
     rate   [1/s] of the motion: the largest |v| / size and sqrt(|vdot| / size)
-    scale  below which an error is absolute: |q| and |v| of the start, or what rounding leaves of size
+    scale  below which an error is absolute: |q| and |v| of the start, or what rounding leaves of size,
+           and of v what forces make of the rounding of q
 
 A coordinate at 0 of whose dimension there is no parameter has no size: its 0 is a mark on a ruler.
 There the motion itself tells what is large, V tau and A tau^2 with V and A the largest speed and
@@ -11,9 +12,11 @@ coordinates that have a size, or V/A.  Too small a size is safe, an error is the
 motion reached so far; too large a one hides errors.  Hence parameters and angles alone give that
 rate (a place may be far away, and says nothing), and V/A the forces before they cancel.
 
-At rest on springs that balance, what is left of the acceleration is rounding of forces that cancel, and
-the natural rate is that of small oscillations: sqrt(|dvdot| / size), with dvdot what a displacement by
-the size would give.
+A displacement of each coordinate in turn tells what holds it: dvdot, were it displaced by its size.  The
+rate of small oscillations is omega = sqrt(|dvdot| / size), and rounding of q shakes v by
+eps |dvdot| (|q| / size) / omega: on stiff springs that is more than rounding of v itself, and no step
+could be small enough to resolve it.  At rest on springs that balance, what is left of the acceleration
+is such rounding, and omega is the natural rate.
 
 Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the only time
 is the importer's: tau is PART of the first communication step.  Were the motion a million times
@@ -95,13 +98,16 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
             own[j] = 1 / (PART * span)
         if own[j] > 0:
             size[j] = max(speed / own[j], acceleration / own[j] / own[j])
+    back, shaken = _held(at, state, now)
     rate = state.rate
     if rate == 0:
-        pull = np.abs(now.vdot) if v.any() else _held(at, state, now)
-        rate = max(_rate(system, known, np.abs(v), pull, found), natural)
+        pull = np.abs(now.vdot)
+        resting = not v.any() and bool((pull <= LOST * back).all())
+        rate = max(_rate(system, known, np.abs(v), back if resting else pull, found), natural)
     rate = rate or _rate(system, size, np.abs(v), felt, found) or (1 / span if span > 0 else 0.0)
     floor = max(1e-8, 10 * EPS / settings.tolerance)
     speed_scale = floor * size * np.where(own > 0, own, rate)
+    speed_scale = np.maximum(speed_scale, 10 / settings.tolerance * shaken)
     scale = np.maximum(state.scale, np.concatenate([floor * size, speed_scale]))
     gap = np.array(state.gap)
     if not found.all():
@@ -131,19 +137,26 @@ def _felt(now: Motion) -> Vector:
     return np.maximum(np.abs(now.vdot), alone)
 
 
-def _held(at: Instant, state: State, now: Motion) -> Vector:
-    """Accelerations (n) at a state without speed; where they are rounding, those with which it comes back
-    if each coordinate in turn is displaced by its size, linearly."""
-    active = at.system.active(state.closed)
-    pull, back = np.abs(now.vdot), np.zeros(at.system.n)
-    for j in np.flatnonzero(state.size):
+def _held(at: Instant, state: State, now: Motion) -> tuple[Vector, Vector]:
+    """Accelerations (n) with which a state comes back if each coordinate in turn is displaced by its
+    size, linearly; and the speeds (n) by which rounding of the coordinates shakes it.
+
+    Both 0 at the edge of what the equations describe.
+    """
+    active, size = at.system.active(state.closed), np.array(state.size)
+    back, noise = np.zeros(at.system.n), np.zeros(at.system.n)
+    for j in np.flatnonzero(size):
         moved = np.array(state.q)
-        moved[j] += SHIFT * state.size[j]
+        moved[j] += SHIFT * size[j]
         try:
-            back += np.abs(motion(at, moved, np.array(state.v), active).vdot - now.vdot) / SHIFT
+            there = motion(at, moved, np.array(state.v), active)
         except StepFailureError:
-            return pull  # at the edge of what the equations describe
-    return back if (pull <= LOST * back).all() else pull
+            return np.zeros(at.system.n), np.zeros(at.system.n)
+        change = np.abs(there.vdot - now.vdot) / SHIFT
+        back += change
+        noise += EPS * change * (abs(state.q[j]) / size[j])
+    omega = np.sqrt((back[size > 0] / size[size > 0]).max(initial=0.0))
+    return back, noise / omega if omega > 0 else noise
 
 
 def _rate(system: System, size: Vector, speed: Vector, pull: Vector, counted: Mask) -> float:

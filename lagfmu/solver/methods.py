@@ -12,22 +12,23 @@ import numpy as np
 
 from .integrators import INTEGRATORS
 from .state import Settings
-from .system import Vector
+from .system import Matrix, Vector
 
 RELATIVE_FLOOR = 100 * np.finfo(float).eps  # SciPy's own
 
 
 def stepper(
     settings: Settings,
-    fun: Callable[[float, Vector], Vector],
+    slope: tuple[Callable[[float, Vector], Vector], Callable[[float, Vector], Matrix]],
     t: float,
     y: Vector,
     t_bound: float,
     scale: Vector,
     first_step: float | None,
 ) -> Any:
-    """An integrator of y' = fun(t, y) from t to t_bound [s]."""
-    span = t_bound - t
+    """An integrator of y' = f(t, y) from t to t_bound [s]; `slope` is f and df/dy."""
+    span, (fun, jacobian) = t_bound - t, slope
+    more = {"jac": jacobian} if settings.method == "radau5" else {}
     if settings.method == "rk4":
         return INTEGRATORS["rk4"](fun, t, y, t_bound, first_step or span)
     return INTEGRATORS[settings.method](
@@ -39,4 +40,5 @@ def stepper(
         atol=settings.tolerance / 2 * scale,
         first_step=None if first_step is None else min(first_step, span),
         max_step=settings.maximum_step or np.inf,
+        **more,
     )
