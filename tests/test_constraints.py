@@ -107,6 +107,10 @@ INTEGRABLE = {
     "homogeneous": ((x**2 + y**2) * d(x) - 2 * x * y * d(y), [x, y]),
     "steering to a moving point": (d(y) * (x - omega * t) - y * (d(x) - omega), [x, y]),
     "rotating line": (x * d(y) - y * d(x) - omega * (x**2 + y**2), [x, y]),
+    "a factor of another variable": (
+        cos(s) * (x * d(y) - y * d(x) + x**2 * d(z)) / x**2,
+        [x, y, z, s],
+    ),
     "unknown input": (d(x) - h(t) * x, [x]),
     "linear with an unknown function": (d(y) + h(x) * y * d(x), [x, y]),
 }
