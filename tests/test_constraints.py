@@ -236,6 +236,18 @@ def test_only_a_combination_with_functions():
     check(classify(forms, [x, y, z, s, phi]), Kind.PARTLY, 2, 1)
 
 
+def test_only_a_combination_of_which_each_form_hides_it():
+    """Both forms mix the contact form and d(x y exp(z)), with coefficients of (q): no ansatz finds it."""
+    contact, f = d(s) - z * d(y), x * y * exp(z)
+    forms = [
+        sin(x) * contact + (2 + cos(y)) * exp(z) * d(f),
+        cos(x) * contact + x * d(f),
+    ]
+    answer = check(classify(forms, [x, y, z, s]), Kind.PARTLY, 2, 1)
+    assert [c.kind for c in answer.each] == [Kind.NONHOLONOMIC] * 2
+    assert simplify(answer.integrals[0].f / f).is_number
+
+
 def test_differential_drive():
     """Two driven wheels: of three constraints, l phi - R (theta - psi) = const is holonomic."""
     forward = R / 2 * (d(theta) + d(psi))
