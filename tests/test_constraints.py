@@ -272,6 +272,29 @@ LINEAR = {
 }
 
 
+LINEAR_IN_PLACES = {
+    "turned by an angle": ([d(x) - y * d(theta), d(y) + x * d(theta)], [x, y, theta]),
+    "driven by a place": ([d(z) - y * d(x), d(y) - z * d(x)], [x, y, z]),
+    "two of them, and an exact form": (
+        [
+            d(x) - y * d(theta),
+            d(y) + x * d(theta),
+            d(z) - s * d(psi),
+            d(s) - z * d(psi),
+            d(phi) - R * d(psi),
+        ],
+        [x, y, z, s, theta, phi, psi],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LINEAR_IN_PLACES)
+def test_linear_system_in_a_coordinate(name):
+    """dx = A x ds: any coordinate may be what time is above, x exp(-A s) is constant."""
+    forms, names = LINEAR_IN_PLACES[name]
+    check(classify(forms, names), Kind.INTEGRABLE, len(forms), len(forms))
+
+
 @pytest.mark.parametrize("name", LINEAR)
 def test_linear_system(name):
     """x' = A x + c(t) has the n integrals exp(-A t) x - int exp(-A t) c dt."""
