@@ -226,6 +226,21 @@ def test_contradictory_velocities_are_refused():
     )
 
 
+def test_contradictory_accelerations_are_refused():
+    """x = 0 and x = g t^2/2 agree in place and speed at the start, and part at once."""
+    model = pendulum(
+        constraints=[
+            Holonomic("one", x),
+            Holonomic("level", y),
+            Holonomic("two", x - g * t**2 / 2),
+        ],
+        start={},
+    )
+    message = refusal(lambda: prepare(model), ModelError)
+    says(message, "'one', 'two'", "no accelerations", "leave one out")
+    assert "level" not in message
+
+
 def test_a_redundant_constraint_warns_and_its_multipliers_share_the_force(tmp_path):
     """Two equal rods carry half the tension each; that split is flagged, Q is right."""
     again = Holonomic("again", ROD.expression)
