@@ -501,6 +501,14 @@ def test_a_model_file_that_is_no_good_is_refused(tmp_path, text, parts):
     says(message, str(file), *parts)
 
 
+def test_the_line_is_named_however_the_file_is_called(tmp_path, monkeypatch):
+    """Called by a path relative to the folder, too."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(GOOD + "\n1 / 0\n")
+    for name in ("mine.py", f"../{tmp_path.name}/mine.py"):
+        says(refusal(lambda name=name: load(name), ModelError), name, "line 10 (1 / 0)")
+
+
 def test_a_file_that_is_missing_or_no_python_file_is_refused(tmp_path):
     """A missing file, a folder, a text file."""
     says(refusal(lambda: load(tmp_path / "none.py"), ModelError), "none.py", "no such file")
