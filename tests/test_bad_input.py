@@ -15,7 +15,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from instance import instance
 from pythonfmu.builder import FmuBuilder
-from sympy import Eq, cos, sin, sqrt, symbols
+from sympy import Eq, I, cos, oo, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -154,6 +154,15 @@ def test_a_unit_that_is_not_coherent_si_is_refused(unit, parts):
             {"constraints": [Holonomic("rod", ROD.expression, while_closed="floor")]},
             ("'rod'", "while_closed='floor'", "contacts: none"),
         ),
+        ({"forces": [m * g]}, ("forces = [g*m]", "expected a dict", "forces={x: F}")),
+        ({"start": [1.0]}, ("start = [1.0]", "expected a dict")),
+        ({"constraints": ROD}, ("constraints = Holonomic", "expected a list", "[Holonomic(...)]")),
+        ({"parameters": None}, ("parameters = None", "expected a list")),
+        ({"embedding": {x: L * sin(theta)}}, ("embedding = {", "expected Embedding(")),
+        ({"embedding": Embedding([theta], {x: L})}, ("embedding coordinates", "expected a dict")),
+        ({"lagrangian": K - I * m * g * y}, ("lagrangian", "holds I", "real and finite")),
+        ({"forces": {x: m * g * oo}}, ("force on x", "holds oo", "real and finite")),
+        ({"description": 5}, ("description of the model is 5", "expected a text")),
         (
             {"constraints": [Contact("floor", y, restitution=symbols("e"))]},
             ("restitution of 'floor'", "e is neither"),
@@ -389,6 +398,22 @@ def test_names_that_mean_something_in_python_are_fine(tmp_path):
     )
     run = simulate(build_fmu(model, tmp_path), stop_time=0.2)
     assert run["x"] == pytest.approx(simulate(pendulum(), stop_time=0.2)["x"], rel=1e-9)
+
+
+@pytest.mark.parametrize("sign", ["\x00", "\x1b", "\ufffe", "\ud800"])
+def test_descriptions_that_no_xml_file_can_hold_are_refused(sign):
+    """Control characters and halves of surrogate pairs, wherever they stand."""
+    text = f"the{sign}rod"
+    message = refusal(
+        lambda: pendulum(
+            description=text,
+            descriptions={x: text},
+            parameters=(Parameter(m, 1.0, "kg", text), *CONSTANTS[1:]),
+            constraints=[Holonomic("rod", ROD.expression, text)],
+        ),
+        ModelError,
+    )
+    says(message, "4 problems", "parameter 'm'", "constraint 'rod'", repr(sign), "leave it out")
 
 
 def test_descriptions_with_markup_survive(tmp_path):
