@@ -670,12 +670,17 @@ def test_verify_refuses_values_that_cannot_be(fmu):
     says(refusal(lambda: verify(path, {"m1": "heavy"})), "m1", "'heavy'")
     says(refusal(lambda: verify(path, stop_time=-1.0)), "stop_time", "-1.0")
     says(refusal(lambda: verify(path, step_size=0.0)), "step_size", "0.0")
+    says(refusal(lambda: verify(path, step_size=1e-12)), "step_size = 1e-12", "at most 1e+07")
+    says(refusal(lambda: verify(path, tolerance=0.0)), "tolerance = 0.0", "positive")
 
 
 def test_what_the_fmu_refuses_is_told_by_verify(fmu):
     """The FMU's own message reaches the caller."""
     says(refusal(lambda: verify(fmu("Atwood"), {"m1": math.nan})), "'m1' = nan", "finite")
     says(refusal(lambda: verify(fmu("Atwood"), tolerance=math.nan)), "tolerance = nan")
+    message = refusal(lambda: simulate(fmu("Atwood"), start_values={"m1": 0.0}))
+    says(message, "fmi2SetReal", "'m1' = 0.0, expected a positive number")
+    assert "Fatal py" not in message
 
 
 def test_a_run_that_stops_early_is_no_success(fmu):
@@ -694,6 +699,8 @@ def test_simulate_refuses_values_that_cannot_be():
     says(refusal(lambda: simulate(model, start_values={"solver.method": "euler"})), "euler", "rk4")
     says(refusal(lambda: simulate(model, stop_time=-1.0)), "stop_time", "-1.0")
     says(refusal(lambda: simulate(model, step_size=math.inf)), "step_size", "inf")
+    says(refusal(lambda: simulate(model, step_size=1e-12)), "step_size = 1e-12", "larger step_size")
+    says(refusal(lambda: simulate(model, tolerance=-1e-8)), "tolerance = -1e-08", "positive")
 
 
 # ---------------------------------------------------------------------------- calls of the FMU
