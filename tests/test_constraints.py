@@ -8,6 +8,7 @@ import pytest
 from sympy import (
     Abs,
     Function,
+    I,
     Matrix,
     cos,
     exp,
@@ -359,6 +360,27 @@ def test_contradictory():
         classify([d(x) - 1, d(x) - 2], [x])
     with pytest.raises(DerivationError, match="no velocity"):
         classify(x**2 + y**2 - l**2, [x, y])
+
+
+@pytest.mark.parametrize(
+    ("form", "f"),
+    [
+        (cos(t) * d(x) + x * cos(t) * d(y) - x * sin(t), x * exp(y) * cos(t)),
+        (exp(x * z) * d(x * exp(y) + z * sin(x)), x * exp(y) + z * sin(x)),
+        (d(y) + 2 * z * d(z) + (2 * x * (x + y + z**2) + 1) * d(x), exp(x**2) * (x + y + z**2)),
+    ],
+)
+def test_integrals_are_written_plainly(form, f):
+    """Without factors that cancel, which would leave 0/0 where they vanish, and without i erfc(i x)."""
+    (integral,) = classify(form, [x, y, z]).integrals
+    assert integral.f.count_ops() <= f.expand().count_ops()
+    assert simplify(integral.f / f).is_number
+
+
+def test_integrals_are_real():
+    """x' = 2 t x, y' = x: y - x exp(-t^2) int exp(t^2) dt, in the imaginary error function."""
+    answer = check(classify([d(x) - 2 * t * x, d(y) - x], [x, y]), Kind.INTEGRABLE, 2, 2)
+    assert not any(integral.f.has(I) for integral in answer.integrals)
 
 
 # --- properties ----------------------------------------------------------------------------
