@@ -345,6 +345,15 @@ def test_undecided_in_regions():
     assert answer.kind is Kind.UNDECIDED
 
 
+@pytest.mark.parametrize(("limit", "value"), [("_LARGEST", 3), ("_SECONDS", -1.0)])
+def test_too_long_to_decide(monkeypatch, limit, value):
+    """An expression that outgrows memory or time is undecided, too: no guess, and no crash."""
+    monkeypatch.setattr(f"lagfmu.pfaffian.tower.{limit}", value)
+    answer = classify([sin(phi) * d(x) - (x + y + z) * d(y), d(z) - y * d(x)], [x, y, z, phi])
+    assert answer.kind is Kind.UNDECIDED
+    assert "a long expression" in answer.certificate
+
+
 def test_nonlinear_in_velocities():
     """An isokinetic constraint is not Pfaffian; the message names the term."""
     with pytest.raises(DerivationError, match=r"Derivative\(x\(t\), t\)\*\*2"):
