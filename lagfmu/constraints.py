@@ -216,6 +216,7 @@ class _Analysis:
     def _integral(self, f: Expr, reduced: list[list[Any]], pivots: list[int]) -> Integral:
         """f with its integrating factors: df = sum_i (df/dx_(p_i)) (reduced row i)."""
         tower = Tower(self.variables, [f, *(entry for row in self.rows for entry in row)])
+        f = min(f, tower.back(tower.element(f)), key=lambda e: e.count_ops())  # common factors gone
         factors = [tower.K.zero] * len(self.forms)
         for row, pivot in zip(reduced, pivots, strict=True):
             slope = tower.element(f.diff(self.variables[pivot]))

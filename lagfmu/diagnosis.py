@@ -25,8 +25,8 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
     values = ", ".join(f"{n} = {x!r}" for n, x in named)
     with np.errstate(all="ignore"):
         try:
-            M, F, G, nu, _ = at.evaluate(q, v)
-            bad = not all(np.isfinite(a).all() for a in (M, F, G, nu))
+            M, F, G, nu, gamma = at.evaluate(q, v)
+            bad = not all(np.isfinite(a).all() for a in (M, F, G, nu, gamma))
             reason = "a value is not finite" if bad else ""
             f = at.residual(q)
         except StepFailureError as error:
@@ -49,6 +49,12 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
         if contrary:
             return (
                 f"constraints {contrary} contradict each other: no velocities satisfy them together "
+                "at the start; correct them, or leave one out"
+            )
+        contrary = _first_contrary(system, G, gamma, rows)
+        if contrary:
+            return (
+                f"constraints {contrary} contradict each other: no accelerations satisfy them together "
                 "at the start; correct them, or leave one out"
             )
     return None
@@ -113,7 +119,7 @@ def _missed(at: Instant, q: Vector, v: Vector, rows: list[int], f: Vector, value
 
 
 def _first_contrary(system: System, G: Matrix, nu: Vector, rows: list[int]) -> str:
-    """Names of rows of G v = nu that no v satisfies."""
+    """Names of rows of G v = nu that no v satisfies, or of G vdot = gamma that no vdot does."""
 
     def solvable(chosen: list[int]) -> bool:
         if not chosen:

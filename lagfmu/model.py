@@ -11,7 +11,7 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -26,6 +26,8 @@ from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 Expr = Any  # a SymPy expression; SymPy carries no types
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0, sect. 2.2
+_NO_NUMBERS = (sp.I, sp.nan, sp.oo, -sp.oo, sp.zoo)
 RESERVED: tuple[str, ...] = (
     *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
     *("t", "time", "unique", "velocity"),
@@ -137,8 +139,11 @@ class Model:
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.coordinates, Mapping):  # a bare list: coordinates without units
+        if isinstance(self.coordinates, list | tuple):  # coordinates without units
             object.__setattr__(self, "coordinates", dict.fromkeys(self.coordinates, ""))
+        problems = _check_containers(self)
+        if problems:
+            raise ModelError(str(self.name), problems)
         for name in ("coordinates", "forces", "start", "descriptions"):
             object.__setattr__(self, name, dict(getattr(self, name)))
         for name in ("constraints", "parameters", "inputs"):
@@ -198,6 +203,45 @@ def _problems(model: Model) -> list[str]:
     return problems
 
 
+def _check_containers(model: Model) -> list[str]:
+    """Fields that are no dict or list, before they are copied."""
+    maps: list[tuple[str, object, str]] = [
+        ("coordinates", model.coordinates, "{x: 'm'}"),
+        ("forces", model.forces, "{x: F}"),
+        ("start", model.start, "{x: 1.0}"),
+        ("descriptions", model.descriptions, "{x: 'height'}"),
+    ]
+    problems = []
+    if isinstance(model.embedding, Embedding):
+        problems += [
+            f"embedding {name} = {value!r}, expected a dict, e.g. {example}"
+            for name, value, example in (
+                ("coordinates", model.embedding.coordinates, "{s: 'm'}"),
+                ("relations", model.embedding.relations, "{x: 2*s}"),
+                ("start", model.embedding.start, "{s: 1.0}"),
+            )
+            if not isinstance(value, Mapping)
+        ]
+    elif model.embedding is not None:
+        problems.append(
+            f"embedding = {model.embedding!r}, expected Embedding(coordinates, relations)"
+        )
+    problems += [
+        f"{name} = {value!r}, expected a dict, e.g. {name}={example}"
+        for name, value, example in maps
+        if not isinstance(value, Mapping)
+    ]
+    return problems + [
+        f"{name} = {value!r}, expected a list, e.g. {name}=[{example}(...)]"
+        for name, value, example in (
+            ("constraints", model.constraints, "Holonomic"),
+            ("parameters", model.parameters, "Parameter"),
+            ("inputs", model.inputs, "Input"),
+        )
+        if isinstance(value, str) or not isinstance(value, Iterable)
+    ]
+
+
 def _check_types(model: Model, problems: list[str]) -> None:
     """Things that are not what the fields of a Model hold, before anything is read from them."""
     kinds: tuple[tuple[str, Sequence[object], tuple[type, ...]], ...] = (
@@ -223,12 +267,43 @@ def _check_types(model: Model, problems: list[str]) -> None:
     expressions = [("lagrangian", model.lagrangian), ("kinetic_energy", model.kinetic_energy)]
     expressions += [(f"force on {plain(sp.sympify(q))}", f) for q, f in model.forces.items()]
     expressions += [(f"constraint {c.name!r}", c.expression) for c in model.constraints]
+    relations = model.embedding.relations if model.embedding else {}
+    expressions += [(f"embedding of {plain(sp.sympify(q))}", e) for q, e in relations.items()]
     for what, expression in expressions:
         if expression is not None and not _is_expression(expression):
             problems.append(
                 f"{what}: {expression} is no SymPy expression with a value (it is a "
                 f"{type(expression).__name__}): write sums, products and functions of symbols; "
                 "a constraint is the expression that vanishes"
+            )
+        elif expression is not None and sp.sympify(expression).has(*_NO_NUMBERS):
+            problems.append(
+                f"{what}: {plain(expression)} holds {_no_number(expression)}, expected real and "
+                "finite numbers: correct it"
+            )
+    _check_texts(model, problems)
+
+
+def _no_number(expression: Expr) -> str:
+    return ", ".join(str(n) for n in _NO_NUMBERS if sp.sympify(expression).has(n))
+
+
+def _check_texts(model: Model, problems: list[str]) -> None:
+    """Descriptions are texts of characters that XML can hold."""
+    texts: list[tuple[str, object]] = [("the model", model.description)]
+    texts += [(f"parameter {name_of(p.symbol)!r}", p.description) for p in model.parameters]
+    texts += [(f"input {name_of(i.symbol)!r}", i.description) for i in model.inputs]
+    texts += [(f"constraint {c.name!r}", c.description) for c in model.constraints]
+    texts += [(f"{plain(sp.sympify(q))}", text) for q, text in model.descriptions.items()]
+    for what, text in texts:
+        if not isinstance(text, str):
+            problems.append(f"description of {what} is {text!r}, expected a text: put it in quotes")
+            continue
+        bad = sorted(set(_NO_XML.findall(text)))
+        if bad:
+            problems.append(
+                f"description of {what}: {text!r} holds {', '.join(map(repr, bad))}, which no XML "
+                "file can hold: leave it out"
             )
 
 
@@ -357,7 +432,7 @@ def _check_start(
 def _number(value: object) -> bool:
     try:
         return math.isfinite(float(value))  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return False
 
 

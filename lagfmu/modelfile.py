@@ -46,7 +46,7 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
     except LagfmuError:
         raise
     except (Exception, SystemExit) as error:
-        raise ModelError(str(file), [_where(error, file)]) from error
+        raise ModelError(str(file), [_where(error, file.absolute())]) from error
     finally:
         sys.path.remove(folder)
     models = {id(v): (k, v) for k, v in vars(module).items() if isinstance(v, Model)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from .solver.initial import start
 from .solver.observe import observe
 from .solver.state import METHODS, SMALLEST_TOLERANCE, Settings
 
+MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
 
@@ -53,6 +55,8 @@ def simulate(
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
         if number is not None and not 0 < number < np.inf:
             raise SimulationError(f"{what} = {number!r} s, expected a positive number")
+    if tolerance is not None and not 0 < tolerance < np.inf:
+        raise SimulationError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared):
@@ -62,10 +66,21 @@ def simulate(
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
     """0, h, 2 h, ..., and the stop time."""
+    _check_count(stop_time, step_size)
     count = max(1, int(np.ceil(stop_time / step_size * (1 - 1e-12))))
     times = np.arange(count + 1, dtype=np.float64) * step_size
     times[-1] = stop_time
     return times
+
+
+def _check_count(stop_time: float, step_size: float) -> None:
+    """Refuse a run that would fill the memory with communication points."""
+    if stop_time / step_size > MOST_POINTS:
+        raise SimulationError(
+            f"step_size = {step_size!r} s asks for {stop_time / step_size:.3g} communication points "
+            f"until {stop_time!r} s, expected at most {MOST_POINTS:.0e}: choose a larger step_size, or "
+            "an earlier stop_time"
+        )
 
 
 def _simulate_model(
@@ -195,6 +210,7 @@ def _simulate_fmu(
 
     stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
     step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
+    _check_count(stop, step)
     _check_values(
         str(path),
         {
@@ -223,8 +239,7 @@ def _simulate_fmu(
             debug_logging=True,
         )
     except FMICallException as error:
-        cause = "; ".join(messages) or "no message was logged"
-        raise SimulationError(f"{str(path)!r}: {error} ({cause})") from None
+        raise SimulationError(_told(path, error, messages)) from None
     except Exception as error:
         raise SimulationError(f"{str(path)!r} cannot be simulated: {error}") from None
     reached = float(result["time"][-1])
@@ -234,3 +249,11 @@ def _simulate_fmu(
             f"{str(path)!r}: the run ends at t = {reached!r} s, before {stop!r} s ({cause})"
         )
     return result
+
+
+def _told(path: Path, error: FMICallException, messages: Sequence[str]) -> str:
+    """The FMU's own reason; pythonfmu's binary wraps it in the name of the exception."""
+    raised = re.search(r"""Refused\((["'])(.*)\1\)""", " ".join("; ".join(messages).split()))
+    if raised:
+        return f"{str(path)!r}: {error.function} is refused: {raised[2]}"
+    return f"{str(path)!r}: {error} ({'; '.join(messages) or 'no message was logged'})"

@@ -15,7 +15,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from instance import instance
 from pythonfmu.builder import FmuBuilder
-from sympy import Eq, cos, exp, sin, sqrt, symbols
+from sympy import Eq, I, cos, exp, oo, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -154,6 +154,15 @@ def test_a_unit_that_is_not_coherent_si_is_refused(unit, parts):
             {"constraints": [Holonomic("rod", ROD.expression, while_closed="floor")]},
             ("'rod'", "while_closed='floor'", "contacts: none"),
         ),
+        ({"forces": [m * g]}, ("forces = [g*m]", "expected a dict", "forces={x: F}")),
+        ({"start": [1.0]}, ("start = [1.0]", "expected a dict")),
+        ({"constraints": ROD}, ("constraints = Holonomic", "expected a list", "[Holonomic(...)]")),
+        ({"parameters": None}, ("parameters = None", "expected a list")),
+        ({"embedding": {x: L * sin(theta)}}, ("embedding = {", "expected Embedding(")),
+        ({"embedding": Embedding([theta], {x: L})}, ("embedding coordinates", "expected a dict")),
+        ({"lagrangian": K - I * m * g * y}, ("lagrangian", "holds I", "real and finite")),
+        ({"forces": {x: m * g * oo}}, ("force on x", "holds oo", "real and finite")),
+        ({"description": 5}, ("description of the model is 5", "expected a text")),
         (
             {"constraints": [Contact("floor", y, restitution=symbols("e"))]},
             ("restitution of 'floor'", "e is neither"),
@@ -224,6 +233,21 @@ def test_contradictory_velocities_are_refused():
         "no velocities",
         "leave one out",
     )
+
+
+def test_contradictory_accelerations_are_refused():
+    """x = 0 and x = g t^2/2 agree in place and speed at the start, and part at once."""
+    model = pendulum(
+        constraints=[
+            Holonomic("one", x),
+            Holonomic("level", y),
+            Holonomic("two", x - g * t**2 / 2),
+        ],
+        start={},
+    )
+    message = refusal(lambda: prepare(model), ModelError)
+    says(message, "'one', 'two'", "no accelerations", "leave one out")
+    assert "level" not in message
 
 
 def test_a_redundant_constraint_warns_and_its_multipliers_share_the_force(tmp_path):
@@ -376,6 +400,22 @@ def test_names_that_mean_something_in_python_are_fine(tmp_path):
     assert run["x"] == pytest.approx(simulate(pendulum(), stop_time=0.2)["x"], rel=1e-9)
 
 
+@pytest.mark.parametrize("sign", ["\x00", "\x1b", "\ufffe", "\ud800"])
+def test_descriptions_that_no_xml_file_can_hold_are_refused(sign):
+    """Control characters and halves of surrogate pairs, wherever they stand."""
+    text = f"the{sign}rod"
+    message = refusal(
+        lambda: pendulum(
+            description=text,
+            descriptions={x: text},
+            parameters=(Parameter(m, 1.0, "kg", text), *CONSTANTS[1:]),
+            constraints=[Holonomic("rod", ROD.expression, text)],
+        ),
+        ModelError,
+    )
+    says(message, "4 problems", "parameter 'm'", "constraint 'rod'", repr(sign), "leave it out")
+
+
 def test_descriptions_with_markup_survive(tmp_path):
     """What XML and HTML would take for markup comes back as it was written."""
     text = "<b>\"bob\" & 'rod'</b> ]]> \\ {curly} θ é 100 %"
@@ -484,6 +524,14 @@ def test_a_model_file_that_is_no_good_is_refused(tmp_path, text, parts):
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
     message = refusal(lambda: load(file), ModelError)
     says(message, str(file), *parts)
+
+
+def test_the_line_is_named_however_the_file_is_called(tmp_path, monkeypatch):
+    """Called by a path relative to the folder, too."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(GOOD + "\n1 / 0\n")
+    for name in ("mine.py", f"../{tmp_path.name}/mine.py"):
+        says(refusal(lambda name=name: load(name), ModelError), name, "line 10 (1 / 0)")
 
 
 def test_a_file_that_is_missing_or_no_python_file_is_refused(tmp_path):
@@ -622,12 +670,17 @@ def test_verify_refuses_values_that_cannot_be(fmu):
     says(refusal(lambda: verify(path, {"m1": "heavy"})), "m1", "'heavy'")
     says(refusal(lambda: verify(path, stop_time=-1.0)), "stop_time", "-1.0")
     says(refusal(lambda: verify(path, step_size=0.0)), "step_size", "0.0")
+    says(refusal(lambda: verify(path, step_size=1e-12)), "step_size = 1e-12", "at most 1e+07")
+    says(refusal(lambda: verify(path, tolerance=0.0)), "tolerance = 0.0", "positive")
 
 
 def test_what_the_fmu_refuses_is_told_by_verify(fmu):
     """The FMU's own message reaches the caller."""
     says(refusal(lambda: verify(fmu("Atwood"), {"m1": math.nan})), "'m1' = nan", "finite")
     says(refusal(lambda: verify(fmu("Atwood"), tolerance=math.nan)), "tolerance = nan")
+    message = refusal(lambda: simulate(fmu("Atwood"), start_values={"m1": 0.0}))
+    says(message, "fmi2SetReal", "'m1' = 0.0, expected a positive number")
+    assert "Fatal py" not in message
 
 
 def test_a_run_that_stops_early_is_no_success(fmu):
@@ -646,6 +699,8 @@ def test_simulate_refuses_values_that_cannot_be():
     says(refusal(lambda: simulate(model, start_values={"solver.method": "euler"})), "euler", "rk4")
     says(refusal(lambda: simulate(model, stop_time=-1.0)), "stop_time", "-1.0")
     says(refusal(lambda: simulate(model, step_size=math.inf)), "step_size", "inf")
+    says(refusal(lambda: simulate(model, step_size=1e-12)), "step_size = 1e-12", "larger step_size")
+    says(refusal(lambda: simulate(model, tolerance=-1e-8)), "tolerance = -1e-08", "positive")
 
 
 # ---------------------------------------------------------------------------- calls of the FMU

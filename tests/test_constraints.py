@@ -8,6 +8,7 @@ import pytest
 from sympy import (
     Abs,
     Function,
+    I,
     Matrix,
     cos,
     exp,
@@ -107,6 +108,10 @@ INTEGRABLE = {
     "homogeneous": ((x**2 + y**2) * d(x) - 2 * x * y * d(y), [x, y]),
     "steering to a moving point": (d(y) * (x - omega * t) - y * (d(x) - omega), [x, y]),
     "rotating line": (x * d(y) - y * d(x) - omega * (x**2 + y**2), [x, y]),
+    "a factor of another variable": (
+        cos(s) * (x * d(y) - y * d(x) + x**2 * d(z)) / x**2,
+        [x, y, z, s],
+    ),
     "unknown input": (d(x) - h(t) * x, [x]),
     "linear with an unknown function": (d(y) + h(x) * y * d(x), [x, y]),
 }
@@ -232,6 +237,18 @@ def test_only_a_combination_with_functions():
     check(classify(forms, [x, y, z, s, phi]), Kind.PARTLY, 2, 1)
 
 
+def test_only_a_combination_of_which_each_form_hides_it():
+    """Both forms mix the contact form and d(x y exp(z)), with coefficients of (q): no ansatz finds it."""
+    contact, f = d(s) - z * d(y), x * y * exp(z)
+    forms = [
+        sin(x) * contact + (2 + cos(y)) * exp(z) * d(f),
+        cos(x) * contact + x * d(f),
+    ]
+    answer = check(classify(forms, [x, y, z, s]), Kind.PARTLY, 2, 1)
+    assert [c.kind for c in answer.each] == [Kind.NONHOLONOMIC] * 2
+    assert simplify(answer.integrals[0].f / f).is_number
+
+
 def test_differential_drive():
     """Two driven wheels: of three constraints, l phi - R (theta - psi) = const is holonomic."""
     forward = R / 2 * (d(theta) + d(psi))
@@ -254,6 +271,29 @@ LINEAR = {
     "integrators": ([d(x) - y, d(y) - z, d(z)], [x, y, z]),
     "third order": ([d(x) - y, d(y) - z, d(z) + x], [x, y, z]),
 }
+
+
+LINEAR_IN_PLACES = {
+    "turned by an angle": ([d(x) - y * d(theta), d(y) + x * d(theta)], [x, y, theta]),
+    "driven by a place": ([d(z) - y * d(x), d(y) - z * d(x)], [x, y, z]),
+    "two of them, and an exact form": (
+        [
+            d(x) - y * d(theta),
+            d(y) + x * d(theta),
+            d(z) - s * d(psi),
+            d(s) - z * d(psi),
+            d(phi) - R * d(psi),
+        ],
+        [x, y, z, s, theta, phi, psi],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LINEAR_IN_PLACES)
+def test_linear_system_in_a_coordinate(name):
+    """dx = A x ds: any coordinate may be what time is above, x exp(-A s) is constant."""
+    forms, names = LINEAR_IN_PLACES[name]
+    check(classify(forms, names), Kind.INTEGRABLE, len(forms), len(forms))
 
 
 @pytest.mark.parametrize("name", LINEAR)
@@ -305,6 +345,15 @@ def test_undecided_in_regions():
     assert answer.kind is Kind.UNDECIDED
 
 
+@pytest.mark.parametrize(("limit", "value"), [("_LARGEST", 3), ("_SECONDS", -1.0)])
+def test_too_long_to_decide(monkeypatch, limit, value):
+    """An expression that outgrows memory or time is undecided, too: no guess, and no crash."""
+    monkeypatch.setattr(f"lagfmu.pfaffian.tower.{limit}", value)
+    answer = classify([sin(phi) * d(x) - (x + y + z) * d(y), d(z) - y * d(x)], [x, y, z, phi])
+    assert answer.kind is Kind.UNDECIDED
+    assert "a long expression" in answer.certificate
+
+
 def test_nonlinear_in_velocities():
     """An isokinetic constraint is not Pfaffian; the message names the term."""
     with pytest.raises(DerivationError, match=r"Derivative\(x\(t\), t\)\*\*2"):
@@ -320,6 +369,27 @@ def test_contradictory():
         classify([d(x) - 1, d(x) - 2], [x])
     with pytest.raises(DerivationError, match="no velocity"):
         classify(x**2 + y**2 - l**2, [x, y])
+
+
+@pytest.mark.parametrize(
+    ("form", "f"),
+    [
+        (cos(t) * d(x) + x * cos(t) * d(y) - x * sin(t), x * exp(y) * cos(t)),
+        (exp(x * z) * d(x * exp(y) + z * sin(x)), x * exp(y) + z * sin(x)),
+        (d(y) + 2 * z * d(z) + (2 * x * (x + y + z**2) + 1) * d(x), exp(x**2) * (x + y + z**2)),
+    ],
+)
+def test_integrals_are_written_plainly(form, f):
+    """Without factors that cancel, which would leave 0/0 where they vanish, and without i erfc(i x)."""
+    (integral,) = classify(form, [x, y, z]).integrals
+    assert integral.f.count_ops() <= f.expand().count_ops()
+    assert simplify(integral.f / f).is_number
+
+
+def test_integrals_are_real():
+    """x' = 2 t x, y' = x: y - x exp(-t^2) int exp(t^2) dt, in the imaginary error function."""
+    answer = check(classify([d(x) - 2 * t * x, d(y) - x], [x, y]), Kind.INTEGRABLE, 2, 2)
+    assert not any(integral.f.has(I) for integral in answer.integrals)
 
 
 # --- properties ----------------------------------------------------------------------------

@@ -14,6 +14,9 @@ from sympy.physics.mechanics import (
     Particle,
     Point,
     ReferenceFrame,
+    RigidBody,
+    System,
+    TorqueActuator,
     dynamicsymbols,
 )
 
@@ -196,6 +199,47 @@ def test_a_converted_nonholonomic_system_with_forces_agrees_with_sympy():
     names = ("der(x,2)", "der(y,2)", "der(phi,2)")
     assert [ours[n] for n in names] == pytest.approx(vdot, rel=1e-9, abs=1e-12)
     assert ours["lambda.edge"] == pytest.approx(-lam[0], rel=1e-9)
+
+
+def test_a_converted_system_of_joints_is_the_pendulum_with_spring_and_damper():
+    """m L^2 theta'' = -m g L sin(theta) - k theta - c theta', in speeds u = theta' of a pin joint."""
+    k, c = sp.symbols("k c", positive=True)
+    angle, u = dynamicsymbols("theta u")
+    wall, bob = RigidBody("wall"), Particle("bob", mass=m)
+    arm = ReferenceFrame("A")
+    arm.orient_axis(wall.frame, wall.z, angle)
+    arm.set_ang_vel(wall.frame, u * wall.z)
+    bob.masscenter.set_pos(wall.masscenter, -L * arm.y)
+    wall.masscenter.set_vel(wall.frame, 0)
+    bob.masscenter.v2pt_theory(wall.masscenter, wall.frame, arm)
+    system = System(wall.frame, wall.masscenter)
+    system.add_bodies(bob)
+    system.add_coordinates(angle)
+    system.add_speeds(u)
+    system.add_kdes(angle.diff() - u)
+    system.apply_uniform_gravity(-g * wall.y)
+    system.add_actuators(TorqueActuator(-k * angle - c * u, wall.z, arm))
+    springs = (Parameter(k, 3.0, "N.m/rad"), Parameter(c, 0.5, "N.m.s/rad"))
+    start = {angle: 0.4, angle.diff(): 1.5}
+    model = from_lagranges_method(system, "P", {angle: "rad"}, (*CONSTANTS, *springs), start=start)
+    ours = observed(model)
+    torque = -2.0 * 9.81 * 1.5 * np.sin(0.4) - 3.0 * 0.4 - 0.5 * 1.5
+    assert ours["der(theta,2)"] == pytest.approx(torque / (2.0 * 1.5**2), rel=1e-9)
+    stop = sp.Symbol("a", positive=True)
+    system.add_holonomic_constraints(angle - stop)
+    held = observed(
+        from_lagranges_method(
+            system,
+            "P",
+            {angle: "rad"},
+            (*CONSTANTS, *springs, Parameter(stop, 0.4, "rad")),
+            start={angle: 0.4},
+        )
+    )
+    assert held["lambda.c1"] == pytest.approx(2.0 * 9.81 * 1.5 * np.sin(0.4) + 3.0 * 0.4, rel=1e-9)
+    message = r"coordinate 'theta' of the System has no unit"
+    with pytest.raises(ModelError, match=message):
+        from_lagranges_method(system, "P", {})
 
 
 def test_a_conversion_that_lacks_units_or_names_is_refused():

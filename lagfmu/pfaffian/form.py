@@ -58,6 +58,13 @@ class OneForm:
     def exact(self, a: list[Any]) -> bool:
         return all(self.tower.is_zero(self.curl(a, i, j)) for i, j in pairs(len(a)))
 
+    def closed(self, a: list[Any]) -> bool:
+        """d(omega) = 0 with respect to all variables, those of which omega has no differential too."""
+        others = [v for v in self.tower.variables if v not in self.x]
+        return self.exact(a) and all(
+            self.tower.is_zero(self.tower.diff(entry, v)) for entry in a for v in others
+        )
+
     def integrable(self) -> bool:
         """d(omega) wedge omega = 0."""
         for i, j, k in itertools.combinations(range(len(self.x)), 3):

@@ -45,7 +45,7 @@ def first_integrals(
         with suppress(*FAILURES):
             for f in exponential_integrals(system):
                 system.offer(f)
-    for row in forms if forms and len(rows) == 1 else (*forms, *rows):
+    for row in forms if len(forms) == 1 else (*forms, *rows):  # one row is that of one form
         if not system.complete() and not late() and system.contains(row):
             system.offer(single(row, variables))
     for degree in (1, 2, 3):

@@ -7,6 +7,7 @@ Equations*, ch. 3).
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import Any
 
@@ -33,36 +34,65 @@ from sympy import (
     together,
 )
 
+from .echelon import rref
 from .quadrature import quadrature
 from .system import System
+from .tower import Tower
+from .undecided import late
 
 Expr = Any  # SymPy has no types
 
 
 def exponential_integrals(system: System) -> Iterator[Expr]:
-    """The integrals of the largest part of the system that is linear on its own."""
-    if len(system.free) != 1:
-        return
-    s = system.variables[system.free[0]]
-    names = [system.variables[p] for p in system.pivots]
-    speeds = [-row[system.free[0]] for row in system.rows]
-    kept = list(range(len(names)))
+    """The integrals of the parts of the system that are linear on their own.
+
+    Every variable that the system holds is tried as s: time, or an angle that drives the others.
+    """
+    used = set().union(*(entry.free_symbols for row in system.rows for entry in row))
+    active = [
+        x
+        for j, x in enumerate(system.variables)
+        if x in used or any(row[j] != 0 for row in system.rows)
+    ]
+    for s in reversed(active):
+        if system.complete() or late():
+            return
+        others = [x for x in active if x != s]
+        yield from _linear(_speeds(system, others, s), others, s)
+
+
+def _speeds(system: System, others: list[Expr], s: Expr) -> dict[Expr, Expr]:
+    """dx/ds of the variables that move with s alone."""
+    places = [system.variables.index(x) for x in (*others, s)]
+    tower = Tower(system.variables, itertools.chain(*system.rows))
+    matrix = [[tower.element(row[j]) for j in places] for row in system.rows]
+    reduced, pivots = rref(tower, matrix, len(places))
+    free = [j for j in range(len(others)) if j not in pivots]
+    return {
+        others[p]: -tower.back(row[-1])
+        for row, p in zip(reduced, pivots, strict=False)
+        if p < len(others) and not any(row[j] for j in free)
+    }
+
+
+def _linear(speeds: dict[Expr, Expr], others: list[Expr], s: Expr) -> Iterator[Expr]:
+    """The integrals of the equations dx/ds = speeds that are linear in x among themselves."""
+    x = list(speeds)
     while True:
-        x = [names[k] for k in kept]
-        table = [[expand(speeds[k]).coeff(v) for v in x] for k in kept]
+        table = [[expand(speeds[u]).coeff(v) for v in x] for u in x]
         rest = [
-            expand(speeds[k] - Add(*[a * v for a, v in zip(line, x, strict=True)]))
-            for k, line in zip(kept, table, strict=True)
+            expand(speeds[u] - Add(*[a * v for a, v in zip(line, x, strict=True)]))
+            for u, line in zip(x, table, strict=True)
         ]
         good = [
-            k
-            for k, line, c in zip(kept, table, rest, strict=True)
-            if not any(a.has(s, *names) for a in line) and not c.has(*names)
+            u
+            for u, line, c in zip(x, table, rest, strict=True)
+            if not any(a.has(s, *others) for a in line) and not c.has(*others)
         ]
-        if good == kept:
+        if good == x:
             break
-        kept = good
-    if not 1 < len(kept) <= 6:
+        x = good
+    if not 1 < len(x) <= 6:
         return
     for vector in _exponentials(Matrix(table), s):
         drive = Add(*[a * c for a, c in zip(vector, rest, strict=True)])

@@ -15,6 +15,7 @@ from sympy import (
     Add,
     Dummy,
     Function,
+    I,
     Integral,
     Mul,
     Piecewise,
@@ -24,6 +25,9 @@ from sympy import (
     apart,
     cos,
     csc,
+    erf,
+    erfc,
+    erfi,
     exp,
     expand,
     integrate,
@@ -94,9 +98,15 @@ def _search(term: Expr, x: Expr) -> Expr | None:
         while found.has(Piecewise):
             piece = next(iter(found.atoms(Piecewise)))
             found = found.xreplace({piece: piece.args[0].expr})
+        found = found.replace(erfc, _error_function)
         if not found.has(Integral, S.NaN, S.ComplexInfinity):
             return found.xreplace({new: old for old, new in names.items()})
     return None
+
+
+def _error_function(u: Expr) -> Expr:
+    """erfc(u) less a constant, and real for an imaginary u: erf(i u) = i erfi(u)."""
+    return -I * erfi(u / I) if u.as_coefficient(I) is not None else -erf(u)
 
 
 def _heuristics(term: Expr, x: Expr) -> Expr | None:

@@ -26,7 +26,7 @@ def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Ex
         return None
     try:
         given = [form.tower.element(entry) for entry in form.given]
-        if len(given) > 1 and form.exact(given):  # then no factor makes it easier
+        if len(given) > 1 and form.closed(given):  # then no factor makes it easier
             f = potential(form.given, form.x)
             return f if f is not None and form.solves(f) else None
     except FAILURES:

@@ -24,6 +24,7 @@ from .undecided import Undecided, deadline, late
 
 _SECONDS = 20.0
 _LARGEST = 3000  # terms of a numerator and a denominator; beyond that, the answer is "undecided"
+_LONG = Symbol("(a long expression)")
 _SIMPLIFIABLE = 150  # operations up to which SymPy's simplify is asked
 
 
@@ -63,9 +64,9 @@ class Tower:
         """`element` with the roots' relations applied, and no square root in the denominator."""
         element = self.lift(element)
         if len(element.numer) + len(element.denom) > _LARGEST:
-            raise Undecided("(a long expression)", "too large to decide")
+            raise Undecided(_LONG, "too large to decide")
         if time.monotonic() > self._deadline:
-            raise Undecided("(a long expression)", "not decided in the time allowed")
+            raise Undecided(_LONG, "not decided in the time allowed")
         for generator, (degree, radicand) in reversed(self._generators.relations.items()):
             power = self.K.from_expr(radicand)
             root = self.K.from_expr(generator)
