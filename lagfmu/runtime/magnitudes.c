@@ -34,6 +34,8 @@ static const double LOST = 1e3 * DBL_EPSILON; /* what is left of a place by a pr
 static const double PART = 1e-3;  /* of the first step, in which a motion without scale is measured */
 static const double SHIFT = 0x1p-20; /* of its size, by which a coordinate is displaced to see what
                                       * holds it */
+static const double ROUNDINGS = 1e9; /* times the tolerance: roundings of q that an error of v may
+                                      * reach, 0.01 to 10 */
 static const double TINY = 1e-100; /* scale of what neither moves nor is pushed: anything that moves
                                     * exceeds it */
 
@@ -202,11 +204,12 @@ static Status find_scales(Solver *s, const double *own, const double *shaken) {
     const int n = s->system->n;
     State *state = &s->state;
     const double floor = larger(1e-8, 10 * DBL_EPSILON / s->settings.tolerance);
+    const double roundings = fmin(larger(ROUNDINGS * s->settings.tolerance, 0.01), 10);
     for (int j = 0; j < n; j++) {
         const double least = floor * state->size[j];
         const double rate = own[j] > 0 ? own[j] : state->now.rate;
         state->scale[j] = positive(larger(state->scale[j], least));
-        const double speed = larger(least * rate, 10 / s->settings.tolerance * shaken[j]);
+        const double speed = larger(least * rate, roundings / s->settings.tolerance * shaken[j]);
         state->scale[n + j] = positive(larger(state->scale[n + j], speed));
         if (!(state->scale[j] <= DBL_MAX && state->scale[n + j] <= DBL_MAX))
             return fail(&s->why, "the start is refused: the scale of %s is not finite",

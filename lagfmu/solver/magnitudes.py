@@ -44,6 +44,7 @@ TOUCH = 1e-9  # |f| below this, in units of the constraint's own size, counts as
 LOST = 1e3 * EPS  # what is left of a place by a projection, or of forces that cancel, is rounding
 PART = 1e-3  # of the first communication step, in which a motion without any scale is measured
 SHIFT = 2.0**-20  # of its size, by which a coordinate is displaced to see what holds it
+ROUNDINGS = 1e9  # times the tolerance: roundings of q that an error of v may reach, 0.01 to 10
 TINY = 1e-100  # scale of what neither moves nor is pushed: anything that moves exceeds it
 
 
@@ -107,7 +108,8 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
     rate = rate or _rate(system, size, np.abs(v), felt, found) or (1 / span if span > 0 else 0.0)
     floor = max(1e-8, 10 * EPS / settings.tolerance)
     speed_scale = floor * size * np.where(own > 0, own, rate)
-    speed_scale = np.maximum(speed_scale, 10 / settings.tolerance * shaken)
+    roundings = min(max(ROUNDINGS * settings.tolerance, 0.01), 10.0)
+    speed_scale = np.maximum(speed_scale, roundings / settings.tolerance * shaken)
     scale = np.maximum(state.scale, np.concatenate([floor * size, speed_scale]))
     gap = np.array(state.gap)
     if not found.all():
