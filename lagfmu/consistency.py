@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .diagnosis import cause_of_failure
+from .diagnosis import cause_of_failure, negative_energy
 from .equations import EquationsOfMotion
 from .errors import DerivationError, ModelError
 from .reduction import Reduction
@@ -25,7 +25,7 @@ from .solver.instant import Instant
 from .solver.observe import expand, observe
 from .solver.solution import RANK
 from .solver.state import Settings
-from .solver.system import System, Vector
+from .solver.system import Matrix, System
 from .variables import VariableTable
 
 TRIALS = 5
@@ -62,11 +62,12 @@ def examine(
     `numbers`: values of parameters and inputs (plain symbols) that are not the model's own.
 
     Warns of redundant constraints.  Raises ModelError if no configuration satisfies the constraints,
-    they contradict each other, or the mass matrix is singular on the constraint surface.
+    they contradict each other, the mass matrix is singular on the constraint surface, or the kinetic
+    energy is negative for some velocities at the start.
     """
     begun, u, p = _begun(eom, table, system, numbers or {})
     generator = random.Random(1)
-    ranks = []
+    ranks, masses = [], []
     for trial in range(TRIALS):
         q, v = np.array(begun.state.q), np.array(begun.state.v)
         if trial:  # a nearby configuration that satisfies the constraints as well
@@ -78,7 +79,13 @@ def examine(
                 continue
             q, v = np.array(moved.state.q), np.array(moved.state.v)
         full, q, v = expand(system, 0.0, q, v, u, p)
-        ranks.append(_rank(Instant(full, 0.0, u, p), q, v))
+        M, _, G, _, _ = Instant(full, 0.0, u, p).evaluate(q, v)
+        ranks.append(_rank(full, G))
+        masses.append(M)
+    size = np.abs([M.diagonal() for M in masses]).max(axis=0)
+    negative = negative_energy(full, masses[0], size)
+    if negative:
+        raise ModelError(eom.model.name, [negative])
     rank, redundant = max(ranks, key=lambda r: r[0])
     if redundant:
         warnings.warn(
@@ -156,10 +163,8 @@ def check_embedding(eom: EquationsOfMotion, reduction: Reduction) -> None:
     )
 
 
-def _rank(at: Instant, q: Vector, v: Vector) -> tuple[int, tuple[str, ...]]:
+def _rank(full: System, G: Matrix) -> tuple[int, tuple[str, ...]]:
     """Rank of G with rows scaled to unit norm, and the rows that add nothing to those before them."""
-    full = at.system
-    _, _, G, _, _ = at.evaluate(q, v)
     norm = np.linalg.norm(G, axis=1)
     G = G / np.where(norm > 0, norm, 1.0)[:, None]
     kept: list[int] = []

@@ -15,6 +15,8 @@ from .solver.instant import Instant
 from .solver.solution import RANK
 from .solver.system import Matrix, System, Vector
 
+NEGATIVE = 1e-12  # a mass below this fraction of its neighbours' is rounding
+INDEFINITE = 1e-8  # an eigenvalue of the scaled mass matrix above -this is rounding
 SEARCHES = 40  # other start values that are tried before constraints are called unsatisfiable
 
 
@@ -36,6 +38,9 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
                 f"the equations cannot be evaluated at the start values {values} ({reason}): "
                 "choose others, or other parameters"
             )
+        negative = negative_energy(system, M, np.abs(M.diagonal()))
+        if negative:
+            return negative
         rows = list(system.permanent)
         loose = _massless(system, M, G[rows])
         if loose:
@@ -58,6 +63,37 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
                 "at the start; correct them, or leave one out"
             )
     return None
+
+
+def negative_energy(system: System, M: Matrix, size: Vector) -> str:
+    """Motions with kinetic energy v.M v/2 < 0, in words; empty if M (n, n) is positive semidefinite.
+
+    `size` (n) >= 0: the masses' magnitudes here and nearby, which tell a negative mass from the rounding
+    of one that vanishes at this place.
+    """
+    remedy = (
+        "at the start, expected no negative kinetic energy: check the sign of T in L = T - V, and the "
+        "parameters in it"
+    )
+    masses = dict(zip(system.coordinates, M.diagonal().tolist(), strict=True))
+    below = (M.diagonal() < -NEGATIVE * size).tolist()
+    wrong = [
+        f"{name!r} is {mass:.6g}"
+        for (name, mass), b in zip(masses.items(), below, strict=True)
+        if b
+    ]
+    if wrong:
+        return f"the kinetic energy is negative: the mass of {', of '.join(wrong)} {remedy}"
+    unit = np.sqrt(np.where(size > 0, size, np.abs(M).max(initial=0.0) or 1.0))
+    values, vectors = np.linalg.eigh(M / unit[:, None] / unit)
+    if not values.min(initial=0.0) < -INDEFINITE:
+        return ""
+    names = zip(system.coordinates, vectors[:, 0].tolist(), strict=True)
+    moving = ", ".join(repr(name) for name, part in names if abs(part) > 1e-2)
+    return (
+        f"the kinetic energy is negative where {moving} move together: the mass matrix, scaled to a "
+        f"diagonal of 1, has the eigenvalue {values[0]:.6g} {remedy}"
+    )
 
 
 def _massless(system: System, M: Matrix, G: Matrix) -> str:

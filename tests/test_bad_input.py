@@ -275,6 +275,53 @@ def test_a_coordinate_without_mass_is_refused():
     says(message, "mass matrix is singular", "'y'", "give it a mass")
 
 
+def test_negative_kinetic_energy_is_refused():
+    """L = V - T gives every coordinate a negative mass: pushed to the right, it would go to the left."""
+    message = refusal(lambda: prepare(pendulum(lagrangian=-K - m * g * y)), ModelError)
+    says(message, "kinetic energy is negative", "'x' is -1", "'y' is -1", "sign of T in L = T - V")
+    one = m * (x.diff() ** 2 - y.diff() ** 2) / 2 - m * g * y
+    message = refusal(lambda: prepare(pendulum(lagrangian=one)), ModelError)
+    says(message, "the mass of 'y' is -1 ")
+    assert "'x' is" not in message
+
+
+@pytest.mark.parametrize("coupling", [1.5, -1.5])
+def test_indefinite_kinetic_energy_is_refused(coupling):
+    """T = m (x'^2 + y'^2)/2 + c m x' y' is negative along x' = -y' (or x' = y') where |c| > 1."""
+    lagrangian = K + coupling * m * x.diff() * y.diff() - m * g * y
+    message = refusal(lambda: prepare(pendulum(lagrangian=lagrangian)), ModelError)
+    says(message, "negative where 'x', 'y' move together", "eigenvalue -0.5 ", "L = T - V")
+
+
+def test_the_value_of_a_parameter_decides_whether_kinetic_energy_is_negative():
+    """With |c| < 1 the same T is positive; with |c| = 1 there is a motion without mass, no negative one."""
+    c = symbols("c")
+    lagrangian = K + c * m * x.diff() * y.diff() - m * g * y
+
+    def model(value):
+        return pendulum(lagrangian=lagrangian, parameters=(*CONSTANTS, Parameter(c, value)))
+
+    for value in (0.5, 1.0):
+        assert prepare(model(value)).structure.degrees_of_freedom == 1
+    says(refusal(lambda: prepare(model(2.0)), ModelError), "eigenvalue -1 ")
+
+
+def test_mass_that_vanishes_at_the_start_is_no_negative_one():
+    """A folded linkage: m L^2 (0.3 + 3 c cos(theta)) is 0 at theta = pi, and -6e-17 kg m^2 in doubles."""
+    c = symbols("c")
+    assert 0.3 + 3 * 0.1 * math.cos(math.pi) < 0
+    folded = m * L**2 * (0.3 + 3 * c * cos(theta)) * theta.diff() ** 2 + m * x.diff() ** 2 / 2
+    made = Model(
+        name="Folded",
+        lagrangian=folded - m * g * x,
+        coordinates={x: "m", theta: "rad"},
+        parameters=(*CONSTANTS, Parameter(c, 0.1)),
+        constraints=[Holonomic("band", x - L * theta)],
+        start={x: math.pi, theta: math.pi},
+    )
+    assert prepare(made).structure.degrees_of_freedom == 1
+
+
 def test_a_massless_coordinate_that_a_constraint_determines_is_fine():
     """M = diag(m, 0) with x = y: the motion is free fall, and lambda_x is the whole weight."""
     link = {"lagrangian": m * x.diff() ** 2 / 2 - m * g * x, "constraints": [Holonomic("c", x - y)]}

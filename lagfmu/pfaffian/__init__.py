@@ -1,6 +1,7 @@
 """Pfaffian systems: what `lagfmu.constraints` classifies with.  Each file imports from those above it.
 
 - `undecided`: giving up, and in time
+- `fractions`: rational functions, no operation of which takes long
 - `generators`, `samples`, `tower`: is an expression zero?
 - `echelon`: linear algebra where that is known
 - `coefficients`: the one-form of a constraint

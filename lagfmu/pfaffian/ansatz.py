@@ -16,6 +16,7 @@ from sympy import Add, Mul, S
 from sympy.polys.domains import QQ
 from sympy.polys.matrices import DomainMatrix
 
+from .fractions import admit_gcd
 from .tower import Tower
 
 Expr = Any  # SymPy has no types
@@ -50,6 +51,7 @@ def relations(tower: Tower, columns: Sequence[Sequence[Any]]) -> list[list[Expr]
     for equation in range(len(columns[0])):
         below = ring.one
         for column in columns:
+            admit_gcd(below, column[equation].denom)
             below = below.lcm(column[equation].denom)
         for m, column in enumerate(columns):
             entry = column[equation]

@@ -29,7 +29,7 @@ def bernoulli(form: OneForm) -> Iterator[Expr | None]:
         b = {i: tower.reduce(form.a[i] / form.a[p]) for i in rest}
         slope = {i: tower.diff(b[i], y) for i in rest}
         over = {i: tower.reduce(b[i] / tower.element(y)) for i in rest}
-        k = tower.K.zero
+        k: Any = tower.K.zero
         for i in rest:
             bend = tower.diff(slope[i], y)
             if not tower.is_zero(bend):

@@ -12,6 +12,7 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
+from .fractions import admit_gcd
 from .frobenius import pairs
 from .tower import Tower
 
@@ -40,6 +41,8 @@ class OneForm:
             return row
         below, above = row[0].denom, row[0].numer
         for entry in row[1:]:
+            admit_gcd(below, entry.denom)
+            admit_gcd(above, entry.numer)
             below, above = below.lcm(entry.denom), above.gcd(entry.numer)
         factor = self.tower.K.new(below) / self.tower.K.new(above)
         return [self.tower.reduce(entry * factor) for entry in row]

@@ -14,17 +14,14 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from sympy import Dummy, Poly, S, Symbol, cos, exp, expand, sign, simplify, sin, sympify
-from sympy.polys.domains import QQ
-from sympy.polys.fields import FracField
-from sympy.polys.orderings import lex
 
+from .fractions import LONG, Field
 from .generators import Generators
 from .samples import DIGITS, Samples
 from .undecided import Undecided, deadline, late
 
 _SECONDS = 20.0
 _LARGEST = 3000  # terms of a numerator and a denominator; beyond that, the answer is "undecided"
-_LONG = Symbol("(a long expression)")
 _SIMPLIFIABLE = 150  # operations up to which SymPy's simplify is asked
 
 
@@ -42,7 +39,11 @@ class Tower:
             self._generators.scan(expr)
 
     def _field(self) -> None:
-        self.K = FracField(list(self._generators.meaning), QQ, lex)
+        self.K = Field(list(self._generators.meaning), self._look)
+
+    def _look(self) -> None:
+        if time.monotonic() > self._deadline:
+            raise Undecided(LONG, "not decided in the time allowed")
 
     def element(self, expr: Any) -> Any:
         """`expr` as an element of the field, which grows when it has to."""
@@ -58,18 +59,17 @@ class Tower:
 
     def lift(self, element: Any) -> Any:
         """`element` in the field as it is now."""
-        return element if element.field == self.K else element.set_field(self.K)
+        return element if element.field is self.K else element.set_field(self.K)
 
     def reduce(self, element: Any) -> Any:
         """`element` with the roots' relations applied, and no square root in the denominator."""
         element = self.lift(element)
         if len(element.numer) + len(element.denom) > _LARGEST:
-            raise Undecided(_LONG, "too large to decide")
-        if time.monotonic() > self._deadline:
-            raise Undecided(_LONG, "not decided in the time allowed")
+            raise Undecided(LONG, "too large to decide")
+        self._look()
         for generator, (degree, radicand) in reversed(self._generators.relations.items()):
             power = self.K.from_expr(radicand)
-            root = self.K.from_expr(generator)
+            root = self.K.generator(generator)
             place = self.K.symbols.index(generator)
             numer = self._fold(element.numer, place, degree, root, power)
             denom = self._fold(element.denom, place, degree, root, power)
@@ -113,7 +113,7 @@ class Tower:
         for symbol in used:
             rate = self.lift(inner[symbol])
             if rate:
-                result += element.diff(self.K.from_expr(symbol)) * rate
+                result += element.diff(symbol) * rate
         return self.reduce(result)
 
     def _derivative(self, generator: Any, variable: Any) -> Any:
@@ -122,15 +122,15 @@ class Tower:
             meaning = self._generators.meaning[generator]
             if generator in self._generators.angles:
                 rate = self.element(self._generators.angles[generator].diff(variable))
-                t = self.K.from_expr(generator)
+                t = self.K.generator(generator)
                 rate = rate * (1 + t**2) / 2
             elif isinstance(meaning, exp):
-                rate = self.element(meaning.args[0].diff(variable)) * self.K.from_expr(generator)
+                rate = self.element(meaning.args[0].diff(variable)) * self.K.generator(generator)
             elif generator in self._generators.relations:
                 degree, radicand = self._generators.relations[generator]
                 inner = self.diff(self.K.from_expr(radicand), variable)
                 below = degree * self.K.from_expr(radicand)
-                rate = inner * self.K.from_expr(generator) / below
+                rate = inner * self.K.generator(generator) / below
             elif isinstance(meaning, sign):
                 rate = self.K.zero
             else:

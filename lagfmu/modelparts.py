@@ -1,0 +1,102 @@
+"""What a model is made of: its parameters, inputs, constraints and embedding, as frozen data."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sympy.core.function import AppliedUndef
+
+Expr = Any  # a SymPy expression; SymPy carries no types
+
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+RESERVED: tuple[str, ...] = (
+    *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
+    *("t", "time", "unique", "velocity"),
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A constant of the model, settable before initialization.
+
+    `value` is in coherent SI `unit`; `min` and `max` are the bounds that the equations make sense in.
+    """
+
+    symbol: Expr
+    value: float
+    unit: str = "1"
+    description: str = ""
+    min: float | None = None
+    max: float | None = None
+
+
+@dataclass(frozen=True)
+class Input:
+    """A quantity that the importer drives: a force, a torque, or a prescribed motion u(t).
+
+    A dynamicsymbol that stands in a holonomic constraint or a contact is a prescribed motion: the
+    FMU then has the inputs `u`, `der(u)` and `der(u,2)`, because the constraint's second derivative
+    needs them.
+    """
+
+    symbol: Expr
+    unit: str = "1"
+    start: float = 0.0
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Holonomic:
+    """f(q, t) = 0.  The multiplier's unit is J/[f]; +lambda grad f is the force of constraint."""
+
+    name: str
+    expression: Expr
+    description: str = ""
+    while_closed: str | None = None
+
+
+@dataclass(frozen=True)
+class Nonholonomic:
+    """sum_j a_j(q, t) v_j + a_0(q, t) = 0, affine in the velocities.  [lambda] = W/[expression]."""
+
+    name: str
+    expression: Expr
+    description: str = ""
+    while_closed: str | None = None
+
+
+@dataclass(frozen=True)
+class Contact:
+    """f(q, t) >= 0, lambda >= 0, f lambda = 0: a surface that pushes and never pulls.
+
+    `restitution` is Newton's coefficient for landings, a number or an expression of parameters.
+    """
+
+    name: str
+    expression: Expr
+    description: str = ""
+    restitution: Expr = 0
+
+
+Constraint = Holonomic | Nonholonomic | Contact
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """Dependent coordinates as functions of independent ones, q = phi(s, t).
+
+    `coordinates` maps each new independent coordinate to its unit, `relations` each coordinate of
+    the model that it replaces to its expression; `start` gives s and der(s) at the start.
+    """
+
+    coordinates: Mapping[Expr, str]
+    relations: Mapping[Expr, Expr]
+    start: Mapping[Expr, float] = field(default_factory=dict)
+
+
+def name_of(symbol: Expr) -> str:
+    """A symbol's or dynamicsymbol's plain name."""
+    return str(symbol.func) if isinstance(symbol, AppliedUndef) else str(symbol)
