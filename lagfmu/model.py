@@ -8,8 +8,7 @@ Everything that is wrong with a model (`modelcheck.py`) is reported at once, in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import sympy as sp
@@ -27,6 +26,7 @@ from .modelparts import (
     Expr,
     Holonomic,
     Input,
+    ModelFields,
     Nonholonomic,
     Parameter,
     name_of,
@@ -50,7 +50,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(ModelFields):
     """A mechanical system.
 
     Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is
@@ -60,19 +60,6 @@ class Model:
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
-
-    name: str
-    coordinates: Mapping[Expr, str]
-    lagrangian: Expr | None = None
-    kinetic_energy: Expr | None = None
-    forces: Mapping[Expr, Expr] = field(default_factory=dict)
-    constraints: Sequence[Constraint] = ()
-    parameters: Sequence[Parameter] = ()
-    inputs: Sequence[Input] = ()
-    start: Mapping[Expr, float] = field(default_factory=dict)
-    embedding: Embedding | None = None
-    description: str = ""
-    descriptions: Mapping[Expr, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if isinstance(self.coordinates, list | tuple):  # coordinates without units
@@ -87,11 +74,6 @@ class Model:
         problems = problems_of(self)
         if problems:
             raise ModelError(str(self.name), problems)
-
-    @property
-    def energy_expression(self) -> Expr:
-        """The Lagrangian, or the kinetic energy where forces carry the rest [J]."""
-        return sp.sympify(self.lagrangian if self.lagrangian is not None else self.kinetic_energy)
 
     @cached_property
     def units(self) -> dict[Expr, Unit]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -15,14 +14,11 @@ from sympy.physics.vector import dynamicsymbols
 
 from .errors import UnitError
 from .modelkinds import check_energy, check_names, check_types
-from .modelparts import Contact, Expr, Nonholonomic, name_of
+from .modelparts import Contact, Expr, ModelFields, Nonholonomic, name_of
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
-if TYPE_CHECKING:  # a Model is checked while it is made, so `model.py` imports this file
-    from .model import Model
 
-
-def problems_of(model: Model) -> list[str]:
+def problems_of(model: ModelFields) -> list[str]:
     """All problems of a model whose containers are right (`modelkinds.check_containers`)."""
     problems: list[str] = []
     check_types(model, problems)
@@ -40,7 +36,7 @@ def problems_of(model: Model) -> list[str]:
     return problems
 
 
-def _check_numbers(model: Model, problems: list[str]) -> None:
+def _check_numbers(model: ModelFields, problems: list[str]) -> None:
     t = dynamicsymbols._t
     for p in model.parameters:
         _finite(f"parameter {name_of(p.symbol)!r}", p.value, problems)
@@ -100,7 +96,7 @@ def _finite(what: str, value: object, problems: list[str]) -> None:
         problems.append(f"{what} is {value!r}, expected a finite number")
 
 
-def _expressions(model: Model) -> list[tuple[str, Expr]]:
+def _expressions(model: ModelFields) -> list[tuple[str, Expr]]:
     kind = "lagrangian" if model.lagrangian is not None else "kinetic_energy"
     out = [(kind, model.energy_expression)]
     out += [(f"force on {plain(q)}", sp.sympify(f)) for q, f in model.forces.items()]
@@ -111,7 +107,7 @@ def _expressions(model: Model) -> list[tuple[str, Expr]]:
     return out
 
 
-def _check_symbols(model: Model, problems: list[str]) -> None:
+def _check_symbols(model: ModelFields, problems: list[str]) -> None:
     t = dynamicsymbols._t
     known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t}
     names = {name_of(s) for s in (*known, *model.coordinates)}
@@ -152,7 +148,7 @@ def _check_symbols(model: Model, problems: list[str]) -> None:
             ]
 
 
-def _pfaffian(model: Model, what: str) -> bool:
+def _pfaffian(model: ModelFields, what: str) -> bool:
     return any(
         isinstance(c, Nonholonomic) and what == f"constraint {c.name!r}" for c in model.constraints
     )
@@ -163,7 +159,7 @@ def _unknown(expression: Expr, known: set[Expr]) -> list[str]:
     return sorted(str(plain(s)) for s in symbols - known)
 
 
-def declared_units(model: Model, problems: list[str]) -> dict[Expr, Unit]:
+def declared_units(model: ModelFields, problems: list[str]) -> dict[Expr, Unit]:
     """Unit of each symbol that may stand in an expression; what cannot be read joins `problems`."""
     t = dynamicsymbols._t
     units: dict[Expr, Unit] = {t: parse_unit("s", "time")}
@@ -187,7 +183,7 @@ def declared_units(model: Model, problems: list[str]) -> dict[Expr, Unit]:
     return units
 
 
-def _check_dimensions(model: Model, units: dict[Expr, Unit], problems: list[str]) -> None:
+def _check_dimensions(model: ModelFields, units: dict[Expr, Unit], problems: list[str]) -> None:
     def check(expression: Expr, expected: Unit | None, what: str) -> None:
         problems.extend(check_dimension(sp.sympify(expression), expected, units, what))
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -22,20 +21,18 @@ from .modelparts import (
     Expr,
     Holonomic,
     Input,
+    ModelFields,
     Nonholonomic,
     Parameter,
     name_of,
 )
 from .units import plain
 
-if TYPE_CHECKING:  # a Model is checked while it is made, so `model.py` imports this file
-    from .model import Model
-
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0, sect. 2.2
 _NO_NUMBERS = (sp.I, sp.nan, sp.oo, -sp.oo, sp.zoo)
 
 
-def check_containers(model: Model) -> list[str]:
+def check_containers(model: ModelFields) -> list[str]:
     """Fields that are no dict or list, before they are copied."""
     maps: list[tuple[str, object, str]] = [
         ("coordinates", model.coordinates, "{x: 'm'}"),
@@ -74,7 +71,7 @@ def check_containers(model: Model) -> list[str]:
     ]
 
 
-def check_types(model: Model, problems: list[str]) -> None:
+def check_types(model: ModelFields, problems: list[str]) -> None:
     """Things that are not what the fields of a Model hold, before anything is read from them."""
     kinds: tuple[tuple[str, Sequence[object], tuple[type, ...]], ...] = (
         ("parameters", model.parameters, (Parameter,)),
@@ -120,7 +117,7 @@ def _no_number(expression: Expr) -> str:
     return ", ".join(str(n) for n in _NO_NUMBERS if sp.sympify(expression).has(n))
 
 
-def _check_texts(model: Model, problems: list[str]) -> None:
+def _check_texts(model: ModelFields, problems: list[str]) -> None:
     """Descriptions are texts of characters that XML can hold."""
     texts: list[tuple[str, object]] = [("the model", model.description)]
     texts += [(f"parameter {name_of(p.symbol)!r}", p.description) for p in model.parameters]
@@ -143,7 +140,7 @@ def _is_expression(thing: object) -> bool:
     return not isinstance(thing, str) and isinstance(sp.sympify(thing, strict=False), sp.Expr)
 
 
-def check_names(model: Model, problems: list[str]) -> None:
+def check_names(model: ModelFields, problems: list[str]) -> None:
     """Names that no FMI variable or Python file can bear, and names of two things."""
     named = [("model", model.name)]
     extra = model.embedding.coordinates if model.embedding else {}
@@ -204,7 +201,7 @@ def _check_name(kind: str, name: object, problems: list[str]) -> None:
         )
 
 
-def check_energy(model: Model, problems: list[str]) -> None:
+def check_energy(model: ModelFields, problems: list[str]) -> None:
     """One of the two forms of Lagrange's equations is chosen."""
     given = [f for f in (model.lagrangian, model.kinetic_energy) if f is not None]
     if len(given) != 1:

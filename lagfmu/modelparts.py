@@ -1,12 +1,13 @@
-"""What a model is made of: its parameters, inputs, constraints and embedding, as frozen data."""
+"""What a model is made of: its fields, parameters, inputs, constraints and embedding, as frozen data."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import sympy as sp
 from sympy.core.function import AppliedUndef
 
 Expr = Any  # a SymPy expression; SymPy carries no types
@@ -95,6 +96,29 @@ class Embedding:
     coordinates: Mapping[Expr, str]
     relations: Mapping[Expr, Expr]
     start: Mapping[Expr, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ModelFields:
+    """What is said of a mechanical system, right or wrong; `model.py` checks it."""
+
+    name: str
+    coordinates: Mapping[Expr, str]
+    lagrangian: Expr | None = None
+    kinetic_energy: Expr | None = None
+    forces: Mapping[Expr, Expr] = field(default_factory=dict)
+    constraints: Sequence[Constraint] = ()
+    parameters: Sequence[Parameter] = ()
+    inputs: Sequence[Input] = ()
+    start: Mapping[Expr, float] = field(default_factory=dict)
+    embedding: Embedding | None = None
+    description: str = ""
+    descriptions: Mapping[Expr, str] = field(default_factory=dict)
+
+    @property
+    def energy_expression(self) -> Expr:
+        """The Lagrangian, or the kinetic energy where forces carry the rest [J]."""
+        return sp.sympify(self.lagrangian if self.lagrangian is not None else self.kinetic_energy)
 
 
 def name_of(symbol: Expr) -> str:
