@@ -135,7 +135,9 @@ def build(
     name: Name = None,
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
-    needs = (outputs, fixed, inputs, contacts, methods, method, formulation, derivatives, name)
+    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
+    needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -145,7 +147,7 @@ def build(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
         file = load(model)
-        for s in narrowed(_chosen(file, scene), *needs, accuracy):
+        for s in narrowed(_chosen(file, scene), **needs):
             choice = ""
             if s.accuracy is not None:
                 chosen = chosen_for(file, s, parse(s.accuracy), kind, console)
@@ -192,10 +194,12 @@ def show(
 
     Of a scene that needs less than everything, also what was pruned and what that saved.
     """
-    needs = (outputs, fixed, inputs, contacts, methods, method, formulation, derivatives)
+    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    needs |= {"contacts": contacts, "methods": methods, "method": method}
+    needs |= {"formulation": formulation, "derivatives": derivatives}
     with _plainly():
         file = load(model)
-        for s in narrowed(_chosen(file, None if scene is None else [scene]), *needs):
+        for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
             show_prepared(prepare(file.model, s), console)
 
 
