@@ -6,7 +6,6 @@ from .scene import METHODS, Scene
 from .solver.system import System
 
 PLACES = ("auto", "dop853", "dopri5", "rk4", "rattle", "radau5")  # MethodName in state.h
-STEPPED_BY = {"auto": ("dop853", "radau5")}  # a method that is made of others
 AT_CONTACTS = {
     "events_find": "events.c",
     "contacts_modes": "contacts.c",
@@ -36,21 +35,9 @@ const Parts PARTS = {{
 """
 
 
-def integrators(scene: Scene) -> tuple[str, ...]:
-    """The integrators behind the methods that can be chosen."""
-    wanted = {part for m in scene.selectable for part in STEPPED_BY.get(m, (m,))}
-    return tuple(m for m in METHODS if m in wanted)
-
-
-def is_constrained(system: System) -> bool:
-    """True if accelerations are solved for together with multipliers, stepped or recovered."""
-    full = None if system.embedding is None else system.embedding.full
-    return system.m > 0 or (full is not None and full.dynamics is not None and full.m > 0)
-
-
 def parts_source(scene: Scene, system: System) -> str | None:
     """C text that defines PARTS; None if nothing is left out, as in the runtime's own parts.c."""
-    found, contacts = integrators(scene), bool(system.contacts)
+    found, contacts = scene.integrators, bool(system.contacts)
     if contacts and set(scene.selectable) == set(METHODS):
         return None
     menu = {m: m for m in found}
@@ -62,16 +49,16 @@ def parts_source(scene: Scene, system: System) -> str | None:
     rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     what = ", ".join(found) + (", contacts" if contacts else "")
-    rungs = "" if is_constrained(system) else NO_RUNGS
+    rungs = "" if system.is_constrained else NO_RUNGS
     return HEAD.format(name=scene.name, what=what, rungs=rungs) + "".join(rows) + "};\n"
 
 
 def files_left_out(scene: Scene, system: System) -> frozenset[str]:
     """The runtime's files that the FMU does without."""
-    gone = {f"{m}.c" for m in METHODS if m != "auto" and m not in integrators(scene)}
+    gone = {f"{m}.c" for m in METHODS if m != "auto" and m not in scene.integrators}
     if not system.contacts:
         gone |= {*AT_CONTACTS.values(), *BEHIND_CONTACTS}
-    if not is_constrained(system):
+    if not system.is_constrained:
         gone |= {*AT_CONSTRAINTS}
     return frozenset(gone)
 

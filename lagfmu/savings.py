@@ -9,7 +9,6 @@ from typing import Any
 import sympy as sp
 
 from .ccode import model_source
-from .cparts import is_constrained
 from .elimination import plan
 from .equations import EquationsOfMotion
 from .fmu.native import needs_tangents
@@ -132,7 +131,7 @@ def _left_out(full: Prepared, prepared: Prepared) -> Iterable[str]:
         yield f"contacts that cannot open, and no event code for them: {', '.join(prepared.held)}"
     elif full.system.contacts and not prepared.system.contacts:
         yield "event code: no contact is left"
-    if is_constrained(full.system) and not is_constrained(prepared.system):
+    if full.system.is_constrained and not prepared.system.is_constrained:
         yield "the solution for constraints that depend on each other: none is solved with"
     named = {str(p): eom.units[str(p)] for p in derived.p}
     for title, names in _numbers(prepared):

@@ -17,6 +17,7 @@ from .solver.state import METHODS as PYTHON_METHODS
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
 METHODS = (*PYTHON_METHODS, "rattle")  # the last of native FMUs only
+STEPPED_BY = {"auto": ("dop853", "radau5")}  # a method that is made of others
 EVERYTHING = ("*",)
 
 
@@ -130,6 +131,12 @@ class Scene:
         if self.methods is not None:
             return tuple(self.methods)
         return METHODS if self.complete else (self.method,)
+
+    @property
+    def integrators(self) -> tuple[str, ...]:
+        """The integrators behind the methods that can be chosen."""
+        wanted = {part for m in self.selectable for part in STEPPED_BY.get(m, (m,))}
+        return tuple(m for m in METHODS if m in wanted)
 
     @property
     def differentiable(self) -> bool:

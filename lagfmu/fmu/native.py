@@ -7,7 +7,7 @@ from importlib.resources import files
 
 from ..ccode import model_source
 from ..compiler import HOST, chosen, compile_libraries, is_first
-from ..cparts import files_left_out, integrators, parts_source
+from ..cparts import files_left_out, parts_source
 from ..ctables import entanglements
 from ..cvariables import variables_source
 from ..equations import EquationsOfMotion
@@ -98,7 +98,7 @@ def build(
 
 def needs_tangents(scene: Scene) -> bool:
     """True if derivatives of the equations are offered, or needed by an implicit method."""
-    return scene.differentiable or "radau5" in integrators(scene)
+    return scene.differentiable or "radau5" in scene.integrators
 
 
 def runtime_files() -> dict[str, bytes]:

@@ -79,6 +79,12 @@ class System:
         """The rows that are contacts."""
         return tuple(k for k, row in enumerate(self.rows) if row.kind == CONTACT)
 
+    @property
+    def is_constrained(self) -> bool:
+        """True if accelerations are solved for together with multipliers, stepped or recovered."""
+        full = None if self.embedding is None else self.embedding.full
+        return self.m > 0 or (full is not None and full.dynamics is not None and full.m > 0)
+
     @cached_property
     def permanent(self) -> tuple[int, ...]:
         """The rows that always act."""
