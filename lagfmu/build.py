@@ -42,11 +42,9 @@ def write(
             prepared.scene, closed_forms, prepared.table, prepared.numbers, prepared.held
         ),
     }
-    made = (prepared.coded, prepared.coded_reduction, prepared.scene, prepared.table)
-    if target == "native":
-        content = native.build(*made, prepared.system, extra, platforms)
-    else:
-        content = python.build(*made, prepared.system, extra)
+    equations = (prepared.coded, prepared.coded_reduction)
+    made = (*equations, prepared.scene, prepared.table, prepared.system, extra)
+    content = native.build(*made, platforms) if target == "native" else python.build(*made)
     path = Path(out)
     if path.suffix != ".fmu":
         path = path / f"{prepared.scene.name}.fmu"
