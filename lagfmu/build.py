@@ -15,6 +15,7 @@ from .errors import BuildError
 from .fmu import native, python
 from .prepare import Prepared
 from .proof import pack_closed_forms
+from .starts import check_given, tell
 
 TARGETS = ("python", "native")
 
@@ -30,12 +31,16 @@ def write(
 ) -> Path:
     """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
 
-    `choice` is HTML on how the solver settings were chosen.  For the rest see make.build_fmu.
+    `choice` is HTML on how the solver settings were chosen.  For the rest see make.build_fmu.  Warns of
+    each start value that is moved onto the constraints.  Raises ModelError if one in the model's `start`
+    moves by more than 1e-6 of its coordinate's size.
     """
     if target not in TARGETS:
         raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
     if target == "python":  # it has no model exchange
         prepared = replace(prepared, table=prepared.table.without_local_derivatives())
+    check_given(prepared.model.name, prepared.structure.start.moved)
+    tell(prepared.structure.start.moved)
     extra = {
         "documentation/index.html": page(prepared, figures, choice).encode(),
         "resources/lagfmu.json": pack_closed_forms(
