@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from lagfmu.cli import app
+from lagfmu.cli.app import app
 
 REPOSITORY = Path(__file__).parent.parent
 MODELS = REPOSITORY / "models"

@@ -20,7 +20,7 @@ from sympy import Rational, cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu
-from lagfmu.model import name_of
+from lagfmu.model.model import name_of
 
 ALL = sorted(FILES)
 REPOSITORY = Path(__file__).parent.parent
