@@ -7,6 +7,7 @@ from .mechanics.integrability.classify import classify
 from .model.closed_form import ClosedForm, Conserved, departure, initial, output
 from .model.convert import from_lagranges_method
 from .model.model import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter
+from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .verification.simulate import simulate
 from .verification.verify import Verification, verify
@@ -29,8 +30,10 @@ __all__ = [
     "classify",
     "departure",
     "derive",
+    "force_of_constraint",
     "from_lagranges_method",
     "initial",
+    "multiplier",
     "output",
     "simulate",
     "verify",
