@@ -901,10 +901,10 @@ def test_small_models_are_not_split(case: Callable[[str], Case]) -> None:
 SOURCES_IN_ANOTHER_PROCESS = """
 import hashlib, sys
 from pathlib import Path
-from lagfmu.ccode import model_source
-from lagfmu.cvariables import variables_source
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
+from lagfmu.codegen.c.equations import model_source
+from lagfmu.codegen.c.variables import variables_source
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
 digest = hashlib.sha256()
 for path in sys.argv[1:]:
     file = load(Path(path))

@@ -178,9 +178,9 @@ BUILD = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from lagfmu.build import write
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
+from lagfmu.fmu.write import write
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
 file = load(Path(sys.argv[1]))
 for s in file.scenes:
     if s.name == "PendulumCartesian":
