@@ -18,7 +18,9 @@ from lagfmu.fmu.compiler import find_compiler
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
-    pytest.mark.filterwarnings("ignore::lagfmu.prepare.consistency.RedundantConstraintWarning"),
+    pytest.mark.filterwarnings(
+        "ignore::lagfmu.prepare.prepare.consistency.RedundantConstraintWarning"
+    ),
 ]
 SCENARIO = Path(__file__).parent / "scenario.c"
 SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
