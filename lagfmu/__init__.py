@@ -7,6 +7,7 @@ from .equations import EquationsOfMotion, derive
 from .errors import LagfmuError
 from .make import build_fmu
 from .model import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter
+from .reactions import force_of_constraint, multiplier
 from .scene import Scene
 from .simulate import simulate
 from .verify import Verification, verify
@@ -29,8 +30,10 @@ __all__ = [
     "classify",
     "departure",
     "derive",
+    "force_of_constraint",
     "from_lagranges_method",
     "initial",
+    "multiplier",
     "output",
     "simulate",
     "verify",

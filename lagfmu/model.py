@@ -31,6 +31,7 @@ from .modelparts import (
     Parameter,
     name_of,
 )
+from .reactions import reaction_units
 from .units import Unit
 
 __all__ = [
@@ -79,6 +80,11 @@ class Model(ModelFields):
     def units(self) -> dict[Expr, Unit]:
         """Unit of every symbol that may stand in an expression."""
         return declared_units(self, [])
+
+    @cached_property
+    def reactions(self) -> dict[Expr, Unit]:
+        """The unit of each `multiplier` and `force_of_constraint`."""
+        return reaction_units(self, self.units)
 
     @cached_property
     def prescribed(self) -> tuple[Input, ...]:

@@ -15,6 +15,7 @@ from sympy.physics.vector import dynamicsymbols
 from .errors import UnitError
 from .modelkinds import check_energy, check_names, check_types
 from .modelparts import Contact, Expr, ModelFields, Nonholonomic, name_of
+from .reactions import reactions_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
 
@@ -115,7 +116,10 @@ def _check_symbols(model: ModelFields, problems: list[str]) -> None:
         if q not in model.coordinates:
             problems.append(f"a force is given on {plain(q)}, which is no coordinate of the model")
     for what, expression in _expressions(model):
-        unknown = _unknown(expression, known | set(model.coordinates))
+        problems += _solved_for(what, expression)
+        unknown = _unknown(
+            expression, known | set(model.coordinates) | set(reactions_in(expression))
+        )
         problems += [
             f"{what}: {name} is neither coordinate, parameter nor input: "
             + (
@@ -146,6 +150,16 @@ def _check_symbols(model: ModelFields, problems: list[str]) -> None:
                 "parameter"
                 for name in unknown
             ]
+
+
+def _solved_for(what: str, expression: Expr) -> list[str]:
+    """Multipliers where only what they are solved from can stand."""
+    return [
+        f"{what}: {symbol} is solved for together with the accelerations, so that it cannot stand in "
+        "the equations: a force that a normal force limits is a Friction in `constraints`, a quantity "
+        "to read is an Output in `outputs`"
+        for symbol in reactions_in(expression)
+    ]
 
 
 def _pfaffian(model: ModelFields, what: str) -> bool:

@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "indicators.h"
 #include "leg.h"
 #include "parts.h"
 #include "magnitudes.h"
@@ -57,7 +58,7 @@ static void keep(Solver *s) {
     now->fresh = i->fresh;
 }
 
-/* Puts the integrator at the state; the contacts' indicators there. */
+/* Puts the integrator at the state; the indicators there. */
 static Status set_out(Solver *s) {
     State *x = &s->state;
     const size_t n = (size_t)s->system->n;
@@ -68,13 +69,13 @@ static Status set_out(Solver *s) {
     restart(s, x->now.t, y, x->now.step);
     x->now.ahead = 1;
     x->now.event_count = 0;
-    return s->system->contacts == 0 ? OK : leg_indicators(s, x->now.t, y, x->indicator);
+    return indicators_at(s, x->now.t, y, x->indicator);
 }
 
 /* One step, projected and searched for events; `bound`: not to be passed. */
 static Status step_towards(Solver *s, double t_end, double bound, double longest) {
     Integrator *i = &s->integrator;
-    const int watch = s->system->contacts > 0;
+    const int watch = indicators_count(s->system) > 0;
     double *y1 = s->work_advance;
     if (leg_step(s, i, bound, longest) != OK) return FAILED;
     if ((watch || i->t > t_end) && leg_prepare_dense(s, i) != OK) return FAILED;
@@ -169,7 +170,7 @@ static Status meet(Solver *s) {
     }
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
-    return PARTS.switch_modes(s, s->state.event_contacts);
+    return PARTS.switch_modes(s, s->state.left);
 }
 
 /* To t_end, or to the first event before it. */

@@ -197,7 +197,7 @@ static void natural_speeds(const Start *x, double *natural) {
 }
 
 /* Every row that acts has G v = nu to rounding; otherwise the constraints contradict each other. */
-static Status check_velocities(const Start *x, const int *active, double *fastest) {
+static Status check_velocities(const Start *x, const int *active, double *fastest, double *shared) {
     Solver *solver = x->s;
     const Mechanism *b = &solver->stepped;
     const System *s = b->system;
@@ -205,8 +205,9 @@ static Status check_velocities(const Start *x, const int *active, double *fastes
     int missed = 0;
     for (int j = 0; j < s->n; j++)
         fastest[j] = fmax(fmax(fabs(x->v0[j]), fabs(v[j])), fastest[j]);
+    magnitudes_motion_speeds(b, fastest, shared);
     for (int k = 0; k < s->m; k++) {
-        double unit = mechanism_row_size(b, k, fastest) + fabs(b->nu[k]);
+        double unit = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);
         if (!active[k] || fabs(mechanism_slip(b, k, v)) <= 1e-9 * unit) continue;
         if (!missed) fail(&solver->why, "no velocities satisfy the constraints ");
         why_append(&solver->why, "%s'%s'", missed ? ", " : "", s->rows[k].name);
@@ -223,24 +224,25 @@ static Status find_velocities(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
-    double *natural = x->s->work_initial, *fastest = natural + s->n;
+    double *natural = x->s->work_initial, *fastest = natural + s->n, *shared = fastest + s->n;
     int *active = x->s->iwork_initial;
     memcpy(state->v, x->v0, (size_t)s->n * sizeof *state->v);
     if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return refused(x->s);
     if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
     for (int j = 0; j < s->n; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
+    magnitudes_motion_speeds(b, fastest, shared);
     for (int c = 0; c < s->contacts; c++) {
         int k = s->contact[c];
         double speed = mechanism_slip(b, k, x->v0);
-        if (speed > TOUCH * mechanism_row_size(b, k, fastest)) state->closed[c] = 0;
+        if (speed > TOUCH * mechanism_row_size(b, k, shared)) state->closed[c] = 0;
     }
     system_active(s, state->closed, active);
     if (mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->size) ==
         FAILED)
         return refused(x->s);
     if (mechanism_evaluate(b, x->at, state->q, state->v) == FAILED) return refused(x->s);
-    return check_velocities(x, active, natural);
+    return check_velocities(x, active, natural, shared);
 }
 
 /* Contact modes by complementarity, and the state on the rows that then act. */

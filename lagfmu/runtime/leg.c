@@ -107,21 +107,6 @@ Status leg_check_projection(Solver *s, double t, const double *y, const double *
     return OK;
 }
 
-Status leg_indicators(Solver *s, double t, const double *y, double *values) {
-    const System *system = s->system;
-    const Instant at = leg_instant(s, t);
-    Mechanism *b = &s->stepped;
-    int any = 0;
-    for (int c = 0; c < system->contacts; c++) any |= s->state.closed[c];
-    if (mechanism_residual(b, at, y, b->f) != OK) return FAILED;
-    for (int c = 0; c < system->contacts; c++) values[c] = b->f[system->contact[c]];
-    if (!any) return OK;
-    if (mechanism_motion(b, at, y, y + system->n, s->active) != OK) return FAILED;
-    for (int c = 0; c < system->contacts; c++)
-        if (s->state.closed[c]) values[c] = b->lambda[system->contact[c]];
-    return OK;
-}
-
 Status leg_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
     Integrator *i = &s->probe;
     memcpy(y, y0, 2 * (size_t)s->system->n * sizeof *y);

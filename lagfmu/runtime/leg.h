@@ -30,9 +30,6 @@ Status leg_project(Solver *s, double t, double *y);
  * can be: next to a singular configuration the constraints lead to another branch. */
 Status leg_check_projection(Solver *s, double t, const double *y, const double *projected);
 
-/* One a contact: lambda while closed, f - offset while open. */
-Status leg_indicators(Solver *s, double t, const double *y, double *values);
-
 /* y at t1, integrated from (t0, y0) and projected. */
 Status leg_reach(Solver *s, double t0, const double *y0, double t1, double *y);
 

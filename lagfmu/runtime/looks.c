@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "indicators.h"
 #include "leg.h"
 
 enum { DIPS = 3 };                            /* parabolas drawn through a dip, ... */
@@ -72,8 +73,8 @@ static int vertex(const double *t, const double *y, double *lowest, double *dept
     return bend > 0;
 }
 
-static void insert(Looks *looks, int k, int contacts, double t, const double *values) {
-    const size_t row = (size_t)contacts, after = (size_t)(looks->count - k);
+static void insert(Looks *looks, int k, int width, double t, const double *values) {
+    const size_t row = (size_t)width, after = (size_t)(looks->count - k);
     double *place = looks->values + (size_t)k * row;
     memmove(looks->t + k + 1, looks->t + k, after * sizeof *looks->t);
     memmove(place + row, place, after * row * sizeof *place);
@@ -88,11 +89,11 @@ static void insert(Looks *looks, int k, int contacts, double t, const double *va
 static Status look_into_dip(Solver *s, Looks *looks, int i, int contact, double *y, double *seen,
                             int *found) {
     const Integrator *integrator = &s->integrator;
-    const int contacts = s->system->contacts;
+    const int width = indicators_count(s->system);
     double t[3], lambda[3];
     for (int k = 0; k < 3; k++) {
         t[k] = looks->t[i + k];
-        lambda[k] = looks->values[(i + k) * contacts + contact];
+        lambda[k] = looks->values[(i + k) * width + contact];
     }
     for (int round = 0; round < DIPS; round++) {
         double lowest, depth;
@@ -102,9 +103,9 @@ static Status look_into_dip(Solver *s, Looks *looks, int i, int contact, double 
         if (!(t[0] < lowest && lowest < t[2]) || lowest == t[1] || depth > SHALLOW * most)
             return OK;
         integrator->method->dense(integrator, lowest, y);
-        if (leg_indicators(s, lowest, y, seen) != OK) return FAILED;
+        if (indicators_at(s, lowest, y, seen) != OK) return FAILED;
         if (seen[contact] < 0) {
-            insert(looks, i + (lowest > looks->t[i + 1] ? 2 : 1), contacts, lowest, seen);
+            insert(looks, i + (lowest > looks->t[i + 1] ? 2 : 1), width, lowest, seen);
             *found = 1;
             return OK;
         }
@@ -121,32 +122,32 @@ static Status look_into_dip(Solver *s, Looks *looks, int i, int contact, double 
 
 Status looks_take(Solver *s, const double *y1, double *y, Looks *looks) {
     const Integrator *i = &s->integrator;
-    const int contacts = s->system->contacts;
+    const int contacts = s->system->contacts, width = indicators_count(s->system);
     const double h = i->t - i->t_old;
     double highest;
     memcpy(y, i->y_old, (size_t)i->ny * sizeof *y);
-    memcpy(looks->values, s->state.indicator, (size_t)contacts * sizeof *looks->values);
+    memcpy(looks->values, s->state.indicator, (size_t)width * sizeof *looks->values);
     looks->t[0] = i->t_old;
     if (top_of_rebound(s, i->t_old, y, looks->values, &highest) != OK) return FAILED;
     highest += i->t_old;
     for (looks->count = 1;; looks->count++) {
         const double t = looks->t[looks->count - 1];
-        double *values = looks->values + looks->count * contacts;
+        double *values = looks->values + looks->count * width;
         double ahead;
-        if (stride(s, t, y, values - contacts, h, &ahead) != OK) return FAILED;
+        if (stride(s, t, y, values - width, h, &ahead) != OK) return FAILED;
         double next = t + ahead;
         if (t < highest) next = fmin(next, highest);
         if (next >= i->t - h * SMALLEST_LOOK || next <= t || looks->count == MOST_LOOKS - 1) break;
         i->method->dense(i, next, y);
-        if (leg_indicators(s, next, y, values) != OK) return FAILED;
+        if (indicators_at(s, next, y, values) != OK) return FAILED;
         looks->t[looks->count] = next;
     }
     looks->t[looks->count] = i->t;
-    if (leg_indicators(s, i->t, y1, looks->values + looks->count * contacts) != OK) return FAILED;
+    if (indicators_at(s, i->t, y1, looks->values + looks->count * width) != OK) return FAILED;
     looks->count += 1;
     for (int c = 0; c < contacts; c++) {
         if (!s->state.closed[c]) continue;
-        double *seen = looks->values + (MOST_LOOKS + contacts) * contacts; /* one row of scratch */
+        double *seen = looks->values + (MOST_LOOKS + width) * width; /* one row of scratch */
         for (int k = 0, found = 0; k + 2 < looks->count && !found; k++)
             if (look_into_dip(s, looks, k, c, y, seen, &found) != OK) return FAILED;
     }

@@ -1,20 +1,20 @@
-/* looks.h -- the times within a step at which the contacts are looked at. */
+/* looks.h -- the times within a step at which the indicators are looked at. */
 #ifndef LAGFMU_LOOKS_H
 #define LAGFMU_LOOKS_H
 
 #include "solver.h"
 
-enum { MOST_LOOKS = 256 }; /* and one more for each contact */
+enum { MOST_LOOKS = 256 }; /* and one more for each indicator */
 
-/* Times t[0] < ... < t[count - 1] and the indicators then, a row of `contacts` values for each look. */
+/* Times t[0] < ... < t[count - 1] and the indicators then, a row of values for each look. */
 typedef struct {
     int count;
     double *t, *values;
 } Looks;
 
 /* Doubles behind t and values, one row of scratch among them. */
-static inline int looks_doubles(int contacts) {
-    return (MOST_LOOKS + contacts) * (1 + contacts) + contacts;
+static inline int looks_doubles(int indicators) {
+    return (MOST_LOOKS + indicators) * (1 + indicators) + indicators;
 }
 
 /* Fills `looks` for the step of s->integrator (dense output prepared), from state.indicator at its start

@@ -106,6 +106,24 @@ static double largest_alike(const System *s, int j, const double *x) {
     return largest;
 }
 
+void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *shared) {
+    const System *s = b->system;
+    double momentum = 0;
+    for (int e = 0; e < s->masses; e++)
+        if (s->mass_row[e] == s->mass_column[e] && b->M[e] > 0)
+            momentum = larger(momentum, sqrt(b->M[e]) * speed[s->mass_row[e]]);
+    for (int j = 0; j < s->n; j++) shared[j] = 0;
+    for (int e = 0; e < s->masses; e++) /* the heaviest of each coordinate's dimension */
+        if (s->mass_row[e] == s->mass_column[e])
+            for (int j = 0; j < s->n; j++)
+                if (s->dimension[j] == s->dimension[s->mass_row[e]])
+                    shared[j] = larger(shared[j], b->M[e]);
+    for (int j = 0; j < s->n; j++) {
+        const double own = shared[j] > 0 ? momentum / sqrt(shared[j]) : 0;
+        shared[j] = larger(own, largest_alike(s, j, speed));
+    }
+}
+
 /* own (n): the rate by which a coordinate takes its size from the motion; 0 for those that have one.
  * The largest rate that the motion itself gives is returned. */
 static double find_own(Solver *s, double span, const double *felt, double *own) {

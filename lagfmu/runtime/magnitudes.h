@@ -12,6 +12,12 @@ void magnitudes_extents(const System *s, const double *p, double *least);
 /* state.size at q; 0 where there is none.  Before: the sizes before q was projected, or 0. */
 void magnitudes_sizes(Solver *s, const double *q);
 
+/* shared (n): what speeds a whole motion has that moves each coordinate at `speed` (n) >= 0: the largest of
+ * its dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its
+ * own.  A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed
+ * is rounding of theirs.  Of the masses that were evaluated last. */
+void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *shared);
+
 /* 1 while a size, or the rate, is not known. */
 int magnitudes_incomplete(const Solver *s);
 

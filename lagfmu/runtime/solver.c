@@ -1,11 +1,12 @@
 /* solver.c -- the memory of a simulation, taken in two passes (arena.h). */
 #include "solver.h"
 
+#include "indicators.h"
 #include "looks.h"
 #include "parts.h"
 
 static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
-    const int n = s->n, contacts = s->contacts;
+    const int n = s->n, contacts = s->contacts, indicators = indicators_count(s);
     const size_t begin = saved->used;
     x->block = saved->base == NULL ? NULL : saved->base + begin;
     x->q = arena_doubles(saved, n);
@@ -16,12 +17,12 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->gap = arena_doubles(saved, contacts);
     x->closed = arena_ints(saved, contacts);
     x->armed = arena_ints(saved, contacts);
-    x->event_contacts = arena_ints(saved, contacts);
+    x->left = arena_ints(saved, indicators);
     x->count = arena_ints(saved, contacts);
     x->departure_time = arena_doubles(saved, contacts);
     x->departure_q = arena_doubles(saved, contacts * n);
     x->departure_v = arena_doubles(saved, contacts * n);
-    x->indicator = arena_doubles(saved, contacts);
+    x->indicator = arena_doubles(saved, indicators);
     integrator_layout(i, saved, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
     x->y = i->y;
     x->f = i->f;
@@ -33,6 +34,7 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
 
 void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system) {
     const int n = system->n, m = system->m, contacts = system->contacts;
+    const int indicators = indicators_count(system);
     s->system = system;
     state_layout(&s->state, &s->integrator, saved, scratch, system);
     s->drive.value = arena_doubles(saved, system->inputs);
@@ -55,7 +57,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
     s->work_advance = arena_doubles(scratch, 4 * n);
     s->work_events =
-        arena_doubles(scratch, contacts == 0 ? 0 : 2 * n + contacts + looks_doubles(contacts));
+        arena_doubles(scratch, indicators == 0 ? 0 : 2 * n + indicators + looks_doubles(indicators));
     s->iwork_events = arena_ints(scratch, 5 * contacts);
 }
 

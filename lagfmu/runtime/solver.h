@@ -25,7 +25,7 @@ typedef struct {
     double *work_contacts;     /* (2 n + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */
     double *work_advance;      /* (4 n) of advance.c */
-    double *work_events;       /* (2 n + contacts and all looks) of events.c */
+    double *work_events;       /* (2 n + indicators and all looks) of events.c */
     int *iwork_events;         /* (5 contacts) of events.c and switch.c */
     Why why;
 } Solver;

@@ -38,7 +38,7 @@ typedef struct {
     int steps;           /* internal steps taken so far */
     int ahead;           /* 1: the integrator stands at integrator->t >= t, and dense output answers */
     double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */
-    int event_count;     /* contacts that open or close then */
+    int event_count;     /* indicators that leave their ranges then */
     double t_old, t_integrator, h_next, error_old; /* of the integrator, when it is ahead */
     int fresh;
     Choice choice;       /* of the method `auto` */
@@ -53,11 +53,11 @@ typedef struct {
     double *size;             /* (n) the coordinates' magnitudes, for rounding */
     double *gap;              /* (contacts) |f| below which a contact touches */
     int *closed, *armed;      /* (contacts) */
-    int *event_contacts;      /* (contacts) those of the event ahead */
+    int *left;                /* (indicators) 1: leaves its range at the event ahead */
     int *count;               /* (contacts) departures so far */
     double *departure_time;   /* (contacts) [s] of the latest */
     double *departure_q, *departure_v; /* (contacts * n) state then */
-    double *indicator;        /* (contacts) lambda or f at the integrator's time, when it is ahead */
+    double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
     double *y, *f, *y_old, *f_old, *dense; /* the integrator's own, shared with it */
     char *block;              /* all of the arrays above */
     size_t block_size;

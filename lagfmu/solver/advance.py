@@ -11,6 +11,7 @@ import numpy as np
 
 from . import at_contacts
 from .failure import StepFailureError
+from .indicators import indicators, is_watched
 from .instant import Instant
 from .leg import Leg
 from .magnitudes import complete, is_incomplete
@@ -73,8 +74,8 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
     solver = leg.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
     steps, choice = state.steps, state.choice
-    watch = bool(leg.system.contacts)
-    before = leg.indicators(state.t, y) if watch else np.zeros(0)
+    watch = is_watched(leg.system)
+    before = indicators(leg, state.t, y) if watch else np.zeros(0)
     while True:
         t0, y0 = solver.t, solver.y
         offered = solver.h_abs
@@ -91,9 +92,7 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
             continue
         steps += 1
         if watch:
-            event, before = at_contacts.first_event(
-                leg, solver, t0, y0, y1, before, armed, state.gap
-            )
+            event, before = at_contacts.first_event(leg, solver, t0, y0, y1, before, armed)
             if event is not None:
                 step = offered
                 if choice.implicit:
