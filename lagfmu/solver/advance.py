@@ -16,15 +16,7 @@ from .instant import Instant
 from .leg import Leg
 from .magnitudes import complete, is_incomplete
 from .state import Settings, State
-from .stiffness import (
-    Choice,
-    Slope,
-    explicit,
-    explicit_step,
-    implicit_step,
-    is_due,
-    unjudged_step,
-)
+from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step, is_due, unjudged_step
 from .system import System, Vector
 
 CHATTER = 200  # contact events in next to no time after which the step is given up
