@@ -35,6 +35,7 @@ typedef struct {
     double t;            /* [s] the communication point */
     double rate;         /* [1/s] the motion's natural rate at the start */
     double step;         /* [s] the step to try next */
+    double span;         /* [s] the communication step that led to t; 0: none */
     int steps;           /* internal steps taken so far */
     int ahead;           /* 1: the integrator stands at integrator->t >= t, and dense output answers */
     double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */
