@@ -13,8 +13,8 @@ from ...prepare.prepare import Prepared
 from ..documentation import mathml
 from ..typeset import typeset
 from .facts import facts
-from .render import Playable
 from .markup import Section, equations_of, safe_mathml
+from .render import Playable
 from .wasm import compile_module
 
 

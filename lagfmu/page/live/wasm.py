@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.resources import files
 
-from ...fmu.compiler import WASM, compile_libraries, find_compiler
 from ...errors import BuildError
+from ...fmu.compiler import WASM, compile_libraries, find_compiler
 from ...fmu.native import runtime_files
 
 IMPORTER = "importer.c"
