@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from instance import instance
+from lagfmu.compiler import find_compiler
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu
-from lagfmu.compiler import find_compiler
 
 G = 9.81
 y, u = dynamicsymbols("y u")
@@ -31,7 +31,9 @@ def driven(target, tmp_path_factory):
         inputs=[Input(u, "m")],
         start={y: 0.0},
     )
-    return build_fmu(model, tmp_path_factory.mktemp(target), Scene("Driven"), target=target)
+    return build_fmu(
+        model, tmp_path_factory.mktemp(target), Scene("Driven"), target=target, check=False
+    )
 
 
 def drive(one, motion):
