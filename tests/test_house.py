@@ -22,6 +22,7 @@ ROOMS = (  # each imports from those before it, and from no other; `solver` from
     "prepare",
     "page",
     "fmu",
+    "live",
     "verification",
     "study",
     "api",

@@ -21,9 +21,9 @@ from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
 from ..interface.variables import VariableTable
+from ..live.command import write_page
 from ..model.file import ModelFile, load
 from ..model.scene import Scene
-from ..page.live.command import write_page
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.goal import parse
