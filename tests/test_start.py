@@ -12,12 +12,12 @@ from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
 from lagfmu import simulate
-from lagfmu.build import write
-from lagfmu.cli import app
-from lagfmu.compiler import find_compiler
+from lagfmu.cli.app import app
 from lagfmu.errors import ModelError
-from lagfmu.prepare import prepare
-from lagfmu.starts import StartMovedWarning
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.prepare.prepare import prepare
+from lagfmu.prepare.starts import StartMovedWarning
 
 x, y, theta = dynamicsymbols("x y theta")
 HALF = 0.75  # m, from the pivot to the middle of the rod
