@@ -6,7 +6,7 @@ from .convert import from_lagranges_method
 from .equations import EquationsOfMotion, derive
 from .errors import LagfmuError
 from .make import build_fmu
-from .model import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter
+from .model import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Output, Parameter
 from .reactions import force_of_constraint, multiplier
 from .scene import Scene
 from .simulate import simulate
@@ -23,6 +23,7 @@ __all__ = [
     "LagfmuError",
     "Model",
     "Nonholonomic",
+    "Output",
     "Parameter",
     "Scene",
     "Verification",

@@ -85,6 +85,7 @@ def places(system: System, inputs: list[str], parameters: list[str]) -> dict[str
         found[f"Q.{q}"] = ("FORCE", j, NONE)
     for e, (k, j) in enumerate(zip(*full.jacobian, strict=True)):
         found[f"Q.{full.rows[k].name}.{full.coordinates[j]}"] = ("SHARE", e, NONE)
+    found |= {own.name: ("OUTPUT", k, NONE) for k, own in enumerate(full.outputs)}
     for c, k in enumerate(system.contacts):
         name = system.rows[k].name
         found[f"contact.{name}"] = ("CONTACT", c, c)

@@ -12,12 +12,21 @@ from typing import Any
 import sympy as sp
 
 from .coupling import coupled
-from .equations import EquationsOfMotion
+from .equations import EquationsOfMotion, symbols_of
 from .errors import ModelError
 from .model import Contact, Nonholonomic, name_of
 from .reduction import Reduction
 from .scene import Scene
-from .units import ENERGY, ONE, SECOND, Unit, dimension_of, generalized_force_unit, multiplier_unit
+from .units import (
+    ENERGY,
+    ONE,
+    SECOND,
+    Unit,
+    dimension_of,
+    generalized_force_unit,
+    multiplier_unit,
+    parse_unit,
+)
 from .variables import Value, Variable, VariableTable, menu
 
 Expr = Any
@@ -202,6 +211,7 @@ class _Builder:
             *self.motion(),
             *self.constraint_outputs(),
             *self.energies(),
+            *self.own_outputs(),
             *self.contact_outputs(),
             self.output("solver.steps", "internal steps taken so far", None, (), "Integer"),
         ]
@@ -389,6 +399,22 @@ class _Builder:
         if T is not None and V is not None:
             text = "kinetic plus potential energy"
             variables.append(self.output("energy.total", text, ENERGY, total))
+        return variables
+
+    def own_outputs(self) -> list[Variable]:
+        """The model's own: their dependencies are those of all that stands in them."""
+        variables = []
+        for o in self.eom.outputs:
+            found = symbols_of(o)
+            behind = self.symbols(*found)
+            for j, (a, force) in enumerate(zip(self.eom.vdot, self.eom.Q, strict=True)):
+                if found & {a, force}:
+                    behind |= self.group(coordinate=j)
+            for k, lam in enumerate(self.eom.lam):
+                if lam in found:
+                    behind |= self.group(row=k)
+            text = o.description or f"output {o.name}"
+            variables.append(self.output(o.name, text, parse_unit(o.unit, o.name), behind))
         return variables
 
     def contact_outputs(self) -> list[Variable]:

@@ -25,6 +25,7 @@ from sympy.simplify.fu import TR8
 from .equations import TIME, EquationsOfMotion
 from .model import Contact, Nonholonomic
 from .nullspace import accelerations, lambda_free, largest_group
+from .reactions import multiplier
 from .reduction import Reduction
 
 Expr = Any  # SymPy carries no types
@@ -70,6 +71,8 @@ def typeset(
         sections.append(page.without_lambda())
     if reduction is not None:
         sections += [page.embedding(reduction), page.reduced(reduction)]
+    if eom.outputs:
+        sections.append(page.outputs())
     return tuple(sections)
 
 
@@ -159,7 +162,10 @@ class Notation:
         for c in eom.constraints:
             symbol = sp.Dummy(f"lambda.{c.name}", real=True)
             written[symbol] = f"\\lambda_{{{_letter(c.name)}}}", f"λ_{c.name}"
+            written[multiplier(c.name)] = written[symbol]
             self.multipliers.append(symbol)
+        for q, force in zip(eom.q, eom.Q, strict=True):
+            written[force] = f"Q_{{{name_latex(str(q))}}}", f"Q_{name_text(str(q))}"
         self.into = {s: sp.Symbol(f"x{k:06d}", **s.assumptions0) for k, s in enumerate(written)}
         names = [self.into[s] for s in written]
         latex = dict(zip(names, (a for a, _ in written.values()), strict=True))
@@ -439,6 +445,15 @@ class _Typesetter:
             "from Lagrange's equations with multipliers."
         )
         return self.section("Reduced equations", remark, equations, eom.n)
+
+    def outputs(self) -> Section:
+        """What the model reports of its own."""
+        equations = []
+        for o in self.eom.outputs[:MOST]:
+            left = ".".join(_letter(part) for part in o.name.split(".")), o.name
+            equations.append((o.name, [left, ("=", "="), self.notation.show(o.expression)]))
+        remark = "Quantities that the model names itself, of values of the same instant."
+        return self.section("Outputs of the model", remark, equations, len(self.eom.outputs))
 
 
 def _energy(E: Expr) -> Expr:
