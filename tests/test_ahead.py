@@ -12,7 +12,7 @@ from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter, build_fmu
-from lagfmu.compiler import find_compiler
+from lagfmu.fmu.compiler import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 

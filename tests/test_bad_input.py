@@ -33,10 +33,10 @@ from lagfmu import (
     simulate,
     verify,
 )
-from lagfmu.consistency import RedundantConstraintWarning
 from lagfmu.errors import BuildError, DerivationError, ModelError, VerificationError
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
+from lagfmu.model.file import load
+from lagfmu.prepare.consistency import RedundantConstraintWarning
+from lagfmu.prepare.prepare import prepare
 
 DISCARD, ERROR, FATAL = 2, 3, 4
 

@@ -9,7 +9,7 @@ from sympy import Rational, cos, pi, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate
-from lagfmu.prepare import prepare
+from lagfmu.prepare.prepare import prepare
 
 G = 9.81
 x, y, theta, phi, r = dynamicsymbols("x y theta phi r")

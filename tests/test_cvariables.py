@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 from conftest import FILES
-from runtime import RUNTIME, compile_library
+from runtime import RUNTIME_FILES, compile_library
 
-from lagfmu.ccode import model_source
-from lagfmu.cprinter import string
-from lagfmu.cvariables import variables_source
-from lagfmu.prepare import Prepared
+from lagfmu.codegen.c.equations import model_source
+from lagfmu.codegen.c.printer import string
+from lagfmu.codegen.c.variables import variables_source
+from lagfmu.prepare.prepare import Prepared
 from lagfmu.solver.initial import start
 from lagfmu.solver.observe import observe
 from lagfmu.solver.state import Settings
@@ -47,14 +47,14 @@ class CVariable(ctypes.Structure):
 
 def places() -> list[str]:
     """The enumerators of Place, from the header, in order."""
-    header = (RUNTIME / "variables.h").read_text(encoding="utf-8")
+    header = RUNTIME_FILES["variables.h"].read_text(encoding="utf-8")
     inside = re.sub(r"/\*.*?\*/", "", header[header.index("AT_PARAMETER") :], flags=re.DOTALL)
     return re.findall(r"AT_(\w+)", inside[: inside.index("}")])
 
 
 def methods() -> list[str]:
     """The enumerators of MethodName, from the header, in order."""
-    header = (RUNTIME / "state.h").read_text(encoding="utf-8")
+    header = RUNTIME_FILES["state.h"].read_text(encoding="utf-8")
     found = re.search(r"enum \{([^}]*)\} MethodName", header)
     assert found is not None
     return re.findall(r"\w+", found[1])

@@ -20,7 +20,7 @@ from sympy import Rational, cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu
-from lagfmu.model import name_of
+from lagfmu.model.model import name_of
 
 ALL = sorted(FILES)
 REPOSITORY = Path(__file__).parent.parent
@@ -448,9 +448,9 @@ def test_the_slave_script_is_numeric(name, python_fmu):
 
 BUILD = """
 import sys
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
-from lagfmu.build import write
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
+from lagfmu.fmu.write import write
 file = load(sys.argv[1])
 write(prepare(file.model, file.scenes[0]), sys.argv[2])
 """

@@ -141,9 +141,9 @@ def test_two_models_in_one_process_are_both_right(fmu):
 BUILD = """
 import sys
 from pathlib import Path
-from lagfmu.build import write
-from lagfmu.prepare import prepare
-from lagfmu.modelfile import load
+from lagfmu.fmu.write import write
+from lagfmu.prepare.prepare import prepare
+from lagfmu.model.file import load
 file = load(sys.argv[1])
 for scene in file.scenes:
     write(prepare(file.model, scene), sys.argv[2], file.closed_forms)

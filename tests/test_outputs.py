@@ -24,11 +24,11 @@ from lagfmu import (
     multiplier,
     simulate,
 )
-from lagfmu.documentation import page
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.prepare import prepare
-from lagfmu.stress.lagrange import lagrange
-from lagfmu.tradeoff.quantities import OWN, quantities
+from lagfmu.page.documentation import page
+from lagfmu.prepare.prepare import prepare
+from lagfmu.study.stress.lagrange import lagrange
+from lagfmu.study.tradeoff.quantities import OWN, quantities
 
 t = dynamicsymbols._t
 x, y, r, theta, F = dynamicsymbols("x y r theta F")

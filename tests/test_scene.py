@@ -17,17 +17,17 @@ from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
 from lagfmu import Model, Parameter, build_fmu, simulate, verify
-from lagfmu.build import write
-from lagfmu.ccode import model_source
-from lagfmu.cli import app
+from lagfmu.cli.app import app
+from lagfmu.codegen.c.equations import model_source
+from lagfmu.codegen.py.equations import source
 from lagfmu.errors import LagfmuError, ModelError
-from lagfmu.model import Contact
-from lagfmu.modelfile import ModelFile, load
-from lagfmu.numeric import source
-from lagfmu.prepare import Prepared, prepare
-from lagfmu.savings import savings
-from lagfmu.scene import METHODS, Scene
-from lagfmu.simulate import Trajectory
+from lagfmu.fmu.write import write
+from lagfmu.model.file import ModelFile, load
+from lagfmu.model.model import Contact
+from lagfmu.model.scene import METHODS, Scene
+from lagfmu.page.savings import savings
+from lagfmu.prepare.prepare import Prepared, prepare
+from lagfmu.verification.simulate import Trajectory
 
 FORCES = ("lambda.*", "Q.*")
 Make = Callable[..., tuple[Path, Prepared]]

@@ -16,22 +16,22 @@ from scipy.special import ellipj, ellipk
 from test_cli import SMALL, lagfmu
 
 from lagfmu import Scene, simulate
-from lagfmu.build import write
 from lagfmu.errors import BuildError, SimulationError
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
-from lagfmu.tradeoff import choose as choosing
-from lagfmu.tradeoff.choose import choose, pick
-from lagfmu.tradeoff.front import front
-from lagfmu.tradeoff.goal import Goal, parse
-from lagfmu.tradeoff.held_out import Case, other_values
-from lagfmu.tradeoff.importer import Importer
-from lagfmu.tradeoff.measure import Plan, Tradeoff, measure, take_turns
-from lagfmu.tradeoff.quantities import residual
-from lagfmu.tradeoff.reference import refer
-from lagfmu.tradeoff.setting import EVALUATIONS, Setting
-from lagfmu.tradeoff.survey import formulations, survey
-from lagfmu.verify import claims_in
+from lagfmu.fmu.write import write
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
+from lagfmu.study.tradeoff import choose as choosing
+from lagfmu.study.tradeoff.choose import choose, pick
+from lagfmu.study.tradeoff.front import front
+from lagfmu.study.tradeoff.goal import Goal, parse
+from lagfmu.study.tradeoff.held_out import Case, other_values
+from lagfmu.study.tradeoff.importer import Importer
+from lagfmu.study.tradeoff.measure import Plan, Tradeoff, measure, take_turns
+from lagfmu.study.tradeoff.quantities import residual
+from lagfmu.study.tradeoff.reference import refer
+from lagfmu.study.tradeoff.setting import EVALUATIONS, Setting
+from lagfmu.study.tradeoff.survey import formulations, survey
+from lagfmu.verification.verify import claims_in
 
 MODELS = Path(__file__).parent.parent / "models"
 PENDULUM = load(MODELS / "pendulum.py")

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
-from ..ccode import model_source
-from ..compiler import HOST, chosen, compile_libraries, is_first
-from ..cparts import files_left_out, parts_source
-from ..ctables import entanglements
-from ..cvariables import variables_source
-from ..equations import EquationsOfMotion
+from ..codegen.c.equations import model_source
+from ..codegen.c.parts import files_left_out, needs_tangents, parts_source
+from ..codegen.c.tables import entanglements
+from ..codegen.c.variables import variables_source
 from ..errors import BuildError
-from ..reduction import Reduction
-from ..scene import Scene
+from ..interface.variables import VariableTable
+from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.formulations.minimal import Reduction
+from ..model.scene import Scene
 from ..solver.system import System
-from ..variables import VariableTable
 from .archive import pack, version
+from .compiler import HOST, chosen, compile_libraries, is_first
 from .description import guid_of, model_description
 
 CAPABILITIES = {
@@ -96,18 +96,16 @@ def build(
     return pack(contents)
 
 
-def needs_tangents(scene: Scene) -> bool:
-    """True if derivatives of the equations are offered, or needed by an implicit method."""
-    return scene.differentiable or "radau5" in scene.integrators
-
-
 def runtime_files() -> dict[str, bytes]:
-    """Name -> content of the C files that every native FMU carries."""
-    return {
+    """Name -> content of the runtime's C files, its folders flattened as in an FMU's `sources/`."""
+    found = {
         file.name: file.read_bytes()
-        for file in sorted(files("lagfmu").joinpath("runtime").iterdir(), key=lambda f: f.name)
+        for folder in files("lagfmu").joinpath("runtime").iterdir()
+        if folder.is_dir()
+        for file in folder.iterdir()
         if file.name.endswith((".c", ".h"))
     }
+    return dict(sorted(found.items()))
 
 
 def takes_long(platforms: Sequence[str]) -> bool:

@@ -13,15 +13,15 @@ from pathlib import Path, PurePosixPath
 
 from pythonfmu.builder import FmuBuilder
 
-from ..equations import EquationsOfMotion
+from ..codegen.py.equations import source
+from ..codegen.py.parts import files_left_out, files_of_its_own
 from ..errors import BuildError
-from ..numeric import source
-from ..pyparts import files_left_out, files_of_its_own
-from ..reduction import Reduction
-from ..scene import Scene
+from ..interface.variables import VariableTable
+from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.formulations.minimal import Reduction
+from ..model.scene import Scene
 from ..solver.state import METHODS
 from ..solver.system import System
-from ..variables import VariableTable
 from .archive import pack, version
 from .description import model_description
 

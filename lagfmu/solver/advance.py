@@ -11,19 +11,12 @@ import numpy as np
 
 from . import at_contacts
 from .failure import StepFailureError
+from .indicators import indicators, is_watched
 from .instant import Instant
 from .leg import Leg
 from .magnitudes import complete, is_incomplete
 from .state import Settings, State
-from .stiffness import (
-    Choice,
-    Slope,
-    explicit,
-    explicit_step,
-    implicit_step,
-    is_due,
-    unjudged_step,
-)
+from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step, is_due, unjudged_step
 from .system import System, Vector
 
 CHATTER = 200  # contact events in next to no time after which the step is given up
@@ -48,8 +41,8 @@ def advance(
         )
     with np.errstate(all="ignore"):
         at = Instant(system, state.t, system.inputs_at(u, 0.0), p)
-        if system.contacts:
-            state = at_contacts.released(at, state)
+        if system.contacts and system.prescribed:
+            state = at_contacts.released(at, state, state.span)
         if is_incomplete(state):
             state = complete(at, settings, state, t_end - state.t)
         while state.t < t_end:
@@ -61,7 +54,7 @@ def advance(
                     f"{CHATTER} contacts open or close in {events[-1] - events[0]:.1g} s at "
                     f"t = {state.t!r} s: the contacts chatter without end"
                 )
-    return state
+    return replace(state, span=t_end - begun)
 
 
 def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> State:
@@ -73,8 +66,8 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
     solver = leg.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
     steps, choice = state.steps, state.choice
-    watch = bool(leg.system.contacts)
-    before = leg.indicators(state.t, y) if watch else np.zeros(0)
+    watch = is_watched(leg.system)
+    before = indicators(leg, state.t, y) if watch else np.zeros(0)
     while True:
         t0, y0 = solver.t, solver.y
         offered = solver.h_abs
@@ -91,9 +84,7 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
             continue
         steps += 1
         if watch:
-            event, before = at_contacts.first_event(
-                leg, solver, t0, y0, y1, before, armed, state.gap
-            )
+            event, before = at_contacts.first_event(leg, solver, t0, y0, y1, before, armed)
             if event is not None:
                 step = offered
                 if choice.implicit:

@@ -16,7 +16,7 @@ from . import at_contacts
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
-from .magnitudes import TOUCH, complete, extents, sizes
+from .magnitudes import TOUCH, complete, extents, motion_speeds, sizes
 from .motion import EPS, project
 from .state import Departure, Settings, State
 from .system import NONHOLONOMIC, Matrix, System, Vector
@@ -91,6 +91,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
         gap=tuple(gap.tolist()),
         rate=0.0,
         step=0.0,
+        span=0.0,
         steps=0,
         departures=(nothing,) * len(system.contacts),
     )
@@ -217,16 +218,16 @@ def _velocities(
     _check_masses(system, M)
     _check_underflow(at, q, v0, M)
     natural = np.sqrt(size * np.abs(F) / np.where(M.diagonal() > 0, M.diagonal(), np.inf))
-    unit = np.abs(G) @ np.maximum(np.abs(v0), natural)
+    unit = np.abs(G) @ motion_speeds(system, M, np.maximum(np.abs(v0), natural))
     speed = G @ v0 - nu
     shut = [
         c and not speed[k] > TOUCH * unit[k] for c, k in zip(closed, system.contacts, strict=True)
     ]
     rows = system.active(shut)
     q, v = project(at, q, v0, rows, np.zeros(system.m), size)
-    _, _, G, nu, _ = at.evaluate(q, v)
+    M, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
-    unit = np.abs(G) @ fastest + np.abs(nu)
+    unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)
     missed = [k for k in rows if abs(G[k] @ v - nu[k]) > 1e-9 * unit[k]]
     if missed:
         names = ", ".join(repr(system.rows[k].name) for k in missed)

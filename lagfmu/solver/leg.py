@@ -101,17 +101,6 @@ class Leg:
             "the configuration is singular, or nearly so"
         )
 
-    def indicators(self, t: float, y: Vector) -> Vector:
-        """One a contact: lambda while closed, f while open."""
-        q, v = self.split(y)
-        at = self.at(t)
-        contacts = list(self.system.contacts)
-        values = at.residual(q)[contacts]
-        if any(self.state.closed):
-            lam = motion(at, q, v, self.rows).lam[contacts]
-            values = np.where(self.state.closed, lam, values)
-        return values
-
     def stepper(self, t: float, y: Vector, t_bound: float, first_step: float | None) -> Any:
         if self.settings.method == "rk4" and not self.settings.step:
             first_step = 1 / (FEWEST_STEPS * self.state.rate)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .indicators import indicators
 from .leg import Leg
 from .motion import motion
 from .system import Vector
@@ -45,7 +46,7 @@ def looks(
             return times, values
         times.append(t)
         y = dense(t)
-        values.append(leg.indicators(t, y))
+        values.append(indicators(leg, t, y))
 
 
 def _top_of_rebound(leg: Leg, t: float, y: Vector, values: Vector) -> float:
@@ -87,7 +88,7 @@ def look_into_dips(
             lowest, depth = _vertex(t, lam)
             if not (t[0] < lowest < t[2]) or lowest in t or depth > SHALLOW * max(lam):
                 break
-            seen = leg.indicators(lowest, solver.dense_output()(lowest))
+            seen = indicators(leg, lowest, solver.dense_output()(lowest))
             if seen[contact] < 0:
                 k = next(k for k, other in enumerate(times) if other > lowest)
                 times.insert(k, lowest)

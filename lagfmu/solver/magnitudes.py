@@ -36,7 +36,7 @@ from .failure import StepFailureError
 from .instant import Instant
 from .motion import EPS, Motion, motion
 from .state import Settings, State
-from .system import System, Vector
+from .system import Matrix, System, Vector
 
 Mask = NDArray[np.bool_]
 
@@ -66,6 +66,25 @@ def sizes(system: System, q: Vector, p: Sequence[float], before: Vector) -> Vect
     if angles:
         size[angles] = min(place[angles].max(), 1.0) or 1.0
     return size
+
+
+def motion_speeds(system: System, M: Matrix, speed: Vector) -> Vector:
+    """What speeds (n) a whole motion has that moves each coordinate at `speed` (n) >= 0: the largest of its
+    dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its own.
+
+    A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed is
+    rounding of theirs.
+    """
+    mass = M.diagonal()
+    momentum = (np.sqrt(np.maximum(mass, 0.0)) * speed).max(initial=0.0)
+    shared = np.empty(system.n)
+    for j in range(system.n):
+        like = list(system.like[j]) if system.like else [j]
+        heaviest = mass[like].max()
+        shared[j] = speed[like].max()
+        if heaviest > 0:
+            shared[j] = max(shared[j], momentum / np.sqrt(heaviest))
+    return shared
 
 
 def is_incomplete(state: State) -> bool:

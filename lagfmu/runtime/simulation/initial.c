@@ -1,0 +1,326 @@
+/* initial.c -- a consistent start: projection of start values onto the constraints, contact modes,
+ * magnitudes.
+ *
+ *   M dq = G^T mu ,  G dq = -f     damped Newton's method from afar (Deuflhard, Newton Methods for
+ *                                  Nonlinear Problems, sect. 3.1), the step halved until |f| falls
+ *
+ * Positions are projected, weighted by M, onto the constraints that always act and onto contacts
+ * that are penetrated (f < gap); then velocities onto G v = nu; then the contacts that touch are
+ * closed if their multiplier is positive. */
+#include <float.h>
+#include <string.h>
+
+#include "digits.h"
+#include "magnitudes.h"
+#include "parts.h"
+
+enum { ITERATIONS = 60, HALVINGS = 25 };
+static const double EPS = DBL_EPSILON;
+static const double LARGEST_ANGLE = 1e-3 / DBL_EPSILON; /* [rad] neighbouring numbers are 1e-3 apart */
+
+/* The start of a simulation: the state that is being found, and where it began. */
+typedef struct {
+    Solver *s;
+    Instant at;
+    const double *q0, *v0;
+} Start;
+
+static Status refused(Solver *s) {
+    Why cause = s->why;
+    return fail(&s->why, "the start is refused: %s", cause.text);
+}
+
+/* allowed (m): `factor` roundings of each constraint's terms at q, no smaller than those of `least`. */
+static void find_allowed(const Start *x, const double *q, const double *least, double factor,
+                         double *reach, double *allowed) {
+    const System *s = x->s->system;
+    for (int j = 0; j < s->n; j++) reach[j] = fmax(fabs(q[j]), least[j]);
+    for (int k = 0; k < s->m; k++)
+        allowed[k] = factor * EPS * mechanism_row_size(&x->s->stepped, k, reach);
+}
+
+static int arrived(const System *s, const int *rows, const double *f, const double *allowed) {
+    for (int k = 0; k < s->m; k++)
+        if (rows[k] && !(fabs(f[k]) <= allowed[k])) return 0;
+    return 1;
+}
+
+/* |f| on the rows in units of what may be left; of f0 where nothing may. */
+static double norm(const System *s, const int *rows, const double *f, const double *allowed,
+                   const double *f0) {
+    double sum = 0;
+    for (int k = 0; k < s->m; k++) {
+        double unit = allowed[k] > 0 ? allowed[k] : f0[k] != 0 ? fabs(f0[k]) : 1;
+        if (rows[k]) sum += f[k] / unit * (f[k] / unit);
+    }
+    return sqrt(sum);
+}
+
+static Status cannot_be_projected(const Start *x, const int *rows, const double *f,
+                                  const double *allowed) {
+    const System *s = x->s->system;
+    Why *why = &x->s->why;
+    const char *comma = "";
+    fail(why, "the start values ");
+    for (int j = 0; j < s->n; j++) {
+        Digits given = digits(x->q0[j]);
+        why_append(why, "%s%s = %s", j > 0 ? ", " : "", s->coordinates[j], given.text);
+    }
+    why_append(why, " cannot be projected onto the constraints (missed: ");
+    for (int k = 0; k < s->m; k++)
+        if (rows[k] && !(fabs(f[k]) <= allowed[k])) {
+            why_append(why, "%s'%s' by %.3g", comma, s->rows[k].name, f[k]);
+            comma = ", ";
+        }
+    why_append(why, "): choose start values near a configuration that satisfies them, or other "
+                    "parameters");
+    return FAILED;
+}
+
+/* Damped Newton's method for f = 0 on the rows, weighted by M, from anywhere; q is moved.
+ *
+ * It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
+ * since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
+ * of at the start (`size`).  While it falls on and on, there is nothing to arrive at. */
+static Status project_from_afar(const Start *x, double *q, int *rows) {
+    const System *s = x->s->system;
+    const size_t bytes = (size_t)s->n * sizeof *q;
+    Mechanism *b = &x->s->stepped;
+    double *step = x->s->work_initial, *trial = step + s->n, *least = trial + s->n;
+    double *f = least + s->n, *f_trial = f + s->m, *allowed = f_trial + s->m;
+    int any = 0;
+    for (int k = 0; k < s->m; k++) {
+        if (s->rows[k].kind == NONHOLONOMIC) rows[k] = 0;
+        any |= rows[k];
+    }
+    if (!any) return OK;
+    magnitudes_extents(s, x->at.p, least);
+    if (mechanism_residual(b, x->at, q, f) == FAILED) return refused(x->s);
+    for (int count = 0;; count++) {
+        if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return refused(x->s);
+        find_allowed(x, q, least, 4, trial, allowed);
+        if (arrived(s, rows, f, allowed)) return OK;
+        if (count == ITERATIONS) return cannot_be_projected(x, rows, f, allowed);
+        find_allowed(x, q, x->s->state.size, 1e3, trial, allowed);
+        for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
+        if (linear_factor(&b->linear, b->M, b->G, rows) == FAILED) break;
+        if (linear_nearest(&b->linear, f_trial, step) == FAILED) break;
+        double damping = 1;
+        int halvings = 0;
+        for (; halvings < HALVINGS; halvings++, damping /= 2) {
+            for (int j = 0; j < s->n; j++) trial[j] = q[j] + damping * step[j];
+            if (mechanism_residual(b, x->at, trial, f_trial) == FAILED) continue;
+            if (norm(s, rows, f_trial, allowed, f) <
+                (1 - 0.1 * damping) * norm(s, rows, f, allowed, f))
+                break;
+        }
+        if (halvings == HALVINGS) break;
+        memcpy(q, trial, bytes);
+        memcpy(f, f_trial, (size_t)s->m * sizeof *f);
+    }
+    return arrived(s, rows, f, allowed) ? OK : cannot_be_projected(x, rows, f, allowed);
+}
+
+/* An angle whose neighbouring numbers are no neighbouring directions is refused. */
+static Status check_angles(const Start *x) {
+    const System *s = x->s->system;
+    const double *q = x->s->state.q;
+    for (int j = 0; j < s->n; j++) {
+        if (s->dimension[j] != s->angles || fabs(q[j]) <= LARGEST_ANGLE) continue;
+        return fail(&x->s->why,
+                    "the start is refused: the angle %s = %s rad has no digits left for a "
+                    "direction, expected at most %.1e rad either way: take off whole turns",
+                    s->coordinates[j], digits(q[j]).text, LARGEST_ANGLE);
+    }
+    return OK;
+}
+
+/* A mass that a double holds to a few digits only is refused. */
+static Status check_masses(const Start *x) {
+    const Mechanism *b = &x->s->stepped;
+    const System *s = b->system;
+    for (int e = 0; e < s->masses; e++) {
+        if (s->mass_row[e] != s->mass_column[e]) continue;
+        if (!(b->M[e] > 0 && b->M[e] < DBL_MIN)) continue;
+        return fail(&x->s->why,
+                    "the start is refused: the mass of %s is %s, expected 0 or at least %.3g (in SI "
+                    "units), below which numbers lose their digits: choose larger units of mass",
+                    s->coordinates[s->mass_row[e]], digits(b->M[e]).text, DBL_MIN);
+    }
+    return OK;
+}
+
+/* Positions on the constraints; contacts that touch or were penetrated are closed, for now. */
+static Status find_positions(const Start *x) {
+    const System *s = x->s->system;
+    State *state = &x->s->state;
+    Mechanism *b = &x->s->stepped;
+    double *moved = x->s->work_initial + 3 * s->n + 3 * s->m, *unit = moved + s->n;
+    int *rows = x->s->iwork_initial;
+    memcpy(state->q, x->q0, (size_t)s->n * sizeof *state->q);
+    memset(state->closed, 0, (size_t)s->contacts * sizeof *state->closed);
+    system_active(s, state->closed, rows);
+    if (project_from_afar(x, state->q, rows) == FAILED) return FAILED;
+    for (int count = 0; count <= s->contacts; count++) {
+        if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return refused(x->s);
+        if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return refused(x->s);
+        for (int j = 0; j < s->n; j++) unit[j] = fmax(fabs(state->q[j]), state->size[j]);
+        for (int c = 0; c < s->contacts; c++) {
+            int k = s->contact[c];
+            state->gap[c] = TOUCH * mechanism_row_size(b, k, unit);
+            state->closed[c] = b->f[k] <= state->gap[c];
+        }
+        system_active(s, state->closed, rows);
+        memcpy(moved, state->q, (size_t)s->n * sizeof *moved);
+        if (project_from_afar(x, moved, rows) == FAILED) return FAILED;
+        int still = 1;
+        for (int j = 0; j < s->n; j++)
+            still &= fabs(moved[j] - state->q[j]) <= 4 * EPS * state->size[j];
+        if (still) break;
+        memcpy(state->q, moved, (size_t)s->n * sizeof *moved);
+    }
+    if (check_angles(x) == FAILED) return FAILED;
+    magnitudes_sizes(x->s, state->q);
+    return OK;
+}
+
+/* natural (n): the speeds that the forces give within the coordinates' size, sqrt(size |F| / M). */
+static void natural_speeds(const Start *x, double *natural) {
+    const Mechanism *b = &x->s->stepped;
+    const System *s = b->system;
+    for (int j = 0; j < s->n; j++) natural[j] = 0;
+    for (int e = 0; e < s->masses; e++) {
+        int j = s->mass_row[e];
+        if (s->mass_column[e] == j && b->M[e] > 0)
+            natural[j] = sqrt(x->s->state.size[j] * fabs(b->F[j]) / b->M[e]);
+    }
+}
+
+/* Every row that acts has G v = nu to rounding; otherwise the constraints contradict each other. */
+static Status check_velocities(const Start *x, const int *active, double *fastest, double *shared) {
+    Solver *solver = x->s;
+    const Mechanism *b = &solver->stepped;
+    const System *s = b->system;
+    const double *v = solver->state.v;
+    int missed = 0;
+    for (int j = 0; j < s->n; j++)
+        fastest[j] = fmax(fmax(fabs(x->v0[j]), fabs(v[j])), fastest[j]);
+    magnitudes_motion_speeds(b, fastest, shared);
+    for (int k = 0; k < s->m; k++) {
+        double unit = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);
+        if (!active[k] || fabs(mechanism_slip(b, k, v)) <= 1e-9 * unit) continue;
+        if (!missed) fail(&solver->why, "no velocities satisfy the constraints ");
+        why_append(&solver->why, "%s'%s'", missed ? ", " : "", s->rows[k].name);
+        missed = 1;
+    }
+    if (!missed) return OK;
+    why_append(&solver->why, " at the start: they contradict each other, or the configuration is "
+                             "singular");
+    return FAILED;
+}
+
+/* Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open. */
+static Status find_velocities(const Start *x) {
+    const System *s = x->s->system;
+    State *state = &x->s->state;
+    Mechanism *b = &x->s->stepped;
+    double *natural = x->s->work_initial, *fastest = natural + s->n, *shared = fastest + s->n;
+    int *active = x->s->iwork_initial;
+    memcpy(state->v, x->v0, (size_t)s->n * sizeof *state->v);
+    if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return refused(x->s);
+    if (check_masses(x) == FAILED) return FAILED;
+    natural_speeds(x, natural);
+    for (int j = 0; j < s->n; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
+    magnitudes_motion_speeds(b, fastest, shared);
+    for (int c = 0; c < s->contacts; c++) {
+        int k = s->contact[c];
+        double speed = mechanism_slip(b, k, x->v0);
+        if (speed > TOUCH * mechanism_row_size(b, k, shared)) state->closed[c] = 0;
+    }
+    system_active(s, state->closed, active);
+    if (mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->size) ==
+        FAILED)
+        return refused(x->s);
+    if (mechanism_evaluate(b, x->at, state->q, state->v) == FAILED) return refused(x->s);
+    return check_velocities(x, active, natural, shared);
+}
+
+/* Contact modes by complementarity, and the state on the rows that then act. */
+static Status find_modes(const Start *x) {
+    const System *s = x->s->system;
+    State *state = &x->s->state;
+    Mechanism *b = &x->s->stepped;
+    int *touching = x->s->iwork_initial + s->m;
+    memcpy(touching, state->closed, (size_t)s->contacts * sizeof *touching);
+    if (s->contacts > 0 && PARTS.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
+                                                touching, NULL) == FAILED)
+        return refused(x->s);
+    system_active(s, state->closed, x->s->active);
+    if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,
+                          state->size) == FAILED)
+        return refused(x->s);
+    if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
+        return refused(x->s);
+    return OK;
+}
+
+/* A start value is its own scale, so that a start at theta0 = 1e-6 is resolved. */
+static Status find_magnitudes(const Start *x) {
+    Solver *s = x->s;
+    const int n = s->system->n;
+    for (int j = 0; j < n; j++) {
+        s->state.scale[j] = fabs(s->state.q[j]);
+        s->state.scale[n + j] = fabs(s->state.v[j]);
+    }
+    return magnitudes_complete(s, x->at, 0);
+}
+
+static void tell_moved(const Start *x, Moved moved, void *context) {
+    const State *state = &x->s->state;
+    const int n = x->s->system->n;
+    for (int i = 0; i < 2 * n; i++) {
+        int is_velocity = i >= n, j = i % n;
+        double given = is_velocity ? x->v0[j] : x->q0[j];
+        double used = is_velocity ? state->v[j] : state->q[j];
+        double unit = fmax(is_velocity ? state->scale[i] : state->size[j], fabs(given));
+        if (fabs(given - used) > 1e-12 * unit)
+            moved(context, x->s->system->coordinates[j], is_velocity, given, used);
+    }
+}
+
+static Status check_finite(Solver *s, const double *q0, const double *v0) {
+    for (int j = 0; j < s->system->n; j++) {
+        int is_velocity = fabs(q0[j]) <= DBL_MAX;
+        if (is_velocity && fabs(v0[j]) <= DBL_MAX) continue;
+        Digits given = digits(is_velocity ? v0[j] : q0[j]);
+        return fail(&s->why, "the start is refused: %s%s%s = %s is not finite",
+                    is_velocity ? "der(" : "", s->system->coordinates[j], is_velocity ? ")" : "",
+                    given.text);
+    }
+    return OK;
+}
+
+/* Nothing has happened yet: no steps, no departures, every row on its own level. */
+static void clear(Solver *s, double t) {
+    State *state = &s->state;
+    memset(state->block, 0, state->block_size);
+    memset(&state->now, 0, sizeof state->now);
+    state->now.t = t;
+    state->now.fresh = 1;
+}
+
+Status solver_start(Solver *s, double t, const double *q0, const double *v0, Moved moved,
+                    void *context) {
+    if (check_finite(s, q0, v0) == FAILED) return FAILED;
+    clear(s, t);
+    drive_at(s->system, &s->drive, t, s->u);
+    const Start x = {s, {t, s->u, s->p}, q0, v0};
+    magnitudes_sizes(s, q0);
+    if (find_positions(&x) == FAILED) return FAILED;
+    if (find_velocities(&x) == FAILED) return FAILED;
+    if (find_modes(&x) == FAILED) return FAILED;
+    for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];
+    if (find_magnitudes(&x) == FAILED) return FAILED;
+    if (moved != NULL) tell_moved(&x, moved, context);
+    return OK;
+}

@@ -1,0 +1,119 @@
+/* leg.c -- the index-1 equations of motion as an ordinary differential equation, and its projection
+ * (Hairer & Wanner II, sect. VII.2: index reduction with projection). */
+#include "leg.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "parts.h"
+#include "sensitivity.h"
+#include "step_size.h"
+
+static const double FEWEST_STEPS_RK4 = 100;  /* in one natural time of the motion, 1/rate, ... */
+static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
+static const double SAFETY = 0.25; /* of the tolerance: errors of many steps add up */
+static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may move the state: times the
+                                                  * tolerance, and at least, relative to the state */
+static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the state: it means nothing */
+
+void leg_begin(Solver *s) { system_active(s->system, s->state.closed, s->active); }
+
+Instant leg_instant(Solver *s, double t) {
+    if (s->system->inputs > 0) drive_at(s->system, &s->drive, t, s->u);
+    return (Instant){t, s->u, s->p};
+}
+
+static Status rate(void *context, double t, const double *y, double *dydt) {
+    Solver *s = context;
+    const int n = s->system->n;
+    if (mechanism_motion(&s->stepped, leg_instant(s, t), y, y + n, s->active) != OK) return FAILED;
+    for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
+        dydt[j] = y[n + j];
+        dydt[n + j] = s->stepped.vdot[j];
+    }
+    return OK;
+}
+
+static Status jacobian(void *context, double t, const double *y, double *J, double *dfdt) {
+    Solver *s = context;
+    return sensitivity_jacobian(&s->sensitivity, &s->stepped, leg_instant(s, t), s->active, y, J,
+                                dfdt);
+}
+
+static Control control(const Solver *s, double longest) {
+    const Settings *set = &s->settings;
+    const double fewest = set->method == RATTLE ? FEWEST_STEPS_RATTLE : FEWEST_STEPS_RK4;
+    const double fixed = set->step > 0 ? set->step : 1 / (fewest * s->state.now.rate);
+    if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
+    return (Control){SAFETY * set->tolerance, s->state.scale, longest < HUGE_VAL ? longest : 0,
+                     fixed};
+}
+
+/* rk4 controls no error; a step whose error is as large as the state itself is refused. */
+static Status check_fixed_step(Solver *s, const Integrator *i) {
+    const int n = s->system->n;
+    for (int j = 0; j < 2 * n; j++) {
+        const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
+        if (!(fabs(PARTS.rk4_error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
+            return fail(&s->why,
+                        "the integration stops at t = %.17g s, rk4's step of %.3g s is far too "
+                        "large: reduce solver.step",
+                        i->t_old, i->t - i->t_old);
+    }
+    return OK;
+}
+
+Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
+    const Control c = control(s, longest);
+    if (s->settings.method == RATTLE) {
+        const Instant at = leg_instant(s, i->t);
+        return PARTS.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,
+                                 t_bound);
+    }
+    const Ode ode = {s, rate, jacobian, &s->why};
+    if (i->method->step(i, &ode, &c, t_bound) != OK) return FAILED;
+    return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;
+}
+
+Status leg_rate(Solver *s, Integrator *i) {
+    const Ode ode = {s, rate, jacobian, &s->why};
+    return step_size_rate(i, &ode);
+}
+
+Status leg_prepare_dense(Solver *s, Integrator *i) {
+    const Ode ode = {s, rate, jacobian, &s->why};
+    return i->method->prepare_dense == NULL ? OK : i->method->prepare_dense(i, &ode);
+}
+
+Status leg_project(Solver *s, double t, double *y) {
+    return mechanism_project(&s->stepped, leg_instant(s, t), y, y + s->system->n, s->active,
+                             s->state.offset, s->state.size);
+}
+
+Status leg_check_projection(Solver *s, double t, const double *y, const double *projected) {
+    const int n = s->system->n;
+    const double far = fmax(FAR * s->settings.tolerance, LEAST_FAR);
+    if (s->integrator.method->fixed) return OK;
+    if (s->system->prescribed_count > 0 && s->integrator.t_old == s->drive.since)
+        return OK; /* a prescribed motion may have jumped when it was set */
+    for (int j = 0; j < 2 * n; j++) {
+        const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
+        if (!(fabs(projected[j] - y[j]) <= far * fmax(fabs(y[j]), size)))
+            return fail(&s->why,
+                        "the integration stops at t = %.17g s, the projection onto the constraints "
+                        "moves %s by %.3g: the configuration is singular, or nearly so",
+                        t, s->system->coordinates[j % n], projected[j] - y[j]);
+    }
+    return OK;
+}
+
+Status leg_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
+    Integrator *i = &s->probe;
+    memcpy(y, y0, 2 * (size_t)s->system->n * sizeof *y);
+    if (!(t1 > t0)) return OK;
+    integrator_start(i, s->integrator.method, t0, y0, t1 - t0);
+    while (i->t < t1)
+        if (leg_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
+    memcpy(y, i->y, 2 * (size_t)s->system->n * sizeof *y);
+    return leg_project(s, t1, y);
+}

@@ -1,0 +1,36 @@
+/* leg.h -- a stretch of time over which the contact modes do not change.
+ *
+ *   y = [q; v] ,  q' = v ,  v' = vdot   with   M vdot = F + G^T lambda ,  G vdot = gamma
+ *
+ * is integrated for the rows that act, and projected onto f = offset and G v = nu. */
+#ifndef LAGFMU_LEG_H
+#define LAGFMU_LEG_H
+
+#include "solver.h"
+
+/* The rows that act in the present modes. */
+void leg_begin(Solver *s);
+
+/* Time t with the inputs then (kept in s->u). */
+Instant leg_instant(Solver *s, double t);
+
+/* One accepted step towards t_bound, none longer than `longest` [s]. */
+Status leg_step(Solver *s, Integrator *i, double t_bound, double longest);
+
+/* The rate of change at the integrator's state. */
+Status leg_rate(Solver *s, Integrator *i);
+
+/* Completes the dense output of the step just taken. */
+Status leg_prepare_dense(Solver *s, Integrator *i);
+
+/* y (2 n) moved onto the constraints. */
+Status leg_project(Solver *s, double t, double *y);
+
+/* FAILED if the projection after an adaptive step moved the state by far more than the step's error
+ * can be: next to a singular configuration the constraints lead to another branch. */
+Status leg_check_projection(Solver *s, double t, const double *y, const double *projected);
+
+/* y at t1, integrated from (t0, y0) and projected. */
+Status leg_reach(Solver *s, double t0, const double *y0, double t1, double *y);
+
+#endif

@@ -1,0 +1,24 @@
+/* looks.h -- the times within a step at which the indicators are looked at. */
+#ifndef LAGFMU_LOOKS_H
+#define LAGFMU_LOOKS_H
+
+#include "solver.h"
+
+enum { MOST_LOOKS = 256 }; /* and one more for each indicator */
+
+/* Times t[0] < ... < t[count - 1] and the indicators then, a row of values for each look. */
+typedef struct {
+    int count;
+    double *t, *values;
+} Looks;
+
+/* Doubles behind t and values, one row of scratch among them. */
+static inline int looks_doubles(int indicators) {
+    return (MOST_LOOKS + indicators) * (1 + indicators) + indicators;
+}
+
+/* Fills `looks` for the step of s->integrator (dense output prepared), from state.indicator at its start
+ * to the projected y1 at its end.  y (2 n): scratch. */
+Status looks_take(Solver *s, const double *y1, double *y, Looks *looks);
+
+#endif

@@ -1,0 +1,248 @@
+/* magnitudes.c -- what is large and what is small in a motion.  No unit counts.
+ *
+ *   size   of a coordinate: |q|, or the largest parameter of its dimension; of angles at most 1 rad
+ *   rate   [1/s] of the motion: the largest |v| / size and sqrt(|vdot| / size)
+ *   scale  below which an error is absolute: |q| and |v| of the start, or what rounding leaves of
+ *          size, and of v what forces make of the rounding of q
+ *
+ * A coordinate at 0 of whose dimension there is no parameter has no size: its 0 is a mark on a
+ * ruler.  There the motion itself tells what is large, V tau and A tau^2 with V and A the largest
+ * speed and acceleration of its dimension: tau is the shortest time in which anything changes,
+ * 1/rate of the coordinates that have a size, or V/A.  Too small a size is safe, an error is then
+ * measured by the motion reached so far; too large a one hides errors.  Hence parameters and angles
+ * alone give that rate (a place may be far away, and says nothing), and V/A the forces before they
+ * cancel.
+ *
+ * A displacement of each coordinate in turn tells what holds it: dvdot, were it displaced by its
+ * size.  The rate of small oscillations is omega = sqrt(|dvdot| / size), and rounding of q shakes v by
+ * eps |dvdot| (|q| / size) / omega: on stiff springs that is more than rounding of v itself, and no step
+ * could be small enough to resolve it.  At rest on springs that balance, what is left of the
+ * acceleration is such rounding, and omega is the natural rate.
+ *
+ * Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the
+ * only time is the importer's: tau is PART of the first communication step.  Were the motion a
+ * million times faster than that step, its size would be taken for at most 1e6 times what it is,
+ * which the floor of the scale, below 1e-6, still forgives. */
+#include "magnitudes.h"
+
+#include <float.h>
+#include <string.h>
+
+const double TOUCH = 1e-9;
+static const double LOST = 1e3 * DBL_EPSILON; /* what is left of a place by a projection, or of
+                                               * forces that cancel, is rounding */
+static const double PART = 1e-3;  /* of the first step, in which a motion without scale is measured */
+static const double SHIFT = 0x1p-20; /* of its size, by which a coordinate is displaced to see what
+                                      * holds it */
+static const double ROUNDINGS = 1e9; /* times the tolerance: roundings of q that an error of v may
+                                      * reach, 0.01 to 10 */
+static const double TINY = 1e-100; /* scale of what neither moves nor is pushed: anything that moves
+                                    * exceeds it */
+
+static double larger(double a, double b) { return a > b ? a : b; }
+
+static double positive(double x) { return x > 0 ? x : TINY; }
+
+void magnitudes_extents(const System *s, const double *p, double *least) {
+    for (int j = 0; j < s->n; j++) {
+        least[j] = s->folded != NULL ? s->folded[j] : 0;
+        for (int i = 0; i < s->parameters; i++)
+            if (s->extent_dimension[i] == s->dimension[j]) least[j] = larger(least[j], fabs(p[i]));
+    }
+}
+
+void magnitudes_sizes(Solver *s, const double *q) {
+    const System *system = s->system;
+    double *size = s->state.size, *least = s->work_initial;
+    double turn = 0;
+    magnitudes_extents(system, s->p, least);
+    for (int j = 0; j < system->n; j++) {
+        const double place = fabs(q[j]) > LOST * size[j] ? fabs(q[j]) : 0;
+        size[j] = larger(place, least[j]);
+        if (system->dimension[j] == system->angles) turn = larger(turn, place);
+    }
+    if (!(turn > 0 && turn < 1)) turn = 1;
+    for (int j = 0; j < system->n; j++)
+        if (system->dimension[j] == system->angles) size[j] = turn;
+}
+
+int magnitudes_incomplete(const Solver *s) {
+    int incomplete = !(s->state.now.rate > 0);
+    for (int j = 0; j < s->system->n; j++) incomplete |= !(s->state.size[j] > 0);
+    return incomplete;
+}
+
+static double mass_of(const Mechanism *b, int j) {
+    const System *s = b->system;
+    for (int e = 0; e < s->masses; e++)
+        if (s->mass_row[e] == j && s->mass_column[e] == j) return b->M[e];
+    return 0;
+}
+
+/* Accelerations (n) before forces cancel: at least what each coordinate's forces give it alone. */
+static void find_felt(const Mechanism *b, double *felt) {
+    const System *s = b->system;
+    for (int j = 0; j < s->n; j++) felt[j] = fabs(b->F[j]);
+    for (int e = 0; e < s->entries; e++)
+        felt[s->entry_column[e]] += fabs(b->G[e]) * fabs(b->lambda[s->entry_row[e]]);
+    for (int j = 0; j < s->n; j++) {
+        const double mass = mass_of(b, j);
+        felt[j] = larger(mass > 0 ? felt[j] / mass : 0, fabs(b->vdot[j]));
+    }
+}
+
+/* |v| / size and sqrt(pull / size) of one coordinate, the larger; an angle's speed by 1 rad. */
+static double rate_of(const Solver *s, int j, double pull) {
+    const double size = s->state.size[j];
+    const double unit = s->system->dimension[j] == s->system->angles ? 1 : size;
+    return size > 0 ? larger(fabs(s->state.v[j]) / unit, sqrt(fabs(pull) / size)) : 0;
+}
+
+/* The largest magnitude of x (n) among the coordinates of the dimension of j. */
+static double largest_alike(const System *s, int j, const double *x) {
+    double largest = 0;
+    for (int i = 0; i < s->n; i++)
+        if (s->dimension[i] == s->dimension[j]) largest = larger(largest, fabs(x[i]));
+    return largest;
+}
+
+void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *shared) {
+    const System *s = b->system;
+    double momentum = 0;
+    for (int e = 0; e < s->masses; e++)
+        if (s->mass_row[e] == s->mass_column[e] && b->M[e] > 0)
+            momentum = larger(momentum, sqrt(b->M[e]) * speed[s->mass_row[e]]);
+    for (int j = 0; j < s->n; j++) shared[j] = 0;
+    for (int e = 0; e < s->masses; e++) /* the heaviest of each coordinate's dimension */
+        if (s->mass_row[e] == s->mass_column[e])
+            for (int j = 0; j < s->n; j++)
+                if (s->dimension[j] == s->dimension[s->mass_row[e]])
+                    shared[j] = larger(shared[j], b->M[e]);
+    for (int j = 0; j < s->n; j++) {
+        const double own = shared[j] > 0 ? momentum / sqrt(shared[j]) : 0;
+        shared[j] = larger(own, largest_alike(s, j, speed));
+    }
+}
+
+/* own (n): the rate by which a coordinate takes its size from the motion; 0 for those that have one.
+ * The largest rate that the motion itself gives is returned. */
+static double find_own(Solver *s, double span, const double *felt, double *own) {
+    const System *system = s->system;
+    double *least = s->work_initial, steady = 0, natural = 0;
+    magnitudes_extents(system, s->p, least);
+    for (int j = 0; j < system->n; j++)
+        if (least[j] > 0 || system->dimension[j] == system->angles)
+            steady = larger(steady, rate_of(s, j, felt[j]));
+    for (int j = 0; j < system->n; j++) {
+        own[j] = 0;
+        if (s->state.size[j] > 0) continue;
+        const double speed = largest_alike(system, j, s->state.v);
+        own[j] = larger(steady, speed > 0 ? largest_alike(system, j, felt) / speed : 0);
+        natural = larger(natural, own[j]);
+        if (!(own[j] > 0) && span > 0) own[j] = 1 / (PART * span);
+    }
+    return natural;
+}
+
+/* back (n): accelerations with which the state comes back if each coordinate in turn is displaced by
+ * its size, linearly; shaken (n): the speeds by which rounding of the coordinates shakes it.  Both 0 at
+ * the edge of what the equations describe.  `stepped` is at the state before and after. */
+static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
+    const int n = s->system->n;
+    State *state = &s->state;
+    Mechanism *b = &s->stepped;
+    double *vdot = s->work_initial, omega = 0;
+    int evaluated = 1;
+    memcpy(vdot, b->vdot, (size_t)n * sizeof *vdot);
+    for (int i = 0; i < n; i++) back[i] = shaken[i] = 0;
+    for (int j = 0; j < n && evaluated; j++) {
+        const double q = state->q[j], size = state->size[j];
+        if (!(size > 0)) continue;
+        state->q[j] += SHIFT * size;
+        evaluated = mechanism_motion(b, at, state->q, state->v, s->active) == OK;
+        state->q[j] = q;
+        for (int i = 0; i < n; i++) {
+            const double change = fabs(b->vdot[i] - vdot[i]) / SHIFT;
+            back[i] += change;
+            shaken[i] += DBL_EPSILON * change * (fabs(q) / size);
+        }
+    }
+    for (int i = 0; i < n; i++)
+        if (state->size[i] > 0) omega = larger(omega, sqrt(back[i] / state->size[i]));
+    for (int i = 0; i < n; i++) {
+        if (!evaluated) back[i] = shaken[i] = 0;
+        if (omega > 0) shaken[i] /= omega;
+    }
+    return mechanism_motion(b, at, state->q, state->v, s->active);
+}
+
+/* 1 if nothing moves and the accelerations are what rounding leaves of forces that cancel. */
+static int is_resting(const Solver *s, const double *back) {
+    for (int j = 0; j < s->system->n; j++)
+        if (s->state.v[j] != 0 || !(fabs(s->stepped.vdot[j]) <= LOST * back[j])) return 0;
+    return 1;
+}
+
+static double find_rate(const Solver *s, double span, const double *felt, const double *back,
+                        double natural) {
+    const double *pull = is_resting(s, back) ? back : s->stepped.vdot;
+    double rate = natural, forced = 0;
+    for (int j = 0; j < s->system->n; j++) {
+        rate = larger(rate, rate_of(s, j, pull[j]));
+        forced = larger(forced, rate_of(s, j, felt[j]));
+    }
+    if (!(rate > 0)) rate = forced;
+    return rate > 0 ? rate : span > 0 ? 1 / span : 0;
+}
+
+/* Sizes of the coordinates that take them from the motion, and the gaps in which contacts touch. */
+static void take_sizes(Solver *s, const double *felt, const double *own) {
+    const System *system = s->system;
+    const Mechanism *b = &s->stepped;
+    double *reach = s->work_initial;
+    int taken = 0;
+    for (int j = 0; j < system->n; j++) {
+        if (!(own[j] > 0)) continue;
+        const double speed = largest_alike(system, j, s->state.v);
+        double acceleration = largest_alike(system, j, b->vdot);
+        const double pull = largest_alike(system, j, felt);
+        if (acceleration <= LOST * pull) acceleration = pull; /* at rest: the rest is rounding */
+        s->state.size[j] = larger(speed / own[j], acceleration / own[j] / own[j]);
+        taken = 1;
+    }
+    if (!taken) return;
+    for (int j = 0; j < system->n; j++) reach[j] = larger(fabs(s->state.q[j]), s->state.size[j]);
+    for (int c = 0; c < system->contacts; c++)
+        s->state.gap[c] =
+            larger(s->state.gap[c], TOUCH * mechanism_row_size(b, system->contact[c], reach));
+}
+
+/* No smaller than what rounding in values of the coordinate's size allows at this tolerance. */
+static Status find_scales(Solver *s, const double *own, const double *shaken) {
+    const int n = s->system->n;
+    State *state = &s->state;
+    const double floor = larger(1e-8, 10 * DBL_EPSILON / s->settings.tolerance);
+    const double roundings = fmin(larger(ROUNDINGS * s->settings.tolerance, 0.01), 10);
+    for (int j = 0; j < n; j++) {
+        const double least = floor * state->size[j];
+        const double rate = own[j] > 0 ? own[j] : state->now.rate;
+        state->scale[j] = positive(larger(state->scale[j], least));
+        const double speed = larger(least * rate, roundings / s->settings.tolerance * shaken[j]);
+        state->scale[n + j] = positive(larger(state->scale[n + j], speed));
+        if (!(state->scale[j] <= DBL_MAX && state->scale[n + j] <= DBL_MAX))
+            return fail(&s->why, "the start is refused: the scale of %s is not finite",
+                        s->system->coordinates[j]);
+    }
+    return OK;
+}
+
+Status magnitudes_complete(Solver *s, Instant at, double span) {
+    const int n = s->system->n;
+    double *felt = s->work_initial + n, *own = felt + n, *back = own + n, *shaken = back + n;
+    find_felt(&s->stepped, felt);
+    const double natural = find_own(s, span, felt, own);
+    if (find_held(s, at, back, shaken) != OK) return FAILED;
+    if (!(s->state.now.rate > 0)) s->state.now.rate = find_rate(s, span, felt, back, natural);
+    take_sizes(s, felt, own);
+    return find_scales(s, own, shaken);
+}
