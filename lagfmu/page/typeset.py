@@ -160,9 +160,8 @@ class Notation:
             written.setdefault(symbol, (name_latex(name, dots), name_text(name, dots)))
         self.multipliers = []
         for c in eom.constraints:
-            symbol = sp.Dummy(f"lambda.{c.name}", real=True)
+            symbol = multiplier(c.name)
             written[symbol] = f"\\lambda_{{{_letter(c.name)}}}", f"λ_{c.name}"
-            written[multiplier(c.name)] = written[symbol]
             self.multipliers.append(symbol)
         for q, force in zip(eom.q, eom.Q, strict=True):
             written[force] = f"Q_{{{name_latex(str(q))}}}", f"Q_{name_text(str(q))}"
