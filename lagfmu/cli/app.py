@@ -15,12 +15,13 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from ..api import package
 from ..errors import LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
-from ..fmu.write import write
 from ..interface.variables import VariableTable
+from ..live.command import write_page
 from ..model.file import ModelFile, load
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
@@ -173,20 +174,21 @@ def build(
             if s.accuracy is not None:
                 chosen = chosen_for(file, s, parse(s.accuracy), kind, console)
                 s, choice = chosen.scene, section(chosen)
-            with console.status(f"building {s.name}{_first_time(target, places)}"):
+            with console.status(
+                f"building {'and verifying ' if check else ''}{s.name}{_first_time(target, places)}"
+            ):
                 prepared = prepare(file.model, s)
                 if name is None and any(v is not None for v in narrowing):
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
-                path = write(prepared, out / kind, file.closed_forms, (), kind, places, choice)
+                built = package(
+                    prepared, out / kind, file.closed_forms, kind, places, choice, check
+                )
+            path, found = built.path, built.verification
             console.print(
                 f"[green]built[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
                 soft_wrap=True,
             )
-            if check:
-                with console.status(f"verifying {s.name}"):
-                    found = verify(path)
-                    rows = found.rows()
-                    write(prepared, out / kind, file.closed_forms, rows, kind, places, choice)
+            if found is not None:
                 _print(found)
                 failed |= not found.passed
     if failed:
@@ -301,6 +303,31 @@ def simulate_command(
                 f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
                 soft_wrap=True,
             )
+
+
+@app.command()
+def page(
+    target: Annotated[
+        Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or a native FMU.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
+    ] = None,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+) -> None:
+    """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
+    with _plainly():
+        chosen = None
+        if target.suffix == ".py":
+            chosen = _chosen(load(target), None if scene is None else [scene])[0]
+        elif scene is not None:
+            raise LagfmuError(f"--scene {scene}: an FMU is one scene; leave it out")
+        with console.status("compiling to WebAssembly"):
+            path = write_page(target, out, chosen)
+        console.print(
+            f"[green]wrote[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
+            soft_wrap=True,
+        )
 
 
 @app.command()
