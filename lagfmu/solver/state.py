@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, field, fields
 
 from .stiffness import Choice
 
-METHODS = ("auto", "dop853", "dopri5", "rk4", "radau5")
 DEFAULT_TOLERANCE = 1e-8
 SMALLEST_TOLERANCE = 1e-14
 MAXIMUM_STEPS = 5000.0  # that make no headway, in one communication step

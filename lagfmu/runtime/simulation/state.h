@@ -8,8 +8,8 @@
 #include "stiffness.h"
 #include "system.h"
 
-/* In the order of METHOD_NAMES. */
-typedef enum { AUTO, DOP853, DOPRI5, RK4, RATTLE, RADAU5 } MethodName;
+/* The numbers that an importer sees; they never change (lagfmu/methods.py).  METHOD_NAMES[0] is NULL. */
+typedef enum { AUTO = 1, DOP853 = 2, RK4 = 3, RADAU5 = 4, RATTLE = 5 } MethodName;
 enum { METHOD_COUNT = 6 };
 extern const char *const METHOD_NAMES[METHOD_COUNT];
 
