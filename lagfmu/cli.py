@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import enum
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from .build import write
 from .compiler import HOST, NAMES
-from .errors import LagfmuError, SimulationError
+from .errors import LagfmuError, SimulationError, VerificationError
+from .fmu.archive import version
 from .fmu.native import takes_long
 from .modelfile import ModelFile, load
 from .options import (
@@ -40,9 +41,11 @@ from .simulate import read_description, simulate
 from .stress.command import LIMIT
 from .stress.command import stress as stress_fmus
 from .stress.probe import WRONG
+from .terminal import new_table, prepare_streams, print_whole
 from .tradeoff.command import chosen_for, compare
 from .tradeoff.goal import parse
 from .tradeoff.page import section
+from .variables import VariableTable
 from .verify import Verification, verify
 
 app = typer.Typer(
@@ -52,6 +55,23 @@ app = typer.Typer(
 )
 console = Console()
 errors = Console(stderr=True)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"lagfmu {version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def prepared_streams(
+    _: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Lagrange's equations with multipliers, from SymPy to FMUs that report forces of constraint."""
+    prepare_streams()
 
 
 class Target(enum.StrEnum):
@@ -138,6 +158,7 @@ def build(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
+    narrowing = (outputs, fixed, inputs, contacts, methods, method)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -154,6 +175,8 @@ def build(
                 s, choice = chosen.scene, section(chosen)
             with console.status(f"building {s.name}{_first_time(target, places)}"):
                 prepared = prepare(file.model, s)
+                if name is None and any(v is not None for v in narrowing):
+                    _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
                 path = write(prepared, out / kind, file.closed_forms, (), kind, places, choice)
             console.print(
                 f"[green]built[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
@@ -168,6 +191,21 @@ def build(
                 failed |= not found.passed
     if failed:
         raise typer.Exit(1)
+
+
+def _keep_the_full_one(path: Path, table: VariableTable) -> None:
+    """Refuse to replace an FMU by one of the same name that shows less."""
+    if not path.is_file():
+        return
+    with contextlib.suppress(VerificationError):  # what is no FMU may be replaced
+        shown = {v.name for v in read_description(path).modelVariables}
+        lost = sorted(shown - {v.name for v in table.variables})
+        if lost:
+            more = f", and {len(lost) - 3} more" if len(lost) > 3 else ""
+            raise LagfmuError(
+                f"{path} is there and shows more than this scene ({', '.join(lost[:3])}{more}): give "
+                "this one a name of its own with --name, or another folder with --out"
+            )
 
 
 def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
@@ -231,7 +269,8 @@ def simulate_command(
         Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
     ] = None,
     variable: Annotated[
-        list[str] | None, typer.Option("--variable", "-v", help="What to plot; repeatable.")
+        list[str] | None,
+        typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
 ) -> None:
@@ -242,14 +281,18 @@ def simulate_command(
             file = load(target)
             source = prepare(file.model, _chosen(file, None if scene is None else [scene])[0])
             name = source.scene.name
-            units = {v.name: v.unit.name for v in source.table.variables if v.unit is not None}
+            variables = source.table.variables
+            units = {v.name: v.unit.name for v in variables if v.unit is not None}
         else:
             description = read_description(target)
-            name = description.modelName
-            units = {v.name: v.unit for v in description.modelVariables if v.unit}
+            name, variables = description.modelName, description.modelVariables
+            units = {v.name: v.unit for v in variables if v.unit}
+        known = {v.name: v.causality for v in variables if v.causality != "parameter"}
+        besides = _besides(variable or (), known)
+        given = _assignments(set_)
         with console.status(f"simulating {name}"):
-            result = simulate(source, stop_time, step_size, tolerance, _assignments(set_))
-        _print_last(name, result, units)
+            result = simulate(source, stop_time, step_size, tolerance, given, besides=besides)
+        _print_last(name, result, units, variable or ())
         if csv is not None:
             _save(csv, result)
             console.print(f"[green]wrote[/] {escape(str(csv))}", soft_wrap=True)
@@ -342,15 +385,12 @@ def _assignments(texts: list[str] | None) -> dict[str, Any]:
 
 
 def _print(found: Verification) -> None:
-    table = Table(title=f"{found.name}: {'pass' if found.passed else 'FAIL'}", title_justify="left")
-    table.add_column("statement")
-    table.add_column("largest error", justify="right")
-    table.add_column("allowed", justify="right")
-    table.add_column("verdict")
+    title = f"{found.name}: {'pass' if found.passed else 'FAIL'}"
+    table = new_table(title, "statement", "largest error", "allowed", "verdict", text=["statement"])
     for row, check in zip(found.rows(), found.checks, strict=True):
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
         table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
-    console.print(table)
+    print_whole(console, table)
     if not found.claims:
         console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
     for check in found.checks:
@@ -362,16 +402,32 @@ def _print(found: Verification) -> None:
             )
 
 
-def _print_last(name: str, result: Any, units: dict[str, str]) -> None:
-    table = Table(title=f"{name} at t = {result['time'][-1]:g} s", title_justify="left")
-    table.add_column("variable")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    for n in result.dtype.names[1:]:
+def _besides(names: Sequence[str], known: Mapping[str, str]) -> list[str]:
+    """Those of the names that are no outputs: inputs, and local variables.
+
+    Raises SimulationError with all that is unknown.
+    """
+    unknown = [n for n in names if n not in known and n != "time"]
+    if unknown:
+        near = {n: difflib.get_close_matches(n, known, 1) for n in unknown}
+        hints = [f"{n!r} (did you mean {m[0]!r}?)" if (m := near[n]) else repr(n) for n in unknown]
+        raise SimulationError(
+            f"--variable: there is no {', '.join(hints)}, expected some of {', '.join(known)}"
+        )
+    return [n for n in names if n in known and known[n] != "output"]
+
+
+def _print_last(
+    name: str, result: Any, units: Mapping[str, str], names: Sequence[str] = ()
+) -> None:
+    """The last values of the named variables, of all outputs without names."""
+    table = new_table(f"{name} at t = {result['time'][-1]:g} s", "variable", "value", "unit")
+    table.columns[0].justify = table.columns[2].justify = "left"
+    for n in names or result.dtype.names[1:]:
         value = result[n][-1]
         text = f"{value:.9g}" if result[n].dtype.kind == "f" else str(value)
         table.add_row(escape(n), text, escape(units.get(n, "")))
-    console.print(table)
+    print_whole(console, table)
 
 
 def _save(path: Path, result: Any) -> None:

@@ -151,12 +151,12 @@ def compile_libraries(
     """
     compiler = find_compiler()
     if compiler is None:
-        raise BuildError("no C compiler was found: pip install lagfmu[native], or install cc")
+        raise BuildError("no C compiler was found: pip install ziglang, or install cc")
     foreign = [p.folder for p in platforms if p != host()] if not compiler.cross else []
     if foreign:
         raise BuildError(
             f"{compiler.command[0]} compiles for this machine only, not for {', '.join(foreign)}: "
-            "pip install lagfmu[native]"
+            "pip install ziglang"
         )
     targets = dict.fromkeys(t for p in platforms for t in (p.targets if compiler.cross else ("",)))
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:

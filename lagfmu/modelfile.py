@@ -33,6 +33,11 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
     Raises ModelError if the file is missing, raises, or does not define exactly one Model.
     """
     file = Path(path)
+    if file.is_dir():
+        inside = ", ".join(str(p) for p in sorted(file.glob("*.py"))) or "none"
+        raise ModelError(
+            str(file), [f"this is a folder, expected a Python file; those in it: {inside}"]
+        )
     if not file.is_file():
         raise ModelError(str(file), ["there is no such file"])
     spec = importlib.util.spec_from_file_location(f"_lagfmu_model_{file.stem}", file)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from .errors import BuildError
 from .simulate import Trajectory
 
 COLOURS = ("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72", "#6940a5", "#64473a")
+DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # once the colours are used up
+PER_COLUMN = 8  # curves in one column of a legend, which stands beside its panel
 
 
 def default_names(names: Sequence[str]) -> list[str]:
@@ -31,11 +34,6 @@ def plot(
 
     Raises BuildError if a name is unknown or the file cannot be written.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     known = list(result.dtype.names or ())
     chosen = list(names) or default_names(known)
     unknown = [n for n in chosen if n not in known]
@@ -43,9 +41,33 @@ def plot(
         raise BuildError(
             f"cannot plot {', '.join(unknown) or 'nothing'}: expected names among {', '.join(known)}"
         )
-    panels: dict[tuple[bool, str], list[str]] = {}
+    path = Path(out)
+    with panels(result, units, chosen) as (figure, _):
+        if title:
+            figure.suptitle(title, fontsize=12)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            metadata = {"Date": None} if path.suffix == ".svg" else {}
+            figure.savefig(path, metadata=metadata, dpi=150)
+        except (OSError, ValueError) as error:
+            raise BuildError(f"cannot write the figure {str(path)!r}: {error}") from None
+    return path
+
+
+@contextlib.contextmanager
+def panels(
+    result: Trajectory, units: Mapping[str, str], chosen: Sequence[str]
+) -> Iterator[tuple[Any, list[Any]]]:
+    """The figure and its panels, one a unit, multipliers first; it is gone afterwards."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    known = list(result.dtype.names or ())
+    members_of: dict[tuple[bool, str], list[str]] = {}
     for n in chosen:
-        panels.setdefault((not n.startswith("lambda."), units.get(n, "")), []).append(n)
+        members_of.setdefault((not n.startswith("lambda."), units.get(n, "")), []).append(n)
     style: dict[str, Any] = {
         "svg.hashsalt": "lagfmu",
         "font.size": 11,
@@ -56,33 +78,40 @@ def plot(
     }
     with plt.rc_context(style):
         figure, axes = plt.subplots(
-            len(panels),
+            len(members_of),
             1,
             sharex=True,
             squeeze=False,
-            figsize=(7.5, 1.2 + 2.1 * len(panels)),
+            figsize=(7.5, 1.2 + 2.1 * len(members_of)),
             layout="constrained",
         )
-        for axis, ((_, unit), members) in zip(axes[:, 0], panels.items(), strict=True):
-            for n, colour in zip(members, COLOURS * len(members), strict=False):
-                axis.plot(result["time"], result[n], color=colour, label=n, linewidth=1.8)
+        for axis, ((_, unit), members) in zip(axes[:, 0], members_of.items(), strict=True):
+            for k, n in enumerate(members):
+                turn, colour = divmod(k, len(COLOURS))
+                axis.plot(
+                    result["time"],
+                    result[n],
+                    color=COLOURS[colour],
+                    linestyle=DASHES[turn % len(DASHES)],
+                    label=n,
+                    linewidth=1.8,
+                )
             axis.set_ylabel(unit if unit != "1" else "")
             axis.margins(x=0)
             _mark_departures(axis, result, known, named=axis is axes[0, 0])
-            axis.legend(frameon=False, loc="best", fontsize=10)
+            axis.legend(
+                frameon=False,
+                loc="upper left",
+                bbox_to_anchor=(1.01, 1.0),
+                fontsize=10,
+                borderaxespad=0.0,
+                ncols=1 + (len(members) - 1) // PER_COLUMN,
+            )
         axes[-1, 0].set_xlabel("time in s")
-        if title:
-            figure.suptitle(title, fontsize=12)
-        path = Path(out)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, metadata=metadata, dpi=150)
-        except (OSError, ValueError) as error:
-            raise BuildError(f"cannot write the figure {str(path)!r}: {error}") from None
+            yield figure, list(axes[:, 0])
         finally:
             plt.close(figure)
-    return path
 
 
 def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:

@@ -46,7 +46,7 @@ def simulate(
     fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
     values; `inputs` is a structured array with 'time' and one field an input, interpolated linearly.
     What is left out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables
-    to be recorded too.
+    and inputs to be recorded too.
 
     Raises ModelError for a model that cannot start, SimulationError if a step fails, and
     VerificationError for a file that is no FMU.
@@ -138,7 +138,8 @@ def _simulate_model(
                 u = system.inputs_at(u, moved.t - state.t)
                 state = moved
             seen = observe(system, state, u, p)
-            result[k] = (t, *(seen[o.name] for o in read))
+            driven = dict(zip((d.name for d in drives), u, strict=True))
+            result[k] = (t, *(driven[o.name] if o in drives else seen[o.name] for o in read))
     except StepFailureError as error:
         raise SimulationError(str(error)) from error
     return result

@@ -50,6 +50,10 @@ class Check:
             return "not reached"
         return "pass" if self.passed else "FAIL"
 
+    def __str__(self) -> str:
+        figures = f" {self.error:.1e}, allowed {self.allowed:.0e}" if self.allowed else ""
+        return f"{self.name}: {self.verdict}{figures} {self.detail}".rstrip()
+
 
 @dataclass(frozen=True)
 class Verification:
@@ -71,6 +75,12 @@ class Verification:
     def reached(self) -> bool:
         """True if every closed form was evaluated somewhere."""
         return all(c.points for c in self.checks)
+
+    @property
+    def worst(self) -> Check | None:
+        """The closed form whose error is the largest part of what it is allowed; None without any."""
+        measured = [c for c in self.checks if c.points and c.allowed]
+        return max(measured, key=lambda c: c.error / c.allowed, default=None)
 
     def rows(self) -> list[tuple[str, str, str, str]]:
         """(statement, largest error, allowed, verdict) as text; no figures where it is yes or no."""

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import csv
+import importlib.metadata
+import importlib.resources
+import os
 import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from lagfmu.cli import app
+from lagfmu.plot import panels
 
 REPOSITORY = Path(__file__).parent.parent
 MODELS = REPOSITORY / "models"
@@ -221,6 +226,89 @@ def test_help_names_every_command():
             assert command in text
 
 
+def test_the_version_is_that_of_the_package():
+    """lagfmu --version names the version that FMUs state as their tool's."""
+    assert lagfmu("--version") == f"lagfmu {importlib.metadata.version('lagfmu')}"
+
+
+def test_types_are_told_to_users_type_checkers():
+    """PEP 561: the package has the marker py.typed."""
+    assert importlib.resources.files("lagfmu").joinpath("py.typed").is_file()
+
+
+def test_a_folder_is_no_model_file(tmp_path):
+    """`lagfmu build .` names the Python files that stand in the folder."""
+    (tmp_path / "bead.py").write_text("")
+    text = lagfmu("build", tmp_path, code=1)
+    assert "this is a folder, expected a Python file" in text
+    assert "bead.py" in text
+
+
+def test_what_an_encoding_lacks_is_spelled_out():
+    """In cp1252, as piped on Windows, the equations are there: lambda for λ, theta' for its rate."""
+    command = [sys.executable, "-m", "lagfmu", "show", str(MODELS / "hemisphere.py")]
+    environment = {**os.environ, "PYTHONIOENCODING": "cp1252"}
+    run = subprocess.run(command, capture_output=True, timeout=60, check=True, env=environment)
+    text = run.stdout.decode("cp1252")
+    assert "m r'' + m g cos(theta) - m r theta'² = lambda_surface" in text
+    assert "r - a >= 0" in text
+    assert "?" not in text
+    assert not run.stderr
+
+
+def test_a_narrowed_scene_never_replaces_the_full_fmu(small, tmp_path):
+    """--outputs without --name is refused where the full FMU stands, and leaves it; built twice is fine."""
+    out = tmp_path / "dist"
+    narrow = ("build", small, "-o", out, "--no-check", "--scene", "Link", "--outputs", "x")
+    lagfmu("build", small, "-o", out, "--no-check", "--scene", "Link")
+    full = (out / "python" / "Link.fmu").read_bytes()
+    text = lagfmu(*narrow, code=1)
+    assert "Link.fmu is there and shows more than this scene" in text
+    assert "--name" in text
+    assert (out / "python" / "Link.fmu").read_bytes() == full
+    for _ in range(2):
+        lagfmu(*narrow, "--name", "Short")
+    assert lagfmu("build", small, "-o", tmp_path / "x", *narrow[4:])
+
+
+def test_simulate_prints_what_is_asked_for_inputs_too():
+    """-v F -v s: these two and no other; an unknown name is refused with the nearest one."""
+    cart = MODELS / "cart_pendulum.py"
+    short = ("--stop-time", "0.01", "--set", "F=2.5")
+    text = lagfmu("simulate", cart, *short, "-v", "F", "-v", "s")
+    assert "F 2.5 N" in text
+    assert "lambda.rod" not in text
+    text = lagfmu("simulate", cart, *short, "-v", "lambda.rode", code=1)
+    assert "did you mean 'lambda.rod'?" in text
+
+
+def test_no_number_is_cut_at_80_columns(small, tmp_path):
+    """A statement of 70 letters folds; its error, what is allowed and the verdict stand whole."""
+    file = tmp_path / "long.py"
+    name = "the multiplier of the link that carries the weight of both bodies " * 2
+    text = SMALL.replace('ClosedForm("lambda.link", WRONG * m * g)', "WRONG").replace(
+        "WRONG", f'ClosedForm("{name.strip()}", -m * g, actual=output("lambda.link"))'
+    )
+    file.write_text(text.replace("import ClosedForm", "import output, ClosedForm"))
+    arguments = ["build", str(file), "-o", str(tmp_path), "--scene", "Link"]
+    printed = CliRunner().invoke(app, arguments, env={"COLUMNS": "80"}).output
+    assert "…" not in printed
+    assert all(len(line) <= 80 for line in printed.splitlines() if "built" not in line)
+    assert re.search(r"\d\.\de[-+]\d\d +1e-07 +pass", printed)
+
+
+def test_curves_are_told_apart_and_the_legend_covers_none():
+    """Twelve curves in one panel: no two share colour and dashes; the legend stands beside the panel."""
+    result = np.zeros(3, dtype=[("time", float), *((f"x{k}", float) for k in range(12))])
+    result["time"] = (0, 1, 2)
+    with panels(result, {}, list(result.dtype.names[1:])) as (_, axes):
+        looks = {(line.get_color(), str(line.get_linestyle())) for line in axes[0].get_lines()}
+        assert len(looks) == 12
+        axes[0].figure.canvas.draw()
+        legend = axes[0].get_legend().get_window_extent()
+        assert legend.x0 >= axes[0].get_window_extent().x1
+
+
 def test_python_m_lagfmu_is_the_same_command():
     """python -m lagfmu --help, in a process of its own."""
     command = [sys.executable, "-m", "lagfmu", "--help"]
@@ -229,15 +317,29 @@ def test_python_m_lagfmu_is_the_same_command():
     assert "simulate" in run.stdout
 
 
-def test_build_fmus_builds_all_and_prints_one_table(tmp_path):
+def test_build_fmus_prints_a_line_an_fmu(tmp_path):
     """python build_fmus.py pendulum atwood --out DIR, from another folder: four FMUs of each target, each
-    with its verdict."""
+    with its verdict, its worst error and whose that is, within 80 columns; every statement in a file."""
     command = [sys.executable, str(REPOSITORY / "build_fmus.py"), "pendulum", "atwood"]
-    command += ["--out", str(tmp_path / "out")]
+    command += ["--out", "out"]
     run = subprocess.run(
-        command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path
+        command,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "COLUMNS": "80"},
     )
     assert run.returncode == 0, run.stdout + run.stderr
+    assert max(map(len, run.stdout.splitlines())) <= 80
+    assert "…" not in run.stdout
+    line = r"pass +PendulumAngle +native +[\d.e+]+ +\d\.\de-\d\d +\S"
+    assert re.search(line, run.stdout), run.stdout
+    with (tmp_path / "out" / "verification.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {"energy", "lambda.rod"} <= {r["statement"] for r in rows}
+    assert {r["verdict"] for r in rows} == {"pass"}
     for target in ("python", "native"):
         made = {p.stem for p in (tmp_path / "out" / target).glob("*.fmu")}
         assert made == {"Atwood", "PendulumAngle", "PendulumCartesian", "PendulumNullspace"}

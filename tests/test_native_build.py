@@ -41,7 +41,7 @@ def cross() -> compiler.Compiler:
     """The compiler for all platforms; the test is skipped where there is only the host's."""
     found = find_compiler()
     if found is None or not found.cross:
-        pytest.skip("ziglang is not installed: pip install lagfmu[native]")
+        pytest.skip("ziglang is not installed: pip install ziglang")
     return found
 
 

@@ -1,0 +1,80 @@
+"""What the commands print on: a console that never crops, on any width and in any encoding."""
+
+from __future__ import annotations
+
+import codecs
+import sys
+import unicodedata
+from collections.abc import Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+PLAIN = {"≤": "<=", "≥": ">=", "−": "-", "–": "-", "→": "->", "●": "*", "µ": "u", "√": "sqrt"}
+ACCENTS = {"\u0307": "'", "\u0308": "''"}  # combining dots: derivatives
+
+
+def spelled(text: str) -> str:
+    """A text in ASCII as far as there are words for it: lambda for λ, theta' for θ̇, <= for ≤."""
+    return "".join(_spelled(c) for c in text)
+
+
+def _spelled(letter: str) -> str:
+    known = PLAIN.get(letter) or ACCENTS.get(letter)
+    if known:
+        return known
+    parts = unicodedata.normalize("NFKD", letter)
+    if len(parts) > 1:
+        return spelled(parts)
+    name = unicodedata.name(letter, "")
+    if name.startswith("GREEK "):
+        word = name.split(" WITH ")[0].split()[-1].lower().replace("lamda", "lambda")
+        return word.capitalize() if "CAPITAL" in name else word
+    return letter if letter.isascii() else "?"
+
+
+def _replace(error: UnicodeError) -> tuple[str, int]:
+    """Error handler of a codec; see `spelled`."""
+    assert isinstance(error, UnicodeEncodeError)
+    return spelled(error.object[error.start : error.end]), error.end
+
+
+codecs.register_error("lagfmu.spelled", _replace)
+
+
+def prepare_streams() -> None:
+    """Let stdout and stderr spell out what their encoding (cp1252, ASCII) does not have."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="lagfmu.spelled")
+
+
+def new_table(title: str, *columns: str, text: Sequence[str] = ()) -> Table:
+    """An empty table: columns of numbers to the right, in one piece; those named in `text` may fold."""
+    drawn = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for heading in columns:
+        drawn.add_column(
+            heading,
+            justify="left" if heading in text else "right",
+            no_wrap=heading not in text,
+            overflow="fold",
+        )
+    return drawn
+
+
+def print_whole(console: Console, drawn: Table) -> None:
+    """Print a table without cutting anything: row by row in words where the console is too narrow."""
+    if console.measure(drawn).minimum <= console.width:
+        console.print(drawn)
+        return
+    console.print(drawn.title, style="bold", highlight=False, soft_wrap=True)
+    headings = [str(c.header) for c in drawn.columns]
+    for cells in zip(*(c.cells for c in drawn.columns), strict=True):
+        parts = [
+            f"{heading} {cell}".strip()
+            for heading, cell in zip(headings, cells, strict=True)
+            if cell
+        ]
+        console.print("  " + ", ".join(parts), highlight=False)
