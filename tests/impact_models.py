@@ -69,11 +69,12 @@ def table(order: Sequence[int] = (0, 1, 2, 3), value: float = 0.5) -> Model:
     )
 
 
-def wedge(order: Sequence[int] = (0, 1), value: float = 0.0, angle: Any = Rational(1)) -> Model:
+def wedge(order: Sequence[int] = (0, 1), value: float = 0.0, angle: float = 1.0) -> Model:
     """A particle above a V whose walls stand at `angle` [rad] from the vertical, one each side."""
+    c, s = cos(Rational(angle)), sin(Rational(angle))
     walls = [
-        Contact("left", x * cos(angle) + z * sin(angle), restitution=e),
-        Contact("right", -x * cos(angle) + z * sin(angle), restitution=e),
+        Contact("left", x * c + z * s, restitution=e),
+        Contact("right", -x * c + z * s, restitution=e),
     ]
     return Model(
         name="Wedge",

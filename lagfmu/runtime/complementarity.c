@@ -1,11 +1,11 @@
-/* complementarity.c -- 0 <= z  _|_  w = A z + b >= 0  for a symmetric positive semidefinite A: a linear
- * complementarity problem.
+/* complementarity.c -- 0 <= z  _|_  w = A z + b >= 0  for a symmetric positive semidefinite A: linear
+ * complementarity.
  *
- * These are the conditions of the quadratic program  min z^T A z / 2 + b^T z, z >= 0  (Cottle, Pang & Stone,
- * The Linear Complementarity Problem, 1992, sect. 1.2), solved by the dual active set method (Goldfarb &
- * Idnani, Math. Programming 27 (1983) 1): the most violated w joins the set that is held at zero, and those
- * whose z would turn negative leave it.  The set stays independent, so dependent rows do no harm; w is unique,
- * whatever the order of the rows. */
+ * These are the conditions of the quadratic program  min z^T A z / 2 + b^T z, z >= 0  (Cottle, Pang &
+ * Stone, The Linear Complementarity Problem, 1992, sect. 1.2), solved by the dual active set method
+ * (Goldfarb & Idnani, Math. Programming 27 (1983) 1): the most violated w joins the set that is held at
+ * zero, and those whose z would turn negative leave it.  The set stays independent, so dependent rows do
+ * no harm; w is unique, whatever the order of the rows. */
 #include "complementarity.h"
 
 #include <math.h>

@@ -2,11 +2,12 @@
 
     M (v+ - v-) = G^T Lambda ,   s = G v - nu
     0 <= Lambda_k  _|_  s_k+ + e_k s_k- >= 0    contacts that touch with s_k- <= 0
-    s_k+ = 0                                    rows that always act, and those that act with such a contact
+    s_k+ = 0                                    rows that always act, or act with such a contact
 
 Newton's law of restitution with complementarity (Moreau 1988; Pfeiffer & Glocker, Multibody Dynamics with
 Unilateral Contacts, 1996, ch. 8; Glocker, Set-Valued Force Laws, 2001).  With 0 <= e <= 1 and s- <= 0 the
-energy in the contacts' own frame does not rise, Lambda^T (s+ + s-) / 2 = sum (1 - e_k) Lambda_k s_k- / 2 <= 0.
+energy in the contacts' own frame does not rise,
+Lambda^T (s+ + s-) / 2 = sum (1 - e_k) Lambda_k s_k- / 2 <= 0.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .complementarity import complementary
-from .failure import StepFailureError
+from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
 from .system import Matrix, System, Vector
@@ -70,6 +71,9 @@ def _newton(now: Struck) -> Impulse:
         base = _base(system, holding)
         A, b = _reduced(now, base)
         found = complementary(A, b)
+        if found is None and now.e.any():  # rows that act with a contact leave no room to rebound
+            now = replace(now, e=np.zeros(system.m))
+            continue
         if found is None:
             names = ", ".join(repr(system.rows[system.contacts[c]].name) for c in now.contacts)
             raise StepFailureError(
@@ -100,7 +104,9 @@ def _reduced(now: Struck, base: Sequence[int]) -> tuple[Matrix, Vector]:
     still, G = np.zeros(len(base)), now.G[base]
     free = solve(now.M, np.zeros(n), G, -now.slip[base], nearest=True).x
     b = (1 + now.e[rows]) * now.slip[rows] + now.G[rows] @ free
-    A = np.array([now.G[rows] @ solve(now.M, now.G[k], G, still).x for k in rows])
+    A = np.zeros((len(rows), len(rows)))
+    for i, k in enumerate(rows):
+        A[i] = now.G[rows] @ solve(now.M, now.G[k], G, still).x
     return (A + A.T) / 2, b
 
 
@@ -173,3 +179,17 @@ def impacts(
         v = found.v
         struck |= {c for c in entering if found.Lambda[at.system.contacts[c]] > 0}
     return v, frozenset(struck)
+
+
+def check_restitution(system: System, p: Sequence[float]) -> None:
+    """Raises StartFailureError if a coefficient of restitution is not between 0 and 1."""
+    assert system.restitution is not None
+    e = system.restitution(p)
+    wrong = [
+        f"the coefficient of restitution of {system.rows[k].name!r} is {float(e[k])!r}, expected 0 (no "
+        "rebound) to 1 (no loss)"
+        for k in system.contacts
+        if not 0 <= e[k] <= 1
+    ]
+    if wrong:
+        raise StartFailureError("the start is refused: " + "; ".join(wrong))

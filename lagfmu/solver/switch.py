@@ -70,7 +70,8 @@ def _slow(at: Instant, q: Vector, v: Vector, state: State) -> Vector:
     """Speeds (m) of the rows that count as none."""
     G = np.abs(at.evaluate(q, v)[2])
     natural = np.array(state.size) * state.rate
-    return SLOW * np.maximum(G @ natural, G @ np.array(state.scale[at.system.n :]))
+    speed = np.maximum(G @ natural, G @ np.array(state.scale[at.system.n :]))
+    return np.asarray(SLOW * speed)
 
 
 def _settled(
