@@ -22,14 +22,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.text import Text
 
 from lagfmu import LagfmuError, Verification, verify
-from lagfmu.build import TARGETS, write
-from lagfmu.compiler import HOST, find_compiler
+from lagfmu.api import settled
+from lagfmu.cli.terminal import prepare_streams
+from lagfmu.fmu.compiler import HOST, find_compiler
 from lagfmu.fmu.native import takes_long
-from lagfmu.make import settled
-from lagfmu.modelfile import ModelFile, load
-from lagfmu.prepare import prepare
-from lagfmu.scene import Scene
-from lagfmu.terminal import prepare_streams
+from lagfmu.fmu.write import TARGETS, write
+from lagfmu.model.file import ModelFile, load
+from lagfmu.model.scene import Scene
+from lagfmu.prepare.prepare import prepare
 
 MODELS = Path(__file__).parent / "models"
 RUNS = 3  # the time is the median of these

@@ -23,7 +23,7 @@ from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Model, Parameter, Scene, build_fmu
-from lagfmu.modelfile import load
+from lagfmu.model.file import load
 
 METHODS = ("dop853", "radau5", "auto")
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)

@@ -9,16 +9,7 @@ friction c brakes it.  With f = (x - s)^2 + y^2 - L^2 the rod's force on the bob
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import (
-    ClosedForm,
-    Conserved,
-    Holonomic,
-    Input,
-    Model,
-    Parameter,
-    Scene,
-    output,
-)
+from lagfmu import ClosedForm, Conserved, Holonomic, Input, Model, Parameter, Scene, output
 
 t = dynamicsymbols._t
 s, x, y, F = dynamicsymbols("s x y F")

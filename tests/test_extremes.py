@@ -26,9 +26,9 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu
-from lagfmu.compiler import find_compiler
-from lagfmu.consistency import RedundantConstraintWarning
-from lagfmu.simulate import simulate
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.prepare.consistency import RedundantConstraintWarning
+from lagfmu.verification.simulate import simulate
 
 g0 = 9.81  # m/s^2
 m, g, L = symbols("m g L", positive=True)

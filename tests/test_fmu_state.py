@@ -28,7 +28,7 @@ def run(one, steps):
     return record
 
 
-@pytest.mark.parametrize("method", ["auto", "dop853", "dopri5", "rk4", "radau5"])
+@pytest.mark.parametrize("method", ["auto", "dop853", "rk4", "radau5"])
 @pytest.mark.parametrize("before", [10, 31])
 def test_a_restored_state_repeats_the_motion_bit_for_bit(fmu, method, before):
     """From one state there is one future: also across the departure at 1.64 s, from a saved state and
@@ -141,9 +141,9 @@ def test_two_models_in_one_process_are_both_right(fmu):
 BUILD = """
 import sys
 from pathlib import Path
-from lagfmu.build import write
-from lagfmu.prepare import prepare
-from lagfmu.modelfile import load
+from lagfmu.fmu.write import write
+from lagfmu.prepare.prepare import prepare
+from lagfmu.model.file import load
 file = load(sys.argv[1])
 for scene in file.scenes:
     write(prepare(file.model, scene), sys.argv[2], file.closed_forms)

@@ -14,10 +14,10 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Model, Parameter, Scene, simulate
-from lagfmu.build import write
-from lagfmu.compiler import find_compiler
 from lagfmu.errors import LagfmuError
-from lagfmu.prepare import prepare
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.prepare.prepare import prepare
 from lagfmu.solver.complementarity import complementary
 from lagfmu.solver.failure import StepFailureError
 from lagfmu.solver.impact import impact, impacts

@@ -14,7 +14,7 @@ from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Model, Parameter, Scene, build_fmu
-from lagfmu.compiler import find_compiler
+from lagfmu.fmu.compiler import find_compiler
 
 G = 9.81
 COUNT = 3

@@ -14,7 +14,7 @@ from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Model, Parameter, Scene, build_fmu
-from lagfmu.compiler import find_compiler
+from lagfmu.fmu.compiler import find_compiler
 from lagfmu.solver import advance as advancing
 from lagfmu.solver import leg
 from lagfmu.solver.initial import start
