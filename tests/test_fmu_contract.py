@@ -284,7 +284,7 @@ def test_awkward_start_values_survive(tmp_path):
         parameters=[Parameter(m, Rational(1, 3), "kg"), Parameter(k, 1e-300, "N")],
         start={x: 0.1 + 0.2, x.diff(): -2 / 3},
     )
-    path = build_fmu(model, tmp_path)
+    path = build_fmu(model, tmp_path, check=False)
     expected = {"x": 0.1 + 0.2, "der(x)": -2 / 3, "m": 1 / 3, "k": 1e-300}
     described = {v.name: v for v in read_model_description(str(path)).modelVariables}
     with instance(path) as one:
@@ -696,7 +696,7 @@ def test_constraints_that_mix_give_every_variable_its_dependencies(tmp_path):
         inputs=[Input(u, "m")],
         start={x.diff(): 9.81, y.diff(): 9.81},
     )
-    path = build_fmu(model, tmp_path, Scene("Mixed"))
+    path = build_fmu(model, tmp_path, Scene("Mixed"), check=False)
     assert validate_fmu(str(path)) == []
     with instance(path) as one:
         one.start()

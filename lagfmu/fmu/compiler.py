@@ -241,8 +241,8 @@ def _objects_folder(compiler: Compiler, target: str, runtime: Mapping[str, bytes
 
 
 def _cache() -> Path:
-    """The user's cache folder of lagfmu, below LAGFMU_CACHE if that is set."""
-    if "LAGFMU_CACHE" in os.environ:
+    """The user's cache folder of lagfmu, below LAGFMU_CACHE if that is set, and not empty."""
+    if os.environ.get("LAGFMU_CACHE"):
         return Path(os.environ["LAGFMU_CACHE"])
     if sys.platform == "win32" and "LOCALAPPDATA" in os.environ:
         return Path(os.environ["LOCALAPPDATA"], "lagfmu")

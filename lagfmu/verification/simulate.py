@@ -193,6 +193,11 @@ def read_description(path: Path) -> Any:
         ) from None
 
 
+def file_stem(description: Any) -> str:
+    """The name of the model as the name of a file in the folder that is meant, whatever it holds."""
+    return re.sub(r"[^\w-]", "_", description.modelName or "") or "FMU"
+
+
 def _simulate_fmu(
     path: Path,
     stop_time: float | None,
