@@ -137,6 +137,7 @@ def _units(prepared: Prepared) -> Table:
         names += [str(s) for s in prepared.reduction.s if s not in eom.q]
     names += [f"lambda.{c.name}" for c in eom.constraints]
     names += [f"Q.{q}" for q in eom.q if f"Q.{q}" in prepared.table]
+    names += [o.name for o in eom.outputs]
     for name in (n for n in names if n in prepared.table):
         v = prepared.table[name]
         table.add_row(Text(name), Text(shown(v.unit) or "1"), Text(v.description))

@@ -108,6 +108,7 @@ def _simulate_model(
         max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
         known.get("solver.step", scene.step),
         known["solver.maximum_step"],
+        known["solver.maximum_steps"],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
     drives = [v for v in table.variables if v.role == "input"]

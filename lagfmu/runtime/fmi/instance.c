@@ -8,6 +8,7 @@
 #include "digits.h"
 #include "leg.h"
 #include "magnitudes.h"
+#include "outputs.h"
 
 static const double SMALLEST_TOLERANCE = 1e-14;
 
@@ -82,6 +83,7 @@ static int ready(const Instance *x, const Variable *v, double *value) {
         case AT_TOLERANCE: *value = x->given.tolerance; return 1;
         case AT_STEP: *value = x->given.step; return 1;
         case AT_MAXIMUM_STEP: *value = x->given.maximum_step; return 1;
+        case AT_MAXIMUM_STEPS: *value = x->given.maximum_steps; return 1;
         case AT_INPUT: *value = s->drive.value[v->index]; return 1;
         default: break;
     }
@@ -132,6 +134,7 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
         case AT_KINETIC: *value = o->energy[0]; break;
         case AT_POTENTIAL: *value = o->energy[1]; break;
         case AT_TOTAL: *value = o->energy[0] + o->energy[1]; break;
+        case AT_OUTPUT: *value = o->own[v->index]; break;
         case AT_DEPARTURE_Q:
             *value = departed(x, v->contact, v->index, o->departure_q, state->departure_q);
             break;
@@ -181,6 +184,7 @@ void instance_set(Instance *x, const Variable *v, double value) {
         case AT_TOLERANCE: x->given.tolerance = value; break;
         case AT_STEP: x->given.step = value; break;
         case AT_MAXIMUM_STEP: x->given.maximum_step = value; break;
+        case AT_MAXIMUM_STEPS: x->given.maximum_steps = value; break;
         default: break;
     }
 }
@@ -350,18 +354,24 @@ Status instance_differentiate(Instance *x, Direction d) {
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
         return FAILED;
-    if (full == NULL) return OK;
+    if (full == NULL) {
+        outputs_change(&s->sensitivity, &s->stepped, s->system, at, &x->seen, d);
+        return OK;
+    }
     Sensitivity *w = &x->along;
     s->system->embed_tangent(at.t, s->state.q, s->state.v, at.u, at.p, d.dt, d.dq, d.dv, d.du,
                              w->dq, w->dv);
     const Direction wide = {d.dt, w->dq, w->dv, d.du};
     if (full->dynamics == NULL) {
         sensitivity_of_energies(w, full, at, x->seen.q, x->seen.v, wide);
+        outputs_change(w, NULL, full, at, &x->seen, wide);
         return OK;
     }
     if (mechanism_motion(&s->full, at, x->seen.q, x->seen.v, s->active_full) != OK)
         return FAILED;
-    return sensitivity_along(w, &s->full, at, x->seen.q, x->seen.v, wide);
+    if (sensitivity_along(w, &s->full, at, x->seen.q, x->seen.v, wide) != OK) return FAILED;
+    outputs_change(w, &s->full, full, at, &x->seen, wide);
+    return OK;
 }
 
 /* Q = G^T lambda: the change of the share that G's value e has in it. */
@@ -396,6 +406,7 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_KINETIC: *change = w->denergy[0]; break;
         case AT_POTENTIAL: *change = w->denergy[1]; break;
         case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;
+        case AT_OUTPUT: *change = w->down[v->index]; break;
         case AT_INPUT: *change = d.du[v->index]; break;
         default: break; /* discrete ones and parameters: none */
     }

@@ -83,6 +83,8 @@ void observed_layout(Observed *o, Arena *arena, const System *system) {
     o->unique = arena_ints(arena, m);
     o->force = arena_doubles(arena, n);
     o->share = arena_doubles(arena, full->entries);
+    o->own = arena_doubles(arena, full->output_count);
+    o->other = arena_doubles(arena, full->output_count);
     o->s = arena_doubles(arena, stepped);
     o->sdot = arena_doubles(arena, stepped);
     o->sddot = arena_doubles(arena, stepped);

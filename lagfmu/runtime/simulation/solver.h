@@ -62,6 +62,7 @@ typedef struct {
     int *unique;                   /* (m) */
     double *force, *share;         /* Q (n); one constraint's part of it (entries) */
     double energy[2];              /* kinetic, potential */
+    double *own, *other;           /* (output_count) the model's own; where these are not finite */
     double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
     double *departure_q, *departure_v; /* (contacts * n) in full coordinates */
 } Observed;
