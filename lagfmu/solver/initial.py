@@ -78,6 +78,8 @@ def start(
     try:
         with np.errstate(all="ignore"):
             at = Instant(system, t, system.inputs_at(u, 0.0), p)
+            if system.contacts:
+                at_contacts.check_restitution(system, p)
             ranks = [GIVEN] * (2 * system.n) if rank is None else list(rank)
             return _start(at, settings, np.array(q0, float), np.array(v0, float), ranks)
     except StartFailureError:
