@@ -1,6 +1,7 @@
 /* solver_bench.c -- the solver behind plain functions, for tests through ctypes.  All memory starts
  * as values that are no numbers, so that nothing unset can pass for a result. */
 #include "contacts.h"
+#include "impact.h"
 #include "solver.h"
 
 #include <stdlib.h>
@@ -25,7 +26,10 @@ int bench_motion(Bench *b, double t, const double *q, const double *v, const int
 int bench_project(Bench *b, double t, double *q, double *v, const int *active);
 int bench_modes(Bench *b, const double *q, const double *v, int *closed, const int *touching,
                 const int *leaving);
-int bench_impact(Bench *b, const double *q, double *v, const int *closed, int landing, int plastic);
+int bench_impact(Bench *b, const double *q, double *v, const int *entering, int plastic,
+                 double *Lambda);
+int bench_impacts(Bench *b, const double *q, double *v, const int *touching, const double *slow,
+                  int *struck);
 int bench_moved(const Bench *b, int i, const char **name, double *given, double *used);
 void bench_drive(const Bench *b, double t, double *u);
 void *bench_array(Bench *b, const char *name);
@@ -111,10 +115,14 @@ int bench_modes(Bench *b, const double *q, const double *v, int *closed, const i
                           leaving);
 }
 
-int bench_impact(Bench *b, const double *q, double *v, const int *closed, int landing,
-                 int plastic) {
-    return contacts_impact(&b->solver, instant(b, b->solver.state.now.t), q, v, closed, landing,
-                           plastic);
+int bench_impact(Bench *b, const double *q, double *v, const int *entering, int plastic,
+                 double *Lambda) {
+    return impact(&b->solver, instant(b, b->solver.state.now.t), q, v, entering, plastic, Lambda);
+}
+
+int bench_impacts(Bench *b, const double *q, double *v, const int *touching, const double *slow,
+                  int *struck) {
+    return impacts(&b->solver, instant(b, b->solver.state.now.t), q, v, touching, slow, struck);
 }
 
 void bench_drive(const Bench *b, double t, double *u) {

@@ -47,6 +47,8 @@ def start(
     try:
         with np.errstate(all="ignore"):
             at = Instant(system, t, system.inputs_at(u, 0.0), p)
+            if system.contacts:
+                at_contacts.check_restitution(system, p)
             return _start(at, settings, np.array(q0, float), np.array(v0, float))
     except StartFailureError:
         raise

@@ -314,6 +314,7 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, Mov
     if (check_finite(s, q0, v0) == FAILED) return FAILED;
     clear(s, t);
     drive_at(s->system, &s->drive, t, s->u);
+    if (s->system->contacts > 0 && PARTS.impact_check(s) != OK) return FAILED;
     const Start x = {s, {t, s->u, s->p}, q0, v0};
     magnitudes_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;

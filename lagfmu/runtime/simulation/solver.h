@@ -26,7 +26,10 @@ typedef struct {
     int *iwork_contacts;       /* (m + 2 contacts) */
     double *work_advance;      /* (4 n) of advance.c */
     double *work_events;       /* (2 n + indicators and all looks) of events.c */
-    int *iwork_events;         /* (5 contacts) of events.c and switch.c */
+    int *iwork_events;         /* (6 contacts) of events.c and switch.c */
+    double *work_switch;       /* (m) of switch.c */
+    double *work_impact;       /* of impact.c, see there */
+    int *iwork_impact;
     Why why;
 } Solver;
 
