@@ -17,6 +17,8 @@ from .system import NONHOLONOMIC, Matrix, Vector
 EPS = float(np.finfo(float).eps)
 ITERATIONS = 10
 SMALL = 1e-12  # residual, relative to the constraint's own size, that rounding may leave
+ROUNDING = 100 * EPS  # and that is left in peace where Newton's method still gains, but slowly
+LINEAR = 0.1  # ratio of successive residuals: Newton's method converges linearly, G loses rank
 
 
 @dataclass(frozen=True)
@@ -82,10 +84,14 @@ def project(
         if error < EPS**2 or (error > before / 2 and error < SMALL):
             break  # f vanishes with q, or rounding in f is all that is left
         if count == ITERATIONS:
+            if error < ROUNDING:
+                break  # linear convergence, or terms that are larger than q tells
             worst = [at.system.rows[k].name for k, a in zip(fixed, miss, strict=True) if a > 0]
+            cause = "the configuration is singular, or nearly so" if error > LINEAR * before else ""
             raise StepFailureError(
                 f"the step to t = {float(at.t)!r} s cannot be projected onto the constraints "
-                f"{', '.join(map(repr, worst))} (missed by {miss.max():.3g}): take smaller steps"
+                f"{', '.join(map(repr, worst))} (missed by {miss.max():.3g}): "
+                f"{cause or 'take smaller steps'}"
             )
         before = error
         q = q + solve(M, np.zeros(at.system.n), G[fixed], -f, nearest=True).x
