@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .leg import Leg
-from .motion import motion
 from .system import System, Vector
 
 
@@ -65,6 +64,6 @@ def _of_contacts(leg: Leg, t: float, y: Vector) -> Vector:
     contacts = list(leg.system.contacts)
     values = at.residual(q)[contacts]
     if any(leg.state.closed):
-        lam = motion(at, q, v, leg.rows).lam[contacts]
+        lam = leg.near(t, q, v).lam[contacts]
         values = np.where(leg.state.closed, lam, values)
     return values

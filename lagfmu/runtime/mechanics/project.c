@@ -86,6 +86,7 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
         if (count == ITERATIONS) return no_arrival(b, at, &miss, before);
         int stale = count > 0 && !(miss.error <= CONTRACTS * before);
         if (stale && mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
+        b->linear.off = b->dependent ? miss.error : 0;
         if ((stale || count == 0) &&
             linear_factor(&b->linear, b->M, b->G, b->fixed) == FAILED)
             return FAILED;
@@ -123,8 +124,10 @@ Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const i
     if (!acting) return OK;
     if (mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
     memcpy(b->trial, q, (size_t)s->n * sizeof *q);
-    if (fixed && project_positions(b, at, b->trial, v, offset, size, &moved) == FAILED)
-        return FAILED;
+    const Status status =
+        fixed ? project_positions(b, at, b->trial, v, offset, size, &moved) : OK;
+    b->linear.off = 0;
+    if (status != OK) return FAILED;
     if (moved && mechanism_evaluate(b, at, b->trial, v) == FAILED) return FAILED;
     if (project_velocities(b, v, active) == FAILED) return FAILED;
     memcpy(q, b->trial, (size_t)s->n * sizeof *q);

@@ -9,6 +9,7 @@
 
 #include "afar.h"
 #include "digits.h"
+#include "leg.h"
 #include "magnitudes.h"
 #include "parts.h"
 
@@ -157,6 +158,7 @@ static Status find_modes(const Start *x) {
         return afar_refused(x->s);
     if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
         return afar_refused(x->s);
+    leg_choose_rows(x->s);
     return OK;
 }
 
@@ -213,6 +215,7 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
     drive_at(s->system, &s->drive, t, s->u);
     if (s->system->contacts > 0 && PARTS.impact_check(s) != OK) return FAILED;
     const Start x = {s, {t, s->u, s->p}, q0, v0, rank, rank + s->system->n};
+    s->stepped.dependent = 1; /* it is not known yet */
     magnitudes_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;
     if (find_velocities(&x) == FAILED) return FAILED;
