@@ -10,6 +10,7 @@ from ..errors import DerivationError, ModelError
 from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import fold, prune
+from ..mechanics.jumps import with_jumps
 from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.formulations.minimal import Reduction, reduce
 from ..model.model import Contact, Model
@@ -64,7 +65,7 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
     """Derive, prune, reduce, lower and examine.  Raises ModelError or DerivationError."""
     asked = scene = scene or Scene(model.name)
     problems: list[str] = []
-    derived = derive(model)
+    derived = with_jumps(derive(model))
     equations = prune.held(derived, scene, problems)
     numbers = fold.numbers_of(derived, scene, problems)
     scene, reduction, outputs = _asked(equations, scene, problems)

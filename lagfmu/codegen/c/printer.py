@@ -93,6 +93,8 @@ def identifiers(symbols: Sequence[Expr], taken: Sequence[str] = ()) -> dict[Expr
         if text.startswith("der("):
             inner = text[4:-1]
             text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
+        if text.startswith("level("):
+            text = f"level_{text[6:-1]}"
         text = head + text.replace(".", "_")
         if MACROS.match(text):
             text = f"x_{text}"

@@ -61,6 +61,8 @@ def identifiers(symbols: Sequence[Expr]) -> dict[Expr, str]:
         if text.startswith("der("):
             inner = text[4:-1]
             text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
+        if text.startswith("level("):
+            text = f"level_{text[6:-1]}"
         text = text.replace(".", "_")
         while text in taken:
             text += "_"
