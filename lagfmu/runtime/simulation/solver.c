@@ -52,8 +52,8 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     }
     s->active = arena_ints(scratch, m);
     s->u = arena_doubles(scratch, system->inputs);
-    s->work_initial = arena_doubles(scratch, 5 * n + 3 * m);
-    s->iwork_initial = arena_ints(scratch, m + contacts);
+    s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);
+    s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
     s->work_contacts = arena_doubles(scratch, 2 * n + 3 * m);
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
     s->work_advance = arena_doubles(scratch, 4 * n);
