@@ -107,15 +107,15 @@ def with_jumps(eom: EquationsOfMotion) -> EquationsOfMotion:
     if not wrapped:
         return eom
     done = {e: _wrapped(p, wrapped) for e, p in plain.items()}
-    return replace(
-        eom, F=tuple(done[e] for e in eom.F), gamma=tuple(done[e] for e in eom.gamma)
-    )
+    return replace(eom, F=tuple(done[e] for e in eom.F), gamma=tuple(done[e] for e in eom.gamma))
 
 
 def _refusal(
     eom: EquationsOfMotion, surface: Surface, speeds: Sequence[Expr], plain: Mapping[Expr, Expr]
 ) -> str:
-    on = [str(q) for q, e in zip(eom.q, eom.F, strict=True) if surface in set(_candidates(plain[e]))]
+    on = [
+        str(q) for q, e in zip(eom.q, eom.F, strict=True) if surface in set(_candidates(plain[e]))
+    ]
     where = f"where {surface.h} {'is a whole number' if surface.floor else '= 0'}"
     return (
         f"the force on {', '.join(on) or 'the constraints'} jumps with the velocity "
@@ -214,7 +214,9 @@ def _on(h: Expr, generator: random.Random) -> dict[Expr, Expr] | None:
             if slope != 0:
                 return {**rest, s: -h.xreplace({s: sp.S.Zero}).xreplace(rest) / slope}
     f = sp.lambdify(symbols, h, "math")
-    for _ in range(TRIALS):  # two points on different sides, then bisection along the line between them
+    for _ in range(
+        TRIALS
+    ):  # two points on different sides, then bisection along the line between them
         a, b = (_scattered({*symbols}, generator) for _ in range(2))
         try:
             at = [float(f(*(float(x) for x in p.values()))) for p in (a, b)]
@@ -257,7 +259,9 @@ def jumps_of(eom: EquationsOfMotion, reduction: Reduction | None = None) -> Jump
     return Jumps(tuple(found[k] for k in numbers), levels)
 
 
-def _collect(eom: EquationsOfMotion, inside: Mapping[Expr, Expr], found: dict[Expr, Surface]) -> None:
+def _collect(
+    eom: EquationsOfMotion, inside: Mapping[Expr, Expr], found: dict[Expr, Surface]
+) -> None:
     for e in (*eom.F, *eom.gamma):
         floors = {x.args[0] for x in e.atoms(sp.floor, sp.ceiling)}
         for x in sorted(e.atoms(held), key=lambda x: int(x.args[1])):

@@ -10,9 +10,9 @@ from ..errors import DerivationError, ModelError
 from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import fold, prune
-from ..mechanics.jumps import with_jumps
 from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.formulations.minimal import Reduction, reduce
+from ..mechanics.jumps import with_jumps
 from ..model.model import Contact, Model
 from ..model.scene import Scene
 from ..model.selection import select

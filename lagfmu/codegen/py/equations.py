@@ -26,7 +26,9 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
     """
     eom, reduction, jumps = levelled(eom, reduction)
     if reduction is None:
-        return _imported(_system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n")
+        return _imported(
+            _system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
+        )
     parts = [_bare_system(eom) if eom.bare else _system(eom, "", "multipliers")]
     names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.driven, *eom.p, TIME])
     names[TIME] = "t"
@@ -156,17 +158,17 @@ def _system(
         f"    embedding={embedding},\n"
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
-        f"{_surfaces(prefix, jumps)}"
+        f"{_surfaces(prefix, jumps, len(eom.driven))}"
         f"{_listed(own)})\n"
     )
     return "\n\n".join(parts)
 
 
-def _surfaces(prefix: str, jumps: Jumps) -> str:
+def _surfaces(prefix: str, jumps: Jumps, count: int) -> str:
     if not jumps.surfaces:
         return ""
     floors = tuple(s.floor for s in jumps.surfaces)
-    return f"    surfaces={prefix}surfaces,\n    floors={floors!r},\n"
+    return f"    surfaces={prefix}surfaces,\n    floors={floors!r},\n    driven={count},\n"
 
 
 def _bare_system(eom: EquationsOfMotion) -> str:
