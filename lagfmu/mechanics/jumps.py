@@ -187,10 +187,14 @@ def _jumps(e: Expr, surface: Surface, eom: EquationsOfMotion) -> bool:
             continue
         everything = {**_scattered(e.xreplace(values).free_symbols, generator), **values, **point}
         half = sp.Rational(1, 2) if surface.floor else sp.S.One
-        sides = [_number(_wrapped(e, {surface: level + s * half}), everything) for s in (1, -1)]
+        over, under = (
+            _number(_wrapped(e, {surface: level + s * half}), everything) for s in (1, -1)
+        )
+        if over is None or under is None:
+            continue
         moved = {s: x + sp.Rational(1, 3) for s, x in everything.items() if s not in values}
-        size = sum(abs(x) for x in (_number(e, values | moved), *sides) if x is not None)
-        if None not in sides and abs(sides[0] - sides[1]) > SMALL * size:
+        nearby = _number(e, values | moved)
+        if abs(over - under) > SMALL * (abs(over) + abs(under) + abs(nearby or 0)):
             return True
     return False
 

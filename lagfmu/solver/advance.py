@@ -61,8 +61,8 @@ def advance(
             events.append(state.t)
             if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
                 raise StepFailureError(
-                    f"{CHATTER} contacts open or close in {events[-1] - events[0]:.1g} s at "
-                    f"t = {state.t!r} s: the contacts chatter without end"
+                    f"{CHATTER} events in {events[-1] - events[0]:.1g} s at t = {state.t!r} s: contacts "
+                    "chatter without end, or a force jumps to and fro"
                 )
     return replace(state, span=t_end - begun)
 

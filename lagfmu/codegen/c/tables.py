@@ -105,7 +105,9 @@ class Tables:
             "solve": f"{p}solve" if solve else "NULL",
             **{
                 name: p + name if name in functions else "NULL"
-                for name in ("dynamics", "residual", "energies", "restitution", "tangent")
+                for name in (
+                    *("dynamics", "residual", "surfaces", "energies", "restitution", "tangent"),
+                )
             },
             "embed": "embed" if p else "NULL",
             "embed_tangent": "embed_tangent" if p and "tangent" in functions else "NULL",

@@ -18,7 +18,7 @@ from ...errors import DerivationError
 
 Expr = Any
 ARGUMENTS = (
-    *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "e", "energy"),
+    *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "h", "e", "energy"),
     *("vdot", "lam", "Q", "w"),
 )
 
