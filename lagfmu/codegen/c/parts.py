@@ -11,6 +11,7 @@ AT_EVENTS = {"events_find": "events.c"}
 AT_CONTACTS = {
     "contacts_modes": "contacts.c",
     "impact_check": "impact.c",
+    "landing_lift": "landing.c",
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }
