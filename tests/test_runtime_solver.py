@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import FILES
-from linkages import FOUR_BAR, TIME, rods
+from linkages import FOUR_BAR, TIME, pinned_rod, rods
 from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compile_library, compiler
 from sympy import sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
@@ -33,6 +33,7 @@ from lagfmu.solver.failure import StartFailureError, StepFailureError
 from lagfmu.solver.impact import impact
 from lagfmu.solver.instant import Instant
 from lagfmu.solver.observe import observe
+from lagfmu.solver.precedence import GIVEN, OMITTED, SET
 from lagfmu.solver.state import Settings
 
 EPS = np.finfo(float).eps
@@ -220,12 +221,19 @@ def rounding_spread(system: Any, state: Any, u: Any, p: Any) -> dict[str, float]
     return spread
 
 
-def check_start(one: Bench, q: Sequence[float], v: Sequence[float], u: Sequence[float]) -> Any:
+def check_start(
+    one: Bench,
+    q: Sequence[float],
+    v: Sequence[float],
+    u: Sequence[float],
+    rank: Sequence[int] | None = None,
+) -> Any:
     """The start of the C runtime against the Python solver's: state, moved values, observation."""
     system, p = one.system, one.p.tolist()
     one.drive(u)
+    one.array("rank", 2 * system.n, c_int)[:] = [GIVEN] * (2 * system.n) if rank is None else rank
     assert one.start(q, v), one.why()
-    start = initial.start(system, Settings(), 0.0, q, v, u, p)
+    start = initial.start(system, Settings(), 0.0, q, v, u, p, rank)
     theirs, ours = start.state, one.state()
     speed = np.array(theirs.size) * theirs.rate
     agree(ours["q"], theirs.q, theirs.size)
@@ -328,6 +336,49 @@ def test_a_four_bar_starts_from_any_velocities_of_its_crank(bench):
         check_start(one, near.tolist(), v.tolist(), u)
         assert np.abs(one.state()["v"][ends]).max() < 1e-14
         assert np.abs(one.state()["v"]).max() > 1e-3
+
+
+def test_what_nobody_said_moves_first_and_what_was_set_moves_last(bench):
+    """A rod pinned at its end, its middle at x, y: theta and theta' said are kept bit for bit, and
+    x = l/2 cos(theta), x' = -l/2 theta' sin(theta) follow; theta given in the model follows an x that was
+    set; velocities that were set move if nothing else can, least in the metric of M: what remains of
+    (x', y') is its part along the circle."""
+    one = bench(pinned_rod({theta: 0.3}))
+    at = {name: k for k, name in enumerate(one.system.coordinates)}
+    X, Y, T = at["x"], at["y"], at["theta"]
+
+    def begun(q: dict[int, float], v: dict[int, float], said: dict[int, int]) -> tuple[Any, Any]:
+        values = [[d.get(j, 0.0) for j in range(3)] for d in (q, v)]
+        check_start(one, *values, [], [said.get(j, OMITTED) for j in range(6)])
+        return one.state()["q"], one.state()["v"]
+
+    arm = one.p[2] / 2
+    q, v = begun({T: 0.3}, {T: 1.86}, {T: GIVEN, 3 + T: GIVEN})
+    assert (q[T], v[T]) == (0.3, 1.86)
+    assert q[X] == pytest.approx(arm * np.cos(0.3), rel=1e-15)
+    assert v[X] == pytest.approx(-arm * 1.86 * np.sin(0.3), rel=1e-14)
+    q, v = begun({T: 0.3, X: 0.2}, {T: 1.86, X: 1.0}, {T: GIVEN, X: SET, 3 + T: GIVEN, 3 + X: SET})
+    assert (q[X], v[X]) == (0.2, 1.0)
+    assert q[T] == pytest.approx(np.arccos(0.2 / arm), rel=1e-14)
+    assert v[T] == pytest.approx(-1 / arm / np.sin(q[T]), rel=1e-13)
+    said = {T: GIVEN, 3 + X: SET, 3 + Y: SET, 3 + T: GIVEN}
+    q, v = begun({T: 0.3}, {X: 0.5, Y: 1.0, T: 9.0}, said)
+    tangent = np.array([-np.sin(0.3), np.cos(0.3)])
+    np.testing.assert_allclose(v[[X, Y]], tangent * (tangent @ [0.5, 1.0]), rtol=1e-8)
+
+
+def test_an_omitted_value_whose_zero_is_singular_is_asked_for(bench):
+    """x = 0.6 on a circle of 1 m and nothing said of y: at y = 0 the circle does not depend on y to first
+    order, and which of +-0.8 is meant nobody can know."""
+    one = bench("PendulumCartesian")
+    rank = [GIVEN, OMITTED, OMITTED, OMITTED]
+    one.array("rank", 4, c_int)[:] = rank
+    assert not one.start([0.6, 0.0], [0.0, 0.0])
+    assert "give y a start value" in one.why()
+    with pytest.raises(StartFailureError, match="give y a start value"):
+        initial.start(one.system, Settings(), 0.0, [0.6, 0], [0, 0], [], one.p.tolist(), rank)
+    check_start(one, [0.6, -0.1], [0.0, 0.0], [], rank)
+    np.testing.assert_allclose(one.state()["q"], [0.6, -0.8], rtol=1e-15)
 
 
 def test_constraints_that_no_velocity_satisfies_are_still_refused(bench):

@@ -127,8 +127,8 @@ def pack_closed_forms(
     """JSON with the claims; expressions are indexed symbols, so that any name can be read back.
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
-    closed, `tables` those that the model looks up.  Claims that need a variable which the scene leaves out are left out too.  Raises ModelError
-    if a claim uses what no FMU of the model has.
+    closed, `tables` those that the model looks up.  Claims that need a variable which the scene leaves
+    out are left out too.  Raises ModelError if a claim uses what no FMU of the model has.
     """
     claims = [
         claim

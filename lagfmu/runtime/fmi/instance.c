@@ -28,9 +28,11 @@ void instance_layout(Instance *x, Arena *arena) {
         x->v0 = arena_doubles(&saved, system->n);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
+        x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
         x->happened = arena_ints(&scratch, system->contacts);
+        x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
         x->places = arena_doubles(&scratch, system->lookup_count);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
@@ -218,13 +220,29 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
 /* ------------------------------------------------------------------ start */
 
 static void tell_moved(void *context, const char *coordinate, int is_velocity, double given,
-                       double used) {
+                       double used, Rank rank) {
     Instance *x = context;
-    (void)snprintf(x->note, sizeof x->note,
-                   "start value %s%s%s = %s misses the constraints: projected to %s (moved by %.3g)",
-                   is_velocity ? "der(" : "", coordinate, is_velocity ? ")" : "",
-                   digits(given).text, digits(used).text, used - given);
-    x->tell(x->context, NOTE_WARNING, x->note);
+    const char *head = is_velocity ? "der(" : "", *tail = is_velocity ? ")" : "";
+    if (rank == OMITTED)
+        (void)snprintf(x->note, sizeof x->note,
+                       "%s%s%s has no start value: %s in place of %s satisfies the constraints", head,
+                       coordinate, tail, digits(used).text, digits(given).text);
+    else
+        (void)snprintf(x->note, sizeof x->note,
+                       "start value %s%s%s = %s misses the constraints: projected to %s (moved by "
+                       "%.3g)",
+                       head, coordinate, tail, digits(given).text, digits(used).text, used - given);
+    x->tell(x->context, rank == OMITTED ? NOTE_EVENT : NOTE_WARNING, x->note);
+}
+
+/* A start value that differs from the described one was set, whatever calls set it. */
+static void find_ranks(Instance *x) {
+    for (int k = 0; k < VARIABLE_COUNT; k++) {
+        const Variable *v = &VARIABLES[k];
+        if (v->role != ROLE_START) continue;
+        const int set = instance_setting(x, v) != v->start;
+        x->rank[v->state] = set ? SET : v->given ? GIVEN : OMITTED;
+    }
 }
 
 static void choose_settings(Instance *x) {
@@ -246,7 +264,8 @@ Status instance_start(Instance *x) {
     choose_settings(x);
     s->stop_time = x->stop_time;
     s->drive.since = x->start_time;
-    if (solver_start(s, x->start_time, x->q0, x->v0, tell_moved, x) != OK) return FAILED;
+    find_ranks(x);
+    if (solver_start(s, x->start_time, x->q0, x->v0, x->rank, tell_moved, x) != OK) return FAILED;
     /* model exchange has no communication step: 1 s stands in for it */
     if (x->exchange && magnitudes_incomplete(s) &&
         magnitudes_complete(s, leg_instant(s, x->start_time), 1) != OK)
@@ -289,9 +308,10 @@ static void warn_of_jumps(Instance *x) {
 
 /* Once for each: a table is looked up beyond its ends. */
 static void warn_of_tables(Instance *x) {
-    const Solver *s = &x->solver;
+    Solver *s = &x->solver;
     const System *system = s->system;
-    system->lookups(s->state.now.t, s->state.q, s->state.v, s->drive.value, s->p, x->places);
+    const Instant at = leg_instant(s, s->state.now.t);
+    system->lookups(at.t, s->state.q, s->state.v, at.u, at.p, x->places);
     for (int i = 0; i < system->lookup_count && i < 30; i++) {
         const double first = system->lookup_first[i], last = system->lookup_last[i];
         const int told = 2 << i;
@@ -370,7 +390,7 @@ Status instance_differentiate(Instance *x, Direction d) {
     if (s->system->tangent == NULL)
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
-    const Instant at = {s->state.now.t, s->drive.value, s->p};
+    const Instant at = leg_instant(s, s->state.now.t);
     system_active(s->system, s->state.closed, s->active);
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)

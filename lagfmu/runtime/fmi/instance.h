@@ -28,10 +28,12 @@ typedef struct {
     double *places;         /* (lookup_count) scratch */
     int observed, evaluated;
     double *q0, *v0;        /* (n) start values as they were set */
+    Rank *rank;             /* (2 n) who said them; found anew at each start */
     double *expected;       /* (inputs) values at the end of the latest step */
     int *set;               /* (inputs) 1: set since the latest step */
     int *closed, *count;    /* (contacts) before a step */
     int *happened;          /* (contacts) */
+    double *pull;            /* (contacts) [of f/s^2] acceleration towards each, of exchange.c */
     char *saved, *backup;   /* what must be saved; a copy from before a step */
     size_t saved_size;
     Tell tell;
