@@ -12,9 +12,9 @@ from fmi2 import Library
 
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
+from lagfmu.live.playable import of_fmu
+from lagfmu.live.render import Playable, render
 from lagfmu.model.file import load
-from lagfmu.page.live.playable import of_fmu
-from lagfmu.page.live.render import Playable, render
 from lagfmu.prepare.prepare import Prepared, prepare
 
 MODELS = Path(__file__).parent.parent / "models"
