@@ -10,6 +10,7 @@ AT_CONTACTS = {
     "events_find": "events.c",
     "contacts_modes": "contacts.c",
     "impact_check": "impact.c",
+    "landing_lift": "landing.c",
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }

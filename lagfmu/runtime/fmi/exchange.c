@@ -136,7 +136,8 @@ static Status drift(Instance *x, double *worst) {
     return OK;
 }
 
-/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated. */
+/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated and goes
+ * further in, or is pulled back in.  x->pull: the accelerations towards them. */
 static Status find_happened(Instance *x, int *any) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
@@ -146,10 +147,12 @@ static Status find_happened(Instance *x, int *any) {
         return FAILED;
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
+        x->pull[c] = b->gamma[k] - mechanism_row(b, k, b->vdot);
         if (s->state.closed[c])
             x->happened[c] = b->lambda[k] <= 0;
         else
-            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 && mechanism_slip(b, k, s->state.v) < 0;
+            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 &&
+                             (mechanism_slip(b, k, s->state.v) < 0 || x->pull[c] > 0);
         *any |= x->happened[c];
     }
     return OK;
@@ -182,6 +185,7 @@ Status exchange_event(Instance *x, int *moved) {
     if (any) {
         *moved = 1;
         x->evaluated = 0;
+        if (PARTS.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
         return PARTS.switch_modes(s, x->happened);
     }
     if (drift(x, &worst) != OK) return FAILED;

@@ -32,6 +32,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
         x->happened = arena_ints(&scratch, system->contacts);
+        x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
         if (pass == 1) break;

@@ -8,6 +8,7 @@
 #include "contacts.h"
 #include "events.h"
 #include "impact.h"
+#include "landing.h"
 #include "rattle.h"
 #include "switch.h"
 
@@ -23,6 +24,7 @@ typedef struct {
     Status (*contacts_modes)(Solver *s, Instant at, const double *q, const double *v, int *closed,
                              const int *touching, const int *leaving);
     Status (*impact_check)(Solver *s);
+    Status (*landing_lift)(Solver *s, const int *happened, const double *pull);
     Status (*switch_modes)(Solver *s, const int *happened);
     Status (*switch_released)(Solver *s, double span);
 } Parts;
