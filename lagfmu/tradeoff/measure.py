@@ -3,6 +3,7 @@ falls on all of them alike; the median and the quartiles are kept."""
 
 from __future__ import annotations
 
+import math
 import random
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -36,7 +37,8 @@ class Plan:
 
     A fixed step is halved `halvings` times.
     A run longer than `limit` [s] ends its method's refinement; after `budget` [s] of timing no
-    setting is run again that was run `FEWEST` times.
+    setting is run again that was run `FEWEST` times.  Without `warm_up` the first run is a time like
+    any other: right where a run takes long.
     """
 
     communications: tuple[float, ...]
@@ -46,6 +48,7 @@ class Plan:
     repeats: int = REPEATS
     limit: float = 3.0
     budget: float = 60.0
+    warm_up: bool = True
 
 
 @dataclass(frozen=True)
@@ -242,10 +245,17 @@ def accepts(importer: Importer, method: str) -> bool:
 
 
 def weigh(
-    importer: Importer, setting: Setting, reference: Reference, claims: Sequence[Claim] = ()
+    importer: Importer,
+    setting: Setting,
+    reference: Reference,
+    claims: Sequence[Claim] = (),
+    limit: float = math.inf,
 ) -> Row:
-    """The errors of one setting.  Raises SimulationError if the FMU refuses it."""
-    run = importer.observe(setting)
+    """The errors of one setting.
+
+    Raises SimulationError if the FMU refuses it, TooSlowError if it takes longer than `limit` [s].
+    """
+    run = importer.observe(setting, limit=limit)
     errors = reference.errors(run)
     parameters = {
         v.name: float(v.start)
@@ -271,7 +281,10 @@ def take_turns(
     What takes less than `SHORTEST` is done several times in a row, and the mean is one time.
     """
     seconds: list[list[float]] = [[] for _ in work]
-    often = [max(1, min(MOST, int(SHORTEST / max(once(), 1e-9)))) for once in work]  # warm as well
+    warm = [work[j]() for j in say_each(range(len(work)), "timing", say)]
+    often = [max(1, min(MOST, int(SHORTEST / max(s, 1e-9)))) for s in warm]
+    if not plan.warm_up:
+        seconds = [[s] for s in warm]
     order = list(range(len(work)))
     shuffle = random.Random(0).shuffle
     begun = time.perf_counter()

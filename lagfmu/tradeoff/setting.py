@@ -8,6 +8,7 @@ from typing import Any
 
 ADAPTIVE = ("dop853", "dopri5", "radau5")
 FIXED = ("rk4", "rattle")
+ORDERS = {"rk4": 4, "rattle": 6}  # of convergence
 METHODS = (*ADAPTIVE, *FIXED)  # asked for; the FMU says which of them it has
 EVALUATIONS = {"dop853": 12, "dopri5": 6, "radau5": 20, "rk4": 4, "rattle": 21}  # a step, about
 
