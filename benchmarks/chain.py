@@ -18,7 +18,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter, derive
-from lagfmu.numeric import source
+from lagfmu.codegen.py.equations import source
 
 RUNS = 3
 

@@ -19,10 +19,10 @@ from rich.console import Console
 from rich.table import Table
 
 from lagfmu.errors import LagfmuError
-from lagfmu.modelfile import load
-from lagfmu.tradeoff.choose import Choice, pick
-from lagfmu.tradeoff.goal import Goal
-from lagfmu.tradeoff.survey import survey
+from lagfmu.model.file import load
+from lagfmu.study.tradeoff.choose import Choice, pick
+from lagfmu.study.tradeoff.goal import Goal
+from lagfmu.study.tradeoff.survey import survey
 
 GOALS = (1e-4, 1e-7, 1e-10)
 MODELS = Path(__file__).parent.parent / "models"

@@ -23,7 +23,7 @@ from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Conserved, Holonomic, Model, Parameter, Scene, derive, output
-from lagfmu.numeric import lower
+from lagfmu.codegen.py.equations import lower
 
 OMEGA = 4.0  # [rad/s] the crank's first rate
 LENGTHS = (1.0, sqrt(5.0), 2.0)

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lagfmu
-from lagfmu.ccode import model_source
-from lagfmu.compiler import FLAGS, find_compiler, host
-from lagfmu.equations import EquationsOfMotion
-from lagfmu.prepare import Prepared, prepare
+from lagfmu.codegen.c.equations import model_source
+from lagfmu.fmu.compiler import FLAGS, find_compiler, host
+from lagfmu.mechanics.equations import EquationsOfMotion
+from lagfmu.prepare.prepare import Prepared, prepare
 
 HERE = Path(__file__).parent
 RUNTIME = Path(lagfmu.__file__).parent / "runtime"
@@ -169,7 +169,7 @@ def solver(out: Path, command: tuple[str, ...] = GCC) -> Path:
     archive.unlink(missing_ok=True)
     made = [
         compiled(objects / f"{p.stem}.o", [p], "-c", command=command)
-        for p in sorted(RUNTIME.glob("*.c"))
+        for p in sorted(RUNTIME.glob("*/*.c"))
         if p.name not in FMI_LAYER
     ]
     subprocess.run(["ar", "rcs", str(archive), *map(str, made)], check=True, timeout=60)
@@ -187,7 +187,12 @@ def compiled(
 ) -> Path:
     """One program of C files, for this machine."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    include = (f"-I{HERE / 'native'}", f"-I{RUNTIME}", "-isystem", str(FMI))
+    include = (
+        f"-I{HERE / 'native'}",
+        *(f"-I{folder}" for folder in sorted(RUNTIME.iterdir())),
+        "-isystem",
+        str(FMI),
+    )
     words = [*command, *FLAGS, *include, "-o", str(target), *map(str, sources), *options]
     libraries = [] if "-c" in options else ["-lm"]
     subprocess.run([*words, *libraries], check=True, timeout=600)

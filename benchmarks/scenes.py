@@ -23,12 +23,12 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from lagfmu.build import TARGETS, write
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
-from lagfmu.savings import Cost, cost
-from lagfmu.tradeoff.importer import Importer
-from lagfmu.tradeoff.setting import Setting
+from lagfmu.fmu.write import TARGETS, write
+from lagfmu.model.file import load
+from lagfmu.page.savings import Cost, cost
+from lagfmu.prepare.prepare import prepare
+from lagfmu.study.tradeoff.importer import Importer
+from lagfmu.study.tradeoff.setting import Setting
 
 MODELS = Path(__file__).parent.parent / "models"
 FMUS = {"PendulumCartesian": "pendulum", "Hemisphere": "hemisphere", "Chain": "chain"}

@@ -1,16 +1,25 @@
 """Lagrange's equations with multipliers, from SymPy to FMUs that report the forces of constraint."""
 
-from .closed_form import ClosedForm, Conserved, departure, initial, output
-from .constraints import classify
-from .convert import from_lagranges_method
-from .equations import EquationsOfMotion, derive
-from .errors import LagfmuError
-from .make import build_fmu
-from .model import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter
-from .reactions import force_of_constraint, multiplier
-from .scene import Scene
-from .simulate import simulate
-from .verify import Verification, verify
+from .api import build_fmu
+from .errors import LagfmuError, VerificationError
+from .mechanics.equations import EquationsOfMotion, derive
+from .mechanics.integrability.classify import classify
+from .model.closed_form import ClosedForm, Conserved, departure, initial, output
+from .model.convert import from_lagranges_method
+from .model.model import (
+    Contact,
+    Embedding,
+    Holonomic,
+    Input,
+    Model,
+    Nonholonomic,
+    Output,
+    Parameter,
+)
+from .model.reactions import force_of_constraint, multiplier
+from .model.scene import Scene
+from .verification.simulate import simulate
+from .verification.verify import Verification, verify
 
 __all__ = [
     "ClosedForm",
@@ -23,9 +32,11 @@ __all__ = [
     "LagfmuError",
     "Model",
     "Nonholonomic",
+    "Output",
     "Parameter",
     "Scene",
     "Verification",
+    "VerificationError",
     "build_fmu",
     "classify",
     "departure",

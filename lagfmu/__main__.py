@@ -1,5 +1,5 @@
 """`python -m lagfmu` is the `lagfmu` command."""
 
-from .cli import main
+from .cli.app import main
 
 main()

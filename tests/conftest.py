@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from fmi2 import Library
 
-from lagfmu.build import write
-from lagfmu.compiler import find_compiler
-from lagfmu.modelfile import load
-from lagfmu.prepare import Prepared, prepare
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import Prepared, prepare
 
 MODELS = Path(__file__).parent.parent / "models"
 FILES = {

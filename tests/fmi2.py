@@ -11,7 +11,7 @@ from typing import Any
 
 import fmpy
 
-from lagfmu.compiler import host
+from lagfmu.fmu.compiler import host
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 EXCHANGE, CO_SIMULATION = 0, 1

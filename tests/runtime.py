@@ -13,6 +13,10 @@ from pathlib import Path
 import pytest
 
 RUNTIME = Path(__file__).parent.parent / "lagfmu" / "runtime"
+RUNTIME_FILES = {
+    p.name: p for p in sorted(RUNTIME.glob("*/*.[ch]"))
+}  # in an FMU they lie side by side
+INCLUDES = tuple(f"-I{folder}" for folder in sorted(p for p in RUNTIME.iterdir() if p.is_dir()))
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion")
 
 
@@ -31,11 +35,11 @@ def compile_library(
     """A library of the runtime files `sources` and of the C text `extra`; warnings are errors."""
     key = hashlib.sha256("\0".join([*sources, extra, *flags]).encode()).hexdigest()[:12]
     target = folder / f"runtime_{key}.so"
-    files = [str(RUNTIME / name) for name in sources]
+    files = [str(RUNTIME_FILES[name]) for name in sources]
     if extra:
         text = folder / f"extra_{key}.c"
         text.write_text(extra, encoding="utf-8")
         files.append(str(text))
-    command = [compiler(), *FLAGS, *flags, "-Werror", "-shared", "-fPIC", f"-I{RUNTIME}"]
+    command = [compiler(), *FLAGS, *flags, "-Werror", "-shared", "-fPIC", *INCLUDES]
     subprocess.run([*command, "-o", str(target), *files, "-lm"], check=True, timeout=300)
     return ctypes.CDLL(str(target))

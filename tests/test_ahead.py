@@ -12,7 +12,7 @@ from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter, build_fmu
-from lagfmu.compiler import find_compiler
+from lagfmu.fmu.compiler import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
@@ -30,7 +30,7 @@ def run(one, step: float, until: float) -> None:
         one.step(step)
 
 
-@pytest.mark.parametrize("method", ["auto", "dop853", "dopri5", "radau5"])
+@pytest.mark.parametrize("method", ["auto", "dop853", "radau5"])
 @pytest.mark.parametrize("name", ["PendulumCartesian", "PendulumAngle", "Chain"])
 def test_the_communication_step_changes_nothing_to_the_last_bit(library, name, method):
     """From 1 s to 0.1 ms: the same internal steps, and at t = 1 s and 2 s the same outputs."""
@@ -137,7 +137,7 @@ def candle(folder) -> Library:
         parameters=[Parameter(m, 1.0, "kg"), Parameter(P, 3.0, "N"), Parameter(T, 1.0, "s")],
         start={x: 1.0, y: 1.0},
     )
-    return Library(build_fmu(model, folder, target="native"), folder / "library")
+    return Library(build_fmu(model, folder, target="native", check=False), folder / "library")
 
 
 @pytest.mark.parametrize("stop", [None, 1.0], ids=["no stop time", "stop time"])

@@ -21,19 +21,19 @@ from typing import Any
 import pytest
 import sympy as sp
 from conftest import FILES, MODELS
-from runtime import FLAGS, RUNTIME, compile_library, compiler
+from runtime import FLAGS, INCLUDES, compile_library, compiler
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter, derive
-from lagfmu.ccode import model_source
-from lagfmu.cfunction import BLOCK
-from lagfmu.cprinter import identifiers
-from lagfmu.differential import Differential
-from lagfmu.equations import TIME, EquationsOfMotion
+from lagfmu.codegen.c.equations import model_source
+from lagfmu.codegen.c.function import BLOCK
+from lagfmu.codegen.c.printer import identifiers
+from lagfmu.codegen.py.equations import lower
 from lagfmu.errors import DerivationError
-from lagfmu.numeric import lower
-from lagfmu.prepare import Prepared
-from lagfmu.reduction import Reduction, reduce
+from lagfmu.mechanics.differential import Differential
+from lagfmu.mechanics.equations import TIME, EquationsOfMotion
+from lagfmu.mechanics.formulations.minimal import Reduction, reduce
+from lagfmu.prepare.prepare import Prepared
 from lagfmu.solver.system import System
 
 CLOSE = 1e-14  # of the magnitude of what is added up, about 45 roundings
@@ -588,7 +588,7 @@ def test_no_warning_from_clang(tmp_path: Path, target: str) -> None:
         pytest.skip("ziglang is not installed")
     file = tmp_path / "model.c"
     file.write_text(model_source(derive(names_model()), None, "multipliers"), encoding="utf-8")
-    options = [*FLAGS, "-Werror", f"-I{RUNTIME}", *(["-target", target] if target else [])]
+    options = [*FLAGS, "-Werror", *INCLUDES, *(["-target", target] if target else [])]
     result = subprocess.run(
         [*command, *options, "-c", str(file), "-o", str(tmp_path / "model.o")],
         capture_output=True,
@@ -882,7 +882,7 @@ def serial(n: int) -> Model:
 
 def test_blocks_share_what_is_costly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Split or whole, the sine of an angle is computed once a function; the values stay right."""
-    monkeypatch.setattr("lagfmu.cfunction.BLOCK", 150)
+    monkeypatch.setattr("lagfmu.codegen.c.function.BLOCK", 150)
     one = made(serial(3), tmp_path)
     checked(one, (1,))
     assert "blocks[k]" in one.source
@@ -901,10 +901,10 @@ def test_small_models_are_not_split(case: Callable[[str], Case]) -> None:
 SOURCES_IN_ANOTHER_PROCESS = """
 import hashlib, sys
 from pathlib import Path
-from lagfmu.ccode import model_source
-from lagfmu.cvariables import variables_source
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
+from lagfmu.codegen.c.equations import model_source
+from lagfmu.codegen.c.variables import variables_source
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
 digest = hashlib.sha256()
 for path in sys.argv[1:]:
     file = load(Path(path))

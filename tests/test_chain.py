@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import roots_laguerre
 
 from lagfmu import derive, simulate
-from lagfmu.numeric import lower
+from lagfmu.codegen.py.equations import lower
 
 FILE = Path(__file__).parent.parent / "models" / "chain.py"
 G, MASS, LENGTH = 9.81, 0.1, 0.25

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from lagfmu.cli import app
-from lagfmu.plot import panels
+from lagfmu.cli.app import app
+from lagfmu.cli.plot import panels
 
 REPOSITORY = Path(__file__).parent.parent
 MODELS = REPOSITORY / "models"

@@ -23,8 +23,8 @@ from sympy import (
 )
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu.constraints import Kind, classify, pfaffian
 from lagfmu.errors import DerivationError
+from lagfmu.mechanics.integrability.classify import Kind, classify, pfaffian
 
 x, y, z, s, phi, theta, psi = dynamicsymbols("x y z s phi theta psi")
 t = dynamicsymbols._t
@@ -348,7 +348,7 @@ def test_undecided_in_regions():
 @pytest.mark.parametrize(("limit", "value"), [("_LARGEST", 3), ("_SECONDS", -1.0)])
 def test_too_long_to_decide(monkeypatch, limit, value):
     """An expression that outgrows memory or time is undecided, too: no guess, and no crash."""
-    monkeypatch.setattr(f"lagfmu.pfaffian.tower.{limit}", value)
+    monkeypatch.setattr(f"lagfmu.mechanics.integrability.tower.{limit}", value)
     answer = classify([sin(phi) * d(x) - (x + y + z) * d(y), d(z) - y * d(x)], [x, y, z, phi])
     assert answer.kind is Kind.UNDECIDED
     assert "a long expression" in answer.certificate

@@ -11,12 +11,13 @@ from typing import Any
 
 import pytest
 from conftest import FILES
-from runtime import RUNTIME, compile_library
+from runtime import RUNTIME_FILES, compile_library
 
-from lagfmu.ccode import model_source
-from lagfmu.cprinter import string
-from lagfmu.cvariables import variables_source
-from lagfmu.prepare import Prepared
+from lagfmu.codegen.c.equations import model_source
+from lagfmu.codegen.c.printer import string
+from lagfmu.codegen.c.variables import variables_source
+from lagfmu.methods import NUMBERS
+from lagfmu.prepare.prepare import Prepared
 from lagfmu.solver.initial import start
 from lagfmu.solver.observe import observe
 from lagfmu.solver.state import Settings
@@ -47,17 +48,17 @@ class CVariable(ctypes.Structure):
 
 def places() -> list[str]:
     """The enumerators of Place, from the header, in order."""
-    header = (RUNTIME / "variables.h").read_text(encoding="utf-8")
+    header = RUNTIME_FILES["variables.h"].read_text(encoding="utf-8")
     inside = re.sub(r"/\*.*?\*/", "", header[header.index("AT_PARAMETER") :], flags=re.DOTALL)
     return re.findall(r"AT_(\w+)", inside[: inside.index("}")])
 
 
-def methods() -> list[str]:
-    """The enumerators of MethodName, from the header, in order."""
-    header = (RUNTIME / "state.h").read_text(encoding="utf-8")
+def methods() -> dict[str, int]:
+    """The enumerators of MethodName and their values, from the header."""
+    header = RUNTIME_FILES["state.h"].read_text(encoding="utf-8")
     found = re.search(r"enum \{([^}]*)\} MethodName", header)
     assert found is not None
-    return re.findall(r"\w+", found[1])
+    return {k: int(v) for k, v in re.findall(r"(\w+) = (\d+)", found[1])}
 
 
 @pytest.fixture(scope="session")
@@ -103,7 +104,8 @@ def test_every_variable_is_there_in_order(table: Any, name: str) -> None:
     assert ctypes.c_char_p.in_dll(library, "MODEL_GUID").value == b"{1234}"
     assert ctypes.c_double.in_dll(library, "DEFAULT_TOLERANCE").value == p.scene.tolerance
     method = ctypes.c_int.in_dll(library, "DEFAULT_METHOD").value
-    assert methods()[method] == p.scene.method.upper()
+    assert methods()[p.scene.method.upper()] == method
+    assert methods() == {k.upper(): number for k, number in NUMBERS.items()}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -149,6 +151,7 @@ def arrays(p: Prepared) -> dict[str, Any]:
         "KINETIC": [seen["energy.kinetic"]],
         "POTENTIAL": [seen.get("energy.potential")],
         "TOTAL": [seen.get("energy.total")],
+        "OUTPUT": [seen[own.name] for own in full.outputs],
         "CONTACT": [seen[f"contact.{c}"] for c in contacts],
         "COUNT": [seen[f"departure.{c}.count"] for c in contacts],
         "DEPARTURE_TIME": [seen[f"departure.{c}.time"] for c in contacts],

@@ -14,13 +14,13 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter
-from lagfmu.documentation import page
-from lagfmu.equations import derive
-from lagfmu.nullspace import accelerations
-from lagfmu.prepare import Prepared, prepare
-from lagfmu.scene import Scene
-from lagfmu.show import show
-from lagfmu.typeset import Notation, name_latex, name_text, typeset
+from lagfmu.cli.show import show
+from lagfmu.mechanics.equations import derive
+from lagfmu.mechanics.formulations.nullspace import accelerations
+from lagfmu.model.scene import Scene
+from lagfmu.page.documentation import page
+from lagfmu.page.typeset import Notation, name_latex, name_text, typeset
+from lagfmu.prepare.prepare import Prepared, prepare
 
 t = dynamicsymbols._t
 x, y, s, theta, F = dynamicsymbols("x y s theta F")

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runtime import FLAGS, RUNTIME, compiler
+from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compiler
 
-from lagfmu.elimination import Elimination, Plan, eliminate, plan
+from lagfmu.codegen.c.elimination import Elimination, Plan, eliminate, plan
 
 
 def chain(links):
@@ -216,7 +216,7 @@ def test_the_same_patterns_give_the_same_text():
     """Nothing depends on the order of a set or a dictionary."""
     mass = [(i, j) for i in range(8) for j in range(i + 1) if (i + j) % 3 == 0 or i == j]
     jacobian = [(k, j) for k in range(5) for j in range(8) if (k * j) % 4 == 1]
-    command = "from lagfmu.elimination import plan; print(plan(8, 5, {}, {}).c_text('p'))"
+    command = "from lagfmu.codegen.c.elimination import plan; print(plan(8, 5, {}, {}).c_text('p'))"
     texts = {
         subprocess.run(
             [sys.executable, "-c", command.format(mass, jacobian)],
@@ -233,7 +233,7 @@ def test_the_same_patterns_give_the_same_text():
 @pytest.mark.parametrize("part", [Elimination, Plan])
 def test_fields_stand_in_the_order_of_the_header(part):
     """C fills a struct in the order of its members: plan.h and the dataclasses have the same one."""
-    header = (RUNTIME / "plan.h").read_text(encoding="utf-8")
+    header = RUNTIME_FILES["plan.h"].read_text(encoding="utf-8")
     bodies = {name: body for body, name in re.findall(r"struct \{(.*?)\} (\w+);", header, re.S)}
     body = re.sub(r"/\*.*?\*/", "", bodies[part.__name__], flags=re.S)
     members = [(kind, name) for kind, name in re.findall(r"([\w ]+?[ *]+)(\w+);", body)]
@@ -250,5 +250,5 @@ def test_the_text_is_plain_c99(tmp_path, size):
     source = tmp_path / "plan.c"
     door = "int first(void);\nint first(void) { return the_plan.schur.size; }\n"
     source.write_text(f'#include "plan.h"\n{text}{door}', encoding="utf-8")
-    command = [compiler(), *FLAGS, "-Werror", f"-I{RUNTIME}", "-c", str(source)]
+    command = [compiler(), *FLAGS, "-Werror", *INCLUDES, "-c", str(source)]
     subprocess.run([*command, "-o", str(tmp_path / "plan.o")], check=True, timeout=60)

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from fmi2 import DISCARD, ERROR, EXCHANGE, Library
 
-from lagfmu.compiler import find_compiler
+from lagfmu.fmu.compiler import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 

@@ -28,7 +28,7 @@ def run(one, steps):
     return record
 
 
-@pytest.mark.parametrize("method", ["auto", "dop853", "dopri5", "rk4", "radau5"])
+@pytest.mark.parametrize("method", ["auto", "dop853", "rk4", "radau5"])
 @pytest.mark.parametrize("before", [10, 31])
 def test_a_restored_state_repeats_the_motion_bit_for_bit(fmu, method, before):
     """From one state there is one future: also across the departure at 1.64 s, from a saved state and
@@ -118,7 +118,11 @@ def test_two_versions_with_one_file_name_are_both_right(tmp_path):
     same name in one process do not serve each other's equations."""
     paths = []
     for factor in (1.0, 2.0):
-        paths.append(build_fmu(particle("Same", factor), tmp_path / f"v{factor:g}", Scene("Same")))
+        paths.append(
+            build_fmu(
+                particle("Same", factor), tmp_path / f"v{factor:g}", Scene("Same"), check=False
+            )
+        )
     weights = []
     for path in (*paths, *paths):
         result = fmpy.simulate_fmu(str(path), stop_time=0.01, output_interval=0.01)
@@ -141,9 +145,9 @@ def test_two_models_in_one_process_are_both_right(fmu):
 BUILD = """
 import sys
 from pathlib import Path
-from lagfmu.build import write
-from lagfmu.prepare import prepare
-from lagfmu.modelfile import load
+from lagfmu.fmu.write import write
+from lagfmu.prepare.prepare import prepare
+from lagfmu.model.file import load
 file = load(sys.argv[1])
 for scene in file.scenes:
     write(prepare(file.model, scene), sys.argv[2], file.closed_forms)

@@ -6,11 +6,11 @@ import pytest
 from sympy import exp, simplify, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu.constraints import Kind, classify
-from lagfmu.pfaffian import fractions
-from lagfmu.pfaffian.fractions import Field, Fraction, gcd_bits
-from lagfmu.pfaffian.tower import Tower
-from lagfmu.pfaffian.undecided import Undecided
+from lagfmu.mechanics.integrability import fractions
+from lagfmu.mechanics.integrability.classify import Kind, classify
+from lagfmu.mechanics.integrability.fractions import Field, Fraction, gcd_bits
+from lagfmu.mechanics.integrability.tower import Tower
+from lagfmu.mechanics.integrability.undecided import Undecided
 
 a, b = symbols("a b")
 

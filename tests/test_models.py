@@ -12,11 +12,11 @@ from scipy.integrate import simpson
 from scipy.special import ellipk, ellipkinc
 
 from lagfmu import derive, simulate
-from lagfmu.model import Model
-from lagfmu.modelfile import ModelFile, load
-from lagfmu.prepare import prepare
-from lagfmu.proof import claims_of
-from lagfmu.verify import check_claim
+from lagfmu.fmu.claims import claims_of
+from lagfmu.model.file import ModelFile, load
+from lagfmu.model.model import Model
+from lagfmu.prepare.prepare import prepare
+from lagfmu.verification.verify import check_claim
 
 MODELS = Path(__file__).parent.parent / "models"
 g = 9.81  # m/s^2

@@ -19,20 +19,21 @@ from fmi2 import FUNCTIONS
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
+from runtime import INCLUDES
 from typer.testing import CliRunner
 
-from lagfmu import Contact, compiler
-from lagfmu.build import write
-from lagfmu.cli import app
-from lagfmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
+from lagfmu import Contact
+from lagfmu.cli.app import app
 from lagfmu.errors import BuildError
+from lagfmu.fmu import compiler
+from lagfmu.fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
 from lagfmu.fmu.native import runtime_files
-from lagfmu.prepare import prepare
+from lagfmu.fmu.write import write
+from lagfmu.prepare.prepare import prepare
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
 HERE = Path(__file__).parent
-RUNTIME = HERE.parent / "lagfmu" / "runtime"
 EXPORTS = {f"fmi2{name}" for name in FUNCTIONS}
 LONG = 600  # seconds: the first build for Windows compiles its C library
 
@@ -177,9 +178,9 @@ BUILD = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from lagfmu.build import write
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
+from lagfmu.fmu.write import write
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
 file = load(Path(sys.argv[1]))
 for s in file.scenes:
     if s.name == "PendulumCartesian":
@@ -227,7 +228,7 @@ def hemisphere_by(command: list[str], library: str, path: Path) -> np.ndarray:
 def build_host(target: str, folder: Path, suffix: str = "") -> str:
     """tests/host.c for a platform."""
     program = folder / f"host_{target}{suffix}"
-    command = [*cross().command, "-target", target, "-O1", f"-I{RUNTIME}", str(HERE / "host.c")]
+    command = [*cross().command, "-target", target, "-O1", *INCLUDES, str(HERE / "host.c")]
     libraries = [] if "windows" in target else ["-ldl"]
     subprocess.run([*command, "-o", str(program), *libraries], check=True, timeout=LONG)
     return str(program)
@@ -446,3 +447,9 @@ def test_rattle_is_refused_at_the_build_where_it_cannot_step(prepared, tmp_path)
     with pytest.raises(BuildError, match="native"):
         write(prepare(made.model, replace(made.scene, method="rattle")), tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_an_empty_cache_folder_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """LAGFMU_CACHE= is not the working folder: no compiled files are strewn about it."""
+    monkeypatch.setenv("LAGFMU_CACHE", "")
+    assert compiler._cache() != Path("")

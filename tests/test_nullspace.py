@@ -11,8 +11,8 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Model, Nonholonomic, Parameter
-from lagfmu.equations import EquationsOfMotion, derive
-from lagfmu.nullspace import accelerations, lambda_free, null_space
+from lagfmu.mechanics.equations import EquationsOfMotion, derive
+from lagfmu.mechanics.formulations.nullspace import accelerations, lambda_free, null_space
 
 x, y, z, r, theta, phi, psi = dynamicsymbols("x y z r theta phi psi")
 m, g, L, a, R, J = symbols("m g L a R J", positive=True)

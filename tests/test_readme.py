@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from lagfmu import simulate, verify
-from lagfmu.build import write
-from lagfmu.modelfile import load
-from lagfmu.prepare import prepare
+from lagfmu.fmu.write import write
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 

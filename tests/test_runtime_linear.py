@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from runtime import compile_library, compiler
 
-from lagfmu.elimination import plan
+from lagfmu.codegen.c.elimination import plan
 from lagfmu.solver.failure import StepFailureError
 from lagfmu.solver.linear import solve
 from lagfmu.solver.solution import Solution

@@ -17,16 +17,16 @@ import numpy as np
 import pytest
 from conftest import FILES
 from linkages import FOUR_BAR, TIME, rods
-from runtime import FLAGS, RUNTIME, compile_library, compiler
+from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compile_library, compiler
 from sympy import sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter, Scene
-from lagfmu.ccode import model_source
-from lagfmu.equations import derive
+from lagfmu.codegen.c.equations import model_source
+from lagfmu.codegen.py.equations import lower
 from lagfmu.errors import ModelError
-from lagfmu.numeric import lower
-from lagfmu.prepare import Prepared, prepare
+from lagfmu.mechanics.equations import derive
+from lagfmu.prepare.prepare import Prepared, prepare
 from lagfmu.solver import initial
 from lagfmu.solver.contacts import complementary_modes, impact
 from lagfmu.solver.failure import StartFailureError, StepFailureError
@@ -36,7 +36,7 @@ from lagfmu.solver.state import Settings
 
 EPS = np.finfo(float).eps
 ABOVE = {"fmi2.c", "instance.c", "exchange.c"}  # what stands on the solver
-SOURCES = sorted(path.name for path in RUNTIME.glob("*.c") if path.name not in ABOVE)
+SOURCES = sorted(name for name in RUNTIME_FILES if name.endswith(".c") and name not in ABOVE)
 BENCH = Path(__file__).with_name("solver_bench.c")
 
 x, y, s, theta = dynamicsymbols("x y s theta")
@@ -965,7 +965,7 @@ int main(int count, char **values) {
 
 
 def sanitizing_compiler(*arguments: str) -> None:
-    command = [compiler(), *FLAGS, *SANITIZE, "-Werror", f"-I{RUNTIME}", *arguments]
+    command = [compiler(), *FLAGS, *SANITIZE, "-Werror", *INCLUDES, *arguments]
     subprocess.run(command, check=True, timeout=300)
 
 
@@ -973,7 +973,7 @@ def sanitizing_compiler(*arguments: str) -> None:
 def sanitized(folder: Path) -> Path:
     """The runtime as a library, not to be loaded into Python, which is no sanitized program."""
     target = folder / "sanitized.so"
-    files = [str(RUNTIME / name) for name in SOURCES]
+    files = [str(RUNTIME_FILES[name]) for name in SOURCES]
     sanitizing_compiler("-shared", "-fPIC", "-o", str(target), *files)
     return target
 

@@ -17,15 +17,16 @@ from conftest import FILES, MODELS
 from rich.console import Console
 
 import lagfmu
-from lagfmu.model import name_of
-from lagfmu.stress import command, worker
-from lagfmu.stress.bench import Bench, Finding
-from lagfmu.stress.claims import magnitude
-from lagfmu.stress.command import stress
-from lagfmu.stress.judge import Check, first_landing
-from lagfmu.stress.lagrange import lay_beside
-from lagfmu.stress.player import RefusalError
-from lagfmu.stress.probe import (
+from lagfmu.cli.app import stress as command
+from lagfmu.cli.stress import stress
+from lagfmu.model.model import name_of
+from lagfmu.study.stress import worker
+from lagfmu.study.stress.bench import Bench, Finding
+from lagfmu.study.stress.claims import magnitude
+from lagfmu.study.stress.judge import Check, first_landing
+from lagfmu.study.stress.lagrange import lay_beside
+from lagfmu.study.stress.player import RefusalError
+from lagfmu.study.stress.probe import (
     CONSISTENT,
     REFUSED,
     RIGHT,
@@ -36,8 +37,8 @@ from lagfmu.stress.probe import (
     attempt,
     verdict,
 )
-from lagfmu.stress.report import VERDICTS, Stressed
-from lagfmu.stress.summary import as_summary
+from lagfmu.study.stress.report import VERDICTS, Stressed
+from lagfmu.study.stress.summary import as_summary
 
 
 @pytest.fixture(scope="module")
@@ -192,7 +193,7 @@ def test_a_solver_that_is_slightly_wrong_is_found(mutant, tmp_path):
         root / "lagfmu", tmp_path / "lagfmu", ignore=shutil.ignore_patterns("__pycache__")
     )
     file, old, new = MUTANTS[mutant]
-    source = tmp_path / "lagfmu" / "runtime" / file
+    (source,) = (tmp_path / "lagfmu" / "runtime").glob(f"*/{file}")
     text = source.read_text()
     assert text.count(old) == 1
     source.write_text(text.replace(old, CHANGED.get(new, new)))
@@ -257,10 +258,10 @@ def test_a_crash_is_one_wrong_row(native_fmu, monkeypatch, tmp_path):
     program = tmp_path / "worker.py"
     program.write_text(
         "import os, sys, time\n"
-        "import lagfmu.stress.worker as w\n"
-        "from lagfmu.stress.bench import Finding\n"
-        "from lagfmu.stress.judge import Check\n"
-        "from lagfmu.stress.probe import Probe\n"
+        "import lagfmu.study.stress.worker as w\n"
+        "from lagfmu.study.stress.bench import Finding\n"
+        "from lagfmu.study.stress.judge import Check\n"
+        "from lagfmu.study.stress.probe import Probe\n"
         "good = Finding((Check('x', 0.0, 1.0),))\n"
         "w.probes = lambda *_: [Probe('f', 'good', lambda b: good),\n"
         "    Probe('f', 'crash', lambda b: os.abort()), Probe('f', 'hang', lambda b: time.sleep(99)),\n"

@@ -9,9 +9,9 @@ import uuid
 from collections.abc import Collection, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
-from ..scene import Scene
-from ..units import Unit
-from ..variables import Value, Variable, VariableTable
+from ..interface.variables import Value, Variable, VariableTable
+from ..model.scene import Scene
+from ..model.units import Unit
 
 LOG_CATEGORIES = {
     "logStatusWarning": "start values that were moved, settings that were adjusted",

@@ -13,15 +13,15 @@ from pathlib import Path, PurePosixPath
 
 from pythonfmu.builder import FmuBuilder
 
-from ..equations import EquationsOfMotion
+from ..codegen.py.equations import source
+from ..codegen.py.parts import files_left_out, files_of_its_own
 from ..errors import BuildError
-from ..numeric import source
-from ..pyparts import files_left_out, files_of_its_own
-from ..reduction import Reduction
-from ..scene import Scene
-from ..solver.state import METHODS
+from ..interface.variables import VariableTable
+from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.formulations.minimal import Reduction
+from ..methods import IN_PYTHON
+from ..model.scene import Scene
 from ..solver.system import System
-from ..variables import VariableTable
 from .archive import pack, version
 from .description import model_description
 
@@ -50,7 +50,7 @@ Names are the model's: der_theta is the velocity of theta, lambda stands on the 
 """
 
 from {package}.fmu.slave import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
-from {package}.solver.system import Embedding, Row, System
+from {package}.solver.system import Embedding, Own, Row, System
 {equations}
 
 # name, type, what may set it, start, min, max, positive; the position is the reference
@@ -80,12 +80,12 @@ def build(
     extra: Mapping[str, bytes],
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
-    if scene.method not in METHODS:
+    if scene.method not in IN_PYTHON:
         raise BuildError(
             f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
-            f"{', '.join(METHODS)}, or the target native"
+            f"{', '.join(IN_PYTHON)}, or the target native"
         )
-    methods = tuple(m for m in scene.selectable if m in METHODS)
+    methods = tuple(m for m in scene.selectable if m in IN_PYTHON)
     table = table.offering(methods)
     runtime = _runtime(scene, system)
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"

@@ -10,19 +10,21 @@ from dataclasses import asdict, dataclass, field, fields
 
 from .stiffness import Choice
 
-METHODS = ("auto", "dop853", "dopri5", "rk4", "radau5")
 DEFAULT_TOLERANCE = 1e-8
 SMALLEST_TOLERANCE = 1e-14
+MAXIMUM_STEPS = 5000.0  # that make no headway, in one communication step
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to step: the method, the relative tolerance, the step [s] of rk4, the largest step [s]."""
+    """How to step: the method, the relative tolerance, the step [s] of rk4, the largest step [s], and how
+    many steps shorter than 1e-6 of the natural time a communication step may take (0: no limit)."""
 
     method: str = "auto"
     tolerance: float = DEFAULT_TOLERANCE
     step: float = 0.0
     maximum_step: float = 0.0
+    maximum_steps: float = MAXIMUM_STEPS
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class State:
     q, v (n); closed, armed, departures: one entry a contact; offset (m): the level f = offset that a
     constraint keeps which came back with its contact; scale (2 n): the magnitudes below which errors
     in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
-    below which a contact touches; step [s]: the next step to try; rate [1/s]: the motion's
+    below which a contact touches; step [s]: the next step to try; span [s]: the communication step that
+    led to t (0: none); rate [1/s]: the motion's
     natural rate at the start; choice: what `auto` remembers.
     """
 
@@ -57,6 +60,7 @@ class State:
     gap: tuple[float, ...]
     rate: float
     step: float
+    span: float
     steps: int
     departures: tuple[Departure, ...]
     choice: Choice = field(default_factory=Choice)

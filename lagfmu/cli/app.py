@@ -1,0 +1,472 @@
+"""The `lagfmu` command: build, show, verify, simulate.  Errors are one message, never a traceback."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import enum
+import sys
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from ..api import package
+from ..errors import LagfmuError, SimulationError, VerificationError
+from ..fmu.archive import version
+from ..fmu.compiler import HOST, NAMES
+from ..fmu.native import takes_long
+from ..interface.variables import VariableTable
+from ..live.command import write_page
+from ..model.file import ModelFile, load
+from ..model.scene import Scene
+from ..prepare.prepare import prepare
+from ..study.stress.probe import WRONG
+from ..study.tradeoff.goal import parse
+from ..study.tradeoff.page import section
+from ..verification.simulate import read_description, simulate
+from ..verification.verify import Verification, verify
+from .options import (
+    Contacts,
+    Derivatives,
+    Fixed,
+    Formulation,
+    Inputs,
+    Method,
+    Methods,
+    Name,
+    Outputs,
+    narrowed,
+)
+from .plot import plot
+from .show import show as show_prepared
+from .stress import LIMIT
+from .stress import stress as stress_fmus
+from .terminal import new_table, prepare_streams, print_whole
+from .tradeoff import chosen_for, compare
+
+app = typer.Typer(
+    help="Lagrange's equations with multipliers, from SymPy to FMUs that report forces of constraint.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+console = Console()
+errors = Console(stderr=True)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"lagfmu {version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def prepared_streams(
+    _: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Lagrange's equations with multipliers, from SymPy to FMUs that report forces of constraint."""
+    prepare_streams()
+
+
+class Target(enum.StrEnum):
+    """What an FMU is made of."""
+
+    python = "python"
+    native = "native"
+
+
+ModelPath = Annotated[Path, typer.Argument(help="A Python file that defines a Model.")]
+FmuPath = Annotated[Path, typer.Argument(help="An FMU built by lagfmu.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter or start value; repeatable."),
+]
+Tolerance = Annotated[
+    float | None, typer.Option(help="Relative tolerance: speed against accuracy.")
+]
+StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
+StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
+
+
+@contextlib.contextmanager
+def _plainly() -> Iterator[None]:
+    """Warnings and errors as one message each; exit status 1 after an error."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield
+        except LagfmuError as error:
+            errors.print(
+                f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
+            )
+            raise typer.Exit(1) from None
+        finally:
+            for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
+                errors.print(
+                    f"[yellow]warning:[/] {escape(message)}", highlight=False, soft_wrap=True
+                )
+
+
+def _ours(warning: Any) -> bool:
+    return str(getattr(warning.category, "__module__", "")).startswith("lagfmu")
+
+
+@app.command()
+def build(
+    model: ModelPath,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist"),
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
+    ] = None,
+    check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
+    target: Annotated[
+        Target, typer.Option(help="python: needs Python where it runs. native: compiled C.")
+    ] = Target.python,
+    platforms: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--platforms",
+            metavar="all|host|NAME...",
+            help=f"Where a native FMU can run: host, all, or some of {', '.join(NAMES)}; repeatable.",
+        ),
+    ] = None,
+    accuracy: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ERROR[:OUTPUT,...]",
+            help="Measure, and build with the cheapest solver settings and formulation that hold this "
+            "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
+        ),
+    ] = None,
+    outputs: Outputs = None,
+    fixed: Fixed = None,
+    inputs: Inputs = None,
+    contacts: Contacts = None,
+    methods: Methods = None,
+    method: Method = None,
+    formulation: Formulation = None,
+    derivatives: Derivatives = None,
+    name: Name = None,
+) -> None:
+    """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
+    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
+    needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
+    narrowing = (outputs, fixed, inputs, contacts, methods, method)
+    failed = False
+    kind = target.value
+    places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
+    with _plainly():
+        if platforms and target is Target.python:
+            raise LagfmuError(
+                "--platforms is for --target native: a python FMU has no binaries of ours"
+            )
+        file = load(model)
+        for s in narrowed(_chosen(file, scene), **needs):
+            choice = ""
+            if s.accuracy is not None:
+                chosen = chosen_for(file, s, parse(s.accuracy), kind, console)
+                s, choice = chosen.scene, section(chosen)
+            with console.status(
+                f"building {'and verifying ' if check else ''}{s.name}{_first_time(target, places)}"
+            ):
+                prepared = prepare(file.model, s)
+                if name is None and any(v is not None for v in narrowing):
+                    _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
+                built = package(
+                    prepared, out / kind, file.closed_forms, kind, places, choice, check
+                )
+            path, found = built.path, built.verification
+            console.print(
+                f"[green]built[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
+                soft_wrap=True,
+            )
+            if found is not None:
+                _print(found)
+                failed |= not found.passed
+    if failed:
+        raise typer.Exit(1)
+
+
+def _keep_the_full_one(path: Path, table: VariableTable) -> None:
+    """Refuse to replace an FMU by one of the same name that shows less."""
+    if not path.is_file():
+        return
+    with contextlib.suppress(VerificationError):  # what is no FMU may be replaced
+        shown = {v.name for v in read_description(path).modelVariables}
+        lost = sorted(shown - {v.name for v in table.variables})
+        if lost:
+            more = f", and {len(lost) - 3} more" if len(lost) > 3 else ""
+            raise LagfmuError(
+                f"{path} is there and shows more than this scene ({', '.join(lost[:3])}{more}): give "
+                "this one a name of its own with --name, or another folder with --out"
+            )
+
+
+def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
+    """A word of patience where the runtime has to be compiled first."""
+    if target is Target.native and takes_long(platforms):
+        return " (the runtime is compiled first: for Windows the C library too, about a minute)"
+    return ""
+
+
+@app.command()
+def show(
+    model: ModelPath,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of the file.")] = None,
+    outputs: Outputs = None,
+    fixed: Fixed = None,
+    inputs: Inputs = None,
+    contacts: Contacts = None,
+    methods: Methods = None,
+    method: Method = None,
+    formulation: Formulation = None,
+    derivatives: Derivatives = None,
+) -> None:
+    """Print equations of motion, classification of constraints, degrees of freedom and units.
+
+    Of a scene that needs less than everything, also what was pruned and what that saved.
+    """
+    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    needs |= {"contacts": contacts, "methods": methods, "method": method}
+    needs |= {"formulation": formulation, "derivatives": derivatives}
+    with _plainly():
+        file = load(model)
+        for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
+            show_prepared(prepare(file.model, s), console)
+
+
+@app.command(name="verify")
+def verify_command(
+    fmu: FmuPath,
+    set_: Settings = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Tolerance = None,
+) -> None:
+    """Simulate an FMU through fmpy and hold it against the closed forms that it carries."""
+    with _plainly():
+        found = verify(fmu, _assignments(set_), stop_time, step_size, tolerance)
+        _print(found)
+    if not found.passed:
+        raise typer.Exit(1)
+
+
+@app.command(name="simulate")
+def simulate_command(
+    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    set_: Settings = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Tolerance = None,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    plot_: Annotated[
+        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
+    ] = None,
+    variable: Annotated[
+        list[str] | None,
+        typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
+) -> None:
+    """Simulate an FMU or a model; print the last values, plot or save the rest."""
+    with _plainly():
+        source: Any = target
+        if target.suffix == ".py":
+            file = load(target)
+            source = prepare(file.model, _chosen(file, None if scene is None else [scene])[0])
+            name = source.scene.name
+            variables = source.table.variables
+            units = {v.name: v.unit.name for v in variables if v.unit is not None}
+        else:
+            description = read_description(target)
+            name, variables = description.modelName, description.modelVariables
+            units = {v.name: v.unit for v in variables if v.unit}
+        known = {v.name: v.causality for v in variables if v.causality != "parameter"}
+        besides = _besides(variable or (), known)
+        given = _assignments(set_)
+        with console.status(f"simulating {name}"):
+            result = simulate(source, stop_time, step_size, tolerance, given, besides=besides)
+        _print_last(name, result, units, variable or ())
+        if csv is not None:
+            _save(csv, result)
+            console.print(f"[green]wrote[/] {escape(str(csv))}", soft_wrap=True)
+        if plot_ is not None:
+            console.print(
+                f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
+                soft_wrap=True,
+            )
+
+
+@app.command()
+def page(
+    target: Annotated[
+        Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or a native FMU.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
+    ] = None,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+) -> None:
+    """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
+    with _plainly():
+        chosen = None
+        if target.suffix == ".py":
+            chosen = _chosen(load(target), None if scene is None else [scene])[0]
+        elif scene is not None:
+            raise LagfmuError(f"--scene {scene}: an FMU is one scene; leave it out")
+        with console.status("compiling to WebAssembly"):
+            path = write_page(target, out, chosen)
+        console.print(
+            f"[green]wrote[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
+            soft_wrap=True,
+        )
+
+
+@app.command()
+def tradeoff(
+    targets: Annotated[
+        list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path(
+        "dist/tradeoff"
+    ),
+    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
+    ] = None,
+    step_size: Annotated[
+        list[float] | None, typer.Option(help="Communication step in s; repeatable.")
+    ] = None,
+    tolerance: Annotated[
+        list[float] | None, typer.Option(help="Relative tolerance; repeatable.")
+    ] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Solver method; repeatable.")] = None,
+    repeats: Annotated[int | None, typer.Option(help="Timed runs of each setting.")] = None,
+) -> None:
+    """Measure error against wall time over methods, tolerances and communication steps."""
+    with _plainly():
+        compare(
+            targets,
+            out,
+            console,
+            target.value,
+            step_size or (),
+            tolerance or (),
+            method or (),
+            repeats,
+            scene or (),
+        )
+
+
+@app.command()
+def stress(
+    targets: Annotated[
+        list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist/stress"),
+    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Some of the probes only.")] = False,
+    limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = LIMIT,
+) -> None:
+    """Push FMUs to the extremes: each row is right, refused with a clear message, or wrong."""
+    with _plainly():
+        found = stress_fmus(targets, out, console, target.value, scene or (), quick, limit)
+    if any(f.count(WRONG) for f in found):
+        raise typer.Exit(1)
+
+
+def _chosen(file: ModelFile, names: list[str] | None) -> list[Scene]:
+    """The scenes of a file that are called so; all of them without names."""
+    known = [s.name for s in file.scenes]
+    unknown = ", ".join(repr(n) for n in names or [] if n not in known)
+    if unknown:
+        raise LagfmuError(f"{file.path}: no FMU is called {unknown}; known: {', '.join(known)}")
+    return [s for s in file.scenes if names is None or s.name in names]
+
+
+def _assignments(texts: list[str] | None) -> dict[str, Any]:
+    """NAME=VALUE texts as a dict of numbers; the value of solver.method stays text."""
+    values: dict[str, Any] = {}
+    for text in texts or []:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not sign or not name:
+            raise SimulationError(f"--set {text!r}: expected NAME=VALUE, e.g. --set theta=0.5")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            if name != "solver.method":
+                raise SimulationError(f"--set {text!r}: {value!r} is no number") from None
+            values[name] = value
+    return values
+
+
+def _print(found: Verification) -> None:
+    title = f"{found.name}: {'pass' if found.passed else 'FAIL'}"
+    table = new_table(title, "statement", "largest error", "allowed", "verdict", text=["statement"])
+    for row, check in zip(found.rows(), found.checks, strict=True):
+        colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
+        table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
+    print_whole(console, table)
+    if not found.claims:
+        console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
+    for check in found.checks:
+        if not check.passed and check.detail:
+            errors.print(
+                f"[red]{escape(check.name)}:[/] {escape(check.detail)}",
+                highlight=False,
+                soft_wrap=True,
+            )
+
+
+def _besides(names: Sequence[str], known: Mapping[str, str]) -> list[str]:
+    """Those of the names that are no outputs: inputs, and local variables.
+
+    Raises SimulationError with all that is unknown.
+    """
+    unknown = [n for n in names if n not in known and n != "time"]
+    if unknown:
+        near = {n: difflib.get_close_matches(n, known, 1) for n in unknown}
+        hints = [f"{n!r} (did you mean {m[0]!r}?)" if (m := near[n]) else repr(n) for n in unknown]
+        raise SimulationError(
+            f"--variable: there is no {', '.join(hints)}, expected some of {', '.join(known)}"
+        )
+    return [n for n in names if n in known and known[n] != "output"]
+
+
+def _print_last(
+    name: str, result: Any, units: Mapping[str, str], names: Sequence[str] = ()
+) -> None:
+    """The last values of the named variables, of all outputs without names."""
+    table = new_table(f"{name} at t = {result['time'][-1]:g} s", "variable", "value", "unit")
+    table.columns[0].justify = table.columns[2].justify = "left"
+    for n in names or result.dtype.names[1:]:
+        value = result[n][-1]
+        text = f"{value:.9g}" if result[n].dtype.kind == "f" else str(value)
+        table.add_row(escape(n), text, escape(units.get(n, "")))
+    print_whole(console, table)
+
+
+def _save(path: Path, result: Any) -> None:
+    import fmpy.util
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        fmpy.util.write_csv(str(path), result)
+    except OSError as error:
+        raise SimulationError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+
+
+def main() -> None:
+    """Entry point of `python -m lagfmu`."""
+    sys.exit(app())

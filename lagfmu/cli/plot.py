@@ -1,0 +1,132 @@
+"""A picture of a simulation: multipliers on top, the motion below, departures marked."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import BuildError
+from ..verification.simulate import Trajectory
+
+COLOURS = ("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72", "#6940a5", "#64473a")
+DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # once the colours are used up
+PER_COLUMN = 8  # curves in one column of a legend, which stands beside its panel
+
+
+def default_names(names: Sequence[str]) -> list[str]:
+    """What is plotted unless the user says otherwise: every lambda, then the coordinates."""
+    lam = [n for n in names if n.startswith("lambda.")]
+    coordinates = [n[4:-3] for n in names if n.startswith("der(") and n.endswith(",2)")]
+    return lam + coordinates
+
+
+def plot(
+    result: Trajectory,
+    units: Mapping[str, str],
+    out: str | os.PathLike[str],
+    names: Sequence[str] = (),
+    title: str = "",
+) -> Path:
+    """Write a figure (the ending of `out` says the format), one panel a unit.
+
+    Raises BuildError if a name is unknown or the file cannot be written.
+    """
+    known = list(result.dtype.names or ())
+    chosen = list(names) or default_names(known)
+    unknown = [n for n in chosen if n not in known]
+    if unknown or not chosen:
+        raise BuildError(
+            f"cannot plot {', '.join(unknown) or 'nothing'}: expected names among {', '.join(known)}"
+        )
+    path = Path(out)
+    with panels(result, units, chosen) as (figure, _):
+        if title:
+            figure.suptitle(title, fontsize=12)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            metadata = {"Date": None} if path.suffix == ".svg" else {}
+            figure.savefig(path, metadata=metadata, dpi=150)
+        except (OSError, ValueError) as error:
+            raise BuildError(f"cannot write the figure {str(path)!r}: {error}") from None
+    return path
+
+
+@contextlib.contextmanager
+def panels(
+    result: Trajectory, units: Mapping[str, str], chosen: Sequence[str]
+) -> Iterator[tuple[Any, list[Any]]]:
+    """The figure and its panels, one a unit, multipliers first; it is gone afterwards."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    known = list(result.dtype.names or ())
+    members_of: dict[tuple[bool, str], list[str]] = {}
+    for n in chosen:
+        members_of.setdefault((not n.startswith("lambda."), units.get(n, "")), []).append(n)
+    style: dict[str, Any] = {
+        "svg.hashsalt": "lagfmu",
+        "font.size": 11,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.grid": True,
+        "grid.alpha": 0.3,
+    }
+    with plt.rc_context(style):
+        figure, axes = plt.subplots(
+            len(members_of),
+            1,
+            sharex=True,
+            squeeze=False,
+            figsize=(7.5, 1.2 + 2.1 * len(members_of)),
+            layout="constrained",
+        )
+        for axis, ((_, unit), members) in zip(axes[:, 0], members_of.items(), strict=True):
+            for k, n in enumerate(members):
+                turn, colour = divmod(k, len(COLOURS))
+                axis.plot(
+                    result["time"],
+                    result[n],
+                    color=COLOURS[colour],
+                    linestyle=DASHES[turn % len(DASHES)],
+                    label=n,
+                    linewidth=1.8,
+                )
+            axis.set_ylabel(unit if unit != "1" else "")
+            axis.margins(x=0)
+            _mark_departures(axis, result, known, named=axis is axes[0, 0])
+            axis.legend(
+                frameon=False,
+                loc="upper left",
+                bbox_to_anchor=(1.01, 1.0),
+                fontsize=10,
+                borderaxespad=0.0,
+                ncols=1 + (len(members) - 1) // PER_COLUMN,
+            )
+        axes[-1, 0].set_xlabel("time in s")
+        try:
+            yield figure, list(axes[:, 0])
+        finally:
+            plt.close(figure)
+
+
+def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:
+    for n in known:
+        if n.startswith("departure.") and n.endswith(".count") and result[n][-1] > 0:
+            contact = n.split(".")[1]
+            moment = float(result[f"departure.{contact}.time"][-1])
+            axis.axvline(moment, color="#888888", linewidth=1, linestyle="--")
+            if named:
+                axis.annotate(
+                    f" leaves {contact} ",
+                    (moment, 1.0),
+                    xycoords=("data", "axes fraction"),
+                    ha="right" if moment > result["time"][-1] / 2 else "left",
+                    va="top",
+                    fontsize=9,
+                    color="#555555",
+                )

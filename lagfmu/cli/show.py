@@ -1,0 +1,155 @@
+"""What `lagfmu show` prints: equations of motion, classes of constraints, degrees of freedom, units."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import sympy as sp
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..mechanics.equations import TIME, EquationsOfMotion
+from ..mechanics.integrability.classify import Classification, classify
+from ..model.model import Contact, Nonholonomic, name_of
+from ..page.documentation import shown
+from ..page.savings import Savings, savings
+from ..page.typeset import Notation, typeset
+
+if TYPE_CHECKING:
+    from ..prepare.prepare import Prepared
+
+
+def show(prepared: Prepared, console: Console) -> None:
+    """Print what is known about a model in a scene.
+
+    Raises DerivationError if the nonholonomic constraints contradict each other.
+    """
+    model, scene, structure = prepared.model, prepared.scene, prepared.structure
+    head = Text(scene.name, style="bold")
+    if scene.name != model.name:
+        head.append(f"  (model {model.name})", style="not bold dim")
+    console.print(head)
+    if model.description:
+        console.print(Text(model.description))
+    console.print(Text(f"formulation: {scene.formulation}", style="dim"))
+
+    for section in typeset(prepared.equations, prepared.reduction, prepared.formulation):
+        if section.equations:
+            _heading(console, section.title)
+        width = max((len(e.label) for e in section.equations), default=0)
+        for equation in section.equations:
+            line = Text("  ")
+            line.append(f"{equation.label:{width}}   ", style="dim")
+            line.append(equation.text)
+            console.print(line, soft_wrap=True)
+
+    if prepared.equations.constraints:
+        _heading(console, "Classes of constraints")
+        _classes(prepared.equations, console)
+
+    _heading(console, "Degrees of freedom")
+    count = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
+    console.print(Text(count))
+    if structure.redundant:
+        names = ", ".join(structure.redundant)
+        console.print(Text(f"  redundant: {names} (λ is shared with least norm, Q is unique)"))
+
+    saved = savings(prepared)
+    if saved is not None:
+        _heading(console, "What the scene leaves out")
+        _savings(saved, console)
+
+    _heading(console, "Units")
+    console.print(_units(prepared))
+    _heading(console, "Start values")
+    _starts(prepared, console)
+    console.print()
+
+
+def _savings(saved: Savings, console: Console) -> None:
+    for text in saved.left_out:
+        console.print(Text(f"  {text}"), soft_wrap=True)
+    table = Table(box=None, header_style="dim", padding=(0, 2))
+    for column in ("", "full FMU", "this scene"):
+        table.add_column(column, justify="right" if column else "left")
+    for title, before, after in saved.rows():
+        table.add_row(title, str(before), Text(str(after), style="" if before == after else "bold"))
+    console.print(table)
+
+
+def _heading(console: Console, title: str) -> None:
+    console.print()
+    console.print(Text(title, style="bold"))
+
+
+def _classes(eom: EquationsOfMotion, console: Console) -> None:
+    width = max(len(c.name) for c in eom.constraints)
+    forms = {}
+    for c, f in zip(eom.constraints, eom.f, strict=True):
+        closed = getattr(c, "while_closed", None)
+        note = f", while {closed} is closed" if closed is not None else ""
+        if isinstance(c, Nonholonomic):
+            forms[c.name] = sp.sympify(c.expression)
+            found = classify(forms[c.name], list(eom.model.coordinates))
+            _class(eom, console, f"{c.name:{width}}", found, note)
+            continue
+        kind = "contact (unilateral, holonomic while closed)"
+        if not isinstance(c, Contact):
+            kind = "holonomic"
+        if f is not None and f.free_symbols & {TIME, *eom.u}:
+            kind += ", rheonomic"
+        _line(console, f"{c.name:{width}}", kind + note)
+    if len(forms) > 1:
+        found = classify(list(forms.values()), list(eom.model.coordinates))
+        _class(eom, console, " and ".join(forms), found, "")
+
+
+def _class(
+    eom: EquationsOfMotion, console: Console, label: str, found: Classification, note: str
+) -> None:
+    """The kind, with its certificate and the functions whose derivative it is."""
+    _line(console, label, str(found.kind) + note)
+    names = "|".join(name_of(q) for q in eom.model.coordinates)
+    certificate = re.sub(rf"\b({names})\(t\)", r"\1", found.certificate)
+    console.print(Text(f"      {certificate}", style="dim"), soft_wrap=True)
+    notation = Notation(eom)
+    for integral in found.integrals:
+        text = notation.show(eom.plain(integral.f))[1]
+        console.print(Text(f"      keeps {text} constant"), soft_wrap=True)
+
+
+def _line(console: Console, label: str, text: str) -> None:
+    line = Text("  ")
+    line.append(f"{label}   ", style="dim")
+    line.append(text)
+    console.print(line, soft_wrap=True)
+
+
+def _units(prepared: Prepared) -> Table:
+    table = Table(box=None, header_style="dim", padding=(0, 2))
+    for column in ("variable", "unit", "description"):
+        table.add_column(column, overflow="fold")
+    eom = prepared.equations
+    names = [str(q) for q in eom.q]
+    if prepared.reduction is not None:
+        names += [str(s) for s in prepared.reduction.s if s not in eom.q]
+    names += [f"lambda.{c.name}" for c in eom.constraints]
+    names += [f"Q.{q}" for q in eom.q if f"Q.{q}" in prepared.table]
+    names += [o.name for o in eom.outputs]
+    for name in (n for n in names if n in prepared.table):
+        v = prepared.table[name]
+        table.add_row(Text(name), Text(shown(v.unit) or "1"), Text(v.description))
+    return table
+
+
+def _starts(prepared: Prepared, console: Console) -> None:
+    """Which start values miss the constraints, and where they are moved to."""
+    moved = prepared.structure.start.moved
+    if not moved:
+        console.print(Text("  as given: they satisfy the constraints"))
+    for name, given, used in moved:
+        unit = shown(prepared.whole[name].unit)
+        text = f"  {name} = {given:.10g} is projected to {used:.10g} {unit}".rstrip()
+        console.print(Text(text))

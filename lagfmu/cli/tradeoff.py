@@ -1,0 +1,171 @@
+"""`lagfmu tradeoff`, and what `lagfmu build --accuracy` does: progress, tables, files."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
+
+from ..errors import BuildError, LagfmuError
+from ..fmu.write import write, write_whole
+from ..methods import INTEGRATORS, unknown
+from ..model.file import ModelFile, load
+from ..model.model import Model
+from ..model.scene import Scene
+from ..prepare.prepare import prepare
+from ..study.tradeoff.choose import Choice, choose
+from ..study.tradeoff.figure import draw
+from ..study.tradeoff.goal import Goal
+from ..study.tradeoff.importer import Importer
+from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure
+from ..study.tradeoff.report import as_csv, as_json, digits, remarks, summary, table
+
+WIDTH = 110  # of tables that go into a file
+
+
+@contextlib.contextmanager
+def progress(console: Console, title: str) -> Iterator[Tick]:
+    """A bar that goes when the work is done; what it yields is told how far it has come."""
+    columns = (
+        SpinnerColumn(),
+        TextColumn(escape(title)),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[what]}"),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=None, what="")
+
+        def tick(what: str, done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total, what=escape(what))
+
+        yield tick
+
+
+def compare(
+    paths: Sequence[Path],
+    out: Path,
+    console: Console,
+    target: str = "python",
+    communications: Sequence[float] = (),
+    tolerances: Sequence[float] = (),
+    methods: Sequence[str] = (),
+    repeats: int | None = None,
+    scenes: Sequence[str] = (),
+) -> list[Tradeoff]:
+    """Measure model files and FMUs, print tables, write OUT/TARGET/NAME.json, .csv, .svg and .png.
+
+    Raises LagfmuError with the causes for what cannot be built or run, when the rest is done.
+    """
+    wrong = [m for m in methods if m not in INTEGRATORS]
+    if wrong:
+        raise BuildError("; ".join(unknown(m, INTEGRATORS) for m in wrong))
+    numbers = [*communications, *tolerances, *([] if repeats is None else [repeats])]
+    if not all(0 < x < float("inf") for x in numbers):
+        raise BuildError("communication steps, tolerances and repeats must be positive numbers")
+    found: list[Tradeoff] = []
+    problems: list[str] = []
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+        for item in _work(paths, scenes):
+            try:
+                fmu = _fmu(item, Path(folder), target, console)
+                with Importer(fmu) as importer:
+                    plan = default_plan(importer)
+                if communications:
+                    plan = replace(plan, communications=tuple(sorted(set(communications))))
+                if tolerances:
+                    plan = replace(plan, tolerances=tuple(sorted(set(tolerances), reverse=True)))
+                if methods:
+                    plan = replace(plan, methods=tuple(methods))
+                found.append(_one(fmu, plan, repeats, out, console))
+            except LagfmuError as error:
+                problems.append(str(error))  # the others are measured all the same
+    if len(found) > 1:
+        console.print(summary(found))
+    if problems:
+        raise BuildError("\n".join(problems))
+    return found
+
+
+def _one(fmu: Path, plan: Plan, repeats: int | None, out: Path, console: Console) -> Tradeoff:
+    with progress(console, fmu.stem) as tick:
+        one = measure(fmu, plan, tick, repeats)
+    for h in one.floor:
+        console.print(table(one, h))
+    for line in remarks(one):
+        console.print(f"  {escape(line)}", highlight=False, soft_wrap=True)
+    stem = out / one.target / one.name
+    write_whole(stem.with_suffix(".json"), as_json(one).encode())
+    write_whole(stem.with_suffix(".csv"), as_csv(one).encode())
+    draw(one, [stem.with_suffix(".svg"), stem.with_suffix(".png")])
+    console.print(f"[green]wrote[/] {escape(str(stem))}.json, .csv, .svg, .png", soft_wrap=True)
+    return one
+
+
+def _work(paths: Sequence[Path], scenes: Sequence[str]) -> list[Path | tuple[ModelFile, Scene]]:
+    """The FMUs among the paths, and what is to be built of the model files among them."""
+    work: list[Path | tuple[ModelFile, Scene]] = []
+    for path in paths:
+        if path.suffix == ".py":
+            file = load(path)
+            work += [(file, s) for s in file.scenes if not scenes or s.name in scenes]
+        else:
+            work.append(path)
+    if not work:
+        raise BuildError(f"no FMU is called {', '.join(scenes)}")
+    return work
+
+
+def _fmu(item: Path | tuple[ModelFile, Scene], folder: Path, target: str, console: Console) -> Path:
+    if isinstance(item, Path):
+        return item
+    file, scene = item
+    with console.status(f"building {scene.name}"):
+        return write(prepare(file.model, scene), folder / target, file.closed_forms, target=target)
+
+
+def chosen_for(file: ModelFile, scene: Scene, goal: Goal, target: str, console: Console) -> Choice:
+    """Measure, choose and say what was chosen.  Raises BuildError if nothing holds the accuracy."""
+    with progress(console, scene.name) as tick:
+        choice = choose(file.model, scene, file.closed_forms, goal, tick, target)
+    measured, option = choice.survey, choice.option
+    own = 1e3 * option.row.median / measured.simulated
+    console.print(
+        f"[green]chosen[/] for {escape(str(goal))}: {option}; error {option.error:.1e} on the scene, "
+        f"{choice.held_out_error:.1e} at most on held-out values; {digits(own)} ms per simulated "
+        f"second, {digits(1e3 * measured.floor / measured.simulated)} of them fmpy's own calls; "
+        f"{option.row.steps} steps",
+        highlight=False,
+        soft_wrap=True,
+    )
+    for failed, error in choice.failed:
+        console.print(
+            f"  refused: {failed} ({failed.error:.1e} on the scene, {error:.1e} elsewhere)",
+            highlight=False,
+            soft_wrap=True,
+        )
+    for line in measured.dropped:
+        console.print(f"  not available: {escape(line)}", highlight=False, soft_wrap=True)
+    moved = _interface(file.model, scene, choice)
+    if moved:
+        console.print(f"  [yellow]note:[/] {escape(moved)}", soft_wrap=True)
+    return choice
+
+
+def _interface(model: Model, scene: Scene, choice: Choice) -> str:
+    """What an importer notices of another formulation."""
+    if choice.scene.formulation == scene.formulation or choice.scene.formulation != "minimal":
+        return ""
+    names = ", ".join(str(s.func) for s in model.embedding.coordinates) if model.embedding else ""
+    return (
+        f"the formulation minimal takes start values of {names} and their velocities only; name "
+        "another in the scene to keep those of all coordinates"
+    )

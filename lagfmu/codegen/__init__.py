@@ -1,0 +1,1 @@
+"""Equations and variable table as source code."""

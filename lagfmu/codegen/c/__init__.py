@@ -1,0 +1,1 @@
+"""C99: the only place that prints C."""

@@ -1,0 +1,280 @@
+"""Lists of expressions -> C functions that compute them, named as in the model.
+
+A function unpacks the symbols that it needs, computes common subexpressions, then the results, each
+with a comment that says its place.  A long one is split into blocks of bounded length, each a function
+of its own: eliminating common subexpressions, here and in a compiler, costs more than linearly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from textwrap import wrap
+from typing import Any
+
+import sympy as sp
+from sympy.logic.boolalg import Boolean
+
+from .printer import POWER, Printer
+from .subexpressions import Names, common_subexpressions
+
+Expr = Any
+BLOCK = 1000  # different nodes of the expressions in one block
+TERMS = 40  # of one sum in one statement
+RUN = 6  # equal neighbours that are worth a loop
+FILL = (
+    "static void fill(double *values, int count, double value) {\n"
+    "    for (int i = 0; i < count; i++) {\n        values[i] = value;\n    }\n}\n"
+)
+
+
+@dataclass(frozen=True)
+class Result:
+    """One value to compute: expression, and what stands in the comment behind it."""
+
+    value: Expr
+    place: str
+
+
+@dataclass(frozen=True)
+class _Statement:
+    """array[index] operator value, or `count` equal values from there on."""
+
+    array: str
+    index: int
+    operator: str
+    value: Expr
+    place: str
+    count: int = 1
+
+
+def function(
+    name: str,
+    doc: str,
+    arguments: Mapping[str, Sequence[Expr]],
+    results: Mapping[str, Sequence[Result]],
+    names: Mapping[Expr, str],
+) -> str:
+    """C text of `name(arguments, results)`.
+
+    `arguments` maps an array to the symbols in it, a scalar to its one symbol, which has its name.
+    """
+    statements = [s for array, group in results.items() for s in _statements(array, group)]
+    blocks = list(_blocks(statements))
+    if len(blocks) > 1:
+        return _in_blocks(name, doc, arguments, list(results), blocks, names)
+    return f"/* {doc} */\n{_define(name, arguments, list(results), statements, names)}"
+
+
+def _define(
+    name: str,
+    arguments: Mapping[str, Sequence[Expr]],
+    results: Sequence[str],
+    statements: Sequence[_Statement],
+    names: Mapping[Expr, str],
+) -> str:
+    body, used = _body(statements, arguments, names)
+    silence = _silence([a for a in (*arguments, *results) if a not in used])
+    return f"{_signature(name, arguments, names, results)}{silence}{body}}}\n"
+
+
+def _in_blocks(
+    name: str,
+    doc: str,
+    arguments: Mapping[str, Sequence[Expr]],
+    results: Sequence[str],
+    blocks: Sequence[Sequence[_Statement]],
+    names: Mapping[Expr, str],
+) -> str:
+    """A function for what blocks share, one for each block, and one that calls them in order.
+
+    It calls them through a table, because compilers would join functions that are called once.
+    """
+    parts, calls, inner = [], "", dict(arguments)
+    shared = {e: sp.Symbol(f"shared {k}", real=True) for k, e in enumerate(_shared(blocks))}
+    if shared:
+        common = [_Statement("shared", k, "=", e, "") for k, e in enumerate(shared)]
+        blocks = [[replace(s, value=s.value.xreplace(shared)) for s in block] for block in blocks]
+        parts.append(_define(f"{name}_shared", arguments, ["shared"], common, names))
+        calls = f"    double shared[{len(shared)}];\n"
+        calls += _lines(f"    {name}_shared(", [*arguments, "shared"], ", ", ");")
+        inner["shared"] = tuple(shared.values())
+        names = {**names, **_distinct(inner["shared"], set(names.values()))}
+    titles = [f"{name}_{k}" for k in range(1, len(blocks) + 1)]
+    for title, block in zip(titles, blocks, strict=True):
+        parts.append(_define(title, inner, results, block, names))
+    types = ["double" if _scalar(a, s, names) else "const double *" for a, s in inner.items()]
+    types += ["double *"] * len(results)
+    calls += _lines("    static void (*const blocks[])(", types, ", ", ") = {")
+    calls += _lines("        ", titles, ", ", "};")
+    calls += "    for (size_t k = 0; k < sizeof blocks / sizeof blocks[0]; k++) {\n"
+    calls += _lines("        blocks[k](", [*inner, *results], ", ", ");", " " * 18) + "    }\n"
+    parts.append(f"/* {doc} */\n{_signature(name, arguments, names, results)}{calls}}}\n")
+    return "\n".join(parts)
+
+
+def _distinct(symbols: Sequence[Expr], taken: set[str]) -> dict[Expr, str]:
+    """shared0, shared1, ..., where no symbol of the model is called so."""
+    texts = (text for k in count() if (text := f"shared{k}") not in taken)
+    return dict(zip(symbols, texts, strict=False))
+
+
+def _signature(
+    name: str,
+    arguments: Mapping[str, Sequence[Expr]],
+    names: Mapping[Expr, str],
+    results: Sequence[str],
+) -> str:
+    declared = [
+        f"double {a}" if _scalar(a, s, names) else f"const double *{a}"
+        for a, s in arguments.items()
+    ]
+    declared += [f"double *{a}" for a in results]
+    head = f"static void {name}("
+    return _lines(head, declared, ", ", ") {", " " * len(head))
+
+
+def _scalar(argument: str, symbols: Sequence[Expr], names: Mapping[Expr, str]) -> bool:
+    return len(symbols) == 1 and names[symbols[0]] == argument
+
+
+def _silence(unused: Sequence[str]) -> str:
+    return _lines("    ", [f"(void){a};" for a in unused], " ", "", "    ") if unused else ""
+
+
+# ------------------------------------------------------------------------------- statements
+
+
+def _statements(array: str, group: Sequence[Result]) -> Iterator[_Statement]:
+    """Assignments; equal neighbours become one loop, long sums are added up in pieces."""
+    k = 0
+    while k < len(group):
+        value = sp.sympify(group[k].value)
+        end = k + 1
+        while end < len(group) and group[end].value == value:
+            end += 1
+        if end - k >= RUN:
+            place = f"{group[k].place} ... {group[end - 1].place}"
+            yield _Statement(array, k, "=", value, place, end - k)
+            k = end
+            continue
+        terms = sp.Add.make_args(value)
+        for start in range(0, len(terms), TERMS):
+            part = sp.Add(*terms[start : start + TERMS]) if len(terms) > TERMS else value
+            yield _Statement(array, k, "+=" if start else "=", part, group[k].place)
+        k += 1
+
+
+def _blocks(statements: Sequence[_Statement]) -> Iterator[list[_Statement]]:
+    """Neighbouring statements in blocks of about BLOCK different nodes and statements."""
+    block: list[_Statement] = []
+    seen: dict[Expr, None] = {}
+    for s in statements:
+        more = _nodes(s.value, seen)
+        if block and len(seen) + len(more) + len(block) > BLOCK:
+            yield block
+            block, seen, more = [], {}, _nodes(s.value, {})
+        block.append(s)
+        seen |= more
+    if block:
+        yield block
+
+
+def _nodes(e: Expr, seen: Mapping[Expr, None]) -> dict[Expr, None]:
+    """The nodes of an expression that are not among those seen, in a fixed order."""
+    stack: list[Expr] = [e]
+    found: dict[Expr, None] = {}
+    while stack:
+        node = stack.pop()
+        if node not in seen and node not in found:
+            found[node] = None
+            stack.extend(node.args)
+    return found
+
+
+def _shared(blocks: Sequence[Sequence[_Statement]]) -> list[Expr]:
+    """Calls of functions, roots and powers that more than one block would compute."""
+    uses: dict[Expr, int] = {}
+    for block in blocks:
+        nodes: dict[Expr, None] = {}
+        for s in block:
+            nodes |= _nodes(s.value, nodes)
+        for e in nodes:
+            if _costly(e):
+                uses[e] = uses.get(e, 0) + 1
+    return [e for e, times in uses.items() if times > 1]
+
+
+def _costly(e: Expr) -> bool:
+    if e.is_Pow:
+        return not e.exp.is_Integer or abs(e.exp) > POWER
+    return bool(e.is_Function) and not isinstance(e, Boolean)
+
+
+def _body(
+    statements: Sequence[_Statement],
+    arguments: Mapping[str, Sequence[Expr]],
+    names: Mapping[Expr, str],
+) -> tuple[str, set[str]]:
+    """Unpacking, common subexpressions, assignments; and the arguments that they use."""
+    values = [s.value for s in statements]
+    symbols: set[Expr] = set().union(*(e.free_symbols for e in values)) if values else set()
+    local = {s: names[s] for s in symbols}
+    common, reduced = common_subexpressions(values, Names(local))
+    printer = Printer(local)
+    used = {s.array for s in statements}
+    lines = []
+    for argument, group in arguments.items():
+        wanted = [(k, s) for k, s in enumerate(group) if s in symbols]
+        if not wanted:
+            continue
+        used.add(argument)
+        if _scalar(argument, group, names):
+            continue
+        declared = [f"{names[s]} = {argument}[{k}]" for k, s in wanted]
+        lines.append(_lines("    const double ", declared, ", ", ";"))
+    for s, e in common:
+        lines.append(_lines("    ", [f"const double {local[s]} = {printer(e)};"], ""))
+    if lines:
+        lines.append("\n")
+    lines += [_assignment(s, printer(e)) for s, e in zip(statements, reduced, strict=True)]
+    return "".join(lines), used
+
+
+def _assignment(s: _Statement, text: str) -> str:
+    if s.count > 1:
+        place = s.array if s.index == 0 else f"{s.array} + {s.index}"
+        line = f"fill({place}, {s.count}, {text});"
+    else:
+        line = f"{s.array}[{s.index}] {s.operator} {text};"
+    if not s.place:
+        return _lines("    ", [line], "")
+    comment = f"/* {s.place} */"
+    if len(line) + len(comment) + 5 <= 100:
+        return f"    {line} {comment}\n"
+    return _lines("    ", [comment], "") + _lines("    ", [line], "")
+
+
+def _lines(
+    head: str, items: Sequence[str], between: str, end: str = "", indent: str = " " * 8
+) -> str:
+    """head item, item, ... end, in lines of at most 100 characters, broken between items."""
+    if len(items) == 1:  # broken at any blank
+        text = wrap(
+            items[0] + end,
+            100,
+            initial_indent=head,
+            subsequent_indent=indent,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        return "\n".join(text) + "\n"
+    lines = [head + items[0]]
+    for item in items[1:]:
+        if len(lines[-1]) + len(between) + len(item) + len(end) <= 100:
+            lines[-1] += between + item
+        else:
+            lines[-1] += between.rstrip()
+            lines.append(indent + item)
+    return "\n".join(lines) + end + "\n"

@@ -1,0 +1,197 @@
+"""The tables of model.c: index patterns, names, dimensions, flags, and the System that holds them."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Collection, Sequence
+from textwrap import wrap
+from typing import Any
+
+from ...mechanics.equations import EquationsOfMotion
+from ...model.model import Constraint, Contact, Nonholonomic
+from . import elimination
+from . import solve as csolve
+
+Expr = Any
+Pair = tuple[int, int]
+
+
+class Tables:
+    """Of one system; `mass` and `entries` are the positions of the values in M and G."""
+
+    def __init__(
+        self,
+        eom: EquationsOfMotion,
+        prefix: str,
+        formulation: str,
+        constraints: Sequence[Constraint],
+        mass: Sequence[Pair],
+        entries: Sequence[Pair],
+    ) -> None:
+        self.eom, self.prefix, self.formulation = eom, prefix, formulation
+        self.constraints, self.mass, self.entries = constraints, mass, entries
+
+    def of_what_is_read(self, functions: Collection[str]) -> str:
+        """A System of coordinates that are only read: names, and the energies if they are read."""
+        names = self._array("const char *const", "coordinates", [f'"{s}"' for s in self.eom.q])
+        own, more = self._outputs(functions)
+        fields = {"n": self.eom.n, "coordinates": f"{self.prefix}coordinates"}
+        fields |= {name: f"{self.prefix}{name}" for name in sorted(functions)} | more
+        lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
+        return f"{names}{own}static const System {self.prefix}equations = {{\n{lines}}};\n"
+
+    def text(self, functions: Collection[str]) -> str:
+        """The tables, the elimination's plan, and the System with these functions."""
+        eom = self.eom
+        start = [bisect_left(self.entries, (k,)) for k in range(eom.m + 1)]
+        contacts = [k for k, c in enumerate(self.constraints) if isinstance(c, Contact)]
+        prescribed = [k for k, s in enumerate(eom.u) if eom.rates.get(s) in eom.rates]
+        dimension, extent, angles = self._dimensions()
+        names = [f'"{s}"' for s in eom.q]
+        parts = [
+            self._array("const char *const", "coordinates", names),
+            self._array("const Row", "rows", self._rows()),
+            self._integers("contact", contacts),
+            self._integers("mass_row", [i for i, _ in self.mass]),
+            self._integers("mass_column", [j for _, j in self.mass]),
+            self._integers("entry_row", [k for k, _ in self.entries]),
+            self._integers("entry_column", [j for _, j in self.entries]),
+            self._integers("row_start", start),
+            self._integers("prescribed", prescribed),
+            self._integers("dimension", dimension),
+            self._integers("extent_dimension", extent),
+        ]
+        folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
+        if any(folded):
+            parts.append(self._array("const double", "folded", [repr(x) for x in folded]))
+        p = self.prefix
+        plan = elimination.plan(eom.n, eom.m, self.mass, self.entries)
+        parts.append("\n" + plan.c_text(f"{p}plan") + "\n")
+        solve = None
+        if self.formulation != "nullspace":
+            solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
+            parts.append(f"{solve}\n" if solve else "")
+        own, more = self._outputs(functions)
+        parts.append(own)
+        fields = {
+            "n": eom.n,
+            "m": eom.m,
+            "contacts": len(contacts),
+            "inputs": len(eom.u),
+            "parameters": len(eom.p),
+            "masses": len(self.mass),
+            "entries": len(self.entries),
+            **{
+                name: p + name
+                for name in (
+                    *("coordinates", "rows", "contact", "mass_row", "mass_column"),
+                    *("entry_row", "entry_column", "row_start"),
+                )
+            },
+            "prescribed_count": len(prescribed),
+            **{name: p + name for name in ("prescribed", "dimension", "extent_dimension")},
+            "angles": angles,
+            "folded": f"{p}folded" if any(folded) else "NULL",
+            "formulation": self.formulation.upper(),
+            "constant_mass": int(self._constant_mass()),
+            "separable": int(self._separable()),
+            "plan": f"&{p}plan",
+            "solve": f"{p}solve" if solve else "NULL",
+            **{
+                name: p + name if name in functions else "NULL"
+                for name in ("dynamics", "residual", "energies", "restitution", "tangent")
+            },
+            "embed": "embed" if p else "NULL",
+            "embed_tangent": "embed_tangent" if p and "tangent" in functions else "NULL",
+            "full": "&equations" if p else "NULL",
+            **{name: name for name in ("outputs", "outputs_tangent") if name in functions},
+            **more,
+        }
+        lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
+        return "".join(parts) + f"static const System {p}equations = {{\n{lines}}};\n"
+
+    def _outputs(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
+        """Tables of the model's own outputs, and the System's fields that hold them."""
+        if "outputs" not in functions:
+            return "", {}
+        outputs = self.eom.outputs
+        text = self._array("const char *const", "output_names", [f'"{o.name}"' for o in outputs])
+        text += self._integers("guarded", [int(o.otherwise is not None) for o in outputs])
+        names = {"output_names": "output_names", "guarded": "guarded"}
+        return text, {"output_count": len(outputs), **names}
+
+    def _array(self, kind: str, name: str, items: Sequence[str]) -> str:
+        head = f"static {kind} {self.prefix}{name}[] = {{"
+        body = ", ".join(items)
+        if len(head) + len(body) + 2 <= 100:
+            return f"{head}{body}}};\n"
+        lines = wrap(body, 96, break_long_words=False, break_on_hyphens=False)
+        return head + "\n" + "".join(f"    {line}\n" for line in lines) + "};\n"
+
+    def _integers(self, name: str, values: Sequence[int]) -> str:
+        return self._array("const int", name, [str(k) for k in values] or ["0"])
+
+    def _rows(self) -> list[str]:
+        position = {c.name: k for k, c in enumerate(self.constraints)}
+        items = []
+        for c in self.constraints:
+            kind = "HOLONOMIC"
+            if isinstance(c, Contact):
+                kind = "CONTACT"
+            elif isinstance(c, Nonholonomic):
+                kind = "NONHOLONOMIC"
+            closed = getattr(c, "while_closed", None)
+            items.append(f'{{"{c.name}", {kind}, {-1 if closed is None else position[closed]}}}')
+        return items or ['{"", HOLONOMIC, -1}']
+
+    def _dimensions(self) -> tuple[list[int], list[int], int]:
+        """One number for each dimension of coordinates; that of each parameter; that of angles; -1: none."""
+        eom = self.eom
+        units = [eom.units[str(q)] for q in eom.q]
+        number: dict[Any, int] = {}
+        of_coordinates = [number.setdefault(u.exponents, len(number)) for u in units]
+        of_parameters = [
+            -1 if u.dimensionless else number.get(u.exponents, -1)
+            for u in (eom.units[str(p)] for p in eom.p)
+        ]
+        angles = [k for u, k in zip(units, of_coordinates, strict=True) if u.dimensionless]
+        return of_coordinates, of_parameters or [-1], angles[0] if angles else -1
+
+    def _constant_mass(self) -> bool:
+        return _constant_mass(self.eom)
+
+    def _separable(self) -> bool:
+        return not entanglements(self.eom, self.formulation)
+
+
+def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:
+    """Why the method rattle cannot step these equations; nothing if it can.
+
+    It needs M of parameters, forces without velocities, position constraints that no input moves, and
+    the formulation 'multipliers'.
+    """
+    velocities, inputs = set(eom.v), set(eom.u)
+    found = []
+    if formulation != "multipliers":
+        found.append(f"the formulation is {formulation!r}, expected 'multipliers'")
+    if not _constant_mass(eom):
+        found.append("the mass matrix holds more than parameters")
+    moved = [
+        str(q)
+        for q, e in zip(eom.q, eom.F, strict=True)
+        if not e.free_symbols.isdisjoint(velocities)
+    ]
+    if moved:
+        found.append(f"the forces on {', '.join(moved)} hold velocities")
+    found += [
+        f"the constraint {c.name!r} is nonholonomic"
+        for c in eom.constraints
+        if isinstance(c, Nonholonomic)
+    ]
+    if any(not e.free_symbols.isdisjoint(inputs) for e in eom.G.todok().values()):
+        found.append("an input stands in the constraint matrix")
+    return found
+
+
+def _constant_mass(eom: EquationsOfMotion) -> bool:
+    return all(e.free_symbols <= set(eom.p) for e in eom.M.todok().values())

@@ -1,0 +1,1 @@
+"""Python: the only place that prints Python."""

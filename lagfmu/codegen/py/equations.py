@@ -1,0 +1,273 @@
+"""Equations of motion -> the solver's numeric form, by way of generated Python source."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import sympy as sp
+
+from ...mechanics.equations import TIME, EquationsOfMotion
+from ...mechanics.formulations.minimal import Reduction
+from ...model.model import Contact, Nonholonomic
+from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
+from .function import function, identifiers
+
+Expr = Any
+
+
+def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str) -> str:
+    """Python text that defines SYSTEM, the numeric form of the equations in the given formulation.
+
+    It needs the names System, Row, Own and Embedding of `lagfmu.solver.system`.
+    """
+    if reduction is None:
+        return _imported(_system(eom, "", formulation) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n")
+    parts = [_bare_system(eom) if eom.bare else _system(eom, "", "multipliers")]
+    names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.u, *eom.p, TIME])
+    names[TIME] = "t"
+    parts.append(
+        function(
+            "embed",
+            "q = phi(s, t) and v = J sdot + dphi/dt.",
+            {"t": (), "s": reduction.s, "sdot": reduction.sdot, "u": eom.u, "p": eom.p},
+            {"q": reduction.phi, "v": reduction.vel},
+            names,
+        )
+    )
+    rows = tuple(reduction.rows)
+    parts.append(
+        _system(
+            reduction.reduced,
+            "reduced_",
+            "minimal",
+            rows,
+            "Embedding(embed, SYSTEM_OF_COORDINATES)",
+        )
+    )
+    return _imported("\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n")
+
+
+def _imported(text: str) -> str:
+    """The text under an import of the functions of `math` that it calls."""
+    called = sorted(
+        name for name in set(re.findall(r"\b([a-z]\w*)\(", text)) if hasattr(math, name)
+    )
+    return (f"from math import {', '.join(called)}\n\n\n" if called else "") + text
+
+
+def compile_system(text: str) -> System:
+    """Run generated source in memory and take its SYSTEM."""
+    from ...solver import system as vocabulary
+
+    scope: dict[str, Any] = {
+        "System": vocabulary.System,
+        "Own": vocabulary.Own,
+        "Row": vocabulary.Row,
+        "Embedding": vocabulary.Embedding,
+    }
+    exec(compile(text, "<lagfmu equations>", "exec"), scope)
+    system: System = scope["SYSTEM"]
+    return system
+
+
+def lower(
+    eom: EquationsOfMotion, reduction: Reduction | None = None, formulation: str = "multipliers"
+) -> System:
+    """The numeric form of `eom`, ready for the solver."""
+    return compile_system(source(eom, reduction, formulation))
+
+
+def _system(
+    eom: EquationsOfMotion,
+    prefix: str,
+    formulation: str,
+    rows: Sequence[int] | None = None,
+    embedding: str = "None",
+) -> str:
+    names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
+    names[TIME] = "t"
+    lower_triangle = sorted((i, j) for i, j in eom.M.todok() if i >= j)
+    jacobian = sorted(eom.G.todok())
+    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.u, "p": eom.p}
+    still = {"t": (), "q": eom.q, "u": eom.u, "p": eom.p}
+    parts = [
+        function(
+            f"{prefix}dynamics",
+            "M (lower triangle), F, G, nu, gamma of  M vdot = F + G^T lambda,  G vdot = gamma.",
+            state,
+            {
+                "M": [eom.M[i, j] for i, j in lower_triangle],
+                "F": eom.F,
+                "G": [eom.G[k, j] for k, j in jacobian],
+                "nu": eom.nu,
+                "gamma": eom.gamma,
+            },
+            names,
+        ),
+        function(
+            f"{prefix}residual",
+            "f of each constraint f(q, t) = 0; 0 for a nonholonomic one.",
+            still,
+            {"f": [sp.S.Zero if f is None else f for f in eom.f]},
+            names,
+        ),
+    ]
+    restitution = [
+        eom.plain(c.restitution) if isinstance(c, Contact) else sp.S.Zero
+        for c in _constraints(eom, rows)
+    ]
+    rebounds = any(isinstance(c, Contact) for c in _constraints(eom, rows))
+    if rebounds:
+        text = "Newton's coefficient of restitution of each row; 0 for one that is no contact."
+        arguments, results = {"p": eom.p}, {"e": restitution}
+        parts.append(function(f"{prefix}restitution", text, arguments, results, names))
+    energies = []
+    if rows is None:  # the energies of the full system serve the reduced one too
+        energies = _energies(eom, names)
+    parts += energies
+    own = _outputs(eom) if rows is None else []
+    parts += [text for _, text in own]
+    label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
+    parts.append(
+        f"{label} = System(\n"
+        f"    coordinates={_strings(eom.q)},\n"
+        f"    rows={_rows(eom, rows)},\n"
+        f"    mass={_pattern(lower_triangle)},\n"
+        f"    jacobian={_pattern(jacobian)},\n"
+        f"    dynamics={prefix}dynamics,\n"
+        f"    residual={prefix}residual,\n"
+        f"    energies={'energies' if energies else None},\n"
+        f"    restitution={f'{prefix}restitution' if rebounds else None},\n"
+        f"    prescribed={_prescribed(eom)!r},\n"
+        f"    like={_like(eom)!r},\n"
+        f"    extent={_extent(eom)!r},\n"
+        f"    folded={tuple(eom.folded(unit) for unit in _units(eom))!r},\n"
+        f"    angles={_angles(eom)!r},\n"
+        f"    embedding={embedding},\n"
+        f"    formulation={formulation!r},\n"
+        f"    parameters={_strings(eom.p)},\n"
+        f"{_listed(own)})\n"
+    )
+    return "\n\n".join(parts)
+
+
+def _bare_system(eom: EquationsOfMotion) -> str:
+    """Coordinates that are only read, and the energies of them if these are."""
+    names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
+    names[TIME] = "t"
+    energies, own = _energies(eom, names), _outputs(eom)
+    system = (
+        "SYSTEM_OF_COORDINATES = System(\n"
+        f"    coordinates={_strings(eom.q)},\n"
+        "    rows=(),\n"
+        "    mass=((), ()),\n"
+        "    jacobian=((), ()),\n"
+        "    dynamics=None,\n"
+        "    residual=None,\n"
+        f"    energies={'energies' if energies else None},\n"
+        "    restitution=None,\n"
+        f"    parameters={_strings(eom.p)},\n"
+        f"{_listed(own)})\n"
+    )
+    return "\n\n".join([*energies, *(text for _, text in own), system])
+
+
+def _energies(eom: EquationsOfMotion, names: dict[Expr, str]) -> list[str]:
+    """The function that gives the energies which can be read; nothing if none can."""
+    group = {"kinetic": eom.kinetic, "potential": eom.potential}
+    found = {name: e for name, e in group.items() if e is not None}
+    if not found:
+        return []
+    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.u, "p": eom.p}
+    text = f"{' and '.join(found).capitalize()} energy [J]."
+    values = {"energy": [found.get(name, sp.S.Zero) for name in group]}
+    return [function("energies", text, state, values, names)]
+
+
+def _outputs(eom: EquationsOfMotion) -> list[tuple[str, str]]:
+    """The model's own outputs: what makes each in the System, and the text of its functions."""
+    groups = (eom.q, eom.v, eom.vdot, eom.u, eom.p, eom.lam, eom.Q)
+    names = identifiers([s for group in groups for s in group])
+    names[TIME] = "t"
+    arguments = {
+        "t": (),
+        **dict(zip(("q", "v", "vdot", "u", "p", "lam", "Q"), groups, strict=True)),
+    }
+    found = []
+    for k, o in enumerate(eom.outputs):
+        parts = {f"output_{k}": (f"{o.name} [{o.unit}].", o.expression)}
+        if o.otherwise is not None:
+            parts[f"otherwise_{k}"] = (f"{o.name} where it has no value.", o.otherwise)
+        text = "\n\n".join(
+            function(name, doc, arguments, {"w": [e]}, names) for name, (doc, e) in parts.items()
+        )
+        found.append((f"Own({o.name!r}, {', '.join(parts)})", text))
+    return found
+
+
+def _listed(own: Sequence[tuple[str, str]]) -> str:
+    lines = "".join(f"        {made},\n" for made, _ in own)
+    return f"    outputs=(\n{lines}    ),\n" if own else ""
+
+
+def _constraints(eom: EquationsOfMotion, rows: Sequence[int] | None) -> list[Any]:
+    chosen = range(len(eom.constraints)) if rows is None else rows
+    return [eom.constraints[k] for k in chosen]
+
+
+def _rows(eom: EquationsOfMotion, rows: Sequence[int] | None) -> str:
+    constraints = _constraints(eom, rows)
+    position = {c.name: k for k, c in enumerate(constraints)}
+    items = []
+    for c in constraints:
+        kind = HOLONOMIC
+        if isinstance(c, Contact):
+            kind = CONTACT
+        elif isinstance(c, Nonholonomic):
+            kind = NONHOLONOMIC
+        closed = getattr(c, "while_closed", None)
+        tail = "" if closed is None else f", {position[closed]}"
+        items.append(f"Row({c.name!r}, {kind!r}{tail}),")
+    return f"({' '.join(items)})"
+
+
+def _strings(symbols: Sequence[Expr]) -> str:
+    return repr(tuple(str(s) for s in symbols))
+
+
+def _pattern(indices: Sequence[tuple[int, int]]) -> str:
+    return repr((tuple(i for i, _ in indices), tuple(j for _, j in indices)))
+
+
+def _prescribed(eom: EquationsOfMotion) -> tuple[int, ...]:
+    """Where in u a prescribed motion begins: what has a rate that has a rate."""
+    return tuple(k for k, s in enumerate(eom.u) if eom.rates.get(s) in eom.rates)
+
+
+def _units(eom: EquationsOfMotion) -> list[Any]:
+    return [eom.units[str(q)] for q in eom.q]
+
+
+def _angles(eom: EquationsOfMotion) -> tuple[int, ...]:
+    """The coordinates without dimension."""
+    return tuple(j for j, unit in enumerate(_units(eom)) if unit.dimensionless)
+
+
+def _like(eom: EquationsOfMotion) -> tuple[tuple[int, ...], ...]:
+    """For each coordinate, the coordinates of the same dimension."""
+    units = _units(eom)
+    return tuple(
+        tuple(i for i, other in enumerate(units) if other.same_dimension(unit)) for unit in units
+    )
+
+
+def _extent(eom: EquationsOfMotion) -> tuple[tuple[int, ...], ...]:
+    """For each coordinate, the parameters of the same dimension (for an angle: none)."""
+
+    def same(parameter: Expr, unit: Any) -> bool:
+        return not unit.dimensionless and bool(eom.units[str(parameter)].same_dimension(unit))
+
+    return tuple(tuple(i for i, p in enumerate(eom.p) if same(p, unit)) for unit in _units(eom))

@@ -1,0 +1,120 @@
+"""Equations -> Python source: short functions with common subexpressions, named as in the model.
+
+The only Python printer.  The same text is run in memory by `simulate` and shipped in an FMU.
+"""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import sympy as sp
+from sympy.printing.pycode import PythonCodePrinter
+
+from ...errors import DerivationError
+
+Expr = Any
+ARGUMENTS = (
+    *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "e", "energy"),
+    *("vdot", "lam", "Q", "w"),
+)
+
+
+class _Printer(PythonCodePrinter):  # type: ignore[misc]
+    """Numbers as doubles, functions without the module's name; unknown functions are refused."""
+
+    def __init__(self, names: Mapping[Expr, str]) -> None:
+        super().__init__({"fully_qualified_modules": False, "strict": True})
+        self.names = names
+
+    def _print_Symbol(self, symbol: Expr) -> str:
+        return self.names.get(symbol) or str(symbol)
+
+    def _print_Rational(self, number: Expr) -> str:
+        return repr(float(number))
+
+    def _print_Float(self, number: Expr) -> str:
+        return repr(float(number))
+
+    def _print_NumberSymbol(self, number: Expr) -> str:
+        return repr(float(number))
+
+    def _print_Pi(self, number: Expr) -> str:
+        return repr(float(number))
+
+    def _print_Exp1(self, number: Expr) -> str:
+        return repr(float(number))
+
+    def _print_Integer(self, number: Expr) -> str:
+        return str(number) if abs(int(number)) < 2**53 else repr(float(number))
+
+
+def identifiers(symbols: Sequence[Expr]) -> dict[Expr, str]:
+    """A distinct Python identifier for each symbol: theta, der_theta, der2_theta, m, ..."""
+    taken = {*keyword.kwlist, *dir(math), *dir(builtins), *ARGUMENTS}
+    names: dict[Expr, str] = {}
+    for symbol in symbols:
+        text = str(symbol)
+        if text.startswith("der("):
+            inner = text[4:-1]
+            text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
+        text = text.replace(".", "_")
+        while text in taken:
+            text += "_"
+        taken.add(text)
+        names[symbol] = text
+    return names
+
+
+def function(
+    name: str,
+    doc: str,
+    arguments: Mapping[str, Sequence[Expr]],
+    results: Mapping[str, Sequence[Expr]],
+    names: Mapping[Expr, str],
+) -> str:
+    """Source of `name(*arguments)` that returns a tuple of the lists in `results`.
+
+    `arguments` maps an argument to the symbols it is unpacked into (none: it is passed as it is).
+    """
+    printer = _Printer(names)
+    flat = [sp.sympify(e) for group in results.values() for e in group]
+    used = set().union(*(e.free_symbols for e in flat)) if flat else set()
+    free = _fresh(set(names.values()))
+    common, reduced = sp.cse(flat, symbols=free, order="none", list=True)
+    lines = [f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
+    for argument, symbols in arguments.items():
+        wanted = [names[s] if s in used else "_" for s in symbols]
+        if any(w != "_" for w in wanted):
+            lines.append(f"    {', '.join(wanted)}{',' if len(wanted) == 1 else ''} = {argument}")
+    try:
+        lines += [f"    {s} = {printer.doprint(e)}" for s, e in common]
+        values = iter([printer.doprint(e) for e in reduced])
+    except sp.printing.codeprinter.PrintMethodNotImplementedError as error:
+        raise DerivationError(
+            f"an expression cannot be written as numeric code: {str(error).splitlines()[0]}; use "
+            "functions that Python's math module has"
+        ) from error
+    for label, group in results.items():
+        items = [next(values) for _ in group]
+        lines += _assignment(label, items)
+    lines.append(f"    return {', '.join(results)}")
+    return "\n".join(lines) + "\n"
+
+
+def _assignment(label: str, items: Sequence[str]) -> list[str]:
+    line = f"    {label} = [{', '.join(items)}]"
+    if len(line) <= 100:
+        return [line]
+    return [f"    {label} = [", *(f"        {item}," for item in items), "    ]"]
+
+
+def _fresh(taken: set[str]) -> Any:
+    k = 0
+    while True:
+        if f"x{k}" not in taken:
+            yield sp.Symbol(f"x{k}")
+        k += 1

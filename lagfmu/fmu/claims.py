@@ -1,0 +1,219 @@
+"""Closed forms as they travel inside an FMU: text that SymPy reads back."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import sympy as sp
+
+from ..errors import ModelError, VerificationError
+from ..interface.variables import VariableTable
+from ..model.closed_form import ClosedForm, Conserved, in_variables, output
+from ..model.scene import Scene
+from .formula import read_formula, text_of
+
+Expr = Any
+FORMAT = 1
+LARGEST_RECORD = 1 << 24  # bytes
+EXPRESSIONS = ("actual", "expected", "scale", "when")
+CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One statement to verify, in symbols named as the FMU's variables.
+
+    `expected` is None for a conserved quantity.
+    """
+
+    name: str
+    actual: Expr
+    expected: Expr | None
+    while_closed: str | None
+    while_open: str | None
+    until_departure: str | None
+    at_departure: str | None
+    scale: Expr | None
+    within: float
+    rounding: float
+    when: Expr | None = None
+
+    @property
+    def variables(self) -> set[str]:
+        """The FMU's variables and parameters that it needs."""
+        names = {
+            str(s)
+            for e in (self.actual, self.expected, self.scale, self.when)
+            if e is not None
+            for s in sp.sympify(e).free_symbols
+        }
+        read = {n[len("initial(") : -1] if n.startswith("initial(") else n for n in names}
+        contacts = {c for condition in CONDITIONS if (c := getattr(self, condition))}
+        read |= {f"contact.{c}" for c in contacts}
+        left = {c for c in (self.until_departure, self.at_departure) if c}
+        left |= {n.split(".")[1] for n in read if n.startswith("departure.")}
+        return (read | {f"departure.{c}.count" for c in left}) - {"time"}
+
+    def in_scene(self, numbers: Mapping[str, Expr], held: Collection[str]) -> Claim | None:
+        """The same with numbers for parameters, and contacts that stay closed; None if it speaks of
+        such a contact being open, or never holds with these numbers."""
+        if {self.while_open, self.at_departure} & set(held):
+            return None
+
+        def put(e: Expr) -> Expr:
+            if e is None:
+                return None
+            e = sp.sympify(e)
+            return e.xreplace({s: numbers[str(s)] for s in e.free_symbols if str(s) in numbers})
+
+        when = put(self.when)
+        if when == sp.false:
+            return None
+        return replace(
+            self,
+            actual=put(self.actual),
+            expected=put(self.expected),
+            scale=put(self.scale),
+            when=None if when == sp.true else when,
+            while_closed=None if self.while_closed in held else self.while_closed,
+            until_departure=None if self.until_departure in held else self.until_departure,
+        )
+
+
+def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> list[Claim]:
+    """The closed forms that apply to this FMU."""
+    claims = []
+    for form in closed_forms:
+        if form.only is not None and scene.name not in form.only:
+            continue
+        scale = None if form.scale is None else in_variables(form.scale)
+        if isinstance(form, Conserved):
+            actual, expected, leaving = form.expression, None, None
+        else:
+            actual = output(form.name) if form.actual is None else form.actual
+            expected, leaving = in_variables(form.expected), form.at_departure
+        claims.append(
+            Claim(
+                name=form.name,
+                actual=in_variables(actual),
+                expected=expected,
+                while_closed=form.while_closed,
+                while_open=form.while_open,
+                until_departure=form.until_departure,
+                at_departure=leaving,
+                scale=scale,
+                within=form.within,
+                rounding=form.rounding,
+                when=None if form.when is None else in_variables(form.when),
+            )
+        )
+    return claims
+
+
+def pack_closed_forms(
+    scene: Scene,
+    closed_forms: Sequence[ClosedForm | Conserved],
+    table: VariableTable,
+    numbers: Mapping[str, Expr] | None = None,
+    held: Collection[str] = (),
+) -> bytes:
+    """JSON with the claims; expressions are indexed symbols, so that any name can be read back.
+
+    `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
+    closed.  Claims that need a variable which the scene leaves out are left out too.  Raises ModelError
+    if a claim uses what no FMU of the model has.
+    """
+    claims = [
+        claim
+        for form in claims_of(scene, closed_forms)
+        if (claim := form.in_scene(numbers or {}, held)) is not None
+    ]
+    known = {v.name for v in table.variables}
+    problems = []
+    kept = []
+    for claim in claims:
+        missing = sorted(claim.variables - known)
+        if not missing:
+            kept.append(claim)
+        elif scene.complete:
+            for name in missing:
+                near = difflib.get_close_matches(name, known, 1)
+                problems.append(
+                    f"closed form {claim.name!r} uses {name!r}, which is no variable of the FMU"
+                    + (f"; did you mean {near[0]!r}?" if near else "")
+                )
+    packed = []
+    for claim in kept:
+        entry: dict[str, Any] = {
+            key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
+        }
+        names: dict[Expr, str] = {}
+        for key in EXPRESSIONS:
+            e = getattr(claim, key)
+            entry[key] = None if e is None else _text(sp.sympify(e), names)
+        entry["symbols"] = {short: str(symbol) for symbol, short in names.items()}
+        packed.append(entry)
+        try:
+            _claim(entry)  # it has to come back
+        except ValueError as error:
+            problems.append(f"closed form {claim.name!r} cannot be carried by an FMU: {error}")
+    if problems:
+        raise ModelError(scene.name, problems)
+    return json.dumps({"format": FORMAT, "closed_forms": packed}, indent=1).encode()
+
+
+def unpack_closed_forms(content: bytes, name: str) -> list[Claim]:
+    """The claims in an FMU, none of whose text is run (fmu/formula.py).
+
+    Raises VerificationError if the file is not lagfmu's.
+    """
+    try:
+        if len(content) > LARGEST_RECORD:
+            raise ValueError(f"{len(content)} bytes, expected at most {LARGEST_RECORD}")
+        data = json.loads(content)
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise ValueError(f"expected format {FORMAT}")
+        if not isinstance(data.get("closed_forms"), list):
+            raise ValueError("expected a list of closed forms")
+        return [_claim(entry) for entry in data["closed_forms"]]
+    except (ValueError, RecursionError) as error:
+        raise VerificationError(
+            f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "
+            "version of lagfmu"
+        ) from None
+
+
+def _text(e: Expr, names: dict[Expr, str]) -> str:
+    for symbol in sorted(e.free_symbols, key=str):
+        names.setdefault(symbol, f"s{len(names)}")
+    return text_of(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}))
+
+
+def _claim(entry: Any) -> Claim:
+    """One entry of the record.  Raises ValueError with what is wrong in it."""
+    texts = {"name", *CONDITIONS, *EXPRESSIONS}
+    numbers = {"within", "rounding"}
+    if not isinstance(entry, dict) or set(entry) != texts | numbers | {"symbols"}:
+        raise ValueError("a closed form with other fields than this version of lagfmu knows")
+    for key in texts:
+        optional = key not in ("name", "actual")
+        if not isinstance(entry[key], str) and not (optional and entry[key] is None):
+            raise ValueError(f"{key!r} of a closed form is {entry[key]!r}, expected text")
+    for key in numbers:
+        number = entry[key]
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not number >= 0:
+            raise ValueError(f"{key!r} of {entry['name']!r} is {number!r}, expected a number >= 0")
+    names = entry["symbols"]
+    if not isinstance(names, dict) or not all(isinstance(n, str) for n in names.values()):
+        raise ValueError(f"the symbols of {entry['name']!r} are not names")
+    symbols = {short: output(name) for short, name in names.items()}
+    fields: dict[str, Any] = {key: entry[key] for key in ("name", *CONDITIONS)}
+    fields |= {key: float(entry[key]) for key in numbers}
+    for key in EXPRESSIONS:
+        text = entry[key]
+        fields[key] = None if text is None else read_formula(text, symbols)
+    return Claim(**fields)

@@ -1,0 +1,95 @@
+"""What is known about a model in a scene -> one FMU file, replaced whole and never half-written."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ..errors import BuildError
+from ..model.closed_form import ClosedForm, Conserved
+from ..page.documentation import page
+from ..prepare.prepare import Prepared
+from . import native, python
+from .archive import pack
+from .claims import pack_closed_forms
+from .compiler import HOST
+
+TARGETS = ("python", "native")
+PAGE = "documentation/index.html"
+
+
+def write(
+    prepared: Prepared,
+    out: str | os.PathLike[str] = ".",
+    closed_forms: Sequence[ClosedForm | Conserved] = (),
+    target: str = "python",
+    platforms: Sequence[str] = (HOST,),
+    choice: str = "",
+) -> Path:
+    """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
+
+    `choice` is HTML on how the solver settings were chosen.  For the rest see api.build_fmu.
+    """
+    if target not in TARGETS:
+        raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
+    prepared = _as_built(prepared, target)
+    extra = {
+        PAGE: page(prepared, choice=choice).encode(),
+        "resources/lagfmu.json": pack_closed_forms(
+            prepared.scene, closed_forms, prepared.table, prepared.numbers, prepared.held
+        ),
+    }
+    equations = (prepared.coded, prepared.coded_reduction)
+    made = (*equations, prepared.scene, prepared.table, prepared.system, extra)
+    content = native.build(*made, platforms) if target == "native" else python.build(*made)
+    path = Path(out)
+    if path.suffix != ".fmu":
+        path = path / f"{prepared.scene.name}.fmu"
+    write_whole(path, content)
+    return path
+
+
+def put_figures(
+    path: Path,
+    prepared: Prepared,
+    figures: Sequence[tuple[str, ...]],
+    target: str,
+    choice: str = "",
+) -> None:
+    """Put verification results into the page of an FMU that stands at `path`; nothing else changes."""
+    with zipfile.ZipFile(path) as archive:
+        contents = {name: archive.read(name) for name in archive.namelist()}
+    contents[PAGE] = page(_as_built(prepared, target), figures, choice).encode()
+    write_whole(path, pack(contents))
+
+
+def _as_built(prepared: Prepared, target: str) -> Prepared:
+    """A python FMU has no model exchange."""
+    if target == "native":
+        return prepared
+    return replace(prepared, table=prepared.table.without_local_derivatives())
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file at once, or leave what was there.  Raises BuildError with the cause."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        raise BuildError(
+            f"cannot write {str(path)!r} ({error.strerror or error}): choose another output folder"
+        ) from None
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except OSError as error:
+        Path(name).unlink(missing_ok=True)
+        raise BuildError(
+            f"cannot write {str(path)!r} ({error.strerror or error}): choose another output folder"
+        ) from None

@@ -1,0 +1,104 @@
+"""The FMU's variables, one by one and as a table.  Both targets and the documentation share it; the
+table itself is made in table.py.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+from ..methods import described
+from ..model.units import Unit
+
+Value = float | int | bool | str
+RECORD = re.compile(r"contact\.\w+\Z|departure\.\w+\.count\Z|solver\.steps\Z")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One FMI scalar variable.
+
+    `kind` is Real, Integer, Boolean or String; `role` says what may set it: parameter, start, input,
+    solver, or output (nothing).  `depends` are the inputs and states that it is computed from at a
+    communication point, `depends_initially` the inputs and exact start values at the start.
+    `positive`: zero, though not below the minimum, makes no sense.
+    """
+
+    name: str
+    kind: str
+    role: str
+    causality: str
+    variability: str
+    initial: str | None
+    description: str
+    start: Value | None = None
+    unit: Unit | None = None
+    derivative_of: str | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    positive: bool = False
+    depends: tuple[str, ...] = ()
+    depends_initially: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class VariableTable:
+    """The variables in the order of their value references (0, 1, ...), and the state derivatives."""
+
+    variables: tuple[Variable, ...]
+    states: tuple[str, ...]
+    derivatives: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Variable:
+        return self.variables[self.reference(name)]
+
+    def __contains__(self, name: str) -> bool:
+        return any(v.name == name for v in self.variables)
+
+    def reference(self, name: str) -> int:
+        """Value reference; the index in modelDescription.xml is one more."""
+        return next(k for k, v in enumerate(self.variables) if v.name == name)
+
+    def keeping(self, outputs: Collection[str]) -> VariableTable:
+        """Without the outputs that are not among these.
+
+        Local, if they are not among the outputs, but there are the states, so that their start values
+        can be set, their derivatives for model exchange, and the record of the run: the steps that
+        were taken, and which contacts are closed or have opened, for that says which closed form holds.
+        """
+        moving = {*self.states, *self.derivatives}
+        kept = []
+        for v in self.variables:
+            if v.causality == "output" and v.name not in outputs:
+                if v.name not in moving and not RECORD.match(v.name):
+                    continue
+                v = replace(v, causality="local")
+            kept.append(v)
+        names = {v.name for v in kept}
+        kept = [v if v.derivative_of in names else replace(v, derivative_of=None) for v in kept]
+        return VariableTable(tuple(kept), self.states, self.derivatives)
+
+    def offering(self, methods: Collection[str]) -> VariableTable:
+        """The same, where `solver.method` can only be one of these."""
+        variables = [
+            replace(v, description=described(methods)) if v.name == "solver.method" else v
+            for v in self.variables
+        ]
+        return replace(self, variables=tuple(variables))
+
+    def without_local_derivatives(self) -> VariableTable:
+        """What co-simulation needs: derivatives that are no outputs serve model exchange only."""
+        gone = {
+            n for n in self.derivatives if self[n].causality == "local" and n not in self.states
+        }
+        return VariableTable(
+            tuple(v for v in self.variables if v.name not in gone),
+            self.states,
+            tuple(name for name in self.derivatives if name not in gone),
+        )
+
+    @property
+    def outputs(self) -> tuple[Variable, ...]:
+        """The variables of causality output."""
+        return tuple(v for v in self.variables if v.causality == "output")

@@ -1,0 +1,396 @@
+"""Lagrange's equations with undetermined multipliers, and the one place where lambda gets its sign.
+
+    d/dt dL/dv_j - dL/dq_j = Q_nc,j + sum_k lambda_k a_kj      (Marion & Thornton sect. 7.5, eq. 7.66
+                                                               with forces; ME 6590 eqs. 2 and 3)
+is brought to the numeric form
+
+    M(q,t) vdot = F(q,v,t,u) + G^T lambda ,   G v = nu(q,t,u) ,   G vdot = gamma(q,v,t,u)
+
+by differentiation alone: nothing is inverted, and every term of L is differentiated only by the
+symbols that stand in it, so that a chain of n links costs n times as much as one link.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+from sympy.physics.vector import dynamicsymbols
+
+from ..errors import ModelError
+from ..model.model import Constraint, Model, Nonholonomic, Output, Parameter, name_of
+from ..model.reactions import force_of_constraint, multiplier
+from ..model.units import Unit
+
+Expr = Any
+TIME = dynamicsymbols._t
+
+
+@dataclass(frozen=True)
+class EquationsOfMotion:
+    """The equations of one model in plain symbols; n coordinates, m constraints.
+
+    q, v (n): coordinates and velocities; u: inputs (with derivatives where they are needed);
+    p: parameters.  M (n, n) and G (m, n) are sparse; `constraints` (m) are those of the rows of G.
+    F (n) holds all forces without lambda, nu and gamma (m) the right-hand sides of G v = nu and
+    G vdot = gamma, f (m) the residual of a position constraint (None for a nonholonomic one).
+    `symbols` maps the model's dynamicsymbols to the plain symbols, `rates` a prescribed motion u to
+    der(u) and der(u) to der(u,2).  Energies in joule: `kinetic` is the part of L that is quadratic in
+    v, `potential` minus the part without v; their sum is Jacobi's integral.  `outputs` are the model's
+    own, in the same symbols and those of accelerations (`vdot`), lambda (`lam`) and Q (`Q`).
+
+    A scene may need less than the model (prune.py): then some coordinates and constraints are not
+    there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
+    equations are of coordinates that are only read: nothing is solved for them.
+    """
+
+    model: Model
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    u: tuple[Expr, ...]
+    p: tuple[Expr, ...]
+    M: Expr
+    F: tuple[Expr, ...]
+    G: Expr
+    nu: tuple[Expr, ...]
+    gamma: tuple[Expr, ...]
+    f: tuple[Expr | None, ...]
+    kinetic: Expr
+    potential: Expr | None
+    symbols: dict[Expr, Expr]
+    rates: dict[Expr, Expr]
+    constraints: tuple[Constraint, ...]
+    outputs: tuple[Output, ...] = ()
+    numbers: Mapping[Expr, Expr] = field(default_factory=dict)
+    bare: bool = False
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.q)
+
+    @property
+    def m(self) -> int:
+        """Number of constraints."""
+        return len(self.nu)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters in the order of p."""
+        by_symbol = {p.symbol: p for p in self.model.parameters}
+        return tuple(by_symbol[s] for s in self.p)
+
+    @property
+    def vdot(self) -> tuple[Expr, ...]:
+        """The symbols der(q,2) of the accelerations (n)."""
+        return tuple(sp.Symbol(f"der({q},2)", real=True) for q in self.q)
+
+    @property
+    def lam(self) -> tuple[Expr, ...]:
+        """The symbols of the multipliers (m)."""
+        return tuple(multiplier(c.name) for c in self.constraints)
+
+    @property
+    def Q(self) -> tuple[Expr, ...]:
+        """The symbols of the generalized forces of constraint (n)."""
+        return tuple(force_of_constraint(q) for q in self.q)
+
+    @cached_property
+    def units(self) -> dict[str, Unit]:
+        """The unit of each quantity, by its name in the FMU."""
+        return {str(self.symbols.get(s, s)): unit for s, unit in self.model.units.items()}
+
+    def folded(self, unit: Unit) -> float:
+        """The largest magnitude of that dimension among the parameters that became numbers."""
+        values = [
+            abs(float(self.numbers[p.symbol]))
+            for p in self.model.parameters
+            if p.symbol in self.numbers and self.model.units[p.symbol].same_dimension(unit)
+        ]
+        return 0.0 if unit.dimensionless else max(values, default=0.0)
+
+    def mapped(self, change: Callable[[Expr], Expr]) -> EquationsOfMotion:
+        """The same with `change` done to every expression of the equations and energies."""
+
+        def each(group: tuple[Expr, ...]) -> tuple[Expr, ...]:
+            return tuple(None if e is None else change(sp.sympify(e)) for e in group)
+
+        def sparse(matrix: Expr) -> Expr:
+            entries = matrix.todok().items()
+            values = {ij: e for ij, a in entries if (e := change(a)) != 0}
+            return sp.ImmutableSparseMatrix(matrix.rows, matrix.cols, values)
+
+        kinetic, potential = each((self.kinetic, self.potential))
+        return replace(
+            self,
+            M=sparse(self.M),
+            F=each(self.F),
+            G=sparse(self.G),
+            nu=each(self.nu),
+            gamma=each(self.gamma),
+            f=each(self.f),
+            kinetic=kinetic,
+            potential=potential,
+            outputs=tuple(_changed(o, change) for o in self.outputs),
+        )
+
+    def plain(self, expression: Expr) -> Expr:
+        """An expression of the model's dynamicsymbols in this object's plain symbols and numbers."""
+        return sp.sympify(expression).xreplace(self.symbols).xreplace(self.numbers)
+
+
+def _changed(output: Output, change: Callable[[Expr], Expr]) -> Output:
+    """The output with `change` done to its expressions."""
+    other = output.otherwise
+    return replace(
+        output,
+        expression=change(sp.sympify(output.expression)),
+        otherwise=None if other is None else change(sp.sympify(other)),
+    )
+
+
+def symbols_of(o: Output) -> set[Expr]:
+    """The symbols in an output of the model's own, its value where it has none included."""
+    other = sp.S.Zero if o.otherwise is None else sp.sympify(o.otherwise)
+    return set(sp.sympify(o.expression).free_symbols | other.free_symbols)
+
+
+def plain_symbols(model: Model) -> dict[Expr, Expr]:
+    """dynamicsymbols and their derivatives -> plain symbols named as in the FMU."""
+    table = {}
+    extra = model.embedding.coordinates if model.embedding else {}
+    for s in (*model.coordinates, *extra, *(i.symbol for i in model.inputs)):
+        name = name_of(s)
+        if s.is_Symbol:
+            continue  # an input that was written as a plain symbol
+        table[s] = sp.Symbol(name, real=True)
+        table[s.diff(TIME)] = sp.Symbol(f"der({name})", real=True)
+        table[s.diff(TIME, 2)] = sp.Symbol(f"der({name},2)", real=True)
+    return table
+
+
+def derive(model: Model) -> EquationsOfMotion:
+    """Derive the equations of motion of `model`.
+
+    Raises ModelError if the energy is not quadratic in the velocities, or a nonholonomic constraint
+    is not affine in them.
+    """
+    table = plain_symbols(model)
+    q = tuple(table[c] for c in model.coordinates)
+    v = tuple(table[c.diff(TIME)] for c in model.coordinates)
+    u, rates = _inputs(model, table)
+    clock = _Clock(q, v, rates)
+    problems: list[str] = []
+
+    energy = model.energy_expression.xreplace(table)
+    M, F = _left_hand_side(list(_terms(energy)), q, v, clock, problems)
+    for coordinate, force in model.forces.items():
+        F[list(model.coordinates).index(coordinate)] += sp.sympify(force).xreplace(table)
+
+    G: dict[tuple[int, int], Expr] = {}
+    nu: list[Expr] = []
+    gamma: list[Expr] = []
+    f: list[Expr | None] = []
+    for k, constraint in enumerate(model.constraints):
+        expression = sp.sympify(constraint.expression).xreplace(table)
+        if isinstance(constraint, Nonholonomic):
+            row, drift = _pfaffian(constraint, expression, v, problems)
+            f.append(None)
+        else:
+            row = dict(_gradient(expression, q))
+            drift = clock.partial(expression)
+            f.append(expression)
+        G.update({(k, j): a for j, a in row.items()})
+        nu.append(-drift)
+        # d/dt (sum_j a_j v_j + drift) = sum_j a_j vdot_j - gamma
+        gamma.append(-sp.Add(*(clock.total(a) * v[j] for j, a in row.items()), clock.total(drift)))
+
+    if problems:
+        raise ModelError(model.name, problems)
+    kinetic, potential = _energies(model, energy, M, q, v, table)
+    return EquationsOfMotion(
+        model=model,
+        q=q,
+        v=v,
+        u=u,
+        p=tuple(p.symbol for p in model.parameters),
+        M=sp.ImmutableSparseMatrix(len(q), len(q), M),
+        F=tuple(F),
+        G=sp.ImmutableSparseMatrix(len(nu), len(q), G),
+        nu=tuple(nu),
+        gamma=tuple(gamma),
+        f=tuple(f),
+        kinetic=kinetic,
+        potential=potential,
+        symbols=table,
+        rates=rates,
+        constraints=tuple(model.constraints),
+        outputs=tuple(_changed(o, lambda e: e.xreplace(table)) for o in model.outputs),
+    )
+
+
+class _Clock:
+    """Time derivatives along a motion, by the chain rule over the symbols that occur."""
+
+    def __init__(self, q: tuple[Expr, ...], v: tuple[Expr, ...], rates: dict[Expr, Expr]) -> None:
+        self.inputs = rates
+        self.all = {**dict(zip(q, v, strict=True)), **rates}
+
+    def partial(self, expression: Expr) -> Expr:
+        """The part of d/dt that is there when the coordinates rest: d/dt and prescribed inputs."""
+        return self._chain(expression, self.inputs)
+
+    def total(self, expression: Expr) -> Expr:
+        """d/dt of an expression of q, t and prescribed inputs."""
+        return self._chain(expression, self.all)
+
+    def _chain(self, expression: Expr, rates: dict[Expr, Expr]) -> Expr:
+        present = sorted(expression.free_symbols & rates.keys(), key=str)
+        parts = [expression.diff(s) * rates[s] for s in present]
+        if expression.has(TIME):
+            parts.append(expression.diff(TIME))
+        return sp.Add(*parts)
+
+
+def _inputs(model: Model, table: dict[Expr, Expr]) -> tuple[tuple[Expr, ...], dict[Expr, Expr]]:
+    """The plain input symbols, and the rate of each that is differentiated."""
+    u: list[Expr] = []
+    rates: dict[Expr, Expr] = {}
+    for i in model.inputs:
+        u.append(table.get(i.symbol, i.symbol))
+        if i in model.prescribed:
+            first, second = table[i.symbol.diff(TIME)], table[i.symbol.diff(TIME, 2)]
+            u += [first, second]
+            rates |= {u[-3]: first, first: second}
+    return tuple(u), rates
+
+
+def _terms(expression: Expr) -> Iterator[Expr]:
+    """The summands of an expression, c*(a + b) split into c*a and c*b, nothing else expanded."""
+    stack = [expression]
+    while stack:
+        e = stack.pop()
+        if e.is_Add:
+            stack.extend(reversed(e.args))
+            continue
+        sums = [a for a in e.args if a.is_Add] if e.is_Mul else []
+        if len(sums) == 1:
+            rest = sp.Mul(*(a for a in e.args if a is not sums[0]))
+            stack.extend(rest * a for a in reversed(sums[0].args))
+        else:
+            yield e
+
+
+def _gradient(expression: Expr, symbols: tuple[Expr, ...]) -> Iterator[tuple[int, Expr]]:
+    """(index, derivative) for the symbols that occur in the expression."""
+    present = expression.free_symbols
+    if len(present) < len(symbols):
+        index = {s: j for j, s in enumerate(symbols) if s in present}
+    else:
+        index = {s: j for j, s in enumerate(symbols)}
+    for s, j in index.items():
+        d = expression.diff(s)
+        if d != 0:
+            yield j, d
+
+
+def _left_hand_side(
+    terms: list[Expr],
+    q: tuple[Expr, ...],
+    v: tuple[Expr, ...],
+    clock: _Clock,
+    problems: list[str],
+) -> tuple[dict[tuple[int, int], Expr], list[Expr]]:
+    """M, and F = dL/dq - (d/dt dL/dv without its vdot terms), term by term of L."""
+    M: dict[tuple[int, int], list[Expr]] = defaultdict(list)
+    F: list[list[Expr]] = [[] for _ in q]
+    position = {s: j for j, s in enumerate(q)}
+    speed = {s: j for j, s in enumerate(v)}
+    for term in terms:
+        for s in sorted(term.free_symbols & position.keys(), key=position.__getitem__):
+            F[position[s]].append(term.diff(s))
+        moving = sorted(term.free_symbols & speed.keys(), key=speed.__getitem__)
+        for s in moving:
+            momentum = term.diff(s)
+            F[speed[s]].append(-clock.total(momentum))
+            for r in moving:
+                mass = momentum.diff(r)
+                if mass.free_symbols & speed.keys():
+                    problems.append(
+                        f"the energy's term {term} is not quadratic in the velocities, expected "
+                        "M(q, t): a velocity-dependent force belongs to `forces`"
+                    )
+                elif mass != 0:
+                    M[speed[s], speed[r]].append(mass)
+    return {ij: sp.Add(*m) for ij, m in M.items()}, [sp.Add(*parts) for parts in F]
+
+
+def _pfaffian(
+    constraint: Nonholonomic, expression: Expr, v: tuple[Expr, ...], problems: list[str]
+) -> tuple[dict[int, Expr], Expr]:
+    """Coefficients a_j and a_0 of sum_j a_j v_j + a_0."""
+    row = dict(_gradient(expression, v))
+    nonlinear = [a for a in row.values() if a.free_symbols & set(v)]
+    if nonlinear:
+        problems.append(
+            f"constraint {constraint.name!r}: {expression} is nonlinear in the velocities, expected "
+            "a Pfaffian form sum_j a_j(q, t) v_j + a_0(q, t)"
+        )
+    if not row:
+        problems.append(
+            f"constraint {constraint.name!r}: {expression} holds no velocity; a relation between "
+            "coordinates is Holonomic"
+        )
+    drift = expression.xreplace(dict.fromkeys(v, sp.S.Zero))
+    return row, drift
+
+
+def _energies(
+    model: Model,
+    energy: Expr,
+    M: dict[tuple[int, int], Expr],
+    q: tuple[Expr, ...],
+    v: tuple[Expr, ...],
+    table: dict[Expr, Expr],
+) -> tuple[Expr, Expr | None]:
+    """v^T M v / 2, and minus the part of L without velocities (or the forces' potential)."""
+    kinetic = sp.Add(*(m * v[i] * v[j] / 2 for (i, j), m in sorted(M.items())))
+    standing = -energy.xreplace(dict.fromkeys(v, sp.S.Zero))
+    if model.lagrangian is not None:
+        return kinetic, standing
+    return kinetic, _potential(model, q, standing, table)
+
+
+def _potential(
+    model: Model, q: tuple[Expr, ...], standing: Expr, table: dict[Expr, Expr]
+) -> Expr | None:
+    """V of the forces that depend on q alone, where they are a gradient of polynomials and sines.
+
+    Each force is split into the terms that hold coordinates and parameters only, and the rest.
+    None if the first have a curl: then there is no potential energy to report.
+    """
+    allowed = set(q) | {p.symbol for p in model.parameters}
+    forces = []
+    for coordinate in model.coordinates:
+        force = sp.expand(sp.sympify(model.forces.get(coordinate, 0)).xreplace(table))
+        forces.append(sp.Add(*(a for a in sp.Add.make_args(force) if a.free_symbols <= allowed)))
+    if any(
+        sp.simplify(forces[i].diff(q[j]) - forces[j].diff(q[i])) != 0
+        for i in range(len(q))
+        for j in range(i)
+    ):
+        return None
+    V = sp.S.Zero
+    for force, s in zip(forces, q, strict=True):
+        rest = sp.expand(force + V.diff(s))
+        integral = sp.integrate(rest, s)
+        if integral.has(sp.Integral):
+            return None
+        V -= integral
+    if any(sp.simplify(f + V.diff(s)) != 0 for f, s in zip(forces, q, strict=True)):
+        return None
+    return V + standing

@@ -1,0 +1,1 @@
+"""The equations without multipliers, or in fewer coordinates."""

@@ -1,0 +1,13 @@
+"""Pfaffian systems: what `classify` classifies with.  Each file imports from those above it.
+
+- `undecided`: giving up, and in time
+- `fractions`: rational functions, no operation of which takes long
+- `generators`, `samples`, `tower`: is an expression zero?
+- `echelon`: linear algebra where that is known
+- `coefficients`: the one-form of a constraint
+- `frobenius`, `form`: is a system integrable, is a one-form?
+- `quadrature`, `potential`, `inverse`, `ansatz`: integrals by one variable and of exact forms, inverse
+  functions, sums with constant coefficients
+- `factors`, `homogeneous`, `lie`, `natani`: one integrable form; `single` tries them in turn
+- `system`, `linear`, `elimination`: several forms; `integrals` tries them in turn
+"""

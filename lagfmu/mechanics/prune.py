@@ -1,0 +1,235 @@
+"""Equations -> equations without what a scene does not need.  Each step leaves a full scene as it is.
+
+A contact that cannot open is a holonomic constraint.  A coordinate goes if nothing that is read
+depends on it: what one linear solve ties together (coupling.py) is needed as a whole, with all that
+stands in its equations.
+Where the dependent coordinates are eliminated and no lambda is asked for, of the full equations only
+the coordinates that are read remain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Any
+
+import sympy as sp
+
+from ..errors import ModelError
+from ..model.model import Constraint, Contact, Holonomic, Output
+from ..model.scene import Scene
+from ..model.selection import select
+from .coupling import coupled
+from .equations import EquationsOfMotion, symbols_of
+from .formulations.minimal import Reduction
+
+Expr = Any
+Indices = frozenset[int]
+SOLVED = ("lambda.", "unique.", "residual.", "Q.")  # what needs the full equations solved
+
+
+def held(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> EquationsOfMotion:
+    """Contacts that the scene does not let open, as holonomic constraints."""
+    contacts = [c.name for c in eom.constraints if isinstance(c, Contact)]
+    shut = set(contacts) - set(select(scene.contacts, contacts, "contact", problems))
+    if not shut:
+        return eom
+
+    def hold(c: Constraint) -> Constraint:
+        if isinstance(c, Contact):
+            return Holonomic(c.name, c.expression, c.description) if c.name in shut else c
+        return replace(c, while_closed=None) if c.while_closed in shut else c
+
+    return replace(eom, constraints=tuple(hold(c) for c in eom.constraints))
+
+
+def needed(
+    eom: EquationsOfMotion, reduction: Reduction | None, outputs: Collection[str]
+) -> tuple[Indices, Indices]:
+    """Coordinates and constraint rows on which the outputs depend, by position.
+
+    Raises ModelError if there are none.
+    """
+    of = subjects(eom, reduction)
+    coordinates: set[int] = set()
+    rows: set[int] = set()
+    for name in outputs:
+        more, more_rows = of.get(name, (frozenset(), frozenset()))
+        coordinates |= more
+        rows |= more_rows
+    groups = [(c, r, _positions(eom, _behind(eom, c, r))) for c, r in coupled(eom)]
+    names = [c.name for c in eom.constraints]
+    grown = True
+    while grown:
+        before = len(coordinates), len(rows)
+        for own, own_rows, others in groups:
+            if own & coordinates or own_rows & rows:
+                coordinates |= own | others
+                rows |= own_rows
+        rows |= {
+            names.index(w) for k in rows if (w := getattr(eom.constraints[k], "while_closed", None))
+        }
+        grown = (len(coordinates), len(rows)) != before
+    if not coordinates:
+        raise ModelError(
+            eom.model.name,
+            ["the outputs of the scene depend on no coordinate: name one of the motion"],
+        )
+    return frozenset(coordinates), frozenset(rows)
+
+
+def subjects(
+    eom: EquationsOfMotion, reduction: Reduction | None
+) -> dict[str, tuple[Indices, Indices]]:
+    """Name of an output -> the coordinates and rows that it is of."""
+    none: Indices = frozenset()
+    found: dict[str, tuple[Indices, Indices]] = {}
+    for j, q in enumerate(eom.q):
+        for name in (f"{q}", f"der({q})", f"der({q},2)", f"Q.{q}"):
+            found[name] = frozenset({j}), none
+    for k, c in enumerate(eom.constraints):
+        row = frozenset({k})
+        for head in ("lambda", "unique", "residual", "contact"):
+            found[f"{head}.{c.name}"] = none, row
+        for tail in ("count", "time"):
+            found[f"departure.{c.name}.{tail}"] = none, row
+        for j, q in enumerate(eom.q):
+            for name in (f"{c.name}.{q}", f"{c.name}.velocity.{q}"):
+                found[f"departure.{name}"] = frozenset({j}), row
+            found[f"Q.{c.name}.{q}"] = frozenset({j}), row
+    for o in eom.outputs:
+        found[o.name] = _of_output(eom, o)
+    for name, parts in (
+        ("kinetic", [eom.kinetic]),
+        ("potential", [eom.potential]),
+        ("total", [eom.kinetic, eom.potential]),
+    ):
+        symbols = set().union(*(e.free_symbols for e in parts if e is not None))
+        found[f"energy.{name}"] = _positions(eom, symbols), none
+    if reduction is None:
+        return found
+    for s in reduction.s:
+        moved = frozenset(j for j, phi in enumerate(reduction.phi) if s in phi.free_symbols)
+        for name in (f"{s}", f"der({s})", f"der({s},2)"):
+            found.setdefault(name, (moved, none))
+    return found
+
+
+def _of_output(eom: EquationsOfMotion, o: Output) -> tuple[Indices, Indices]:
+    """The coordinates and rows that an output of the model's own is of."""
+    symbols = symbols_of(o)
+    coordinates = {
+        j for group in (eom.q, eom.v, eom.vdot, eom.Q) for j, s in enumerate(group) if s in symbols
+    }
+    return frozenset(coordinates), frozenset(k for k, s in enumerate(eom.lam) if s in symbols)
+
+
+def _behind(eom: EquationsOfMotion, coordinates: Indices, rows: Indices) -> set[Expr]:
+    """The symbols in the equations of a group."""
+    flat = [m for (i, _), m in eom.M.todok().items() if i in coordinates]
+    flat += [a for (k, _), a in eom.G.todok().items() if k in rows]
+    flat += [eom.F[j] for j in coordinates]
+    for k in rows:
+        flat += [eom.nu[k], eom.gamma[k], *([] if eom.f[k] is None else [eom.f[k]])]
+    return set().union(*(sp.sympify(e).free_symbols for e in flat)) if flat else set()
+
+
+def _positions(eom: EquationsOfMotion, symbols: set[Expr]) -> Indices:
+    pairs = enumerate(zip(eom.q, eom.v, strict=True))
+    return frozenset(j for j, (q, v) in pairs if q in symbols or v in symbols)
+
+
+def only(
+    eom: EquationsOfMotion, coordinates: Collection[int], rows: Collection[int]
+) -> EquationsOfMotion:
+    """The equations of some coordinates and rows; energies are left out where they hold others."""
+    if len(coordinates) == eom.n and len(rows) == eom.m:
+        return eom
+    js, ks = sorted(coordinates), sorted(rows)
+
+    def pick(group: Sequence[Any], which: Sequence[int]) -> tuple[Any, ...]:
+        return tuple(group[i] for i in which)
+
+    def part(matrix: Expr, of: Sequence[int]) -> Expr:
+        row = {k: i for i, k in enumerate(of)}
+        column = {j: i for i, j in enumerate(js)}
+        values = matrix.todok().items()
+        return sp.ImmutableSparseMatrix(
+            len(of),
+            len(js),
+            {(row[i], column[j]): a for (i, j), a in values if i in row and j in column},
+        )
+
+    away = [j for j in range(eom.n) if j not in js]
+    gone = {s for j in away for s in (eom.q[j], eom.v[j])}
+    unsolved = gone | {s for j in away for s in (eom.vdot[j], eom.Q[j])}
+    unsolved |= {s for k, s in enumerate(eom.lam) if k not in ks}
+
+    def whole(energy: Expr) -> Expr:
+        return None if energy is None or energy.free_symbols & gone else energy
+
+    return replace(
+        eom,
+        q=pick(eom.q, js),
+        v=pick(eom.v, js),
+        M=part(eom.M, js),
+        F=pick(eom.F, js),
+        G=part(eom.G, ks),
+        nu=pick(eom.nu, ks),
+        gamma=pick(eom.gamma, ks),
+        f=pick(eom.f, ks),
+        kinetic=whole(eom.kinetic),
+        potential=whole(eom.potential),
+        constraints=pick(eom.constraints, ks),
+        outputs=tuple(o for o in eom.outputs if not symbols_of(o) & unsolved),
+    )
+
+
+def silent(eom: EquationsOfMotion, outputs: Collection[str]) -> EquationsOfMotion:
+    """Without the energies and outputs of the model's own that are not read."""
+    kinetic = bool({"energy.kinetic", "energy.total"} & set(outputs))
+    potential = bool({"energy.potential", "energy.total"} & set(outputs))
+    return replace(
+        eom,
+        kinetic=eom.kinetic if kinetic else None,
+        potential=eom.potential if potential else None,
+        outputs=tuple(o for o in eom.outputs if o.name in outputs),
+    )
+
+
+def read_only(
+    eom: EquationsOfMotion, reduction: Reduction, outputs: Collection[str]
+) -> tuple[EquationsOfMotion, Reduction | None]:
+    """Of the full equations, what is read where nothing that they are solved for is asked for.
+
+    Unchanged if an output needs lambda, Q, a residual or a dependent acceleration.  If only the
+    stepped coordinates are read, their equations are all there is.
+    """
+    stepped = {f"der({s},2)" for s in reduction.s}
+    solved = {f"der({q},2)" for q in eom.q} - stepped
+    reactions = {*eom.vdot, *eom.lam, *eom.Q}
+    solved |= {o.name for o in eom.outputs if symbols_of(o) & reactions}
+    if any(name.startswith(SOLVED) or name in solved for name in outputs):
+        return eom, reduction
+    of_s = {name for s in reduction.s for name in (f"{s}", f"der({s})", f"der({s},2)")}
+    of = subjects(eom, reduction)
+    wanted: set[int] = set()
+    for name in set(outputs) - of_s:
+        wanted |= of.get(name, (frozenset(), frozenset()))[0]
+    js = sorted(wanted)
+    if not js:
+        own = replace(reduction.reduced, constraints=reduction.constraints, outputs=eom.outputs)
+        return silent(own, outputs), None
+    rates = [n for n in outputs if n.startswith(("der(", "energy.")) or ".velocity." in n]
+    rates += [o.name for o in eom.outputs if o.name in outputs and symbols_of(o) & set(eom.v)]
+    moving = bool(set(rates) - of_s)  # of what is read, velocities are asked for
+    nothing = sp.ImmutableSparseMatrix(len(js), len(js), {})
+    zeros = (sp.S.Zero,) * len(js)
+    return (
+        replace(only(eom, js, ()), M=nothing, F=zeros, bare=True),
+        replace(
+            reduction,
+            phi=tuple(reduction.phi[j] for j in js),
+            vel=tuple(reduction.vel[j] if moving else sp.S.Zero for j in js),
+        ),
+    )

@@ -1,0 +1,218 @@
+"""Everything that is wrong with a Model, in words: numbers, symbols, units, dimensions.
+
+A term of the energy is in J, a generalized force in J/[coordinate]; a constraint is homogeneous.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+from sympy.physics.vector import dynamicsymbols
+
+from ..errors import UnitError
+from .kinds import check_energy, check_names, check_types
+from .outputs import check_output_units, check_outputs
+from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
+from .reactions import reactions_in
+from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
+
+
+def problems_of(model: ModelFields) -> list[str]:
+    """All problems of a model whose containers are right (`modelkinds.check_containers`)."""
+    problems: list[str] = []
+    check_types(model, problems)
+    if problems:
+        return problems
+    check_names(model, problems)
+    check_energy(model, problems)
+    if problems:
+        return problems
+    _check_numbers(model, problems)
+    _check_symbols(model, problems)
+    check_outputs(model, problems)
+    units = declared_units(model, problems)
+    if not problems:
+        _check_dimensions(model, units, problems)
+        check_output_units(model, units, problems)
+    return problems
+
+
+def _check_numbers(model: ModelFields, problems: list[str]) -> None:
+    t = dynamicsymbols._t
+    for p in model.parameters:
+        _finite(f"parameter {name_of(p.symbol)!r}", p.value, problems)
+        for bound, value in (("min", p.min), ("max", p.max)):
+            if value is not None:
+                _finite(f"{bound} of parameter {name_of(p.symbol)!r}", value, problems)
+        if p.min is not None and p.max is not None and p.min > p.max:
+            problems.append(
+                f"parameter {name_of(p.symbol)!r}: min = {p.min!r} is above max = {p.max!r}, so that "
+                "no value is allowed: exchange them"
+            )
+        elif _number(p.value) and (
+            (p.min is not None and p.value < p.min) or (p.max is not None and p.value > p.max)
+        ):
+            problems.append(
+                f"parameter {name_of(p.symbol)!r} = {p.value!r} is outside its own bounds "
+                f"[{p.min}, {p.max}]"
+            )
+        if p.symbol.is_positive and _number(p.value) and not p.value > 0:
+            problems.append(
+                f"parameter {name_of(p.symbol)!r} = {p.value!r}, but its symbol was declared "
+                "positive: give a positive value or drop the assumption"
+            )
+    for i in model.inputs:
+        _finite(f"start of input {name_of(i.symbol)!r}", i.start, problems)
+    states = {s for q in model.coordinates for s in (q, q.diff(t))}
+    _check_start("start", model.start, states, problems)
+    if model.embedding is not None:
+        states = {s for q in model.embedding.coordinates for s in (q, q.diff(t))}
+        _check_start("embedding start", model.embedding.start, states, problems)
+        for q in model.embedding.relations:
+            if q not in model.coordinates:
+                problems.append(f"embedding gives {plain(q)}, which is no coordinate of the model")
+
+
+def _check_start(
+    what: str, start: Mapping[Expr, float], states: set[Expr], problems: list[str]
+) -> None:
+    for state, value in start.items():
+        if state not in states:
+            problems.append(
+                f"{what} names {plain(state)}, which is neither a coordinate nor the first "
+                "derivative of one"
+            )
+        _finite(f"{what} of {plain(state)}", value, problems)
+
+
+def _number(value: object) -> bool:
+    try:
+        return math.isfinite(float(value))  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def _finite(what: str, value: object, problems: list[str]) -> None:
+    if not _number(value):
+        problems.append(f"{what} is {value!r}, expected a finite number")
+
+
+def _expressions(model: ModelFields) -> list[tuple[str, Expr]]:
+    kind = "lagrangian" if model.lagrangian is not None else "kinetic_energy"
+    out = [(kind, model.energy_expression)]
+    out += [(f"force on {plain(q)}", sp.sympify(f)) for q, f in model.forces.items()]
+    out += [(f"constraint {c.name!r}", sp.sympify(c.expression)) for c in model.constraints]
+    for c in model.constraints:
+        if isinstance(c, Contact):
+            out.append((f"restitution of {c.name!r}", sp.sympify(c.restitution)))
+    return out
+
+
+def _check_symbols(model: ModelFields, problems: list[str]) -> None:
+    t = dynamicsymbols._t
+    known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t}
+    names = {name_of(s) for s in (*known, *model.coordinates)}
+    for q in model.forces:
+        if q not in model.coordinates:
+            problems.append(f"a force is given on {plain(q)}, which is no coordinate of the model")
+    for what, expression in _expressions(model):
+        problems += _solved_for(what, expression)
+        unknown = _unknown(
+            expression, known | set(model.coordinates) | set(reactions_in(expression))
+        )
+        problems += [
+            f"{what}: {name} is neither coordinate, parameter nor input: "
+            + (
+                "one of that name is declared, but as another symbol (other assumptions, or no "
+                "function of time): use the same"
+                if name in names
+                else "declare it, e.g. as a Parameter with value and unit"
+            )
+            for name in unknown
+        ]
+        if what.startswith("constraint") and not expression.has(*model.coordinates):
+            problems.append(
+                f"{what}: {expression} holds no coordinate, expected a condition on the motion: "
+                "correct it or leave it out"
+            )
+        orders = [d.derivative_count for d in expression.atoms(sp.Derivative)]
+        limit = 0 if what.startswith("constraint") and not _pfaffian(model, what) else 1
+        if any(order > limit for order in orders):
+            problems.append(
+                f"{what}: holds a derivative of order {max(orders)}, expected at most {limit}"
+                + (": a constraint on velocities is Nonholonomic" if limit == 0 else "")
+            )
+    if model.embedding is not None:
+        for q, phi in model.embedding.relations.items():
+            unknown = _unknown(sp.sympify(phi), known | set(model.embedding.coordinates))
+            problems += [
+                f"embedding of {plain(q)}: {name} is neither an independent coordinate nor a "
+                "parameter"
+                for name in unknown
+            ]
+
+
+def _solved_for(what: str, expression: Expr) -> list[str]:
+    """Multipliers where only what they are solved from can stand."""
+    return [
+        f"{what}: {symbol} is solved for together with the accelerations, so that it cannot stand in "
+        "the equations: a force that a normal force limits is a Friction in `constraints`, a quantity "
+        "to read is an Output in `outputs`"
+        for symbol in reactions_in(expression)
+    ]
+
+
+def _pfaffian(model: ModelFields, what: str) -> bool:
+    return any(
+        isinstance(c, Nonholonomic) and what == f"constraint {c.name!r}" for c in model.constraints
+    )
+
+
+def _unknown(expression: Expr, known: set[Expr]) -> list[str]:
+    symbols = expression.free_symbols | expression.atoms(AppliedUndef)
+    return sorted(str(plain(s)) for s in symbols - known)
+
+
+def declared_units(model: ModelFields, problems: list[str]) -> dict[Expr, Unit]:
+    """Unit of each symbol that may stand in an expression; what cannot be read joins `problems`."""
+    t = dynamicsymbols._t
+    units: dict[Expr, Unit] = {t: parse_unit("s", "time")}
+    extra = model.embedding.coordinates if model.embedding else {}
+    declared = [("coordinate", q, u) for q, u in (*model.coordinates.items(), *extra.items())]
+    declared += [("parameter", p.symbol, p.unit) for p in model.parameters]
+    declared += [("input", i.symbol, i.unit) for i in model.inputs]
+    for kind, symbol, text in declared:
+        what = f"{kind} {name_of(symbol)!r}"
+        if not isinstance(text, str) or not text.strip():
+            problems.append(f"{what} has no unit: give one, e.g. 'm', 'rad', or '1' for a number")
+            continue
+        try:
+            units[symbol] = parse_unit(text, what)
+        except UnitError as error:
+            problems.append(str(error))
+            continue
+        if isinstance(symbol, AppliedUndef):
+            units[symbol.diff(t)] = units[symbol].per_second()
+            units[symbol.diff(t, 2)] = units[symbol].per_second().per_second()
+    return units
+
+
+def _check_dimensions(model: ModelFields, units: dict[Expr, Unit], problems: list[str]) -> None:
+    def check(expression: Expr, expected: Unit | None, what: str) -> None:
+        problems.extend(check_dimension(sp.sympify(expression), expected, units, what))
+
+    kind = "lagrangian" if model.lagrangian is not None else "kinetic_energy"
+    check(model.energy_expression, ENERGY, kind)
+    for q, force in model.forces.items():
+        check(force, ENERGY / units[q], f"force on {plain(q)}")
+    for constraint in model.constraints:
+        check(constraint.expression, None, f"constraint {constraint.name!r}")
+        if isinstance(constraint, Contact):
+            one = POWER / POWER
+            check(constraint.restitution, one, f"restitution of {constraint.name!r}")
+    if model.embedding is not None:
+        for q, phi in model.embedding.relations.items():
+            check(phi, units[q], f"embedding of {plain(q)}")

@@ -1,0 +1,100 @@
+"""Loading a model file: one Model, its scenes and closed forms."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ..errors import LagfmuError, ModelError
+from .closed_form import ClosedForm, Conserved
+from .model import Model
+from .scene import Scene
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """What a model file defines: a Model; `scenes` (default: one, named as the model), closed forms."""
+
+    path: Path
+    model: Model
+    scenes: tuple[Scene, ...]
+    closed_forms: tuple[ClosedForm | Conserved, ...]
+
+
+def load(path: str | os.PathLike[str]) -> ModelFile:
+    """Run a model file and take its model.
+
+    Raises ModelError if the file is missing, raises, or does not define exactly one Model.
+    """
+    file = Path(path)
+    if file.is_dir():
+        inside = ", ".join(str(p) for p in sorted(file.glob("*.py"))) or "none"
+        raise ModelError(
+            str(file), [f"this is a folder, expected a Python file; those in it: {inside}"]
+        )
+    if not file.is_file():
+        raise ModelError(str(file), ["there is no such file"])
+    spec = importlib.util.spec_from_file_location(f"_lagfmu_model_{file.stem}", file)
+    if spec is None or spec.loader is None:
+        raise ModelError(str(file), ["expected a Python file that defines a Model, NAME.py"])
+    module = importlib.util.module_from_spec(spec)
+    folder = str(file.resolve().parent)
+    sys.path.insert(0, folder)
+    try:
+        spec.loader.exec_module(module)
+    except LagfmuError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise ModelError(str(file), [_where(error, file.absolute())]) from error
+    finally:
+        sys.path.remove(folder)
+    models = {id(v): (k, v) for k, v in vars(module).items() if isinstance(v, Model)}
+    if len(models) != 1:
+        names = ", ".join(k for k, _ in models.values()) or "none"
+        raise ModelError(
+            str(file),
+            [f"the file defines {len(models)} models ({names}), expected one: model = Model(...)"],
+        )
+    ((_, model),) = models.values()
+    problems: list[str] = []
+    scenes = _listed(module, "scenes", (Scene,), problems) or (Scene(model.name),)
+    forms = _listed(module, "closed_forms", (ClosedForm, Conserved), problems)
+    titles = [s.name for s in scenes if isinstance(s, Scene)]
+    problems += [
+        f"scenes hold the name {name!r} twice, so that one FMU would replace the other: rename one"
+        for name in sorted({n for n in titles if titles.count(n) > 1})
+    ]
+    if problems:
+        raise ModelError(str(file), problems)
+    return ModelFile(file, model, scenes, forms)
+
+
+def _listed(
+    module: ModuleType, name: str, types: tuple[type, ...], problems: list[str]
+) -> tuple[Any, ...]:
+    """The file's list of that name; what is no list, or stands in it wrongly, is a problem."""
+    found = getattr(module, name, ())
+    expected = f"expected a list of {types[0].__name__}(...)"
+    if not isinstance(found, (list, tuple)):
+        problems.append(f"{name} = {found!r}, {expected}")
+        return ()
+    problems += [f"{name} hold {x!r}, {expected}" for x in found if not isinstance(x, types)]
+    return tuple(found)
+
+
+def _where(error: BaseException, file: Path) -> str:
+    """The file's own line at which it raised, and what it raised."""
+    if isinstance(error, SyntaxError):
+        place = f"line {error.lineno}: " if error.lineno else ""
+        if error.filename and error.filename != str(file):
+            place = f"{error.filename}, {place}"
+        return f"{place}syntax error, {error.msg}"
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(file)]
+    place = f"line {frames[-1].lineno} ({frames[-1].line}): " if frames else ""
+    return f"{place}raises {type(error).__name__}: {error}"

@@ -1,0 +1,218 @@
+"""What each field of a Model must hold to be read at all: dicts and lists, expressions, texts, names.
+
+Nothing here knows what a name or an expression means; `modelcheck.py` does.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+from sympy.physics.vector import dynamicsymbols
+
+from .parts import (
+    NAME,
+    RESERVED,
+    Contact,
+    Embedding,
+    Expr,
+    Holonomic,
+    Input,
+    ModelFields,
+    Nonholonomic,
+    Output,
+    Parameter,
+    name_of,
+)
+from .units import plain
+
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0, sect. 2.2
+_NO_NUMBERS = (sp.I, sp.nan, sp.oo, -sp.oo, sp.zoo)
+
+
+def check_containers(model: ModelFields) -> list[str]:
+    """Fields that are no dict or list, before they are copied."""
+    maps: list[tuple[str, object, str]] = [
+        ("coordinates", model.coordinates, "{x: 'm'}"),
+        ("forces", model.forces, "{x: F}"),
+        ("start", model.start, "{x: 1.0}"),
+        ("descriptions", model.descriptions, "{x: 'height'}"),
+    ]
+    problems = []
+    if isinstance(model.embedding, Embedding):
+        problems += [
+            f"embedding {name} = {value!r}, expected a dict, e.g. {example}"
+            for name, value, example in (
+                ("coordinates", model.embedding.coordinates, "{s: 'm'}"),
+                ("relations", model.embedding.relations, "{x: 2*s}"),
+                ("start", model.embedding.start, "{s: 1.0}"),
+            )
+            if not isinstance(value, Mapping)
+        ]
+    elif model.embedding is not None:
+        problems.append(
+            f"embedding = {model.embedding!r}, expected Embedding(coordinates, relations)"
+        )
+    problems += [
+        f"{name} = {value!r}, expected a dict, e.g. {name}={example}"
+        for name, value, example in maps
+        if not isinstance(value, Mapping)
+    ]
+    return problems + [
+        f"{name} = {value!r}, expected a list, e.g. {name}=[{example}(...)]"
+        for name, value, example in (
+            ("constraints", model.constraints, "Holonomic"),
+            ("parameters", model.parameters, "Parameter"),
+            ("inputs", model.inputs, "Input"),
+            ("outputs", model.outputs, "Output"),
+        )
+        if isinstance(value, str) or not isinstance(value, Iterable)
+    ]
+
+
+def check_types(model: ModelFields, problems: list[str]) -> None:
+    """Things that are not what the fields of a Model hold, before anything is read from them."""
+    kinds: tuple[tuple[str, Sequence[object], tuple[type, ...]], ...] = (
+        ("parameters", model.parameters, (Parameter,)),
+        ("inputs", model.inputs, (Input,)),
+        ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact)),
+        ("outputs", model.outputs, (Output,)),
+    )
+    for field_name, items, types in kinds:
+        expected = ", ".join(t.__name__ for t in types)
+        problems += [
+            f"{field_name} hold {item!r}, expected {expected}: write {types[0].__name__}(...)"
+            for item in items
+            if not isinstance(item, types)
+        ]
+    if problems:
+        return
+    for kind, symbol in [
+        *(("parameter", p.symbol) for p in model.parameters),
+        *(("input", i.symbol) for i in model.inputs),
+    ]:
+        if not isinstance(symbol, (sp.Symbol, AppliedUndef)):
+            problems.append(f"{kind} {symbol!r} is no SymPy symbol: make one with sympy.symbols")
+    expressions = [("lagrangian", model.lagrangian), ("kinetic_energy", model.kinetic_energy)]
+    expressions += [(f"force on {plain(sp.sympify(q))}", f) for q, f in model.forces.items()]
+    expressions += [(f"constraint {c.name!r}", c.expression) for c in model.constraints]
+    expressions += [(f"output {o.name!r}", o.expression) for o in model.outputs]
+    expressions += [(f"otherwise of output {o.name!r}", o.otherwise) for o in model.outputs]
+    relations = model.embedding.relations if model.embedding else {}
+    expressions += [(f"embedding of {plain(sp.sympify(q))}", e) for q, e in relations.items()]
+    for what, expression in expressions:
+        if expression is not None and not _is_expression(expression):
+            problems.append(
+                f"{what}: {expression} is no SymPy expression with a value (it is a "
+                f"{type(expression).__name__}): write sums, products and functions of symbols; "
+                "a constraint is the expression that vanishes"
+            )
+        elif expression is not None and sp.sympify(expression).has(*_NO_NUMBERS):
+            problems.append(
+                f"{what}: {plain(expression)} holds {_no_number(expression)}, expected real and "
+                "finite numbers: correct it"
+            )
+    _check_texts(model, problems)
+
+
+def _no_number(expression: Expr) -> str:
+    return ", ".join(str(n) for n in _NO_NUMBERS if sp.sympify(expression).has(n))
+
+
+def _check_texts(model: ModelFields, problems: list[str]) -> None:
+    """Descriptions are texts of characters that XML can hold."""
+    texts: list[tuple[str, object]] = [("the model", model.description)]
+    texts += [(f"parameter {name_of(p.symbol)!r}", p.description) for p in model.parameters]
+    texts += [(f"input {name_of(i.symbol)!r}", i.description) for i in model.inputs]
+    texts += [(f"constraint {c.name!r}", c.description) for c in model.constraints]
+    texts += [(f"output {o.name!r}", o.description) for o in model.outputs]
+    texts += [(f"{plain(sp.sympify(q))}", text) for q, text in model.descriptions.items()]
+    for what, text in texts:
+        if not isinstance(text, str):
+            problems.append(f"description of {what} is {text!r}, expected a text: put it in quotes")
+            continue
+        bad = sorted(set(_NO_XML.findall(text)))
+        if bad:
+            problems.append(
+                f"description of {what}: {text!r} holds {', '.join(map(repr, bad))}, which no XML "
+                "file can hold: leave it out"
+            )
+
+
+def _is_expression(thing: object) -> bool:
+    return not isinstance(thing, str) and isinstance(sp.sympify(thing, strict=False), sp.Expr)
+
+
+def check_names(model: ModelFields, problems: list[str]) -> None:
+    """Names that no FMI variable or Python file can bear, and names of two things."""
+    named = [("model", model.name)]
+    extra = model.embedding.coordinates if model.embedding else {}
+    for q in (*model.coordinates, *extra):
+        if not (isinstance(q, AppliedUndef) and q.args == (dynamicsymbols._t,)):
+            problems.append(
+                f"coordinate {q} is no function of time: write it as dynamicsymbols('{q}')"
+            )
+            continue
+        named.append(("coordinate", name_of(q)))
+    if not model.coordinates:
+        problems.append("there is no coordinate: a model needs at least one")
+    named += [("parameter", name_of(p.symbol)) for p in model.parameters]
+    named += [("input", name_of(i.symbol)) for i in model.inputs]
+    seen: dict[str, str] = {}
+    for kind, name in named:
+        check_name(kind, name, problems)
+        if kind == "model":
+            continue
+        if name in seen:
+            problems.append(
+                f"the name {name!r} is used twice, by a {seen[name]} and a {kind}: rename one"
+            )
+        seen[name] = kind
+    contacts = {c.name for c in model.constraints if isinstance(c, Contact)}
+    names = set()
+    for constraint in model.constraints:
+        check_name("constraint", constraint.name, problems)
+        if constraint.name in names:
+            problems.append(f"two constraints are called {constraint.name!r}: rename one")
+        names.add(constraint.name)
+        if constraint.name in seen and seen[constraint.name] == "coordinate":
+            problems.append(
+                f"constraint {constraint.name!r} has the name of a coordinate, so that "
+                f"'Q.{constraint.name}' would be two things: rename one"
+            )
+        closed = getattr(constraint, "while_closed", None)
+        if closed is not None and closed not in contacts:
+            known = ", ".join(sorted(contacts)) or "none"
+            problems.append(
+                f"constraint {constraint.name!r} acts while_closed={closed!r}, which is no contact "
+                f"of this model (contacts: {known})"
+            )
+
+
+def check_name(kind: str, name: object, problems: list[str]) -> None:
+    if not isinstance(name, str) or not NAME.match(name):
+        problems.append(
+            f"{kind} name {name!r} is no FMI name: use letters a-z, A-Z, digits and _, "
+            "not beginning with a digit"
+        )
+    elif kind == "model" and keyword.iskeyword(name):
+        problems.append(f"model name {name!r} is a word of the Python language: choose another")
+    elif kind != "model" and name in RESERVED:
+        problems.append(
+            f"{kind} name {name!r} is reserved for the FMU's own variables "
+            f"({', '.join(RESERVED)}): choose another"
+        )
+
+
+def check_energy(model: ModelFields, problems: list[str]) -> None:
+    """One of the two forms of Lagrange's equations is chosen."""
+    given = [f for f in (model.lagrangian, model.kinetic_energy) if f is not None]
+    if len(given) != 1:
+        found = "both lagrangian and" if given else "neither lagrangian nor"
+        problems.append(
+            f"{found} kinetic_energy given: give either a "
+            "lagrangian (with non-conservative forces) or a kinetic_energy (with all forces)"
+        )

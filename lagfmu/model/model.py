@@ -1,0 +1,91 @@
+"""What the user writes: a frozen description of a mechanical system.  No derivatives are taken here.
+
+Two forms are accepted (the lectures' two): a Lagrangian L = T - V with non-conservative generalized
+forces Q_nc (ME 6590 eq. 3), or the kinetic energy K with all generalized forces F_q (eq. 2).
+
+Everything that is wrong with a model (`modelcheck.py`) is reported at once, in one ModelError.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from ..errors import ModelError
+from .check import declared_units, problems_of
+from .kinds import check_containers
+from .parts import (
+    NAME,
+    RESERVED,
+    Constraint,
+    Contact,
+    Embedding,
+    Expr,
+    Holonomic,
+    Input,
+    ModelFields,
+    Nonholonomic,
+    Output,
+    Parameter,
+    name_of,
+)
+from .reactions import reaction_units
+from .units import Unit
+
+__all__ = [
+    "NAME",
+    "RESERVED",
+    "Constraint",
+    "Contact",
+    "Embedding",
+    "Expr",
+    "Holonomic",
+    "Input",
+    "Model",
+    "Nonholonomic",
+    "Output",
+    "Parameter",
+    "name_of",
+]
+
+
+@dataclass(frozen=True)
+class Model(ModelFields):
+    """A mechanical system.
+
+    Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is
+    given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
+    each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
+    numbers in SI.  `descriptions` may explain coordinates.  `outputs` are quantities besides those
+    that every FMU reports.
+
+    Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
+    """
+
+    def __post_init__(self) -> None:
+        if isinstance(self.coordinates, list | tuple):  # coordinates without units
+            object.__setattr__(self, "coordinates", dict.fromkeys(self.coordinates, ""))
+        problems = check_containers(self)
+        if problems:
+            raise ModelError(str(self.name), problems)
+        for name in ("coordinates", "forces", "start", "descriptions"):
+            object.__setattr__(self, name, dict(getattr(self, name)))
+        for name in ("constraints", "parameters", "inputs", "outputs"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        problems = problems_of(self)
+        if problems:
+            raise ModelError(str(self.name), problems)
+
+    @cached_property
+    def units(self) -> dict[Expr, Unit]:
+        """Unit of every symbol that may stand in an expression."""
+        return declared_units(self, [])
+
+    @cached_property
+    def reactions(self) -> dict[Expr, Unit]:
+        """The unit of each `multiplier` and `force_of_constraint`."""
+        return reaction_units(self, self.units)
+
+    def constraint(self, name: str) -> Constraint:
+        """The constraint called `name`; KeyError if there is none."""
+        return next(c for c in self.constraints if c.name == name)

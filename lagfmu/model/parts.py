@@ -1,0 +1,156 @@
+"""What a model is made of: its fields, parameters, inputs, constraints and embedding, as frozen data."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+Expr = Any  # a SymPy expression; SymPy carries no types
+
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+RESERVED: tuple[str, ...] = (
+    *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
+    *("t", "time", "unique", "velocity"),
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A constant of the model, settable before initialization.
+
+    `value` is in coherent SI `unit`; `min` and `max` are the bounds that the equations make sense in.
+    """
+
+    symbol: Expr
+    value: float
+    unit: str = "1"
+    description: str = ""
+    min: float | None = None
+    max: float | None = None
+
+
+@dataclass(frozen=True)
+class Input:
+    """A quantity that the importer drives: a force, a torque, or a prescribed motion u(t).
+
+    A dynamicsymbol that stands in a holonomic constraint or a contact is a prescribed motion: the
+    FMU then has the inputs `u`, `der(u)` and `der(u,2)`, because the constraint's second derivative
+    needs them.
+    """
+
+    symbol: Expr
+    unit: str = "1"
+    start: float = 0.0
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Holonomic:
+    """f(q, t) = 0.  The multiplier's unit is J/[f]; +lambda grad f is the force of constraint."""
+
+    name: str
+    expression: Expr
+    description: str = ""
+    while_closed: str | None = None
+
+
+@dataclass(frozen=True)
+class Nonholonomic:
+    """sum_j a_j(q, t) v_j + a_0(q, t) = 0, affine in the velocities.  [lambda] = W/[expression]."""
+
+    name: str
+    expression: Expr
+    description: str = ""
+    while_closed: str | None = None
+
+
+@dataclass(frozen=True)
+class Contact:
+    """f(q, t) >= 0, lambda >= 0, f lambda = 0: a surface that pushes and never pulls.
+
+    `restitution` is Newton's coefficient for landings, a number or an expression of parameters.
+    """
+
+    name: str
+    expression: Expr
+    description: str = ""
+    restitution: Expr = 0
+
+
+Constraint = Holonomic | Nonholonomic | Contact
+
+
+@dataclass(frozen=True)
+class Output:
+    """A quantity of the model's own that the FMU reports: a tension, a height, a power.
+
+    `expression` may hold coordinates, their first and second derivatives, inputs, parameters, time,
+    `multiplier(constraint)` and `force_of_constraint(coordinate)`; each of its terms has the dimension
+    of `unit`.  The name may be structured, as bob.height.  `otherwise` (a number, or an expression) is
+    its value where the expression has none, as a quotient by a lambda that is 0 in the open.
+    """
+
+    name: str
+    expression: Expr
+    unit: str = "1"
+    description: str = ""
+    otherwise: Expr | None = None
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """Dependent coordinates as functions of independent ones, q = phi(s, t).
+
+    `coordinates` maps each new independent coordinate to its unit, `relations` each coordinate of
+    the model that it replaces to its expression; `start` gives s and der(s) at the start.
+    """
+
+    coordinates: Mapping[Expr, str]
+    relations: Mapping[Expr, Expr]
+    start: Mapping[Expr, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ModelFields:
+    """What is said of a mechanical system, right or wrong; `model.py` checks it."""
+
+    name: str
+    coordinates: Mapping[Expr, str]
+    lagrangian: Expr | None = None
+    kinetic_energy: Expr | None = None
+    forces: Mapping[Expr, Expr] = field(default_factory=dict)
+    constraints: Sequence[Constraint] = ()
+    parameters: Sequence[Parameter] = ()
+    inputs: Sequence[Input] = ()
+    start: Mapping[Expr, float] = field(default_factory=dict)
+    embedding: Embedding | None = None
+    description: str = ""
+    descriptions: Mapping[Expr, str] = field(default_factory=dict)
+    outputs: Sequence[Output] = ()
+
+    @property
+    def energy_expression(self) -> Expr:
+        """The Lagrangian, or the kinetic energy where forces carry the rest [J]."""
+        return sp.sympify(self.lagrangian if self.lagrangian is not None else self.kinetic_energy)
+
+    @cached_property
+    def prescribed(self) -> tuple[Input, ...]:
+        """Inputs whose first and second derivative the equations need."""
+        used: set[Expr] = set(self.energy_expression.atoms(AppliedUndef))
+        for constraint in self.constraints:
+            if not isinstance(constraint, Nonholonomic):
+                used |= sp.sympify(constraint.expression).atoms(AppliedUndef)
+        for relation in self.embedding.relations.values() if self.embedding else ():
+            used |= sp.sympify(relation).atoms(AppliedUndef)
+        return tuple(i for i in self.inputs if i.symbol in used)
+
+
+def name_of(symbol: Expr) -> str:
+    """A symbol's or dynamicsymbol's plain name."""
+    return str(symbol.func) if isinstance(symbol, AppliedUndef) else str(symbol)

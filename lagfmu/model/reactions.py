@@ -1,0 +1,63 @@
+"""Multipliers and generalized forces of constraint as symbols, for expressions of a model's own.
+
+    multiplier("rod")        lambda of the constraint, with the sign and unit of the FMU's lambda.rod
+    force_of_constraint(x)   Q_x = sum_k lambda_k a_kx of all constraints, as the FMU's Q.x
+
+They are the symbols that the FMU's variables are named by, so that an output, the normal force of a
+friction and a closed form mean the same by them.  They have no place in the energy or in a force: what
+is solved for cannot stand among what it is solved from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+from ..errors import UnitError
+from .parts import ModelFields, Nonholonomic, name_of
+from .units import ONE, Unit, dimension_of, generalized_force_unit, multiplier_unit
+
+Expr = Any
+
+
+def multiplier(constraint: str) -> Expr:
+    """lambda of the constraint of that name; its unit is J/[f], W/[expression] if nonholonomic."""
+    return sp.Symbol(f"lambda.{constraint}", real=True)
+
+
+def force_of_constraint(coordinate: Expr) -> Expr:
+    """Q of all constraints on a coordinate, in J/[coordinate]."""
+    return sp.Symbol(f"Q.{name_of(coordinate)}", real=True)
+
+
+def is_reaction(symbol: Expr) -> bool:
+    """True for what `multiplier` and `force_of_constraint` make."""
+    return bool(symbol.is_Symbol) and str(symbol).startswith(("lambda.", "Q."))
+
+
+def reactions_in(expression: Expr) -> list[Expr]:
+    """The multipliers and forces of constraint in an expression, by name."""
+    return sorted(filter(is_reaction, sp.sympify(expression).free_symbols), key=str)
+
+
+def reaction_units(model: ModelFields, units: Mapping[Expr, Unit]) -> dict[Expr, Unit]:
+    """The unit of each multiplier and each force of constraint of the model.
+
+    A constraint whose own terms disagree in dimension has none; that is told where it is checked.
+    """
+    found = {}
+    for c in model.constraints:
+        if not hasattr(c, "expression"):
+            continue
+        try:
+            unit = dimension_of(sp.sympify(c.expression), units, c.name) or ONE
+        except UnitError:
+            continue
+        found[multiplier(c.name)] = multiplier_unit(unit, isinstance(c, Nonholonomic))
+    for q in model.coordinates:
+        if q in units and isinstance(q, AppliedUndef):
+            found[force_of_constraint(q)] = generalized_force_unit(units[q])
+    return found

@@ -1,0 +1,139 @@
+"""What one FMU must show, and so what it must hold: the full FMU is the scene that asks for everything.
+
+`outputs`, `fixed`, `inputs` and `contacts` say what an importer will read, change, drive and see open;
+prune.py and fold.py take everything else away before code is printed.
+"""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..errors import ModelError
+from ..methods import METHODS, integrators, unknown
+from ..solver.state import DEFAULT_TOLERANCE
+from .model import NAME
+
+FORMULATIONS = ("multipliers", "nullspace", "minimal")
+EVERYTHING = ("*",)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One FMU of a model.
+
+    `formulation` is 'multipliers' (KKT), 'nullspace' (lambda eliminated) or 'minimal' (dependent
+    coordinates eliminated); all three report lambda and Q.  None: 'minimal' where `outputs` need no
+    lambda and dependent coordinates can be eliminated, else 'multipliers'.  `stop_time` and
+    `step_size` [s], `tolerance`, `method` and `step` (the largest one of a method with a fixed step
+    [s]; 0: chosen from the start) are the defaults that the FMU states and starts with.
+
+    What the importer needs; names may be patterns such as 'lambda.*':
+    `outputs`: the variables that it reads (start values can be set whether they are read or not).
+    `fixed`: parameters that become numbers in the code, 'm' at the model's value or 'm=2.5' at
+    another [SI]; the other ones stay adjustable, but for those on which no output depends.
+    `inputs`: those that it drives; the others keep their start values, and can no longer be set.
+    `contacts`: those that may open; the others hold like a holonomic constraint, whatever the sign of
+    lambda.
+    `accuracy`: '1e-6' or '1e-6:lambda.surface', the relative error that the FMU is to hold; the
+    method, its tolerance or step, and the formulation if None, are then measured and chosen when it
+    is built.
+    `methods`: those that `solver.method` can be set to; None: `method` alone if `outputs` are named,
+    else all.
+    `derivatives`: whether a native FMU offers directional derivatives; None: unless `outputs` are
+    named.
+
+    Raises ModelError with every problem at once.
+    """
+
+    name: str
+    formulation: str | None = None
+    stop_time: float = 1.0
+    step_size: float = 0.01
+    tolerance: float = DEFAULT_TOLERANCE
+    method: str = "auto"
+    step: float = 0.0
+    outputs: Sequence[str] = EVERYTHING
+    fixed: Sequence[str] = ()
+    inputs: Sequence[str] = EVERYTHING
+    contacts: Sequence[str] = EVERYTHING
+    accuracy: str | None = None
+    methods: Sequence[str] | None = None
+    derivatives: bool | None = None
+
+    def __post_init__(self) -> None:
+        problems = []
+        if not NAME.match(self.name):
+            problems.append(f"scene name {self.name!r} is no FMI name: use letters, digits and _")
+        elif keyword.iskeyword(self.name):
+            problems.append(
+                f"scene name {self.name!r} is a word of the Python language: choose another"
+            )
+        if self.formulation is not None and self.formulation not in FORMULATIONS:
+            problems.append(
+                f"formulation {self.formulation!r} is unknown, expected one of "
+                f"{', '.join(FORMULATIONS)}"
+            )
+        for method in (self.method, *(self.methods or ())):
+            if method not in METHODS:
+                problems.append(unknown(method))
+        for what in ("stop_time", "step_size", "tolerance"):
+            value = getattr(self, what)
+            if not 0 < value < float("inf"):
+                problems.append(f"{what} = {value!r}, expected a positive number")
+        if not 0 <= self.step < float("inf"):
+            problems.append(f"step = {self.step!r}, expected a positive number, or 0")
+        for what in ("outputs", "fixed", "inputs", "contacts"):
+            problems += self._listed(what)
+        if self.methods is not None:
+            wanted = {self.method, *self.methods}
+            chosen = tuple(m for m in METHODS if m in wanted)
+            whole = self.complete and chosen == METHODS
+            object.__setattr__(self, "methods", None if whole else chosen)
+        if problems:
+            raise ModelError(self.name, problems)
+
+    def _listed(self, what: str) -> list[str]:
+        """A list of names is kept as a tuple; a bare text would be taken letter by letter."""
+        value = getattr(self, what)
+        if isinstance(value, str) or not all(isinstance(x, str) for x in value):
+            return [f"{what} = {value!r}, expected a list of names, e.g. {what}=['m']"]
+        whole = "*" in value and what != "fixed"
+        object.__setattr__(self, what, EVERYTHING if whole else tuple(value))
+        return []
+
+    @property
+    def whole(self) -> Scene:
+        """The scene that asks for everything, of the same experiment."""
+        return replace(
+            self,
+            outputs=EVERYTHING,
+            fixed=(),
+            inputs=EVERYTHING,
+            contacts=EVERYTHING,
+            methods=None,
+            derivatives=None,
+        )
+
+    @property
+    def complete(self) -> bool:
+        """True if every variable of the model can be read."""
+        return tuple(self.outputs) == EVERYTHING
+
+    @property
+    def selectable(self) -> tuple[str, ...]:
+        """The methods that `solver.method` can be set to."""
+        if self.methods is not None:
+            return tuple(self.methods)
+        return METHODS if self.complete else (self.method,)
+
+    @property
+    def integrators(self) -> tuple[str, ...]:
+        """The integrators behind the methods that can be chosen."""
+        return integrators(self.selectable)
+
+    @property
+    def differentiable(self) -> bool:
+        """True if a native FMU offers directional derivatives."""
+        return self.complete if self.derivatives is None else self.derivatives

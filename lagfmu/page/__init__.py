@@ -1,0 +1,1 @@
+"""Equations as mathematics, and the page inside an FMU."""

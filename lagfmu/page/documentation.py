@@ -1,0 +1,152 @@
+"""The page documentation/index.html inside an FMU: equations, variables, units, how to use it.
+
+One HTML file that needs nothing else: mathematics as MathML, styles inside.  The same model gives the
+same bytes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+import jinja2
+from latex2mathml.converter import convert
+from markupsafe import Markup
+
+from ..interface.variables import Variable
+from ..model.model import Contact, Holonomic, Nonholonomic
+from ..model.units import Unit
+from .savings import savings
+from .typeset import SUPERSCRIPT, typeset
+
+if TYPE_CHECKING:  # build.py imports this module
+    from ..prepare.prepare import Prepared
+
+MEANING = {
+    "multipliers": "Lagrange's equations and the constraints, differentiated to accelerations, are "
+    "solved together for the accelerations and the multipliers λ (the KKT system).",
+    "nullspace": "λ is eliminated: Lagrange's equations are projected onto the motions that the "
+    "constraints allow, and λ is evaluated from the state afterwards.",
+    "minimal": "Dependent coordinates are eliminated: only the independent ones are integrated, the "
+    "constraints hold by construction, and λ is recovered from the full equations at each state.",
+}
+KINDS = {Holonomic: "holonomic", Nonholonomic: "nonholonomic (Pfaffian)", Contact: "contact"}
+GROUPS = (
+    ("Parameters", "Set them before initialization."),
+    ("Inputs", "Set them between communication steps."),
+    ("Motion", "Coordinates, velocities and accelerations."),
+    ("Multipliers and constraints", "Residuals are zero up to rounding while a constraint acts."),
+    (
+        "Generalized forces of constraint",
+        "Q of a coordinate is the sum of the constraints' shares.",
+    ),
+    ("Energies", ""),
+    ("Outputs of the model", "What they are made of stands among the equations."),
+    ("Contacts and departures", ""),
+    ("Solver", "Method, accuracy, and what was done."),
+)
+AFTER_FACTOR = re.compile(r"(?<=[\w})]) (?=\\(?:a?(?:sin|cos|tan)h?|log|exp|operatorname)\b)")
+HEADS = {"energy": "Energies", "contact": "Contacts and departures"}
+HEADS |= {"departure": "Contacts and departures", "Q": "Generalized forces of constraint"}
+HEADS |= dict.fromkeys(("lambda", "residual", "unique"), "Multipliers and constraints")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the variable table."""
+
+    name: str
+    causality: str
+    kind: str
+    unit: str
+    start: str
+    description: str
+
+
+def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = (), choice: str = "") -> str:
+    """The HTML page of an FMU.
+
+    `figures` are rows (closed form, largest error, allowed, verdict) of a verification; `choice` is the
+    section on how its solver settings were chosen, in HTML (tradeoff/page.py).
+    """
+    model, structure, table = prepared.model, prepared.structure, prepared.table
+    acting, whole = prepared.equations.constraints, prepared.whole
+    sections = typeset(prepared.equations, prepared.reduction, prepared.formulation)
+    return _template().render(
+        name=prepared.scene.name,
+        model=model,
+        scene=prepared.scene,
+        meaning=MEANING[prepared.formulation],
+        sections=[
+            (s.title, s.remark, [(e.label, mathml(e.latex), e.text) for e in s.equations])
+            for s in sections
+        ],
+        structure=structure,
+        constraints=[
+            (
+                c.name,
+                KINDS[type(c)],
+                c.description,
+                c.while_closed if not isinstance(c, Contact) else None,
+                shown(whole[f"lambda.{c.name}"].unit),
+            )
+            for c in acting
+        ],
+        contacts=[c for c in acting if isinstance(c, Contact)],
+        moved=[
+            (n, f"{given:.6g}", f"{used:.6g}", shown(whole[n].unit))
+            for n, given, used in structure.start.moved
+        ],
+        groups=_grouped(table.variables, {o.name for o in model.outputs}),
+        inputs=[v.name for v in table.variables if v.causality == "input"],
+        prescribed=bool(prepared.system.prescribed),
+        tolerance=f"{prepared.scene.tolerance:g}",
+        figures=figures,
+        saved=savings(prepared),
+        choice=Markup(choice),
+    )
+
+
+def mathml(latex: str) -> Markup:
+    """An equation as the browser shows it."""
+    latex = re.sub(r"\\mathrm{([^{}]*)}", lambda m: f"\\text{{{m[1]}}}".replace("\\_", "_"), latex)
+    return Markup(convert(AFTER_FACTOR.sub(r" \\, ", latex), display="block"))
+
+
+def shown(unit: Unit | None) -> str:
+    """A unit for reading: kg·m² for kg.m2; nothing for a plain number."""
+    if unit is None or unit.name == "1":
+        return ""
+    name = re.sub(r"(?<=[A-Za-z])(\d+)", lambda m: m[1].translate(SUPERSCRIPT), unit.name)
+    return name.replace(".", "·")
+
+
+def _grouped(
+    variables: Sequence[Variable], own: Collection[str]
+) -> list[tuple[str, str, list[Row]]]:
+    rows: dict[str, list[Row]] = {title: [] for title, _ in GROUPS}
+    for v in variables:
+        start = "" if v.start is None else str(v.start)
+        row = Row(v.name, v.causality, v.kind, shown(v.unit), start, v.description)
+        rows["Outputs of the model" if v.name in own else _group(v)].append(row)
+    return [(title, remark, rows[title]) for title, remark in GROUPS if rows[title]]
+
+
+def _group(v: Variable) -> str:
+    if v.name.startswith("solver."):
+        return "Solver"
+    by_role = {"parameter": "Parameters", "input": "Inputs", "start": "Motion"}
+    return by_role.get(v.role) or HEADS.get(v.name.split(".")[0], "Motion")
+
+
+@cache
+def _template() -> jinja2.Template:
+    text = files("lagfmu").joinpath("page/documentation.html.j2").read_text(encoding="utf-8")
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    return environment.from_string(text)

@@ -1,0 +1,180 @@
+"""Rank, redundancy and feasibility of a model's constraints, found numerically where they hold.
+
+Degrees of freedom N = n - rank G (ME 6590).  The rank is taken at the consistent start and at
+configurations near it that satisfy the constraints, because on the constraint surface it may be smaller
+than for a general q.
+"""
+
+from __future__ import annotations
+
+import random
+import warnings
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import DerivationError, ModelError
+from ..interface.variables import VariableTable
+from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.formulations.minimal import Reduction
+from ..solver.failure import StepFailureError
+from ..solver.initial import Start, start
+from ..solver.instant import Instant
+from ..solver.observe import expand, observe
+from ..solver.solution import RANK
+from ..solver.state import Settings
+from ..solver.system import Matrix, System
+from .diagnosis import cause_of_failure, negative_energy
+
+TRIALS = 5
+
+
+class RedundantConstraintWarning(UserWarning):
+    """Constraints that follow from others: lambda is not unique, Q is."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """n, m, rank of G with all constraints acting, degrees of freedom, redundant constraints, start."""
+
+    n: int
+    m: int
+    rank: int
+    redundant: tuple[str, ...]
+    start: Start
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """N = n - rank G."""
+        return self.n - self.rank
+
+
+def examine(
+    eom: EquationsOfMotion,
+    table: VariableTable,
+    system: System,
+    numbers: Mapping[Any, Any] | None = None,
+) -> Structure:
+    """Check that the model can start, and count its degrees of freedom.
+
+    `numbers`: values of parameters and inputs (plain symbols) that are not the model's own.
+
+    Warns of redundant constraints.  Raises ModelError if no configuration satisfies the constraints,
+    they contradict each other, the mass matrix is singular on the constraint surface, or the kinetic
+    energy is negative for some velocities at the start.
+    """
+    begun, u, p = _begun(eom, table, system, numbers or {})
+    generator = random.Random(1)
+    ranks, masses = [], []
+    for trial in range(TRIALS):
+        q, v = np.array(begun.state.q), np.array(begun.state.v)
+        if trial:  # a nearby configuration that satisfies the constraints as well
+            size = np.maximum(np.abs(q), np.abs(q).max(initial=0.0)) + 1e-3
+            shift = [0.1 * s * generator.uniform(-1, 1) for s in size]
+            try:
+                moved = start(system, Settings(), 0.0, (q + shift).tolist(), v.tolist(), u, p)
+            except StepFailureError:
+                continue
+            q, v = np.array(moved.state.q), np.array(moved.state.v)
+        full, q, v = expand(system, 0.0, q, v, u, p)
+        M, _, G, _, _ = Instant(full, 0.0, u, p).evaluate(q, v)
+        ranks.append(_rank(full, G))
+        masses.append(M)
+    size = np.abs([M.diagonal() for M in masses]).max(axis=0)
+    negative = negative_energy(full, masses[0], size)
+    if negative:
+        raise ModelError(eom.model.name, [negative])
+    rank, redundant = max(ranks, key=lambda r: r[0])
+    if redundant:
+        warnings.warn(
+            f"model {eom.model.name!r}: constraint{'s' if len(redundant) > 1 else ''} "
+            f"{', '.join(map(repr, redundant))} follow{'' if len(redundant) > 1 else 's'} from the "
+            "others; lambda is shared with least norm and flagged by unique.*, Q is right",
+            RedundantConstraintWarning,
+            stacklevel=3,
+        )
+    return Structure(eom.n, eom.m, rank, redundant, begun)
+
+
+def _begun(
+    eom: EquationsOfMotion, table: VariableTable, system: System, numbers: Mapping[Any, Any]
+) -> tuple[Start, list[float], list[float]]:
+    """The start with the values of the table and `numbers`, the inputs and the parameters then."""
+    p = [float(numbers.get(x.symbol, x.value)) for x in eom.parameters]
+    u = [float(numbers.get(s, table[str(s)].start or 0.0)) for s in eom.u]
+    q0 = [float(table[c].start or 0.0) for c in system.coordinates]
+    v0 = [float(table[f"der({c})"].start or 0.0) for c in system.coordinates]
+    try:
+        begun = start(system, Settings(), 0.0, q0, v0, u, p)
+        observe(system, begun.state, u, p)
+    except StepFailureError as error:
+        at = Instant(system, 0.0, system.inputs_at(u, 0.0), p)
+        cause = cause_of_failure(at, np.array(q0), np.array(v0)) or str(error)
+        raise ModelError(eom.model.name, [cause]) from error
+    return begun, u, p
+
+
+def check_held(
+    eom: EquationsOfMotion,
+    table: VariableTable,
+    system: System,
+    numbers: Mapping[Any, Any],
+    kept: Collection[str],
+) -> None:
+    """Contacts that a scene does not let open are closed at the start.  Raises ModelError naming others.
+
+    The equations, `table` and `system` are the model's, with all contacts; `kept` may open.
+    """
+    closed = _begun(eom, table, system, numbers)[0].state.closed
+    names = [system.rows[k].name for k in system.contacts]
+    away = [n for n, shut in zip(names, closed, strict=True) if n not in kept and not shut]
+    if away:
+        raise ModelError(
+            eom.model.name,
+            [
+                f"contact {name!r} is open at the start, but the scene says that it cannot open: name "
+                "it in `contacts`, or start on it"
+                for name in away
+            ],
+        )
+
+
+def check_embedding(eom: EquationsOfMotion, reduction: Reduction) -> None:
+    """An embedding q = phi(s) takes away as many coordinates as it satisfies constraints.
+
+    If it took more, it would hold the system where no constraint does, and the forces that hold it would
+    be missing from lambda.  Raises DerivationError naming the constraints that it violates.
+    """
+    taken, satisfied = eom.n - len(reduction.s), eom.m - len(reduction.rows)
+    if taken <= satisfied:
+        return
+    left = zip(reduction.rows, reduction.reduced.f, strict=True)
+    violated = "; ".join(
+        f"constraint {eom.constraints[k].name!r} becomes {f}, expected 0"
+        for k, f in left
+        if f is not None
+    )
+    raise DerivationError(
+        f"the embedding of model {eom.model.name!r} takes {taken} of {eom.n} coordinates away, but "
+        f"satisfies {satisfied} constraints{': ' + violated if violated else ''}; correct its "
+        "relations, keep more coordinates, or add the constraint that it stands for"
+    )
+
+
+def _rank(full: System, G: Matrix) -> tuple[int, tuple[str, ...]]:
+    """Rank of G with rows scaled to unit norm, and the rows that add nothing to those before them."""
+    norm = np.linalg.norm(G, axis=1)
+    G = G / np.where(norm > 0, norm, 1.0)[:, None]
+    kept: list[int] = []
+    redundant = []
+    for k in range(full.m):
+        trial = [*kept, k]
+        if np.linalg.svd(G[trial], compute_uv=False).min(initial=np.inf) > np.sqrt(RANK) and (
+            len(trial) <= full.n
+        ):
+            kept = trial
+        else:
+            redundant.append(full.rows[k].name)
+    return len(kept), tuple(redundant)

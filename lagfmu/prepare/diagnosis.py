@@ -1,0 +1,175 @@
+"""Why a model cannot start: which constraint, coordinate or value is to blame, found by trial.
+
+Newton's method has failed when this is asked.  Each answer names the thing, its value and the remedy.
+"""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+
+from ..solver.failure import StepFailureError
+from ..solver.initial import project_from_afar
+from ..solver.instant import Instant
+from ..solver.solution import RANK
+from ..solver.system import Matrix, System, Vector
+
+NEGATIVE = 1e-12  # a mass below this fraction of its neighbours' is rounding
+INDEFINITE = 1e-8  # an eigenvalue of the scaled mass matrix above -this is rounding
+SEARCHES = 40  # other start values that are tried before constraints are called unsatisfiable
+
+
+def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
+    """What is wrong with a model that the solver cannot start at (q, v); None if it cannot be told."""
+    system = at.system
+    named = zip(system.coordinates, q.tolist(), strict=True)
+    values = ", ".join(f"{n} = {x!r}" for n, x in named)
+    with np.errstate(all="ignore"):
+        try:
+            M, F, G, nu, gamma = at.evaluate(q, v)
+            bad = not all(np.isfinite(a).all() for a in (M, F, G, nu, gamma))
+            reason = "a value is not finite" if bad else ""
+            f = at.residual(q)
+        except StepFailureError as error:
+            bad, reason = True, str(error.__cause__ or error)
+        if bad:
+            return (
+                f"the equations cannot be evaluated at the start values {values} ({reason}): "
+                "choose others, or other parameters"
+            )
+        negative = negative_energy(system, M, np.abs(M.diagonal()))
+        if negative:
+            return negative
+        rows = list(system.permanent)
+        loose = _massless(system, M, G[rows])
+        if loose:
+            return (
+                f"the mass matrix is singular on the constraint surface: {loose} has neither mass "
+                "nor a constraint that determines its acceleration; give it a mass, or a constraint"
+            )
+        if _projected(at, q, v, rows) is None:
+            return _missed(at, q, v, rows, f, values)
+        contrary = _first_contrary(system, G, nu, rows)
+        if contrary:
+            return (
+                f"constraints {contrary} contradict each other: no velocities satisfy them together "
+                "at the start; correct them, or leave one out"
+            )
+        contrary = _first_contrary(system, G, gamma, rows)
+        if contrary:
+            return (
+                f"constraints {contrary} contradict each other: no accelerations satisfy them together "
+                "at the start; correct them, or leave one out"
+            )
+    return None
+
+
+def negative_energy(system: System, M: Matrix, size: Vector) -> str:
+    """Motions with kinetic energy v.M v/2 < 0, in words; empty if M (n, n) is positive semidefinite.
+
+    `size` (n) >= 0: the masses' magnitudes here and nearby, which tell a negative mass from the rounding
+    of one that vanishes at this place.
+    """
+    remedy = (
+        "at the start, expected no negative kinetic energy: check the sign of T in L = T - V, and the "
+        "parameters in it"
+    )
+    masses = dict(zip(system.coordinates, M.diagonal().tolist(), strict=True))
+    below = (M.diagonal() < -NEGATIVE * size).tolist()
+    wrong = [
+        f"{name!r} is {mass:.6g}"
+        for (name, mass), b in zip(masses.items(), below, strict=True)
+        if b
+    ]
+    if wrong:
+        return f"the kinetic energy is negative: the mass of {', of '.join(wrong)} {remedy}"
+    unit = np.sqrt(np.where(size > 0, size, np.abs(M).max(initial=0.0) or 1.0))
+    values, vectors = np.linalg.eigh(M / unit[:, None] / unit)
+    if not values.min(initial=0.0) < -INDEFINITE:
+        return ""
+    names = zip(system.coordinates, vectors[:, 0].tolist(), strict=True)
+    moving = ", ".join(repr(name) for name, part in names if abs(part) > 1e-2)
+    return (
+        f"the kinetic energy is negative where {moving} move together: the mass matrix, scaled to a "
+        f"diagonal of 1, has the eigenvalue {values[0]:.6g} {remedy}"
+    )
+
+
+def _massless(system: System, M: Matrix, G: Matrix) -> str:
+    """Names of coordinates that can accelerate without mass and without violating a constraint."""
+    rows = [a / (np.abs(a).max(initial=0.0) or 1.0) for a in (*M, *G)]
+    _, sizes, V = np.linalg.svd(np.array(rows))
+    free = V[len(sizes) :].tolist() + V[: len(sizes)][sizes < RANK].tolist()
+    loose = sorted({j for direction in free for j, a in enumerate(direction) if abs(a) > 1e-6})
+    return ", ".join(repr(system.coordinates[j]) for j in loose)
+
+
+def _projected(at: Instant, q: Vector, v: Vector, rows: list[int]) -> Vector | None:
+    size = np.maximum(np.abs(q), np.abs(q).max(initial=0.0) or 1.0)
+    try:
+        return project_from_afar(at, q, v, rows, size)
+    except StepFailureError:
+        return None
+
+
+def _missed(at: Instant, q: Vector, v: Vector, rows: list[int], f: Vector, values: str) -> str:
+    """Constraints on position that the start values cannot be projected onto: are there others?"""
+    system = at.system
+    generator = random.Random(1)
+    reach = 2 * max([*np.abs(q), *(abs(x) for x in at.p), 1.0])
+    tried = [q] + [
+        np.array([generator.choice((0.01, 0.1, 1.0)) * generator.uniform(-reach, reach) for _ in q])
+        for _ in range(SEARCHES)
+    ]
+
+    def satisfiable(chosen: list[int]) -> list[Vector]:
+        found = [_projected(at, trial, v, chosen) for trial in tried]
+        return [x for x in found if x is not None]
+
+    others = satisfiable(rows)
+    if others:
+        best = min(others, key=lambda x: float(np.abs(x - q).max()))
+        good = ", ".join(f"{n} = {x:.6g}" for n, x in zip(system.coordinates, best, strict=True))
+        missed = ", ".join(f"{system.rows[k].name!r} by {f[k]:.3g}" for k in rows if f[k] != 0)
+        return (
+            f"the start values {values} cannot be projected onto the constraints (missed: {missed}): "
+            f"choose others, for example {good}"
+        )
+    for k in rows:
+        if not satisfiable([k]):
+            return (
+                f"constraint {system.rows[k].name!r}: no configuration was found that satisfies it; "
+                f"at the start values {values} it is {f[k]:.3g}, expected 0: correct its expression "
+                "or the parameters in it"
+            )
+    kept = list(rows)
+    for k in rows:  # what can be left out while the rest still fails is not to blame
+        if not satisfiable([r for r in kept if r != k]):
+            kept.remove(k)
+    names = ", ".join(repr(system.rows[k].name) for k in kept)
+    return (
+        f"constraints {names} contradict each other: each can be satisfied, but no configuration was "
+        "found that satisfies all; correct them, or leave one out"
+    )
+
+
+def _first_contrary(system: System, G: Matrix, nu: Vector, rows: list[int]) -> str:
+    """Names of rows of G v = nu that no v satisfies, or of G vdot = gamma that no vdot does."""
+
+    def solvable(chosen: list[int]) -> bool:
+        if not chosen:
+            return True
+        norm = np.linalg.norm(G[chosen], axis=1)
+        scaled = G[chosen] / np.where(norm > 0, norm, 1.0)[:, None]
+        right = nu[chosen] / np.where(norm > 0, norm, 1.0)
+        speeds = np.linalg.lstsq(scaled, right, rcond=RANK)[0]
+        return bool(np.abs(scaled @ speeds - right).max() <= 1e-9 * (np.abs(right).max() or 1.0))
+
+    if solvable(rows):
+        return ""
+    kept = list(rows)
+    for k in rows:
+        if not solvable([r for r in kept if r != k]):
+            kept.remove(k)
+    return ", ".join(repr(system.rows[k].name) for k in kept)

@@ -1,0 +1,98 @@
+/* system.h -- the numeric form of a model, as the solver sees it: functions and index patterns.
+ *
+ *   M(q,t) vdot = F(q,v,t,u) + G^T lambda ,  G v = nu(q,t,u) ,  G vdot = gamma(q,v,t,u) ,  f(q,t) = 0
+ *
+ * n coordinates, m constraint rows.  M and G are passed as the lists of their structurally non-zero
+ * values: M's lower triangle (row >= column), G row by row, both sorted by (row, column).  That
+ * layout is decided by the code printer (ccode.py) and described by the patterns below.  SI units.
+ * model.c, which is generated, defines one `const System`. */
+#ifndef LAGFMU_SYSTEM_H
+#define LAGFMU_SYSTEM_H
+
+#include "plan.h"
+
+typedef enum { HOLONOMIC, NONHOLONOMIC, CONTACT } Kind;
+typedef enum { MULTIPLIERS, NULLSPACE, MINIMAL } Formulation;
+
+typedef struct {
+    const char *name;
+    Kind kind;
+    int while_closed; /* row of the contact that must be closed for this one to act; -1: always acts */
+} Row;
+
+typedef struct System System;
+
+struct System {
+    int n, m;                 /* coordinates, constraint rows */
+    int contacts;             /* how many rows are contacts */
+    int inputs, parameters;   /* lengths of u and p */
+    int masses, entries;      /* structural non-zeros of M's lower triangle and of G */
+    const char *const *coordinates; /* (n) names */
+    const Row *rows;          /* (m) */
+    const int *contact;       /* (contacts) rows that are contacts, ascending */
+    const int *mass_row, *mass_column;   /* (masses) */
+    const int *entry_row, *entry_column; /* (entries) */
+    const int *row_start;     /* (m + 1) where each row of G begins among its entries */
+    int prescribed_count;
+    const int *prescribed;    /* positions in u where a prescribed motion begins: u, der(u), der(u,2) */
+    const int *dimension;        /* (n) coordinates of one physical dimension have one number */
+    const double *folded;        /* (n) the largest magnitude of the dimension among parameters that are
+                                  * numbers in the code; NULL: there are none */
+    const int *extent_dimension; /* (parameters) the number of those that it compares to; -1: none */
+    int angles;                  /* the number of those without dimension; -1: none */
+    Formulation formulation;
+    int constant_mass;        /* M holds parameters and numbers only */
+    int separable;            /* constant mass, forces without velocities, position constraints only */
+    const Plan *plan;         /* sparse elimination, found when the FMU was built */
+    /* x (n) and lambda (m) of  M x = b + G^T lambda,  G x = c  with all rows acting, the plan written
+     * out for a small system; 0 where that is not safe: then linear.h decides.  NULL: not there. */
+    int (*solve)(const double *M, const double *b, const double *G, const double *c, double *x,
+                 double *lambda);
+
+    void (*dynamics)(double t, const double *q, const double *v, const double *u, const double *p,
+                     double *M, double *F, double *G, double *nu, double *gamma);
+    /* f (m), 0 for a nonholonomic row */
+    void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
+    /* kinetic and potential energy [J]; NULL where they are not read */
+    void (*energies)(double t, const double *q, const double *v, const double *u, const double *p,
+                     double *energy);
+    /* coefficient of restitution of each row (m); NULL without contacts */
+    void (*restitution)(const double *p, double *e);
+    /* The derivative of all of these along the direction (dt, dq, dv, du): what changes in the values
+     * when the state moves that way.  dM (masses), dF (n), dG (entries), dnu, dgamma, df (m),
+     * denergy (2).  NULL where nobody asks for derivatives. */
+    void (*tangent)(double t, const double *q, const double *v, const double *u, const double *p,
+                    double dt, const double *dq, const double *dv, const double *du, double *dM,
+                    double *dF, double *dG, double *dnu, double *dgamma, double *df,
+                    double *denergy);
+
+    /* The model's own outputs w (output_count), from a state and what is solved for there; `other` is
+     * the value of a guarded one where w is not finite.  NULL without any, outputs_tangent also where
+     * nobody asks for derivatives. */
+    int output_count;
+    const char *const *output_names; /* (output_count) */
+    const int *guarded;              /* (output_count) */
+    void (*outputs)(double t, const double *q, const double *v, const double *u, const double *p,
+                    const double *vdot, const double *lambda, const double *Q, double *w,
+                    double *other);
+    void (*outputs_tangent)(double t, const double *q, const double *v, const double *u,
+                            const double *p, const double *vdot, const double *lambda,
+                            const double *Q, double dt, const double *dq, const double *dv,
+                            const double *du, const double *dvdot, const double *dlambda,
+                            const double *dQ, double *dw, double *dother);
+
+    /* An embedding q = phi(s, t), v = J sdot + dphi/dt, from the coordinates that this system steps
+     * to those of `full`, from which lambda is recovered; both NULL without one.  If nothing that is
+     * solved for is read, `full` has no dynamics, and is nothing but the coordinates that are read. */
+    void (*embed)(double t, const double *s, const double *sdot, const double *u, const double *p,
+                  double *q, double *v);
+    void (*embed_tangent)(double t, const double *s, const double *sdot, const double *u,
+                          const double *p, double dt, const double *ds, const double *dsdot,
+                          const double *du, double *dq, double *dv);
+    const System *full;
+};
+
+/* 1 where a row acts while the contacts stand as in `closed` (one entry a contact). */
+void system_active(const System *s, const int *closed, int *active);
+
+#endif

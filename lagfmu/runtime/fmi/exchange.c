@@ -1,0 +1,193 @@
+/* exchange.c -- an instance whose state is moved by an importer's integrator (Model Exchange).
+ *
+ * An importer's integrator knows no constraints: f = 0 and G v = nu, differentiated twice, drift away
+ * (Hairer & Wanner II, sect. VII.2).  The accelerations that it gets are therefore stabilized,
+ *
+ *   G vdot = gamma - 2 alpha (G v - nu) - alpha^2 f ,  alpha = GAIN * rate
+ *
+ * (Baumgarte 1972), with alpha of the order of the motion's own natural rate, so that nothing becomes
+ * stiff and the drift stays in proportion to the importer's tolerance, whatever that is.  lambda, as it
+ * is read, is that of the unstabilized equations.  Where this does not hold the drift (constraints that
+ * depend on each other), fmi2CompletedIntegratorStep asks for an event, in which the state is
+ * projected.  Projection alone costs a restart of the importer's integrator each time. */
+#include "exchange.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "leg.h"
+#include "parts.h"
+
+static const double GAIN = 3;     /* of the stabilization, in units of the motion's natural rate */
+static const double SHORT = 1e-2; /* natural time in which a contact closes what drift has opened */
+static const double LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
+
+void exchange_set_time(Instance *x, double t) {
+    Solver *s = &x->solver;
+    if (s->state.now.t != t) x->observed = x->evaluated = 0;
+    s->state.now.t = s->drive.since = t; /* the importer sets the inputs' values at each time itself */
+}
+
+Status exchange_get_states(Instance *x, double *states) {
+    if (instance_start(x) != OK) return FAILED;
+    for (int j = 0; j < x->solver.system->n; j++) {
+        states[2 * j] = x->solver.state.q[j];
+        states[2 * j + 1] = x->solver.state.v[j];
+    }
+    return OK;
+}
+
+void exchange_set_states(Instance *x, const double *states) {
+    for (int j = 0; j < x->solver.system->n; j++) {
+        x->solver.state.q[j] = states[2 * j];
+        x->solver.state.v[j] = states[2 * j + 1];
+    }
+    x->observed = x->evaluated = 0;
+}
+
+Status exchange_nominals(Instance *x, double *nominals) {
+    const int n = x->solver.system->n;
+    if (instance_start(x) != OK) return FAILED;
+    for (int j = 0; j < n; j++) {
+        nominals[2 * j] = x->solver.state.scale[j];
+        nominals[2 * j + 1] = x->solver.state.scale[n + j];
+    }
+    for (int j = 0; j < 2 * n; j++)
+        if (!(nominals[j] > 0)) nominals[j] = 1;
+    return OK;
+}
+
+/* Accelerations and multipliers at the state. */
+static Status evaluate(Instance *x) {
+    Solver *s = &x->solver;
+    if (x->evaluated) return OK;
+    if (instance_start(x) != OK) return FAILED;
+    leg_begin(s);
+    if (mechanism_motion(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+                         s->active) != OK)
+        return FAILED;
+    x->evaluated = 1;
+    return OK;
+}
+
+/* Adds the accelerations that lead back onto the constraints. */
+static Status stabilize(Instance *x, double *derivatives) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    const double alpha = GAIN * s->state.now.rate;
+    double *c = s->sensitivity.c, *a = s->sensitivity.dvdot;
+    if (s->system->m == 0) return OK;
+    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+        return FAILED;
+    for (int k = 0; k < s->system->m; k++)
+        c[k] = -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
+    if (linear_solve(&b->linear, NULL, c, a, NULL) != OK) return OK; /* rows contradict each other */
+    for (int j = 0; j < s->system->n; j++) derivatives[2 * j + 1] += a[j];
+    return OK;
+}
+
+Status exchange_derivatives(Instance *x, double *derivatives) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    const System *system = s->system;
+    if (evaluate(x) != OK) return FAILED;
+    for (int j = 0; j < system->n; j++) {
+        derivatives[2 * j] = s->state.v[j];
+        derivatives[2 * j + 1] = b->vdot[j];
+    }
+    return stabilize(x, derivatives);
+}
+
+Status exchange_indicators(Instance *x, double *indicators) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    if (s->system->contacts == 0) return OK;
+    if (evaluate(x) != OK) return FAILED;
+    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+        return FAILED;
+    for (int c = 0; c < s->system->contacts; c++) {
+        const int k = s->system->contact[c];
+        indicators[c] = s->state.closed[c] ? b->lambda[k] : b->f[k] + s->state.gap[c];
+    }
+    return OK;
+}
+
+/* The worst residual of a row that acts, relative to the constraint's own size. */
+static Status drift(Instance *x, double *worst) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    const System *system = s->system;
+    *worst = 0;
+    if (evaluate(x) != OK) return FAILED;
+    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+        return FAILED;
+    for (int k = 0; k < system->m; k++) {
+        double size = 0, speed = 0;
+        if (!s->active[k]) continue;
+        for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++) {
+            const int j = system->entry_column[e];
+            size += fabs(b->G[e]) * s->state.size[j];
+            speed += fabs(b->G[e]) * fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
+        }
+        if (system->rows[k].kind != NONHOLONOMIC && size > 0)
+            *worst = fmax(*worst, fabs(b->f[k] - s->state.offset[k]) / size);
+        if (speed > 0) *worst = fmax(*worst, fabs(mechanism_slip(b, k, s->state.v)) / speed);
+    }
+    return OK;
+}
+
+/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated. */
+static Status find_happened(Instance *x, int *any) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    *any = 0;
+    if (evaluate(x) != OK) return FAILED;
+    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+        return FAILED;
+    for (int c = 0; c < s->system->contacts; c++) {
+        const int k = s->system->contact[c];
+        if (s->state.closed[c])
+            x->happened[c] = b->lambda[k] <= 0;
+        else
+            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 && mechanism_slip(b, k, s->state.v) < 0;
+        *any |= x->happened[c];
+    }
+    return OK;
+}
+
+Status exchange_step_done(Instance *x, int *event) {
+    Solver *s = &x->solver;
+    double worst;
+    int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
+    *event = 0;
+    if (s->system->m == 0) return OK;
+    if (drift(x, &worst) != OK) return FAILED;
+    for (int c = 0; c < s->system->contacts; c++)
+        if (!s->state.closed[c] && s->stepped.f[s->system->contact[c]] > s->state.gap[c])
+            s->state.armed[c] = 1;
+    if (find_happened(x, &any) != OK) return FAILED;
+    *event = any || worst > LIMIT;
+    return OK;
+}
+
+Status exchange_event(Instance *x, int *moved) {
+    Solver *s = &x->solver;
+    int any;
+    double worst;
+    *moved = 0;
+    if (instance_start(x) != OK) return FAILED;
+    if (s->system->contacts > 0 && PARTS.switch_released(s, SHORT / s->state.now.rate) != OK) return FAILED;
+    x->observed = x->evaluated = 0;
+    if (find_happened(x, &any) != OK) return FAILED;
+    if (any) {
+        *moved = 1;
+        x->evaluated = 0;
+        return PARTS.switch_modes(s, x->happened);
+    }
+    if (drift(x, &worst) != OK) return FAILED;
+    if (!(worst > LIMIT)) return OK;
+    *moved = 1;
+    x->evaluated = 0;
+    return mechanism_project(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+                             s->active, s->state.offset, s->state.size);
+}

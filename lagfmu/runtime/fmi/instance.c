@@ -1,0 +1,489 @@
+/* instance.c -- one simulation behind an FMU: values by variable, start, step, saved states. */
+#include "instance.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "digits.h"
+#include "leg.h"
+#include "magnitudes.h"
+#include "outputs.h"
+
+static const double SMALLEST_TOLERANCE = 1e-14;
+
+/* ------------------------------------------------------------------ memory */
+
+static void *after(Arena *arena, char **base, size_t size) {
+    *base = arena_take(arena, size, 1);
+    return *base;
+}
+
+void instance_layout(Instance *x, Arena *arena) {
+    const System *system = MODEL_SYSTEM;
+    Arena saved = {NULL, 0}, scratch = {NULL, 0};
+    for (int pass = 0; pass < 2; pass++) {
+        solver_layout(&x->solver, &saved, &scratch, system);
+        x->q0 = arena_doubles(&saved, system->n);
+        x->v0 = arena_doubles(&saved, system->n);
+        x->expected = arena_doubles(&saved, system->inputs);
+        x->set = arena_ints(&saved, system->inputs);
+        x->closed = arena_ints(&scratch, system->contacts);
+        x->count = arena_ints(&scratch, system->contacts);
+        x->happened = arena_ints(&scratch, system->contacts);
+        observed_layout(&x->seen, &scratch, system);
+        if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
+        if (pass == 1) break;
+        x->saved_size = saved.used;
+        const size_t scratch_size = scratch.used;
+        saved.used = scratch.used = 0;
+        (void)after(arena, &saved.base, x->saved_size);
+        (void)after(arena, &scratch.base, scratch_size);
+        x->saved = saved.base;
+        (void)after(arena, &x->backup, instance_record_size(x));
+        if (arena->base == NULL) break;
+    }
+}
+
+void instance_reset(Instance *x) {
+    memset(x->saved, 0, x->saved_size);
+    memset(&x->solver.state.now, 0, sizeof x->solver.state.now);
+    memset(&x->solver.settings, 0, sizeof x->solver.settings);
+    memset(&x->given, 0, sizeof x->given);
+    x->solver.drive.since = 0;
+    x->solver.why.text[0] = '\0';
+    x->start_time = 0;
+    x->stop_time = HUGE_VAL;
+    x->tolerance = 0;
+    x->given.method = (MethodName)DEFAULT_METHOD;
+    x->started = x->running = x->warned = x->observed = x->evaluated = 0;
+    for (int k = 0; k < VARIABLE_COUNT; k++)
+        if (VARIABLES[k].role != ROLE_OUTPUT && VARIABLES[k].type == TYPE_REAL)
+            instance_set(x, &VARIABLES[k], VARIABLES[k].start);
+    memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
+}
+
+/* ------------------------------------------------------------------ values */
+
+static double departed(const Instance *x, int contact, int index, const double *seen,
+                            const double *own) {
+    const System *full = x->solver.system->full;
+    if (full != NULL) return seen[contact * full->n + index];
+    if (x->solver.state.count[contact] == 0) return 0;
+    return own[contact * x->solver.system->n + index];
+}
+
+/* Values that lie ready; 0 if the value has to be calculated first. */
+static int ready(const Instance *x, const Variable *v, double *value) {
+    const Solver *s = &x->solver;
+    const int embedded = s->system->full != NULL;
+    switch (v->place) {
+        case AT_PARAMETER: *value = s->p[v->index]; return 1;
+        case AT_METHOD: *value = (double)x->given.method; return 1;
+        case AT_TOLERANCE: *value = x->given.tolerance; return 1;
+        case AT_STEP: *value = x->given.step; return 1;
+        case AT_MAXIMUM_STEP: *value = x->given.maximum_step; return 1;
+        case AT_MAXIMUM_STEPS: *value = x->given.maximum_steps; return 1;
+        case AT_INPUT: *value = s->drive.value[v->index]; return 1;
+        default: break;
+    }
+    if (!x->started) return 0;
+    switch (v->place) {
+        case AT_Q:
+            if (embedded) return 0;
+            *value = s->state.q[v->index];
+            return 1;
+        case AT_V:
+            if (embedded) return 0;
+            *value = s->state.v[v->index];
+            return 1;
+        case AT_S: *value = s->state.q[v->index]; return 1;
+        case AT_SDOT: *value = s->state.v[v->index]; return 1;
+        case AT_STEPS: *value = s->state.now.steps; return 1;
+        case AT_CONTACT: *value = s->state.closed[v->index]; return 1;
+        case AT_COUNT: *value = s->state.count[v->index]; return 1;
+        case AT_DEPARTURE_TIME: *value = s->state.departure_time[v->index]; return 1;
+        default: return 0;
+    }
+}
+
+double instance_setting(const Instance *x, const Variable *v) {
+    const int n = x->solver.system->n;
+    double value = 0;
+    if (v->role == ROLE_START) return v->state < n ? x->q0[v->state] : x->v0[v->state - n];
+    (void)ready(x, v, &value);
+    return value;
+}
+
+Status instance_get(Instance *x, const Variable *v, double *value) {
+    if (ready(x, v, value)) return OK;
+    if (!x->observed && instance_observe(x) != OK) return FAILED;
+    if (ready(x, v, value)) return OK;
+    const Observed *o = &x->seen;
+    const State *state = &x->solver.state;
+    switch (v->place) {
+        case AT_Q: *value = o->q[v->index]; break;
+        case AT_V: *value = o->v[v->index]; break;
+        case AT_VDOT: *value = o->vdot[v->index]; break;
+        case AT_SDDOT: *value = o->sddot[v->index]; break;
+        case AT_LAMBDA: *value = o->lambda[v->index]; break;
+        case AT_UNIQUE: *value = o->unique[v->index]; break;
+        case AT_RESIDUAL: *value = o->residual[v->index]; break;
+        case AT_FORCE: *value = o->force[v->index]; break;
+        case AT_SHARE: *value = o->share[v->index]; break;
+        case AT_KINETIC: *value = o->energy[0]; break;
+        case AT_POTENTIAL: *value = o->energy[1]; break;
+        case AT_TOTAL: *value = o->energy[0] + o->energy[1]; break;
+        case AT_OUTPUT: *value = o->own[v->index]; break;
+        case AT_DEPARTURE_Q:
+            *value = departed(x, v->contact, v->index, o->departure_q, state->departure_q);
+            break;
+        case AT_DEPARTURE_V:
+            *value = departed(x, v->contact, v->index, o->departure_v, state->departure_v);
+            break;
+        default: return fail(&x->solver.why, "%s has no value", v->name);
+    }
+    return OK;
+}
+
+/* The first setting of an input after a step replaces its polynomial, whatever is set first. */
+static void renew_input(Instance *x, int k) {
+    if (x->set[k]) return;
+    x->set[k] = 1;
+    x->solver.drive.first[k] = x->solver.drive.second[k] = 0;
+}
+
+static void set_input(Instance *x, int k, double value) {
+    Drive *drive = &x->solver.drive;
+    const int same = drive->value[k] == value && drive->first[k] == 0 && drive->second[k] == 0;
+    renew_input(x, k);
+    drive->value[k] = value;
+    if (same) return;
+    x->observed = x->evaluated = 0;
+    if (x->started) solver_inputs_changed(&x->solver);
+}
+
+void instance_set(Instance *x, const Variable *v, double value) {
+    const int n = x->solver.system->n;
+    if (v->place == AT_INPUT) {
+        set_input(x, v->index, value);
+        if (!x->running) x->started = x->observed = 0;
+        return;
+    }
+    x->started = x->observed = x->evaluated = 0;
+    if (v->role == ROLE_START) {
+        if (v->state < n)
+            x->q0[v->state] = value;
+        else
+            x->v0[v->state - n] = value;
+        return;
+    }
+    switch (v->place) {
+        case AT_PARAMETER: x->solver.p[v->index] = value; break;
+        case AT_METHOD: x->given.method = (MethodName)value; break;
+        case AT_TOLERANCE: x->given.tolerance = value; break;
+        case AT_STEP: x->given.step = value; break;
+        case AT_MAXIMUM_STEP: x->given.maximum_step = value; break;
+        case AT_MAXIMUM_STEPS: x->given.maximum_steps = value; break;
+        default: break;
+    }
+}
+
+/* Where a prescribed motion stands in u: 0, 1 or 2 for u, der(u), der(u,2); -1 for other inputs. */
+static int order_in_motion(const System *s, int k) {
+    for (int i = 0; i < s->prescribed_count; i++)
+        if (k >= s->prescribed[i] && k <= s->prescribed[i] + 2) return k - s->prescribed[i];
+    return -1;
+}
+
+void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value) {
+    Drive *drive = &x->solver.drive;
+    const int k = v->index, place = order_in_motion(x->solver.system, k);
+    if (place >= 0) { /* its derivatives are inputs themselves */
+        if (place + order <= 2) {
+            set_input(x, k + order, value);
+            if (!x->running) x->started = x->observed = 0;
+        }
+        return;
+    }
+    renew_input(x, k);
+    double *where = order == 1 ? &drive->first[k] : &drive->second[k];
+    if (*where == value) return;
+    *where = value;
+    x->observed = x->evaluated = 0;
+    if (x->started) solver_inputs_changed(&x->solver);
+}
+
+/* ------------------------------------------------------------------ start */
+
+static void tell_moved(void *context, const char *coordinate, int is_velocity, double given,
+                       double used) {
+    Instance *x = context;
+    (void)snprintf(x->note, sizeof x->note,
+                   "start value %s%s%s = %s misses the constraints: projected to %s (moved by %.3g)",
+                   is_velocity ? "der(" : "", coordinate, is_velocity ? ")" : "",
+                   digits(given).text, digits(used).text, used - given);
+    x->tell(x->context, NOTE_WARNING, x->note);
+}
+
+static void choose_settings(Instance *x) {
+    Settings *s = &x->solver.settings;
+    *s = x->given;
+    if (!(s->tolerance > 0)) s->tolerance = x->tolerance;
+    if (!(s->tolerance > 0)) s->tolerance = DEFAULT_TOLERANCE;
+    if (s->tolerance >= SMALLEST_TOLERANCE) return;
+    (void)snprintf(x->note, sizeof x->note,
+                   "tolerance %s is below what double precision allows, %s is used",
+                   digits(s->tolerance).text, digits(SMALLEST_TOLERANCE).text);
+    s->tolerance = SMALLEST_TOLERANCE;
+    x->tell(x->context, NOTE_WARNING, x->note);
+}
+
+Status instance_start(Instance *x) {
+    Solver *s = &x->solver;
+    if (x->started) return OK;
+    choose_settings(x);
+    s->stop_time = x->stop_time;
+    s->drive.since = x->start_time;
+    if (solver_start(s, x->start_time, x->q0, x->v0, tell_moved, x) != OK) return FAILED;
+    /* model exchange has no communication step: 1 s stands in for it */
+    if (x->exchange && magnitudes_incomplete(s) &&
+        magnitudes_complete(s, leg_instant(s, x->start_time), 1) != OK)
+        return FAILED;
+    memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
+    x->started = 1;
+    x->observed = x->evaluated = 0;
+    return OK;
+}
+
+Status instance_observe(Instance *x) {
+    if (x->observed) return OK;
+    if (instance_start(x) != OK) return FAILED;
+    if (solver_observe(&x->solver, &x->seen) != OK) return FAILED;
+    x->observed = 1;
+    x->evaluated = 0;
+    return OK;
+}
+
+/* ------------------------------------------------------------------ step */
+
+/* Once: a prescribed motion moves, but its derivatives are left at zero. */
+static void warn_of_jumps(Instance *x) {
+    const System *s = x->solver.system;
+    const double *u = x->solver.drive.value;
+    for (int i = 0; i < s->prescribed_count && !x->warned; i++) {
+        const int k = s->prescribed[i];
+        if (u[k] == x->expected[k] || u[k + 1] != 0 || u[k + 2] != 0) continue;
+        const char *name = "";
+        for (int j = 0; j < VARIABLE_COUNT; j++)
+            if (VARIABLES[j].place == AT_INPUT && VARIABLES[j].index == k) name = VARIABLES[j].name;
+        (void)snprintf(x->note, sizeof x->note,
+                       "input %s moves while der(%s) = der(%s,2) = 0: it jumps at each "
+                       "communication point; connect its derivatives as well",
+                       name, name, name);
+        x->tell(x->context, NOTE_WARNING, x->note);
+        x->warned = 1;
+    }
+}
+
+/* The inputs go on to the time t by their derivatives, where they stay until they are set again. */
+static void move_inputs(Instance *x, double t) {
+    const System *s = x->solver.system;
+    Drive *drive = &x->solver.drive;
+    if (s->inputs == 0) return;
+    drive_at(s, drive, t, x->expected);
+    for (int k = 0; k < s->inputs; k++) {
+        drive->value[k] = x->expected[k];
+        drive->first[k] += (t - drive->since) * drive->second[k];
+        x->set[k] = 0;
+    }
+    drive->since = t;
+}
+
+static void report_events(Instance *x) {
+    const State *now = &x->solver.state;
+    for (int c = 0; c < x->solver.system->contacts; c++) {
+        const char *name = x->solver.system->rows[x->solver.system->contact[c]].name;
+        if (now->count[c] != x->count[c])
+            (void)snprintf(x->note, sizeof x->note, "contact %s opened at t = %s s", name,
+                           digits(now->departure_time[c]).text);
+        else if (now->closed[c] && !x->closed[c])
+            (void)snprintf(x->note, sizeof x->note, "contact %s closed", name);
+        else
+            continue;
+        x->tell(x->context, NOTE_EVENT, x->note);
+    }
+}
+
+static void note_contacts(Instance *x) {
+    const size_t size = (size_t)x->solver.system->contacts * sizeof *x->closed;
+    memcpy(x->closed, x->solver.state.closed, size);
+    memcpy(x->count, x->solver.state.count, size);
+}
+
+Status instance_step(Instance *x, double t_end) {
+    Solver *s = &x->solver;
+    instance_save(x, x->backup);
+    if (s->system->prescribed_count > 0) warn_of_jumps(x);
+    if (s->system->contacts > 0) note_contacts(x);
+    x->observed = x->evaluated = 0;
+    const double product = s->state.now.choice.product;
+    if (solver_advance(s, t_end) != OK) {
+        instance_restore(x, x->backup);
+        return FAILED;
+    }
+    move_inputs(x, t_end);
+    if (s->system->contacts > 0) report_events(x);
+    if (product == 0 && s->state.now.choice.product > 0) {
+        stiffness_message(&s->state.now.choice, x->note, sizeof x->note);
+        x->tell(x->context, NOTE_EVENT, x->note);
+    }
+    return OK;
+}
+
+/* ------------------------------------------------------------------ derivatives */
+
+Status instance_differentiate(Instance *x, Direction d) {
+    Solver *s = &x->solver;
+    const System *full = s->system->full;
+    if (s->system->tangent == NULL)
+        return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
+    if (instance_observe(x) != OK) return FAILED;
+    const Instant at = {s->state.now.t, s->drive.value, s->p};
+    system_active(s->system, s->state.closed, s->active);
+    if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
+    if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
+        return FAILED;
+    if (full == NULL) {
+        outputs_change(&s->sensitivity, &s->stepped, s->system, at, &x->seen, d);
+        return OK;
+    }
+    Sensitivity *w = &x->along;
+    s->system->embed_tangent(at.t, s->state.q, s->state.v, at.u, at.p, d.dt, d.dq, d.dv, d.du,
+                             w->dq, w->dv);
+    const Direction wide = {d.dt, w->dq, w->dv, d.du};
+    if (full->dynamics == NULL) {
+        sensitivity_of_energies(w, full, at, x->seen.q, x->seen.v, wide);
+        outputs_change(w, NULL, full, at, &x->seen, wide);
+        return OK;
+    }
+    if (mechanism_motion(&s->full, at, x->seen.q, x->seen.v, s->active_full) != OK)
+        return FAILED;
+    if (sensitivity_along(w, &s->full, at, x->seen.q, x->seen.v, wide) != OK) return FAILED;
+    outputs_change(w, &s->full, full, at, &x->seen, wide);
+    return OK;
+}
+
+/* Q = G^T lambda: the change of the share that G's value e has in it. */
+static double share_change(const Sensitivity *w, const Mechanism *b, int e) {
+    const int k = b->system->entry_row[e];
+    return w->dG[e] * b->lambda[k] + b->G[e] * w->dlambda[k];
+}
+
+Status instance_change(const Instance *x, const Variable *v, Direction d, double *change) {
+    const Solver *s = &x->solver;
+    const int embedded = s->system->full != NULL;
+    const Mechanism *b = embedded ? &s->full : &s->stepped;
+    const Sensitivity *w = embedded ? &x->along : &s->sensitivity;
+    const double *dq = embedded ? w->dq : d.dq, *dv = embedded ? w->dv : d.dv;
+    *change = 0;
+    switch (v->place) {
+        case AT_Q: *change = dq[v->index]; break;
+        case AT_V: *change = dv[v->index]; break;
+        case AT_VDOT: *change = w->dvdot[v->index]; break;
+        case AT_S: *change = d.dq[v->index]; break;
+        case AT_SDOT: *change = d.dv[v->index]; break;
+        case AT_SDDOT: *change = s->sensitivity.dvdot[v->index]; break;
+        case AT_LAMBDA: *change = w->dlambda[v->index]; break;
+        case AT_RESIDUAL:
+            *change = sensitivity_residual(w, b, v->index, x->seen.v, dv);
+            break;
+        case AT_FORCE:
+            for (int e = 0; e < b->system->entries; e++)
+                if (b->system->entry_column[e] == v->index) *change += share_change(w, b, e);
+            break;
+        case AT_SHARE: *change = share_change(w, b, v->index); break;
+        case AT_KINETIC: *change = w->denergy[0]; break;
+        case AT_POTENTIAL: *change = w->denergy[1]; break;
+        case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;
+        case AT_OUTPUT: *change = w->down[v->index]; break;
+        case AT_INPUT: *change = d.du[v->index]; break;
+        default: break; /* discrete ones and parameters: none */
+    }
+    if (v->place == AT_LAMBDA && !x->seen.unique[v->index])
+        *change = NAN;
+    return isfinite(*change) ? OK : FAILED;
+}
+
+Status instance_rates(Instance *x, Direction *d) {
+    Solver *s = &x->solver;
+    const System *system = s->system;
+    Sensitivity *w = &s->sensitivity;
+    if (instance_observe(x) != OK) return FAILED;
+    const double *vdot = system->full == NULL ? x->seen.vdot : x->seen.sddot;
+    memcpy(w->dq, s->state.v, (size_t)system->n * sizeof *w->dq);
+    memcpy(w->dv, vdot, (size_t)system->n * sizeof *w->dv);
+    for (int k = 0; k < system->inputs; k++) {
+        const int order = order_in_motion(system, k);
+        w->du[k] = order < 0 ? s->drive.first[k] : order < 2 ? s->drive.value[k + 1] : 0;
+    }
+    *d = (Direction){1, w->dq, w->dv, w->du};
+    return instance_differentiate(x, *d);
+}
+
+/* ------------------------------------------------------------------ saved states */
+
+/* The numbers of a saved state; its arrays follow. */
+typedef struct {
+    Numbers now;
+    Settings settings, given;
+    double since, start_time, stop_time, tolerance, solver_stop_time;
+    int exchange, phase, started, running, warned;
+} Record;
+
+static size_t record_head(void) { return (sizeof(Record) + 15) / 16 * 16; }
+
+size_t instance_record_size(const Instance *x) { return record_head() + x->saved_size; }
+
+void instance_save(const Instance *x, char *record) {
+    const Solver *s = &x->solver;
+    Record head;
+    memset(&head, 0, sizeof head);
+    head.now = s->state.now;
+    head.settings = s->settings;
+    head.given = x->given;
+    head.since = s->drive.since;
+    head.start_time = x->start_time;
+    head.stop_time = x->stop_time;
+    head.tolerance = x->tolerance;
+    head.solver_stop_time = s->stop_time;
+    head.exchange = x->exchange;
+    head.phase = x->phase;
+    head.started = x->started;
+    head.running = x->running;
+    head.warned = x->warned;
+    memset(record, 0, record_head());
+    memcpy(record, &head, sizeof head);
+    memcpy(record + record_head(), x->saved, x->saved_size);
+}
+
+void instance_restore(Instance *x, const char *record) {
+    Solver *s = &x->solver;
+    Record head;
+    memcpy(&head, record, sizeof head);
+    memcpy(x->saved, record + record_head(), x->saved_size);
+    s->state.now = head.now;
+    s->settings = head.settings;
+    x->given = head.given;
+    s->drive.since = head.since;
+    x->start_time = head.start_time;
+    x->stop_time = head.stop_time;
+    x->tolerance = head.tolerance;
+    s->stop_time = head.solver_stop_time;
+    x->exchange = head.exchange;
+    x->phase = head.phase;
+    x->started = head.started;
+    x->running = head.running;
+    x->warned = head.warned;
+    x->observed = x->evaluated = 0;
+}

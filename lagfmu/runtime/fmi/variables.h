@@ -1,0 +1,50 @@
+/* variables.h -- the FMU's variables as fmi2.c sees them; variables.c is generated from the same table
+ * as modelDescription.xml (table.py).  The position is the value reference. */
+#ifndef LAGFMU_VARIABLES_H
+#define LAGFMU_VARIABLES_H
+
+#include "system.h"
+
+typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN, TYPE_STRING } Type;
+
+/* what may set it */
+typedef enum { ROLE_PARAMETER, ROLE_START, ROLE_INPUT, ROLE_SOLVER, ROLE_OUTPUT } Role;
+
+/* where its value lies (`index`, and for departures `contact`) */
+typedef enum {
+    AT_PARAMETER,      /* p[index] */
+    AT_METHOD, AT_TOLERANCE, AT_STEP, AT_MAXIMUM_STEP, AT_MAXIMUM_STEPS,
+    AT_INPUT,          /* u[index] */
+    AT_Q, AT_V, AT_VDOT,       /* full coordinates */
+    AT_S, AT_SDOT, AT_SDDOT,   /* stepped coordinates of an embedding that are not full ones */
+    AT_LAMBDA, AT_UNIQUE, AT_RESIDUAL, /* row index */
+    AT_FORCE,          /* Q[index] */
+    AT_SHARE,          /* entry index of G */
+    AT_KINETIC, AT_POTENTIAL, AT_TOTAL,
+    AT_OUTPUT,         /* own output index */
+    AT_CONTACT, AT_COUNT, AT_DEPARTURE_TIME, /* contact index */
+    AT_DEPARTURE_Q, AT_DEPARTURE_V,          /* full coordinate index, of `contact` */
+    AT_STEPS
+} Place;
+
+typedef struct {
+    const char *name;
+    Type type;
+    Role role;
+    Place place;
+    int index, contact;
+    int state;       /* role START: j for coordinate j of the stepped system, n + j for its velocity; -1 */
+    double start;    /* of what can be set */
+    const char *text; /* start of a String */
+    double min, max; /* -HUGE_VAL, HUGE_VAL where there is none */
+    int positive;    /* zero is refused */
+} Variable;
+
+extern const Variable VARIABLES[];
+extern const int VARIABLE_COUNT;
+extern const System *const MODEL_SYSTEM;       /* the system that is stepped */
+extern const char *const MODEL_IDENTIFIER, *const MODEL_GUID;
+extern const double DEFAULT_TOLERANCE;
+extern const int DEFAULT_METHOD;               /* MethodName */
+
+#endif

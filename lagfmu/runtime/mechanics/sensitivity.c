@@ -1,0 +1,112 @@
+/* sensitivity.c -- the equations of motion, differentiated along a direction.
+ *
+ *   M vdot = F + G^T lambda ,  G vdot = gamma
+ *
+ * gives, with the changes dM, dF, dG, dgamma of the coefficients (system->tangent, symbolic),
+ *
+ *   M dvdot = b + G^T dlambda ,  G dvdot = c ,
+ *   b = dF + dG^T lambda - dM vdot ,  c = dgamma - dG vdot
+ *
+ * a further solve with the factors that gave vdot and lambda (implicit function theorem; Hairer &
+ * Wanner II, sect. VII.1, for index-1 equations). */
+#include "sensitivity.h"
+
+#include <math.h>
+#include <string.h>
+
+void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
+    w->dM = arena_doubles(arena, s->masses);
+    w->dF = arena_doubles(arena, s->n);
+    w->dG = arena_doubles(arena, s->entries);
+    w->dnu = arena_doubles(arena, s->m);
+    w->dgamma = arena_doubles(arena, s->m);
+    w->df = arena_doubles(arena, s->m);
+    w->dvdot = arena_doubles(arena, s->n);
+    w->dlambda = arena_doubles(arena, s->m);
+    w->b = arena_doubles(arena, s->n);
+    w->c = arena_doubles(arena, s->m);
+    w->dq = arena_doubles(arena, s->n);
+    w->dv = arena_doubles(arena, s->n);
+    w->du = arena_doubles(arena, s->inputs);
+    w->dforce = arena_doubles(arena, s->output_count > 0 ? s->n : 0);
+    w->down = arena_doubles(arena, s->output_count);
+    w->dother = arena_doubles(arena, s->output_count);
+}
+
+static void right_sides(Sensitivity *w, const Mechanism *b) {
+    const System *s = b->system;
+    memcpy(w->b, w->dF, (size_t)s->n * sizeof *w->b);
+    memcpy(w->c, w->dgamma, (size_t)s->m * sizeof *w->c);
+    for (int e = 0; e < s->masses; e++) {
+        const int i = s->mass_row[e], j = s->mass_column[e];
+        w->b[i] -= w->dM[e] * b->vdot[j];
+        if (i != j) w->b[j] -= w->dM[e] * b->vdot[i];
+    }
+    for (int e = 0; e < s->entries; e++) {
+        const int k = s->entry_row[e], j = s->entry_column[e];
+        w->b[j] += w->dG[e] * b->lambda[k];
+        w->c[k] -= w->dG[e] * b->vdot[j];
+    }
+}
+
+Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
+                         const double *v, Direction d) {
+    const System *s = b->system;
+    s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dM, w->dF, w->dG, w->dnu,
+               w->dgamma, w->df, w->denergy);
+    right_sides(w, b);
+    for (int j = 0; j < s->n; j++)
+        if (!isfinite(w->b[j]))
+            return fail(b->why, "the derivative of the force on %s is not finite at t = %.17g s",
+                        s->coordinates[j], at.t);
+    for (int k = 0; k < s->m; k++)
+        if (!isfinite(w->c[k]))
+            return fail(b->why, "the derivative of constraint %s is not finite at t = %.17g s",
+                        s->rows[k].name, at.t);
+    return linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda);
+}
+
+void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
+                             const double *v, Direction d) {
+    if (s->tangent == NULL) return;
+    s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dM, w->dF, w->dG, w->dnu,
+               w->dgamma, w->df, w->denergy);
+}
+
+double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,
+                            const double *dv) {
+    const System *s = b->system;
+    if (s->rows[k].kind != NONHOLONOMIC) return w->df[k];
+    double change = -w->dnu[k];
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
+        const int j = s->entry_column[e];
+        change += w->dG[e] * v[j] + b->G[e] * dv[j];
+    }
+    return change;
+}
+
+Status sensitivity_jacobian(Sensitivity *w, Mechanism *b, Instant at, const int *active,
+                            const double *y, double *J, double *dfdt) {
+    const int n = b->system->n, ny = 2 * n;
+    const double *q = y, *v = y + n;
+    Direction d = {0, w->dq, w->dv, w->du};
+    if (mechanism_motion(b, at, q, v, active) != OK) return FAILED;
+    memset(w->dq, 0, (size_t)n * sizeof *w->dq);
+    memset(w->dv, 0, (size_t)n * sizeof *w->dv);
+    memset(w->du, 0, (size_t)b->system->inputs * sizeof *w->du);
+    memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
+    memset(dfdt, 0, (size_t)n * sizeof *dfdt);
+    for (int j = 0; j < ny; j++) {
+        double *seed = j < n ? &w->dq[j] : &w->dv[j - n];
+        *seed = 1;
+        const Status status = sensitivity_along(w, b, at, q, v, d);
+        *seed = 0;
+        if (status != OK) return FAILED;
+        if (j >= n) J[(j - n) * ny + j] = 1;
+        for (int i = 0; i < n; i++) J[(n + i) * ny + j] = w->dvdot[i];
+    }
+    d.dt = 1;
+    if (sensitivity_along(w, b, at, q, v, d) != OK) return FAILED;
+    memcpy(dfdt + n, w->dvdot, (size_t)n * sizeof *dfdt);
+    return OK;
+}

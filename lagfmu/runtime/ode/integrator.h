@@ -1,0 +1,87 @@
+/* integrator.h -- y' = f(t, y): one step of any method, and dense output over the step just taken.
+ *
+ * Each method is a file with its tableau's source: dop853.c, rk4.c, radau5.c (rattle.c
+ * steps a mechanical system, not an ODE, and fills the same Integrator).  Error weights: an
+ * accepted step has a root-mean-square error below 1 in units of tolerance * max(|y_i|, scale_i);
+ * radau5's estimate is of low order: it is kept below 0.1 tolerance^(2/3), so that the error is. */
+#ifndef LAGFMU_INTEGRATOR_H
+#define LAGFMU_INTEGRATOR_H
+
+#include "arena.h"
+#include "status.h"
+
+typedef struct {
+    void *context;
+    /* f(t, y); FAILED where it cannot be evaluated: the step is cut there, the cause is in `why` */
+    Status (*rate)(void *context, double t, const double *y, double *dydt);
+    /* J = df/dy, dense, row by row (ny * ny), and df/dt (ny); for radau5 */
+    Status (*jacobian)(void *context, double t, const double *y, double *J, double *dfdt);
+    Why *why;
+} Ode;
+
+typedef struct {
+    double tolerance;      /* relative, per step */
+    const double *scale;   /* (ny) magnitudes below which errors are measured absolutely */
+    double maximum_step;   /* [s]; 0: no limit */
+    double fixed_step;     /* [s]; of rk4 and rattle */
+} Control;
+
+typedef struct Method Method;
+
+/* Everything up to `memory` and the arrays it points to must be saved for a bit-exact rollback;
+ * `scratch` holds nothing from one call to the next. */
+typedef struct {
+    const Method *method;
+    int ny;
+    double t_old, t;   /* the step just taken went from t_old to t */
+    double h_next;     /* the step to try next; 0: to be chosen from the problem */
+    double error_old;  /* memory of the step-size controller */
+    double *y, *f;     /* (ny) state at t and f(t, y) there; f is valid when `fresh` is 0 */
+    double *y_old, *f_old; /* (ny) at t_old */
+    double *dense;     /* (method->dense_arrays * ny) what the dense output needs */
+    int fresh;         /* 1: f(t, y) is not known yet: y was set or moved, or nobody needed it */
+    int fixed_left;    /* fixed-step methods: steps left to the latest bound (to be read only) */
+    double *scratch;
+    int *pivots;
+} Integrator;
+
+struct Method {
+    const char *name;
+    int dense_arrays;                 /* arrays of ny doubles in `dense` */
+    int (*scratch_doubles)(int ny);
+    int (*scratch_ints)(int ny);
+    int needs_jacobian;
+    int last_stage; /* arrays in `dense` before two of a stage at t, its argument and its rate, which
+                     * stay as they are; 0: they are not kept */
+    int fixed;                        /* a fixed step that divides the way to t_bound evenly */
+    /* One accepted step from integrator->t towards t_bound, never past it.  On success t_old,
+     * y_old, f_old, t, y, h_next are new, and dense() answers in [t_old, t]; the dense data may be
+     * completed lazily by `prepare_dense`.  FAILED (step size underflow, not finite): as before the
+     * call, but that f may be known now.  NULL for rattle: rattle_step() stands in for it. */
+    Status (*step)(Integrator *i, const Ode *ode, const Control *control, double t_bound);
+    /* Evaluates what dense() needs beyond the step itself; called at most once a step.  To be
+     * called before y is changed by a projection, after which dense() answers as before.  NULL:
+     * nothing to do. */
+    Status (*prepare_dense)(Integrator *i, const Ode *ode);
+    void (*dense)(const Integrator *i, double t, double *y);
+};
+
+enum { RADAU5_MOST_STATES = 800 }; /* for which radau5 keeps dense matrices */
+
+extern const Method dop853, rk4, radau5;
+
+/* rk4: estimate of the error of one component in the step just taken. */
+double rk4_error(const Integrator *i, int component);
+
+/* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
+ * f_old, dense) come from `saved`, the scratch from `scratch`. */
+void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
+                       const Method *const *methods, int count);
+
+/* Puts the integrator at (t, y); h: step to try first, 0: to be chosen. */
+void integrator_start(Integrator *i, const Method *method, double t, const double *y, double h);
+
+/* Replaces the state at the end of the step just taken (after a projection). */
+void integrator_move(Integrator *i, const double *y);
+
+#endif

@@ -1,0 +1,264 @@
+/* advance.c -- from one communication point to the next.
+ *
+ * Steps are taken and projected within a leg (leg.c); events are found (events.c) and met (switch.c).
+ * In a scene without inputs the integrator may stand ahead of the communication point: the state there
+ * is read from dense output and projected.  It never passes the stop time, an event that lies ahead is
+ * kept until its time, and a step ahead that fails is taken again as far as the communication point. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "indicators.h"
+#include "leg.h"
+#include "parts.h"
+#include "magnitudes.h"
+
+enum { CHATTER = 200 }; /* contact events in next to no time after which the step is given up */
+static const double PATIENCE = 200; /* steps after which one is judged by its average step */
+static const double STEP_LIMIT = 1e7; /* internal steps that a communication step may need, unless ... */
+static const double CRAWL = 1e-3;     /* ... on average they are no shorter than this part of ... */
+static const double TINY = 1e-6;      /* ... the natural time; a step shorter than this makes no headway */
+static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
+static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
+
+static const Method *method_of(const Solver *s) {
+    return PARTS.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method];
+}
+
+/* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not
+ * at a fixed step, which divides the communication step; not on the way to an obstacle. */
+static int runs_ahead(const Solver *s) {
+    if (s->system->inputs > 0 || method_of(s)->fixed) return 0;
+    for (int c = 0; c < s->system->contacts; c++)
+        if (!s->state.closed[c]) return 0;
+    return 1;
+}
+
+static void restart(Solver *s, double t, const double *y, double h) {
+    integrator_start(&s->integrator, method_of(s), t, y, h);
+}
+
+/* The integrator's own numbers, taken from the state, and put back. */
+static void resume(Solver *s) {
+    const Numbers *now = &s->state.now;
+    Integrator *i = &s->integrator;
+    i->method = method_of(s);
+    i->t_old = now->t_old;
+    i->t = now->t_integrator;
+    i->h_next = now->h_next;
+    i->error_old = now->error_old;
+    i->fresh = now->fresh;
+}
+
+static void keep(Solver *s) {
+    Numbers *now = &s->state.now;
+    const Integrator *i = &s->integrator;
+    now->t_old = i->t_old;
+    now->t_integrator = i->t;
+    now->h_next = i->h_next;
+    now->error_old = i->error_old;
+    now->fresh = i->fresh;
+}
+
+/* Puts the integrator at the state; the indicators there. */
+static Status set_out(Solver *s) {
+    State *x = &s->state;
+    const size_t n = (size_t)s->system->n;
+    double *y = s->work_advance;
+    memcpy(y, x->q, n * sizeof *y);
+    memcpy(y + n, x->v, n * sizeof *y);
+    if (stiffness_turn(&x->now.choice)) x->now.step = x->now.choice.longest;
+    restart(s, x->now.t, y, x->now.step);
+    x->now.ahead = 1;
+    x->now.event_count = 0;
+    return indicators_at(s, x->now.t, y, x->indicator);
+}
+
+/* One step, projected and searched for events; `bound`: not to be passed. */
+static Status step_towards(Solver *s, double t_end, double bound, double longest) {
+    Integrator *i = &s->integrator;
+    const int watch = indicators_count(s->system) > 0;
+    double *y1 = s->work_advance;
+    if (leg_step(s, i, bound, longest) != OK) return FAILED;
+    if ((watch || i->t > t_end) && leg_prepare_dense(s, i) != OK) return FAILED;
+    memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
+    if (leg_project(s, i->t, y1) != OK) return FAILED;
+    if (leg_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
+    if (watch && PARTS.events_find(s, y1) != OK) return FAILED;
+    integrator_move(i, y1);
+    s->state.now.steps += 1;
+    if (s->state.now.choice.implicit) stiffness_implicit_step(&s->state.now.choice, i);
+    return OK;
+}
+
+/* To where the integrator stood at t, before a step that failed or cannot be used; h: to try next. */
+static void take_back(Solver *s, double t, double h) {
+    const Integrator *i = &s->integrator;
+    double *y = s->work_advance;
+    memcpy(y, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y);
+    restart(s, t, y, h);
+    s->state.now.event_count = 0;
+}
+
+/* As far as the communication point, or past it. */
+static Status try_step(Solver *s, double t_end) {
+    Integrator *i = &s->integrator;
+    if (!runs_ahead(s)) return step_towards(s, t_end, t_end, HUGE_VAL);
+    const double reach = fmin(AHEAD / s->state.now.rate, FAR_AHEAD * (t_end - s->state.now.t));
+    const double longest = fmax(reach, t_end - i->t);
+    const double t = i->t, h = i->h_next;
+    if (step_towards(s, t_end, fmax(t_end, s->stop_time), longest) == OK) return OK;
+    take_back(s, t, fmin(h > 0 ? h : t_end - t, t_end - t));
+    return step_towards(s, t_end, t_end, HUGE_VAL);
+}
+
+/* Of `auto`: the step that dop853 took is judged, and the other method takes over if it is due. */
+static void choose(Solver *s) {
+    Integrator *i = &s->integrator;
+    Choice *choice = &s->state.now.choice;
+    if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && leg_rate(s, i) == OK)
+        stiffness_explicit_step(choice, i, s->state.size);
+    if (!stiffness_turn(choice)) return;
+    double *y = s->work_advance;
+    memcpy(y, i->y, (size_t)i->ny * sizeof *y);
+    restart(s, i->t, y, choice->longest);
+}
+
+/* Where radau5 fails, dop853 goes on. */
+static Status take_step(Solver *s, double t_end) {
+    if (s->settings.method == AUTO) choose(s);
+    const double t = s->integrator.t;
+    const Status status = try_step(s, t_end);
+    if (status == OK || !s->state.now.choice.implicit) return status;
+    stiffness_explicit(&s->state.now.choice, 0);
+    take_back(s, t, s->state.now.choice.longest);
+    return try_step(s, t_end);
+}
+
+static void put(Solver *s, double t, const double *y) {
+    const size_t n = (size_t)s->system->n;
+    memcpy(s->state.q, y, n * sizeof *y);
+    memcpy(s->state.v, y + n, n * sizeof *y);
+    s->state.now.t = t;
+}
+
+/* The communication point is reached, or passed. */
+static Status arrive(Solver *s, double t_end) {
+    Integrator *i = &s->integrator;
+    const double *y = i->y;
+    if (i->t > t_end) {
+        double *between = s->work_advance;
+        i->method->dense(i, t_end, between);
+        if (leg_project(s, t_end, between) != OK) return FAILED;
+        y = between;
+    }
+    put(s, t_end, y);
+    s->state.now.step = i->h_next;
+    if (!runs_ahead(s)) s->state.now.ahead = 0;
+    return OK;
+}
+
+/* The event in the step just taken: the modes are switched there. */
+static Status meet(Solver *s) {
+    Integrator *i = &s->integrator;
+    const double t = s->state.now.event_time;
+    double *y = s->work_advance;
+    if (leg_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
+    put(s, t, y);
+    s->state.now.step = i->t - i->t_old;
+    if (s->state.now.choice.implicit) {
+        s->state.now.step = fmin(s->state.now.step, s->state.now.choice.longest);
+        stiffness_explicit(&s->state.now.choice, 1);
+    }
+    s->state.now.ahead = 0;
+    s->state.now.event_count = 0;
+    return PARTS.switch_modes(s, s->state.left);
+}
+
+/* FAILED if the step just taken shows that t_end is too far off for steps of its kind. */
+static Status check_headway(Solver *s, double t_end, double begun, int first) {
+    Numbers *now = &s->state.now;
+    const Integrator *i = &s->integrator;
+    const double t = now->event_count > 0 ? now->event_time : i->t;
+    const double done = now->steps - first, gone = t - begun, most = s->settings.maximum_steps;
+    if ((t - i->t_old) * now->rate < TINY) now->tiny += 1;
+    if (most > 0 && now->tiny > most)
+        return fail(&s->why,
+                    "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
+                    "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
+                    "motion's natural time: is there a force that jumps to and fro?",
+                    t_end, t, most, TINY / now->rate, TINY);
+    if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone && gone * now->rate < CRAWL * done)
+        return fail(&s->why,
+                    "the communication step to t = %.17g s would need about %.0e internal "
+                    "steps, more than %.0e: take a shorter one",
+                    t_end, done * (t_end - begun) / gone, STEP_LIMIT);
+    return OK;
+}
+
+/* To t_end, or to the first event before it. */
+static Status travel(Solver *s, double t_end, double begun, int first, int *met) {
+    Numbers *now = &s->state.now;
+    leg_begin(s);
+    *met = 0;
+    if (!now->ahead && set_out(s) != OK) return FAILED;
+    for (;;) {
+        if (now->event_count > 0 && now->event_time <= t_end) {
+            *met = 1;
+            return meet(s);
+        }
+        if (s->integrator.t >= t_end) return arrive(s, t_end);
+        if (take_step(s, t_end) != OK) return FAILED;
+        if (check_headway(s, t_end, begun, first) != OK) return FAILED;
+    }
+}
+
+static Status complete_magnitudes(Solver *s, double span) {
+    leg_begin(s);
+    const Instant at = leg_instant(s, s->state.now.t);
+    if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
+    return magnitudes_complete(s, at, span);
+}
+
+/* The inputs may have been set: contacts whose surface went away open, the others go with it. */
+static Status follow_surfaces(Solver *s) {
+    const System *system = s->system;
+    if (system->contacts == 0 || system->prescribed_count == 0) return OK;
+    if (PARTS.switch_released(s, s->state.now.span) != OK) return FAILED;
+    const Instant at = leg_instant(s, s->state.now.t);
+    return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                             s->state.size);
+}
+
+Status solver_advance(Solver *s, double t_end) {
+    Numbers *now = &s->state.now;
+    const double begun = now->t;
+    const int first = now->steps;
+    double since = begun;
+    int events = 0;
+    if (!(t_end > begun) || !(t_end < HUGE_VAL))
+        return fail(&s->why, "a communication step must end after t = %.17g s, got %.17g s", begun,
+                    t_end);
+    now->tiny = 0;
+    resume(s);
+    if (follow_surfaces(s) != OK) return FAILED;
+    if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
+    while (now->t < t_end) {
+        int met;
+        if (travel(s, t_end, begun, first, &met) != OK) return FAILED;
+        if (!met) continue;
+        if (events == 0 || now->t - since >= 1e-9 / now->rate) {
+            since = now->t;
+            events = 0;
+        }
+        events += 1;
+        if (events == CHATTER)
+            return fail(&s->why,
+                        "%d contacts open or close in %.1g s at t = %.17g s: the contacts chatter "
+                        "without end",
+                        CHATTER, now->t - since, now->t);
+    }
+    now->span = t_end - begun;
+    keep(s);
+    return OK;
+}

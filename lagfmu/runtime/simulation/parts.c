@@ -1,0 +1,16 @@
+/* parts.c -- everything: the FMU of a scene that asks for all outputs and methods. */
+#include "parts.h"
+
+const Parts PARTS = {
+    .methods = {[AUTO] = &dop853,
+                [DOP853] = &dop853,
+                [RK4] = &rk4,
+                [RATTLE] = &rattle,
+                [RADAU5] = &radau5},
+    .rk4_error = rk4_error,
+    .rattle_step = rattle_step,
+    .events_find = events_find,
+    .contacts_modes = contacts_modes,
+    .switch_modes = switch_modes,
+    .switch_released = switch_released,
+};

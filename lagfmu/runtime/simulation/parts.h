@@ -1,0 +1,30 @@
+/* parts.h -- the parts of the runtime that not every FMU needs.
+ *
+ * parts.c names all of them.  An FMU for a scene that needs less carries a parts.c of its own: what is
+ * not named there is reached by nothing, and the linker leaves it out. */
+#ifndef LAGFMU_PARTS_H
+#define LAGFMU_PARTS_H
+
+#include "contacts.h"
+#include "events.h"
+#include "rattle.h"
+#include "switch.h"
+
+typedef struct {
+    /* Integrators by MethodName, that of AUTO being the explicit one; NULL where it is left out. */
+    const Method *methods[METHOD_COUNT];
+    double (*rk4_error)(const Integrator *i, int component);
+    Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *level,
+                          const double *u, const double *p, const Control *control,
+                          double t_bound);
+    /* What happens at contacts; NULL where there are none. */
+    Status (*events_find)(Solver *s, const double *y1);
+    Status (*contacts_modes)(Solver *s, Instant at, const double *q, const double *v, int *closed,
+                             const int *touching, const int *leaving);
+    Status (*switch_modes)(Solver *s, const int *happened);
+    Status (*switch_released)(Solver *s, double span);
+} Parts;
+
+extern const Parts PARTS;
+
+#endif

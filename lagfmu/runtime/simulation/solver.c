@@ -1,0 +1,89 @@
+/* solver.c -- the memory of a simulation, taken in two passes (arena.h). */
+#include "solver.h"
+
+#include "indicators.h"
+#include "looks.h"
+#include "parts.h"
+
+static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
+    const int n = s->n, contacts = s->contacts, indicators = indicators_count(s);
+    const size_t begin = saved->used;
+    x->block = saved->base == NULL ? NULL : saved->base + begin;
+    x->q = arena_doubles(saved, n);
+    x->v = arena_doubles(saved, n);
+    x->offset = arena_doubles(saved, s->m);
+    x->scale = arena_doubles(saved, 2 * n);
+    x->size = arena_doubles(saved, n);
+    x->gap = arena_doubles(saved, contacts);
+    x->closed = arena_ints(saved, contacts);
+    x->armed = arena_ints(saved, contacts);
+    x->left = arena_ints(saved, indicators);
+    x->count = arena_ints(saved, contacts);
+    x->departure_time = arena_doubles(saved, contacts);
+    x->departure_q = arena_doubles(saved, contacts * n);
+    x->departure_v = arena_doubles(saved, contacts * n);
+    x->indicator = arena_doubles(saved, indicators);
+    integrator_layout(i, saved, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
+    x->y = i->y;
+    x->f = i->f;
+    x->y_old = i->y_old;
+    x->f_old = i->f_old;
+    x->dense = i->dense;
+    x->block_size = saved->used - begin;
+}
+
+void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system) {
+    const int n = system->n, m = system->m, contacts = system->contacts;
+    const int indicators = indicators_count(system);
+    s->system = system;
+    state_layout(&s->state, &s->integrator, saved, scratch, system);
+    s->drive.value = arena_doubles(saved, system->inputs);
+    s->drive.first = arena_doubles(saved, system->inputs);
+    s->drive.second = arena_doubles(saved, system->inputs);
+    s->p = arena_doubles(saved, system->parameters);
+    integrator_layout(&s->probe, scratch, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
+    mechanism_layout(&s->stepped, scratch, system, &s->why);
+    sensitivity_layout(&s->sensitivity, scratch, system);
+    s->active_full = NULL;
+    if (system->embed != NULL && system->full->dynamics != NULL) {
+        mechanism_layout(&s->full, scratch, system->full, &s->why);
+        s->active_full = arena_ints(scratch, system->full->m);
+    }
+    s->active = arena_ints(scratch, m);
+    s->u = arena_doubles(scratch, system->inputs);
+    s->work_initial = arena_doubles(scratch, 5 * n + 3 * m);
+    s->iwork_initial = arena_ints(scratch, m + contacts);
+    s->work_contacts = arena_doubles(scratch, 2 * n + 3 * m);
+    s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
+    s->work_advance = arena_doubles(scratch, 4 * n);
+    s->work_events =
+        arena_doubles(scratch, indicators == 0 ? 0 : 2 * n + indicators + looks_doubles(indicators));
+    s->iwork_events = arena_ints(scratch, 5 * contacts);
+}
+
+void solver_inputs_changed(Solver *s) {
+    Numbers *now = &s->state.now;
+    now->ahead = 0;
+    now->event_count = 0;
+    now->fresh = 1;
+}
+
+void observed_layout(Observed *o, Arena *arena, const System *system) {
+    const System *full = system->embed != NULL ? system->full : system;
+    const int n = full->n, m = full->m, stepped = system->embed != NULL ? system->n : 0;
+    o->q = arena_doubles(arena, n);
+    o->v = arena_doubles(arena, n);
+    o->vdot = arena_doubles(arena, n);
+    o->lambda = arena_doubles(arena, m);
+    o->residual = arena_doubles(arena, m);
+    o->unique = arena_ints(arena, m);
+    o->force = arena_doubles(arena, n);
+    o->share = arena_doubles(arena, full->entries);
+    o->own = arena_doubles(arena, full->output_count);
+    o->other = arena_doubles(arena, full->output_count);
+    o->s = arena_doubles(arena, stepped);
+    o->sdot = arena_doubles(arena, stepped);
+    o->sddot = arena_doubles(arena, stepped);
+    o->departure_q = arena_doubles(arena, system->contacts * n);
+    o->departure_v = arena_doubles(arena, system->contacts * n);
+}

@@ -1,0 +1,72 @@
+/* solver.h -- the simulation of one instance: start, advance, observe.  Knows no FMI. */
+#ifndef LAGFMU_SOLVER_H
+#define LAGFMU_SOLVER_H
+
+#include "mechanism.h"
+#include "sensitivity.h"
+#include "state.h"
+
+typedef struct {
+    const System *system;
+    Settings settings;
+    double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
+    State state;
+    Drive drive;
+    double *p;                 /* (parameters) */
+    Mechanism stepped, full;   /* full: of an embedding; otherwise unused */
+    Integrator integrator, probe; /* probe: integrates again from the last accepted point */
+    int *active;               /* (m) rows that act in the present modes */
+    double *u;                 /* (inputs) at the time of the latest evaluation */
+    Sensitivity sensitivity;   /* of `stepped` */
+    /* scratch, nothing of which is kept from one call to the next: */
+    int *active_full;          /* (m of full) rows that act there */
+    double *work_initial;      /* (5 n + 3 m) of initial.c and magnitudes.c */
+    int *iwork_initial;        /* (m + contacts) */
+    double *work_contacts;     /* (2 n + 3 m) of contacts.c */
+    int *iwork_contacts;       /* (m + 2 contacts) */
+    double *work_advance;      /* (4 n) of advance.c */
+    double *work_events;       /* (2 n + indicators and all looks) of events.c */
+    int *iwork_events;         /* (5 contacts) of events.c and switch.c */
+    Why why;
+} Solver;
+
+/* Takes all memory of the solver: what must be saved from `saved`, the rest from `scratch`.  Of
+ * `saved` the first state.block_size bytes are the state's arrays; the drive and p follow.  To be
+ * called once with arenas that count (base = NULL) and once with memory. */
+void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system);
+
+/* One start value that had to be moved onto the constraints. */
+typedef void (*Moved)(void *context, const char *coordinate, int is_velocity, double given,
+                      double used);
+
+/* initial.c -- the consistent state at t nearest to the start values q0, v0 (n, not in s->state),
+ * for the drive and p that the caller has set; `moved` (may be NULL) is called for each value that
+ * was moved.  FAILED: the start is refused, the cause is in s->why; the state is in disorder. */
+Status solver_start(Solver *s, double t, const double *q0, const double *v0, Moved moved,
+                    void *context);
+
+/* advance.c -- from state.now.t to t_end [s].  FAILED leaves the state in disorder: the caller
+ * puts the saved one back (it keeps a copy). */
+Status solver_advance(Solver *s, double t_end);
+
+/* The inputs were set: what was integrated ahead with the old ones is dropped. */
+void solver_inputs_changed(Solver *s);
+
+/* What an importer can read at a state; arrays of the full system (n, m, entries). */
+typedef struct {
+    double *q, *v, *vdot;          /* (n) of the full system */
+    double *lambda, *residual;     /* (m) */
+    int *unique;                   /* (m) */
+    double *force, *share;         /* Q (n); one constraint's part of it (entries) */
+    double energy[2];              /* kinetic, potential */
+    double *own, *other;           /* (output_count) the model's own; where these are not finite */
+    double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
+    double *departure_q, *departure_v; /* (contacts * n) in full coordinates */
+} Observed;
+
+void observed_layout(Observed *o, Arena *arena, const System *system);
+
+/* observe.c -- evaluates all of them at the state and inputs of now.  FAILED: one is not finite. */
+Status solver_observe(Solver *s, Observed *o);
+
+#endif

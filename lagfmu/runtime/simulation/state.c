@@ -1,0 +1,22 @@
+/* state.c -- names of the methods, and inputs as polynomials in the time since they were set:
+ *
+ *   u_k(e) = value_k + e (first_k + e second_k / 2) ,   e = t - since
+ *
+ * A prescribed motion stands in u as (u, der(u), der(u,2)) and goes on by these (Taylor's rule), so
+ * that the three stay derivatives of each other. */
+#include "state.h"
+
+const char *const METHOD_NAMES[METHOD_COUNT] = {
+    [AUTO] = "auto", [DOP853] = "dop853", [RK4] = "rk4", [RADAU5] = "radau5", [RATTLE] = "rattle"};
+
+void drive_at(const System *s, const Drive *drive, double t, double *u) {
+    const double e = t - drive->since, *value = drive->value;
+    for (int k = 0; k < s->inputs; k++)
+        u[k] = value[k] + e * (drive->first[k] + e * drive->second[k] / 2);
+    for (int i = 0; i < s->prescribed_count; i++) {
+        int k = s->prescribed[i];
+        u[k] = value[k] + e * (value[k + 1] + e * value[k + 2] / 2);
+        u[k + 1] = value[k + 1] + e * value[k + 2];
+        u[k + 2] = value[k + 2];
+    }
+}

@@ -1,0 +1,69 @@
+/* state.h -- everything that a simulation remembers between two communication points, and nothing
+ * else.  A saved state is a copy of two blocks: this struct's numbers and the arrays behind it. */
+#ifndef LAGFMU_STATE_H
+#define LAGFMU_STATE_H
+
+#include "arena.h"
+#include "integrator.h"
+#include "stiffness.h"
+#include "system.h"
+
+/* The numbers that an importer sees; they never change (lagfmu/methods.py).  METHOD_NAMES[0] is NULL. */
+typedef enum { AUTO = 1, DOP853 = 2, RK4 = 3, RADAU5 = 4, RATTLE = 5 } MethodName;
+enum { METHOD_COUNT = 6 };
+extern const char *const METHOD_NAMES[METHOD_COUNT];
+
+/* How to step.  tolerance: relative, a step; step [s]: largest step of rk4 and rattle, 0: chosen;
+ * maximum_step [s]: largest adaptive step, 0: no limit.  maximum_steps: how many steps shorter than 1e-6
+ * of the natural time a communication step may take, 0: no limit. */
+typedef struct {
+    MethodName method;
+    double tolerance, step, maximum_step, maximum_steps;
+} Settings;
+
+/* Inputs as polynomials in the time since they were set: u_k(elapsed) = value + elapsed * first +
+ * elapsed^2 / 2 * second.  A prescribed motion (u, der(u), der(u,2)) goes on by its derivatives. */
+typedef struct {
+    double since;                     /* [s] when they were set */
+    double *value, *first, *second;   /* (inputs) */
+} Drive;
+
+/* u at time t.  */
+void drive_at(const System *s, const Drive *drive, double t, double *u);
+
+/* The numbers of a state (copied as a struct) ... */
+typedef struct {
+    double t;            /* [s] the communication point */
+    double rate;         /* [1/s] the motion's natural rate at the start */
+    double step;         /* [s] the step to try next */
+    double span;         /* [s] the communication step that led to t; 0: none */
+    int steps;           /* internal steps taken so far */
+    int tiny;            /* those of the present communication step that make no headway */
+    int ahead;           /* 1: the integrator stands at integrator->t >= t, and dense output answers */
+    double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */
+    int event_count;     /* indicators that leave their ranges then */
+    double t_old, t_integrator, h_next, error_old; /* of the integrator, when it is ahead */
+    int fresh;
+    Choice choice;       /* of the method `auto` */
+} Numbers;
+
+/* ... and its arrays, which lie in one block. */
+typedef struct {
+    Numbers now;
+    double *q, *v;            /* (n) at t, on the constraints */
+    double *offset;           /* (m) the level f = offset that a row keeps which came back with its contact */
+    double *scale;            /* (2 n) magnitudes below which errors in q and v are measured absolutely */
+    double *size;             /* (n) the coordinates' magnitudes, for rounding */
+    double *gap;              /* (contacts) |f| below which a contact touches */
+    int *closed, *armed;      /* (contacts) */
+    int *left;                /* (indicators) 1: leaves its range at the event ahead */
+    int *count;               /* (contacts) departures so far */
+    double *departure_time;   /* (contacts) [s] of the latest */
+    double *departure_q, *departure_v; /* (contacts * n) state then */
+    double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
+    double *y, *f, *y_old, *f_old, *dense; /* the integrator's own, shared with it */
+    char *block;              /* all of the arrays above */
+    size_t block_size;
+} State;
+
+#endif

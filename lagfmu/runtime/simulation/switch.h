@@ -1,0 +1,16 @@
+/* switch.h -- what happens at an event: contacts open or are struck, modes are settled together. */
+#ifndef LAGFMU_SWITCH_H
+#define LAGFMU_SWITCH_H
+
+#include "solver.h"
+
+/* The state (s->state at s->state.now.t) right after the event of the contacts flagged in `happened`:
+ * a closed one opens, an open one is struck. */
+Status switch_modes(Solver *s, const int *happened);
+
+/* Opens contacts that a jump of a prescribed motion has left a gap in, or a speed at which they part: a
+ * departure.  A gap that the contact, pressed as it is, would have closed within `span` [s] is none: the
+ * motion went on a little otherwise than its derivatives had foreseen over a step of that length. */
+Status switch_released(Solver *s, double span);
+
+#endif

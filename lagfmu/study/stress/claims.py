@@ -1,0 +1,181 @@
+"""The closed forms that an FMU carries, compiled once, with the error that each is allowed.
+
+A claim `actual = expected` that follows the motion (it knows the start, the time or a departure, or says
+that something is conserved) may be off by
+
+    LEEWAY * within * tol * max(1, N) * A * size,    at least    LEEWAY * rounding * max(1, N) * A * size
+
+where `within` and `rounding` are the claim's own, N counts the natural times of the motion that have
+passed, in units of those in the FMU's default experiment, and `size` is
+the largest over the run of the claim's scale and of the sum of the magnitudes of its terms: an error of
+tol in a state is one of tol * |term| in each term, and no sum can be better than its terms.  A is the
+largest angle so far [rad], at least 1: its error is tol * |angle|, that of its sine too.  LEEWAY, because
+`within` holds at the default tolerance, and errors are proportional to the tolerance only roughly.
+
+A claim among the outputs of one instant has nothing to do with the integration: whatever the tolerance,
+it may be off by  LEEWAY * rounding * size,  with the size at that instant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from ...errors import VerificationError
+from ...fmu.claims import Claim
+from ...verification.verify import applies
+from .player import Run
+
+Expr = Any
+LEEWAY = 10.0
+Column = NDArray[np.float64]
+
+
+def magnitude(e: Expr) -> Expr:
+    """The sum of the magnitudes of an expression's terms; f(x): |f(x)| + |x f'(x)|."""
+    if e.is_Atom:
+        return sp.Abs(e)
+    if e.is_Add:
+        return sp.Add(*(magnitude(a) for a in e.args))
+    if e.is_Mul:
+        return sp.Mul(*(magnitude(a) for a in e.args))
+    if e.is_Pow and e.exp.is_number:
+        if e.exp.is_positive:
+            return magnitude(e.base) ** e.exp
+        return sp.Abs(e) * magnitude(e.base) / sp.Abs(e.base)
+    if isinstance(e, sp.Function) and len(e.args) == 1 and not e.has(sp.Piecewise, sp.floor):
+        x = sp.Dummy("x", real=True)
+        slope = e.func(x).diff(x).xreplace({x: e.args[0]})
+        if not slope.has(sp.Derivative, sp.Subs):
+            return sp.Abs(e) + sp.Abs(slope) * magnitude(e.args[0])
+    return sp.Abs(e)
+
+
+class Compiled:
+    """An expression in the FMU's variables, as a function of a run."""
+
+    def __init__(self, expression: Expr, name: str) -> None:
+        self.name = name
+        self.symbols = sorted(sp.sympify(expression).free_symbols, key=str)
+        self.function = sp.lambdify(
+            self.symbols, expression, modules=["scipy", "numpy"], dummify=True
+        )
+
+    def at(
+        self, chosen: NDArray[np.bool_], run: Run, floors: Mapping[str, float] | None = None
+    ) -> Column:
+        """Its values at the chosen rows; magnitudes below `floors` are taken for those."""
+        rows, names, columns = run.rows[chosen], run.rows.dtype.names or (), []
+        for text in map(str, self.symbols):
+            if text.startswith("initial("):
+                column: Any = run.rows[text[len("initial(") : -1]][0]
+            elif text in names:
+                column = rows[text]
+            elif text in run.values:
+                column = run.values[text]
+            else:
+                raise VerificationError(f"closed form {self.name!r} uses {text!r}: not in the FMU")
+            column = np.asarray(column, dtype=float)
+            if floors is not None and text in floors:
+                column = np.maximum(np.abs(column), floors[text])
+            columns.append(column)
+        with np.errstate(all="ignore"):
+            found = np.asarray(self.function(*columns), dtype=float)
+        return np.broadcast_to(found, len(rows)).copy()
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A claim ready to be judged; `pointwise`: it holds at each instant, whatever the inputs did.
+
+    `instantaneous`: it relates the outputs of one instant, so that no error of the integration enters;
+    `law`: an equation that is solved at that instant, so that nothing but its own terms is its size.
+    """
+
+    claim: Claim
+    actual: Compiled
+    expected: Compiled | None
+    sizes: tuple[Compiled, ...]
+    pointwise: bool
+    instantaneous: bool
+    law: bool
+
+    def judge(
+        self,
+        run: Run,
+        growth: Column,
+        undisturbed: NDArray[np.bool_],
+        floors: Mapping[str, float],
+    ) -> tuple[float, float, int]:
+        """(largest error, what is allowed there, points).
+
+        `growth` is max(1, N) at each row; `undisturbed` are the rows before the first impact, where
+        also that may be judged which speaks of the start; `floors` as in Compiled.at.
+        """
+        chosen = applies(self.claim, run.rows)
+        if not self.instantaneous:
+            chosen = chosen & undisturbed
+        actual = self.actual.at(chosen, run)
+        if len(actual) == 0:
+            return 0.0, 1.0, 0
+        first = np.full_like(actual, actual[0])
+        expected = first if self.expected is None else self.expected.at(chosen, run)
+        known = np.isfinite(expected) & np.isfinite(actual)  # elsewhere the form is not defined
+        if not known.any():
+            return 0.0, 1.0, 0
+        least = None if self.law else floors
+        sizes = [np.abs(expected), *(np.abs(s.at(chosen, run, least)) for s in self.sizes)]
+        for s in sizes:
+            known &= np.isfinite(s)
+        if not known.any():
+            return 0.0, 1.0, 0
+        size = np.maximum.reduce(sizes)
+        relative = np.full(len(actual), LEEWAY * self.claim.rounding)
+        if not self.instantaneous:
+            size = np.full(len(actual), size[known].max())
+            tolerance = LEEWAY * self.claim.within * run.tolerance
+            relative = np.maximum(relative, tolerance) * growth[chosen]
+        allowed = relative * size + np.finfo(float).tiny
+        error = np.abs(actual - expected)
+        worst = int(np.argmax(np.where(known, error / allowed, -1.0)))
+        return float(error[worst]), float(allowed[worst]), int(known.sum())
+
+
+def statements(claims: tuple[Claim, ...], inputs: set[str]) -> tuple[Statement, ...]:
+    """Every closed form, compiled."""
+    found = []
+    for c in claims:
+        parts = [c.actual] + ([] if c.expected is None else [c.expected])
+        used = {str(s) for e in parts for s in sp.sympify(e).free_symbols}
+        follows = any(u == "time" or u.startswith(("initial(", "departure.")) for u in used)
+        found.append(_statement(c, c.expected is not None and not follows, False, inputs))
+    return tuple(found)
+
+
+def laws(claims: tuple[Claim, ...]) -> tuple[Statement, ...]:
+    """Lagrange's equations (lagrange.py), compiled: instantaneous even where time stands in them."""
+    return tuple(_statement(c, True, True, set()) for c in claims)
+
+
+def _statement(c: Claim, instantaneous: bool, law: bool, inputs: set[str]) -> Statement:
+    parts = [c.actual] + ([] if c.expected is None else [c.expected])
+    sizes = [magnitude(sp.sympify(e)) for e in parts] + ([] if c.scale is None else [c.scale])
+    return Statement(
+        c,
+        Compiled(c.actual, c.name),
+        None if c.expected is None else Compiled(c.expected, c.name),
+        tuple(Compiled(e, c.name) for e in sizes),
+        instantaneous or not inputs,
+        instantaneous,
+        law,
+    )
+
+
+def undisturbed(run: Run, found: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """Those that say something about this run: driven, only what holds at each instant."""
+    return tuple(s for s in found if s.pointwise or not run.driven)

@@ -1,0 +1,161 @@
+"""What an FMU says about itself: parameters, starts, constraints, units and closed forms."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ...errors import VerificationError
+from ...fmu.claims import Claim, unpack_closed_forms
+from ...verification.simulate import file_stem, read_description
+from ...verification.verify import claims_in
+
+Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+@dataclass(frozen=True)
+class Settable:
+    """A Real that the importer may set before the initialization: its start and its bounds."""
+
+    name: str
+    start: float
+    minimum: float | None
+    maximum: float | None
+
+    def allows(self, value: float) -> bool:
+        """True if the value is inside the bounds, which themselves do not count as inside."""
+        low = self.minimum is None or value > self.minimum
+        return low and (self.maximum is None or value < self.maximum)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """An FMU of lagfmu as its modelDescription.xml and resources/lagfmu.json describe it."""
+
+    path: Path
+    name: str
+    target: str
+    description: Any
+    variables: Mapping[str, Any]
+    outputs: tuple[Any, ...]
+    parameters: tuple[Settable, ...]
+    starts: tuple[Settable, ...]
+    inputs: tuple[Settable, ...]
+    coordinates: tuple[str, ...]
+    constraints: tuple[str, ...]
+    contacts: tuple[str, ...]
+    claims: tuple[Claim, ...]
+    laws: tuple[Claim, ...]
+    dimensions: Mapping[str, Dimension]
+    stop_time: float
+    step_size: float
+    tolerance: float
+
+    def share(self, constraint: str, coordinate: str) -> str | None:
+        """The output with the constraint's share in Q, if it acts on the coordinate."""
+        name = f"Q.{constraint}.{coordinate}"
+        return name if name in self.variables else None
+
+    def rates(self, constraint: str) -> bool:
+        """True if the residual is a velocity: lambda times it is a power (W), else an energy (J)."""
+        lam = self.dimensions[f"lambda.{constraint}"]
+        left = self.dimensions[f"residual.{constraint}"]
+        return lam[2] + left[2] == -3
+
+    def usual(self, coordinate: str) -> float:
+        """The largest default start among the coordinates of the same unit, or 1."""
+        return (
+            max(
+                (
+                    abs(s.start)
+                    for s in self.starts
+                    if self.dimensions[s.name] == self.dimensions[coordinate]
+                ),
+                default=0.0,
+            )
+            or 1.0
+        )
+
+    def same_unit(self, name: str, values: Mapping[str, float]) -> float:
+        """The largest magnitude among the parameters that have the dimension of `name`, or 0."""
+        dimension = self.dimensions[name]
+        return max(
+            (abs(values[p.name]) for p in self.parameters if self.dimensions[p.name] == dimension),
+            default=0.0,
+        )
+
+
+def facts_of(path: Path) -> Facts:
+    """Raises VerificationError if the file is no FMU of lagfmu for co-simulation."""
+    description = read_description(path)
+    claims = claims_in(path)
+    variables = {v.name: v for v in description.modelVariables}
+    if description.coSimulation is None or "solver.method" not in variables:
+        raise VerificationError(
+            f"{str(path)!r} was not built by lagfmu, or for a scene that leaves out what it would be "
+            "judged by: stress the model's full FMU"
+        )
+    with zipfile.ZipFile(path) as archive:
+        python = "resources/slavemodule.txt" in archive.namelist()
+    reals = [v for v in description.modelVariables if v.type == "Real"]
+    bases = {
+        u.name: tuple(int(getattr(u.baseUnit, b, 0) or 0) for b in BASE)
+        for u in description.unitDefinitions
+        if u.baseUnit is not None
+    }
+    experiment = description.defaultExperiment
+    stop = float(getattr(experiment, "stopTime", None) or 1.0)
+    coordinates = tuple(v.name for v in reals if f"der({v.name},2)" in variables)
+    moving = {*coordinates, *(f"der({c})" for c in coordinates)}
+    return Facts(
+        path=path,
+        name=file_stem(description),
+        target="python" if python else "native",
+        description=description,
+        variables=variables,
+        outputs=tuple(
+            v
+            for v in description.modelVariables
+            if v.causality == "output" and v.type in ("Real", "Integer", "Boolean")
+        ),
+        parameters=tuple(
+            _settable(v)
+            for v in reals
+            if v.causality == "parameter" and not v.name.startswith("solver.")
+        ),
+        starts=tuple(_settable(v) for v in reals if v.name in moving and v.start is not None),
+        inputs=tuple(_settable(v) for v in reals if v.causality == "input"),
+        coordinates=coordinates,
+        constraints=tuple(v.name[len("lambda.") :] for v in reals if v.name.startswith("lambda.")),
+        contacts=tuple(n[len("contact.") :] for n in variables if n.startswith("contact.")),
+        claims=tuple(claims),
+        laws=_laws(path),
+        dimensions={v.name: bases.get(v.unit, (0,) * len(BASE)) for v in reals}
+        | {"time": (0, 0, 1) + (0,) * (len(BASE) - 3)},
+        stop_time=stop,
+        step_size=float(getattr(experiment, "stepSize", None) or stop / 500),
+        tolerance=float(getattr(experiment, "tolerance", None) or 1e-8),
+    )
+
+
+def beside(path: Path) -> Path:
+    """Where the command that has the model writes Lagrange's equations for the judge."""
+    return path.with_suffix(".lagrange.json")
+
+
+def _laws(path: Path) -> tuple[Claim, ...]:
+    file = beside(path)
+    return tuple(unpack_closed_forms(file.read_bytes(), str(file))) if file.exists() else ()
+
+
+def _settable(v: Any) -> Settable:
+    return Settable(
+        v.name,
+        float(v.start or 0.0),
+        None if v.min is None else float(v.min),
+        None if v.max is None else float(v.max),
+    )

@@ -1,0 +1,104 @@
+"""Lagrange's equations as statements about what an FMU reports, straight from the model.
+
+    d/dt dL/dv_j - dL/dq_j = Q_nc,j + Q_j                  for each coordinate
+    d^2 f/dt^2 = 0   or   d/dt (sum a_j v_j + a_0) = 0     for each constraint, while it acts
+    Q_cj = lambda_c a_cj ,   residual_c = f   or   sum a_j v_j + a_0
+    an Output of the model = its expression, of the values that are reported beside it
+
+They hold at each instant, whatever the parameters, the inputs and the tolerance, and together they
+determine the accelerations, lambda and Q: nothing of the FMU's own derivation, code and linear algebra stands
+in them.  A solution of linear equations that is stable fulfils them to rounding, however badly they
+are conditioned (Higham, Accuracy and Stability of Numerical Algorithms, sect. 7.1), in the metric of
+M: relative to  sqrt(M_jj) S  and  S sum_j |a_j| / sqrt(M_jj) ,  S = sum_k |terms of equation k| / sqrt(M_kk).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
+
+from ...fmu.claims import pack_closed_forms
+from ...model.closed_form import TIME, ClosedForm, in_variables, output
+from ...model.model import Contact, Model, Nonholonomic, name_of
+from ...prepare.prepare import Prepared
+from .claims import magnitude
+from .facts import beside
+
+Expr = Any
+ROUNDING = 1e-13  # relative to those terms; see claims.LEEWAY
+GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps
+
+
+def lay_beside(fmu: Path, prepared: Prepared) -> None:
+    """Write the equations to where the judge of the FMU looks for them."""
+    forms = lagrange(prepared.model, frozenset(v.name for v in prepared.table.variables))
+    beside(fmu).write_bytes(pack_closed_forms(prepared.scene, forms, prepared.table))
+
+
+def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
+    """The equations that can be held against an FMU with these variables."""
+    L, sides, masses = model.energy_expression, {}, {}
+    for q in model.coordinates:
+        v, name = q.diff(TIME), f"Q.{name_of(q)}"
+        force = sp.sympify(model.forces.get(q, 0)) + (output(name) if name in variables else 0)
+        sides[q] = (L.diff(v).diff(TIME) - L.diff(q), force)
+        masses[q] = sp.Abs(in_variables(L.diff(v, 2)))
+    terms = {q: sum(magnitude(in_variables(e)) for e in sides[q]) for q in sides}
+    forms = []
+    for q, (inertia, force) in sides.items():
+        others = [
+            sp.sqrt(masses[q] / masses[k]) * terms[k] for k in sides if k != q and masses[k] != 0
+        ]
+        scale = sp.Add(terms[q], *others)
+        forms.append(_form(f"Lagrange's equation of {name_of(q)}", inertia, force, scale, None))
+    heavy = [q for q in sides if masses[q] != 0]
+    total = sp.Add(*(terms[q] / sp.sqrt(masses[q]) for q in heavy))
+    forms += _of_constraints(model, {q: total / sp.sqrt(masses[q]) for q in heavy})
+    forms += _of_shares(model, variables)
+    forms += [ClosedForm(o.name, o.expression, rounding=ROUNDING) for o in model.outputs]
+    return [form for form in forms if _names(form) <= variables]
+
+
+def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
+    found = []
+    for c in model.constraints:
+        f, lam = sp.sympify(c.expression), output(f"lambda.{c.name}")
+        contact = c.name if isinstance(c, Contact) else c.while_closed
+        for q in model.coordinates:
+            a = f.diff(q.diff(TIME)) if isinstance(c, Nonholonomic) else f.diff(q)
+            share = f"Q.{c.name}.{name_of(q)}"
+            if share in variables:
+                found.append(ClosedForm(share, lam * a, output(share), rounding=ROUNDING))
+        rounding, residual = ROUNDING if contact is None else GAP, f"residual.{c.name}"
+        found.append(ClosedForm(residual, f, output(residual), rounding=rounding))
+    return found
+
+
+def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[ClosedForm]:
+    found = []
+    for c in model.constraints:
+        rate, along = sp.sympify(c.expression), accelerations
+        if isinstance(c, Nonholonomic):
+            along = {q.diff(TIME): a for q, a in accelerations.items()}
+        scale = sp.Add(*(sp.Abs(in_variables(rate.diff(x))) * a for x, a in along.items()))
+        for _ in range(1 if isinstance(c, Nonholonomic) else 2):
+            rate = rate.diff(TIME)
+        contact = c.name if isinstance(c, Contact) else c.while_closed
+        found.append(_form(f"d2/dt2 of {c.name}", rate, sp.Integer(0), scale, contact))
+    return found
+
+
+def _form(
+    name: str, actual: Expr, expected: Expr, scale: Expr, while_closed: str | None
+) -> ClosedForm:
+    return ClosedForm(
+        name, expected, actual, while_closed=while_closed, scale=scale, rounding=ROUNDING
+    )
+
+
+def _names(form: ClosedForm) -> set[str]:
+    actual = output(form.name) if form.actual is None else form.actual
+    used = in_variables(actual).free_symbols | in_variables(form.expected).free_symbols
+    return {str(s) for s in used} - {"time"}

@@ -1,0 +1,52 @@
+"""The process in which an FMU is probed: `python -m lagfmu.study.stress.worker FMU RESULTS FIRST QUICK`.
+
+It writes a line of JSON to RESULTS for each probe that begins and for each verdict, so that the
+command knows what the FMU was doing when it takes this process down.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+import warnings
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from . import inputs, parameters, starts, states, stepping
+from .bench import Bench
+from .facts import Facts
+from .probe import Probe, attempt, verdict
+
+FAMILIES = (parameters, starts, stepping, inputs, states)
+
+
+def probes(facts: Facts, quick: bool) -> list[Probe]:
+    """All of them, in the order of the report."""
+    return [p for family in FAMILIES for p in family.probes(facts, quick)]
+
+
+def main(fmu: str, results: str, first: str, quick: str) -> None:
+    """Probe from number `first` on."""
+    warnings.simplefilter("ignore")
+    with open(results, "a", encoding="utf-8") as file, Bench(Path(fmu), quick == "1") as bench:
+
+        def tell(**line: Any) -> None:
+            file.write(json.dumps(line) + "\n")
+            file.flush()
+
+        work = probes(bench.facts, bench.quick)
+        tell(total=len(work), name=bench.facts.name, target=bench.facts.target)
+        for k, probe in enumerate(work):
+            if k < int(first):
+                continue
+            tell(begin=k, family=probe.family, probe=probe.name)
+            begun = time.perf_counter()
+            finding = attempt(probe, bench)
+            tell(end=k, row=asdict(verdict(probe, finding, time.perf_counter() - begun)))
+        tell(done=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,1 @@
+"""Simulation through fmpy, held against closed forms."""

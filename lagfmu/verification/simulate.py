@@ -1,0 +1,267 @@
+"""simulate(): a model directly, or an FMU through fmpy; the same columns from both."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
+
+from ..errors import SimulationError, VerificationError
+from ..methods import IN_PYTHON, unknown
+from ..model.model import Model
+from ..model.scene import Scene
+from ..prepare.prepare import Prepared, prepare
+from ..solver.advance import advance
+from ..solver.failure import StepFailureError
+from ..solver.initial import start
+from ..solver.observe import observe
+from ..solver.state import SMALLEST_TOLERANCE, Settings
+
+MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
+Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
+
+
+def simulate(
+    target: Model | Prepared | str | os.PathLike[str],
+    stop_time: float | None = None,
+    step_size: float | None = None,
+    tolerance: float | None = None,
+    start_values: Mapping[str, Any] | None = None,
+    inputs: Trajectory | None = None,
+    scene: Scene | None = None,
+    besides: Sequence[str] = (),
+) -> Trajectory:
+    """Outputs at every communication point, as a structured array with the FMU's variable names.
+
+    `target` is a Model (integrated in this process, in `scene`) or the path of an FMU (simulated by
+    fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
+    values; `inputs` is a structured array with 'time' and one field an input, interpolated linearly.
+    What is left out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables
+    and inputs to be recorded too.
+
+    Raises ModelError for a model that cannot start, SimulationError if a step fails, and
+    VerificationError for a file that is no FMU.
+    """
+    values = dict(start_values or {})
+    for what, number in (("stop_time", stop_time), ("step_size", step_size)):
+        if number is not None and not 0 < number < np.inf:
+            raise SimulationError(f"{what} = {number!r} s, expected a positive number")
+    if tolerance is not None and not 0 < tolerance < np.inf:
+        raise SimulationError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+    if isinstance(target, Model):
+        target = prepare(target, scene)
+    if isinstance(target, Prepared):
+        return _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
+    return _simulate_fmu(Path(target), stop_time, step_size, tolerance, values, inputs, besides)
+
+
+def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
+    """0, h, 2 h, ..., and the stop time."""
+    _check_count(stop_time, step_size)
+    count = max(1, int(np.ceil(stop_time / step_size * (1 - 1e-12))))
+    times = np.arange(count + 1, dtype=np.float64) * step_size
+    times[-1] = stop_time
+    return times
+
+
+def _check_count(stop_time: float, step_size: float) -> None:
+    """Refuse a run that would fill the memory with communication points."""
+    if stop_time / step_size > MOST_POINTS:
+        raise SimulationError(
+            f"step_size = {step_size!r} s asks for {stop_time / step_size:.3g} communication points "
+            f"until {stop_time!r} s, expected at most {MOST_POINTS:.0e}: choose a larger step_size, or "
+            "an earlier stop_time"
+        )
+
+
+def _simulate_model(
+    prepared: Prepared,
+    stop_time: float | None,
+    step_size: float | None,
+    tolerance: float | None,
+    values: dict[str, Any],
+    inputs: Trajectory | None,
+    besides: Sequence[str],
+) -> Trajectory:
+    scene, table, system = prepared.scene, prepared.table, prepared.system
+    known: dict[str, Any] = {v.name: v.start for v in table.variables if v.role != "output"}
+    limits = {
+        v.name: _Settable(v.kind, v.minimum, v.maximum)
+        for v in table.variables
+        if v.role != "output"
+    }
+    _check_values(scene.name, limits, values)
+    known |= values
+    method = known.get("solver.method", scene.method)
+    settings = Settings(
+        method,
+        max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
+        known.get("solver.step", scene.step),
+        known["solver.maximum_step"],
+        known["solver.maximum_steps"],
+    )
+    p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
+    drives = [v for v in table.variables if v.role == "input"]
+    signals: Any = inputs
+
+    def drive(t: float) -> list[float]:
+        return [
+            float(np.interp(t, signals["time"], signals[v.name]))
+            if inputs is not None and v.name in signals.dtype.names
+            else float(known[v.name])
+            for v in drives
+        ]
+
+    times = communication_points(stop_time or scene.stop_time, step_size or scene.step_size)
+    columns: list[tuple[str, Any]] = [("time", np.float64)]
+    kinds: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
+    read = [*table.outputs, *(table[name] for name in besides)]
+    columns += [(v.name, kinds[v.kind]) for v in read]
+    result = np.zeros(len(times), dtype=columns)
+    try:
+        q = [float(known[c]) for c in system.coordinates]
+        v = [float(known[f"der({c})"]) for c in system.coordinates]
+        u = drive(0.0)
+        state = start(system, settings, 0.0, q, v, u, p).state
+        for k, t in enumerate(times):
+            if k:
+                u = drive(state.t)  # held over the step, as an importer of the FMU does
+                moved = advance(system, settings, state, u, p, float(t))
+                u = system.inputs_at(u, moved.t - state.t)
+                state = moved
+            seen = observe(system, state, u, p)
+            driven = dict(zip((d.name for d in drives), u, strict=True))
+            result[k] = (t, *(driven[o.name] if o in drives else seen[o.name] for o in read))
+    except StepFailureError as error:
+        raise SimulationError(str(error)) from error
+    return result
+
+
+@dataclass(frozen=True)
+class _Settable:
+    kind: str
+    minimum: float | None
+    maximum: float | None
+
+
+def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[str, Any]) -> None:
+    """Refuse what the FMU would refuse: all problems at once."""
+    problems = []
+    for name, value in values.items():
+        v = settable.get(name)
+        if v is None:
+            near = difflib.get_close_matches(name, settable, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            problems.append(f"{name!r} cannot be set, expected one of {', '.join(settable)}{hint}")
+        elif v.kind == "String":
+            if value not in IN_PYTHON:
+                problems.append(f"{name!r} = {value!r}: {unknown(value, IN_PYTHON)}")
+        elif not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+            problems.append(f"{name!r} = {value!r}, expected a finite number")
+        elif (v.minimum is not None and value < v.minimum) or (
+            v.maximum is not None and value > v.maximum
+        ):
+            problems.append(
+                f"{name!r} = {value!r} is outside its bounds [{v.minimum}, {v.maximum}]"
+            )
+    if problems:
+        raise SimulationError(f"{what}: " + "; ".join(problems))
+
+
+def read_description(path: Path) -> Any:
+    """fmpy's ModelDescription.  Raises VerificationError if the file is missing or no FMU."""
+    if not path.is_file():
+        raise VerificationError(f"{str(path)!r}: there is no such file")
+    try:
+        return fmpy.read_model_description(str(path), validate=False)
+    except (zipfile.BadZipFile, KeyError, OSError) as error:
+        raise VerificationError(
+            f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
+        ) from None
+    except Exception as error:
+        raise VerificationError(
+            f"{str(path)!r}: modelDescription.xml cannot be read ({error})"
+        ) from None
+
+
+def file_stem(description: Any) -> str:
+    """The name of the model as the name of a file in the folder that is meant, whatever it holds."""
+    return re.sub(r"[^\w-]", "_", description.modelName or "") or "FMU"
+
+
+def _simulate_fmu(
+    path: Path,
+    stop_time: float | None,
+    step_size: float | None,
+    tolerance: float | None,
+    values: dict[str, Any],
+    inputs: Trajectory | None,
+    besides: Sequence[str],
+) -> Trajectory:
+    description = read_description(path)
+    experiment = description.defaultExperiment
+    messages: list[str] = []
+
+    def logger(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
+        if status >= 2:  # discard, error, fatal
+            messages.append(message.decode(errors="replace").strip())
+
+    stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
+    step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
+    _check_count(stop, step)
+    _check_values(
+        str(path),
+        {
+            v.name: _Settable(
+                v.type,
+                None if v.min is None else float(v.min),
+                None if v.max is None else float(v.max),
+            )
+            for v in description.modelVariables
+            if v.causality in ("parameter", "input") or v.initial in ("exact", "approx")
+        },
+        values,
+    )
+    try:
+        result: Trajectory = fmpy.simulate_fmu(
+            str(path),
+            stop_time=stop,
+            output_interval=step,
+            step_size=step,
+            relative_tolerance=tolerance,
+            start_values=values,
+            output=[v.name for v in description.modelVariables if v.causality == "output"]
+            + list(besides),
+            input=inputs,
+            logger=logger,
+            debug_logging=True,
+        )
+    except FMICallException as error:
+        raise SimulationError(_told(path, error, messages)) from None
+    except Exception as error:
+        raise SimulationError(f"{str(path)!r} cannot be simulated: {error}") from None
+    reached = float(result["time"][-1])
+    if reached < stop * (1 - 1e-9):  # fmpy ends a run at fmi2Discard without a word
+        cause = "; ".join(messages) or "no message was logged"
+        raise SimulationError(
+            f"{str(path)!r}: the run ends at t = {reached!r} s, before {stop!r} s ({cause})"
+        )
+    return result
+
+
+def _told(path: Path, error: FMICallException, messages: Sequence[str]) -> str:
+    """The FMU's own reason; pythonfmu's binary wraps it in the name of the exception."""
+    raised = re.search(r"""Refused\((["'])(.*)\1\)""", " ".join("; ".join(messages).split()))
+    if raised:
+        return f"{str(path)!r}: {error.function} is refused: {raised[2]}"
+    return f"{str(path)!r}: {error} ({'; '.join(messages) or 'no message was logged'})"

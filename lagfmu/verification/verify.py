@@ -1,0 +1,289 @@
+"""verify(): an FMU simulated by fmpy and held against the closed forms that it carries."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from fmpy.validation import validate_fmu
+from numpy.typing import NDArray
+
+from ..errors import SimulationError, VerificationError
+from ..fmu.claims import LARGEST_RECORD, Claim, unpack_closed_forms
+from .simulate import Trajectory, read_description, simulate
+
+Expr = Any
+RECORD = "resources/lagfmu.json"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One statement: its largest error relative to its scale, and the error that is allowed.
+
+    `points` is the number of communication points at which it was evaluated; with 0 it was not
+    reached, and nothing is known.
+    """
+
+    name: str
+    error: float
+    allowed: float
+    points: int
+    detail: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """True if the error is within what is allowed, or the statement was not reached."""
+        return self.points == 0 or self.error <= self.allowed
+
+    @property
+    def verdict(self) -> str:
+        """pass, FAIL, or not reached."""
+        if self.points == 0:
+            return "not reached"
+        return "pass" if self.passed else "FAIL"
+
+    def __str__(self) -> str:
+        figures = f" {self.error:.1e}, allowed {self.allowed:.0e}" if self.allowed else ""
+        return f"{self.name}: {self.verdict}{figures} {self.detail}".rstrip()
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The checks of one FMU, `claims` of them closed forms, and what the run cost."""
+
+    name: str
+    checks: tuple[Check, ...]
+    simulated: float
+    seconds: float
+    steps: int
+    claims: int
+
+    @property
+    def passed(self) -> bool:
+        """True if no check failed and at least one was made."""
+        return all(c.passed for c in self.checks) and any(c.points for c in self.checks)
+
+    @property
+    def reached(self) -> bool:
+        """True if every closed form was evaluated somewhere."""
+        return all(c.points for c in self.checks)
+
+    @property
+    def worst(self) -> Check | None:
+        """The closed form whose error is the largest part of what it is allowed; None without any."""
+        measured = [c for c in self.checks if c.points and c.allowed]
+        return max(measured, key=lambda c: c.error / c.allowed, default=None)
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """(statement, largest error, allowed, verdict) as text; no figures where it is yes or no."""
+        return [
+            (
+                c.name,
+                f"{c.error:.1e}" if c.points and c.allowed else "",
+                f"{c.allowed:.0e}" if c.allowed else "",
+                c.verdict,
+            )
+            for c in self.checks
+        ]
+
+
+def verify(
+    fmu: str | os.PathLike[str],
+    start_values: Mapping[str, Any] | None = None,
+    stop_time: float | None = None,
+    step_size: float | None = None,
+    tolerance: float | None = None,
+) -> Verification:
+    """Simulate the FMU through fmpy and evaluate its closed forms on what it returns.
+
+    Also checks what FMU checkers do not: that every output is finite, and that the start values in
+    modelDescription.xml are those that the binary starts with.  Parameters and start values may be
+    changed; the closed forms follow.
+
+    Raises VerificationError if the file is corrupt or carries no closed forms of lagfmu, and
+    SimulationError if it cannot be simulated.
+    """
+    path = Path(fmu)
+    description = read_description(path)
+    claims = claims_in(path)
+    _check_texts(description, start_values or {})
+    problems = validate_fmu(str(path))
+    begun = time.perf_counter()
+    local = {v.name for v in description.modelVariables if v.causality == "local"}
+    besides = sorted(local & set().union(*(claim.variables for claim in claims)))
+    result = simulate(path, stop_time, step_size, tolerance, start_values, besides=besides)
+    seconds = time.perf_counter() - begun
+    experiment = description.defaultExperiment
+    used = tolerance or float(getattr(experiment, "tolerance", None) or 1e-8)
+    values = {
+        v.name: float(v.start)
+        for v in description.modelVariables
+        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
+    }
+    values |= {k: float(v) for k, v in (start_values or {}).items() if not isinstance(v, str)}
+    used = values.get("solver.tolerance") or used
+    checks = [
+        Check("valid for fmpy", len(problems), 0, 1, "; ".join(problems)),
+        _finite(result),
+        _starts(description, start_values or {}, result),
+    ]
+    checks += [check_claim(claim, result, values, used) for claim in claims]
+    span = float(result["time"][-1] - result["time"][0])
+    steps = int(result["solver.steps"][-1]) if "solver.steps" in (result.dtype.names or ()) else 0
+    return Verification(description.modelName, tuple(checks), span, seconds, steps, len(claims))
+
+
+def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
+    """A text is a value for a String variable only."""
+    texts = {v.name for v in description.modelVariables if v.type == "String"}
+    wrong = [f"{k} = {v!r}" for k, v in given.items() if isinstance(v, str) and k not in texts]
+    if wrong:
+        raise SimulationError(f"{', '.join(wrong)}: expected a number")
+
+
+def claims_in(path: Path) -> list[Claim]:
+    """The closed forms that an FMU carries.  Raises VerificationError if it is none of lagfmu's."""
+    variables = {v.name: v for v in read_description(path).modelVariables}
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if RECORD not in archive.namelist():
+                raise VerificationError(
+                    f"{str(path)!r} carries no closed forms ({RECORD} is missing): it was not built "
+                    "by lagfmu, and there is nothing to hold it against"
+                )
+            claims = unpack_closed_forms(_record(archive), str(path))
+    except (zipfile.BadZipFile, OSError) as error:
+        raise VerificationError(f"{str(path)!r} cannot be read as an FMU ({error})") from None
+    problems = []
+    for claim in claims:
+        for name in sorted(claim.variables):
+            v = variables.get(name)
+            if v is None:
+                problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
+            elif (v.type == "Boolean") != name.startswith("contact.") or v.type == "String":
+                problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
+    if problems:
+        raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
+    return claims
+
+
+def _record(archive: zipfile.ZipFile) -> bytes:
+    """Its content, but no more of it than is ever looked at."""
+    with archive.open(RECORD) as file:
+        return file.read(LARGEST_RECORD + 1)
+
+
+def _finite(result: Trajectory) -> Check:
+    bad = [n for n in result.dtype.names or () if not np.isfinite(result[n]).all()]
+    return Check("all outputs finite", len(bad), 0, len(result), ", ".join(bad))
+
+
+def _starts(description: Any, given: Mapping[str, Any], result: Trajectory) -> Check:
+    """Outputs with an exact start begin with it."""
+    worst, count, names = 0.0, 0, []
+    for v in description.modelVariables:
+        if v.initial == "exact" and v.causality == "output" and v.type == "Real":
+            expected = float(given.get(v.name, v.start))
+            error = abs(float(result[v.name][0]) - expected)
+            count += 1
+            if error > 0:
+                names.append(f"{v.name} starts at {result[v.name][0]!r}, described as {expected!r}")
+            worst = max(worst, error)
+    return Check("starts as described", worst, 0, max(count, 1), "; ".join(names))
+
+
+def check_claim(
+    claim: Claim, result: Trajectory, values: Mapping[str, float], tolerance: float
+) -> Check:
+    """One closed form on what a run returned; `values` are the parameters, by name."""
+    chosen = applies(claim, result)
+    allowed = max(claim.within * tolerance, claim.rounding)
+    count = int(chosen.sum())
+    if count == 0:
+        return Check(claim.name, 0.0, allowed, 0)
+    rows = result[chosen]
+    actual = evaluate(claim.actual, rows, result, values, claim.name)
+    if claim.expected is None:
+        expected = np.full_like(actual, actual[0])
+    else:
+        expected = evaluate(claim.expected, rows, result, values, claim.name)
+    if claim.scale is None:
+        scale = float(np.abs(expected).max())
+    else:
+        scale = float(np.abs(evaluate(claim.scale, rows, result, values, claim.name)).max())
+    error = float(np.abs(actual - expected).max())
+    if not math.isfinite(error):
+        return Check(claim.name, math.inf, allowed, count, "not a finite number")
+    return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
+
+
+def applies(claim: Claim, result: Trajectory) -> NDArray[np.bool_]:
+    """The communication points of a run at which a closed form says something."""
+    chosen = np.ones(len(result), dtype=bool)
+    if claim.while_closed is not None:
+        chosen &= result[f"contact.{claim.while_closed}"]
+    if claim.while_open is not None:
+        chosen &= ~result[f"contact.{claim.while_open}"]
+    for contact in _departures(claim):  # before the first one there is nothing to compare with
+        chosen &= result[f"departure.{contact}.count"] > 0
+    if claim.until_departure is not None:
+        closed = result[f"contact.{claim.until_departure}"]
+        left = result[f"departure.{claim.until_departure}.count"] > 0
+        chosen &= np.logical_and.accumulate(closed & ~left)
+    if claim.when is not None:
+        chosen &= evaluate(claim.when, result, result, {}, claim.name) != 0
+    if claim.at_departure is not None:
+        left = result[f"departure.{claim.at_departure}.count"] > 0
+        chosen &= (np.cumsum(left) == 1) & result[f"contact.{claim.at_departure}"][0]
+    return chosen
+
+
+def _departures(claim: Claim) -> list[str]:
+    """Contacts whose departure the claim speaks of, if its `when` does not count them itself."""
+    symbols = {
+        str(s) for e in (claim.actual, claim.expected) if e is not None for s in e.free_symbols
+    }
+    counted = set() if claim.when is None else {str(s) for s in claim.when.free_symbols}
+    told = {s.split(".")[1] for s in symbols if s.startswith("departure.")}
+    return sorted(c for c in told if f"departure.{c}.count" not in counted)
+
+
+def evaluate(
+    expression: Expr,
+    rows: Trajectory,
+    result: Trajectory,
+    values: Mapping[str, float],
+    name: str,
+) -> NDArray[np.float64]:
+    """An expression of closed form `name` at `rows` of the run `result`, parameters in `values`.
+
+    Raises VerificationError if it uses what the FMU does not have.
+    """
+    symbols = sorted(expression.free_symbols, key=str)
+    names = rows.dtype.names or ()
+    columns = []
+    for symbol in symbols:
+        text = str(symbol)
+        inner = text[len("initial(") : -1] if text.startswith("initial(") else ""
+        if inner in names:
+            column = result[inner][0]
+        elif text in names:
+            column = rows[text]
+        elif text in values:
+            column = values[text]
+        else:
+            raise VerificationError(
+                f"closed form {name!r} uses {text!r}, which is no output or parameter of the FMU"
+            )
+        columns.append(np.asarray(column, dtype=float))
+    function = sp.lambdify(symbols, expression, modules=["scipy", "numpy"], dummify=True)
+    with np.errstate(all="ignore"):
+        return np.broadcast_to(np.asarray(function(*columns), dtype=float), len(rows)).copy()
