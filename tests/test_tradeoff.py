@@ -20,11 +20,11 @@ from lagfmu.errors import BuildError, SimulationError
 from lagfmu.fmu.write import write
 from lagfmu.methods import EVALUATIONS
 from lagfmu.model.file import load
+from lagfmu.model.goal import Goal, parse
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.tradeoff import choose as choosing
 from lagfmu.study.tradeoff.choose import choose, pick
 from lagfmu.study.tradeoff.front import front
-from lagfmu.study.tradeoff.goal import Goal, parse
 from lagfmu.study.tradeoff.held_out import Case, other_values
 from lagfmu.study.tradeoff.importer import Importer
 from lagfmu.study.tradeoff.measure import Plan, Tradeoff, measure, take_turns

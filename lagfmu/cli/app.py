@@ -23,10 +23,10 @@ from ..fmu.native import takes_long
 from ..interface.variables import VariableTable
 from ..live.command import write_page
 from ..model.file import ModelFile, load
+from ..model.goal import parse
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
-from ..study.tradeoff.goal import parse
 from ..study.tradeoff.page import section
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification, verify

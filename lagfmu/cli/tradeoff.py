@@ -16,12 +16,12 @@ from ..errors import BuildError, LagfmuError
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile, load
+from ..model.goal import Goal
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.tradeoff.choose import Choice, choose
 from ..study.tradeoff.figure import draw
-from ..study.tradeoff.goal import Goal
 from ..study.tradeoff.importer import Importer
 from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure
 from ..study.tradeoff.report import as_csv, as_json, digits, remarks, summary, table

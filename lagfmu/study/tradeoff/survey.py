@@ -18,11 +18,11 @@ from ...errors import LagfmuError
 from ...fmu.write import write
 from ...methods import EVALUATIONS, METHODS
 from ...model.closed_form import ClosedForm, Conserved
+from ...model.goal import Goal
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
 from ...verification.verify import claims_in
-from .goal import Goal
 from .importer import Importer
 from .measure import Plan, Row, Tick, accepts, default_plan, take_turns, weigh, wider
 from .quantities import selected
