@@ -338,7 +338,12 @@ def tradeoff(
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path(
         "dist/tradeoff"
     ),
-    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    target: Annotated[
+        Target | None,
+        typer.Option(
+            help="What is built of model files: native where there is a compiler, else python."
+        ),
+    ] = None,
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
     ] = None,
@@ -350,6 +355,10 @@ def tradeoff(
     ] = None,
     method: Annotated[list[str] | None, typer.Option(help="Solver method; repeatable.")] = None,
     repeats: Annotated[int | None, typer.Option(help="Timed runs of each setting.")] = None,
+    full: Annotated[
+        bool,
+        typer.Option("--full", help="The whole grid: minutes instead of half a minute an FMU."),
+    ] = False,
 ) -> None:
     """Measure error against wall time over methods, tolerances and communication steps."""
     with _plainly():
@@ -357,12 +366,13 @@ def tradeoff(
             targets,
             out,
             console,
-            target.value,
+            None if target is None else target.value,
             step_size or (),
             tolerance or (),
             method or (),
             repeats,
             scene or (),
+            full,
         )
 
 
