@@ -25,6 +25,7 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
+from lagfmu.model.formula import with_outputs
 from lagfmu.page.documentation import page
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress.lagrange import lagrange
@@ -231,6 +232,49 @@ def test_an_output_that_cannot_be_is_told(output, parts):
     """The output, what is wrong with it, what was expected and what to do."""
     with pytest.raises(ModelError) as refused:
         pendulum(outputs=[output], inputs=[Input(F, "N")], forces={x: F})
+    for part in parts:
+        assert part in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("tension = -2*L*lambda.rod [N]", TENSION),
+        ("bob.speed = sqrt(der(x)^2 + der( y )**2) [m/s]", SPEED),
+        ("felt = m*abs(der(x,2)) + 0.5*Q.y [N]", None),
+    ],
+)
+def test_an_output_of_the_command_line_is_that_of_the_file(text, expected):
+    """The FMU's names in a formula mean the model's coordinates, rates, lambda and Q."""
+    (found,) = with_outputs(pendulum(), [text]).outputs
+    if expected is None:
+        value = m * Abs(x.diff(t, 2)) + force_of_constraint(y) / 2
+        assert (found.expression - value).evalf() == 0
+    else:
+        assert (found.name, found.expression, found.unit) == (
+            expected.name,
+            expected.expression,
+            expected.unit,
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("tension", ("NAME = EXPRESSION [UNIT]", "lambda.rod [N]")),
+        ("tension = -2*L*lambda.rope [N]", ("'lambda.rope' is unknown", "'lambda.rod'")),
+        ("h = y + [m]", ("'y +' is no expression",)),
+        ("h = exec(1) [m]", ("'exec' is no function",)),
+        ("h = y if x else L [m]", ("'if' is unknown",)),
+        ("h = (y, L) [m]", ("no part of an expression",)),
+        ("h = sqrt() [m]", ("sqrt cannot take 0 arguments",)),
+        ("h = y*y [m]", ("output 'h'", "m2", "expected m")),
+    ],
+)
+def test_a_formula_that_cannot_be_read_is_told(text, parts):
+    """What is wrong in it, and what was expected; nothing of it is executed."""
+    with pytest.raises(ModelError) as refused:
+        with_outputs(pendulum(), [text])
     for part in parts:
         assert part in str(refused.value)
 

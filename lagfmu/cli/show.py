@@ -16,6 +16,7 @@ from ..model.model import Contact, Nonholonomic, name_of
 from ..page.documentation import shown
 from ..page.savings import Savings, savings
 from ..page.typeset import Notation, typeset
+from ..solver.precedence import OMITTED
 
 if TYPE_CHECKING:
     from ..prepare.prepare import Prepared
@@ -149,7 +150,7 @@ def _starts(prepared: Prepared, console: Console) -> None:
     moved = prepared.structure.start.moved
     if not moved:
         console.print(Text("  as given: they satisfy the constraints"))
-    for name, given, used in moved:
-        unit = shown(prepared.whole[name].unit)
-        text = f"  {name} = {given:.10g} is projected to {used:.10g} {unit}".rstrip()
-        console.print(Text(text))
+    for m in moved:
+        unit = shown(prepared.whole[m.name].unit)
+        said = "is left out: it becomes" if m.rank == OMITTED else f"= {m.given!r} is projected to"
+        console.print(Text(f"  {m.name} {said} {m.used!r} {unit}".rstrip()), soft_wrap=True)

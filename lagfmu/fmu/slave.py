@@ -25,6 +25,8 @@ from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import Values, observe
+from ..solver.precedence import GIVEN, OMITTED, SET
+from ..solver.restored import restored, restored_settings
 from ..solver.state import SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
 from .references import end_once, keep, keep_module_of
@@ -60,12 +62,12 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     """A simulation of `system` behind the FMI functions.
 
     The generated subclass gives `system`, `variables` (name, kind, role, start, min, max, must it be
-    positive; the position is the value reference), `default_tolerance`, the `methods` that can be
-    chosen, the default method and fixed step, and `identity`.
+    positive, does the model give the start; the position is the value reference), `default_tolerance`, the
+    `methods` that can be chosen, the default method and fixed step, and `identity`.
     """
 
     system: System
-    variables: Sequence[tuple[str, str, str, Any, float | None, float | None, bool]]
+    variables: Sequence[tuple[str, str, str, Any, float | None, float | None, bool, bool]]
     default_tolerance: float
     methods: Sequence[str]
     default_method: str
@@ -215,7 +217,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set parameters, start values (before the end of initialization) or inputs."""
         for vr, value in zip(vrs, values, strict=True):  # all are checked before one is set
-            name, _, _, _, low, high, positive = self._settable(vr, "Real")
+            name, _, _, _, low, high, positive, _ = self._settable(vr, "Real")
             if not math.isfinite(value):
                 raise Refused(f"{name!r} = {value!r}, expected a finite number")
             if (low is not None and value < low) or (high is not None and value > high):
@@ -308,16 +310,22 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             maximum_steps=value["solver.maximum_steps"],
         )
         self.p = self._values(self.parameters)
-        q = [value[c] for c in self.system.coordinates]
-        v = [value[f"der({c})"] for c in self.system.coordinates]
-        u = self._values(self.inputs)
-        found = start(self.system, self.settings, self.start_time, q, v, u, self.p)
-        for name, given, used in found.moved:
-            self._warn(
-                f"start value {name} = {given!r} misses the constraints: projected to {used!r} "
-                f"(moved by {used - given:.3g})"
-            )
+        states = [*self.system.coordinates, *(f"der({c})" for c in self.system.coordinates)]
+        y, rank = [value[name] for name in states], [self._rank(name) for name in states]
+        n, u = self.system.n, self._values(self.inputs)
+        found = start(self.system, self.settings, self.start_time, y[:n], y[n:], u, self.p, rank)
+        for moved in found.moved:
+            if moved.rank == OMITTED:
+                self.log(str(moved), Fmi2Status.ok, "logEvents")
+            else:
+                self._warn(str(moved))
         self.state, self.observed = found.state, None
+
+    def _rank(self, name: str) -> int:
+        """Who said a start value: the importer if it differs from what is described, the model, nobody."""
+        k = self.reference[name]
+        described, given = self.variables[k][3], self.variables[k][7]
+        return SET if self.values[k] != described else GIVEN if given else OMITTED
 
     def _warn(self, message: str) -> None:
         self.log(message, Fmi2Status.warning, "logStatusWarning")
@@ -352,14 +360,46 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             raise Refused(state["refused"])
         if state.get("identity") != self.identity:
             raise Refused("the saved state belongs to another FMU, or to another version of this")
-        self.values = list(state["values"])
-        self.running = state["running"]
-        self.start_time, self.stop_time, self.tolerance = state["experiment"]
-        if state["settings"] is not None:
-            self.settings = Settings(**state["settings"])
-        self.state = None if state["state"] is None else State.from_json(state["state"])
+        try:
+            kept = self._checked_state(state)
+        except (ValueError, TypeError, KeyError) as error:
+            raise Refused(f"the saved state is none of this FMU's: {error}") from None
+        self.values, self.running, experiment, settings, self.state = kept
+        self.start_time, self.stop_time, self.tolerance = experiment
+        if settings is not None:
+            self.settings = settings
         self.p = self._values(self.parameters)
         self.observed = None
+
+    def _checked_state(self, state: dict[str, Any]) -> tuple[Any, ...]:
+        """Everything that was read is what this FMU can have saved.  Raises ValueError."""
+        values, running = state["values"], state["running"]
+        if not isinstance(values, list) or len(values) != len(self.variables):
+            raise ValueError("it has other variables")
+        for variable, value in zip(self.variables, values, strict=True):
+            if variable[2] != "output":
+                self._check_saved(variable, value)
+        start, stop, tolerance = (float(x) for x in state["experiment"])
+        if not (math.isfinite(start) and stop > start and 0 <= tolerance < math.inf):
+            raise ValueError(f"its experiment is {state['experiment']!r}")
+        settings, kept = state["settings"], state["state"]
+        settings = None if settings is None else restored_settings(settings, self.methods)
+        kept = None if kept is None else restored(self.system, kept)
+        if not isinstance(running, bool) or (running and None in (settings, kept)):
+            raise ValueError(f"its mode is {running!r}")
+        return list(values), running, (start, stop, tolerance), settings, kept
+
+    def _check_saved(self, variable: Any, value: Any) -> None:
+        name, kind, _, _, low, high, positive = variable[:7]
+        if kind == "Real":
+            number = float(value)
+            good = isinstance(value, (int, float)) and math.isfinite(number)
+            good = good and (low is None or number >= low) and (high is None or number <= high)
+            good = good and (not positive or number > 0)
+        else:
+            good = value in self.methods if name == "solver.method" else True
+        if not good:
+            raise ValueError(f"its {name} is {value!r}")
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
@@ -373,5 +413,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             if int(check, 16) != zlib.crc32(text):
                 raise ValueError("their check sum is wrong")
             return dict(json.loads(text.decode("ascii")))
-        except (TypeError, ValueError) as error:  # raised here, it would crash pythonfmu's binary
+        except (
+            TypeError,
+            ValueError,
+            RecursionError,
+        ) as error:  # raised here, it would crash pythonfmu's binary
             return {"refused": f"the bytes are no saved state of an FMU ({error})"}

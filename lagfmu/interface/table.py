@@ -83,7 +83,8 @@ class _Builder:
         self.known = {*self.state_names, *self.inputs}
         self.descriptions = {name_of(s): text for s, text in self.model.descriptions.items()}
         self.movable = self._movable()
-        self.starts = self._starts()
+        self.given = self._given()
+        self.starts = {name: self.given.get(name, 0.0) for name in self.state_names}
 
     # ------------------------------------------------------------------ dependencies
 
@@ -98,14 +99,15 @@ class _Builder:
                 moved |= {str(eom.v[j]) for j in coordinates}
         return moved
 
-    def _starts(self) -> dict[str, float]:
+    def _given(self) -> dict[str, float]:
+        """The start values that the model says, by name."""
         model, given = self.model, {}
         for state, value in model.start.items():
             given[str(self.eom.symbols[state])] = float(value)
         if model.embedding is not None:
             for state, value in model.embedding.start.items():
                 given[str(self.eom.symbols[state])] = float(value)
-        return {name: given.get(name, 0.0) for name in self.state_names}
+        return given
 
     def symbols(self, *expressions: Expr) -> set[str]:
         """Names of the symbols that the expressions hold, reduced coordinates put in."""
@@ -198,6 +200,7 @@ class _Builder:
             initial="approx" if approx else "exact",
             description=description,
             start=self.starts[name],
+            given=name in self.given,
             unit=self.units[name],
             derivative_of=derivative_of,
             depends=(name,),

@@ -20,6 +20,7 @@ from markupsafe import Markup
 from ..interface.variables import Variable
 from ..model.model import Contact, Holonomic, Nonholonomic
 from ..model.units import Unit
+from ..solver.precedence import OMITTED
 from .savings import savings
 from .typeset import SUPERSCRIPT, typeset
 
@@ -98,8 +99,13 @@ def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = (), choice: st
         ],
         contacts=[c for c in acting if isinstance(c, Contact)],
         moved=[
-            (n, f"{given:.6g}", f"{used:.6g}", shown(whole[n].unit))
-            for n, given, used in structure.start.moved
+            (
+                m.name,
+                "left out" if m.rank == OMITTED else f"{m.given:.10g}",
+                f"{m.used:.10g}",
+                shown(whole[m.name].unit),
+            )
+            for m in structure.start.moved
         ],
         groups=_grouped(table.variables, {o.name for o in model.outputs}),
         inputs=[v.name for v in table.variables if v.causality == "input"],

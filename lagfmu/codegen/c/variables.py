@@ -25,7 +25,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include "state.h"
 #include "variables.h"
 
-/* name, type, role, place, index, contact, state, start, text, min, max, positive */
+/* name, type, role, place, index, contact, state, start, text, min, max, positive, given */
 const Variable VARIABLES[] = {{
 {rows}}};
 
@@ -126,5 +126,6 @@ def _row(v: Variable, place: Place, states: dict[str, int]) -> str:
         low,
         high,
         str(int(v.positive)),
+        str(int(v.given)),
     ]
     return f"{{{', '.join(fields)}}}"

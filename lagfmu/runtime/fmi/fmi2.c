@@ -23,6 +23,7 @@
 #include "exchange.h"
 #include "instance.h"
 #include "parts.h"
+#include "restored.h"
 
 enum {
     INSTANTIATED = 1,
@@ -550,6 +551,15 @@ fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *FMUstate) {
     return fmi2OK;
 }
 
+/* Is the phase that was restored one that this instance can be in?  The cause is in why if not. */
+static int in_phase(Instance *x) {
+    const int live = x->exchange ? EXCHANGE : STEPPING, all = INSTANTIATED | INITIALIZATION | live | TERMINATED;
+    const int one = x->phase > 0 && (x->phase & (x->phase - 1)) == 0 && (x->phase & all) != 0;
+    if (one && x->running == ((x->phase & (live | TERMINATED)) != 0)) return 1;
+    (void)fail(&x->solver.why, "the saved state is none of this FMU's: its mode is %d", x->phase);
+    return 0;
+}
+
 fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate) {
     Component *c = component;
     if (!allowed(c, ANY_MODE)) return forbidden(c, "fmi2SetFMUstate");
@@ -559,9 +569,12 @@ fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate) {
     instance_save(&c->instance, c->instance.backup);
     const int exchange = c->instance.exchange;
     instance_restore(&c->instance, (const char *)FMUstate + sizeof(Head));
-    if (c->instance.exchange == exchange) return fmi2OK;
+    const int other = c->instance.exchange != exchange;
+    if (!other && instance_restored(&c->instance) == OK && in_phase(&c->instance)) return fmi2OK;
     instance_restore(&c->instance, c->instance.backup);
-    return refuse(c, "fmi2SetFMUstate: the state was saved by an instance of the other type");
+    if (other)
+        return refuse(c, "fmi2SetFMUstate: the state was saved by an instance of the other type");
+    return failed(c, fmi2Error);
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *FMUstate) {

@@ -28,6 +28,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->v0 = arena_doubles(&saved, system->n);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
+        x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
         x->happened = arena_ints(&scratch, system->contacts);
@@ -217,13 +218,29 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
 /* ------------------------------------------------------------------ start */
 
 static void tell_moved(void *context, const char *coordinate, int is_velocity, double given,
-                       double used) {
+                       double used, Rank rank) {
     Instance *x = context;
-    (void)snprintf(x->note, sizeof x->note,
-                   "start value %s%s%s = %s misses the constraints: projected to %s (moved by %.3g)",
-                   is_velocity ? "der(" : "", coordinate, is_velocity ? ")" : "",
-                   digits(given).text, digits(used).text, used - given);
-    x->tell(x->context, NOTE_WARNING, x->note);
+    const char *head = is_velocity ? "der(" : "", *tail = is_velocity ? ")" : "";
+    if (rank == OMITTED)
+        (void)snprintf(x->note, sizeof x->note,
+                       "%s%s%s has no start value: %s in place of %s satisfies the constraints", head,
+                       coordinate, tail, digits(used).text, digits(given).text);
+    else
+        (void)snprintf(x->note, sizeof x->note,
+                       "start value %s%s%s = %s misses the constraints: projected to %s (moved by "
+                       "%.3g)",
+                       head, coordinate, tail, digits(given).text, digits(used).text, used - given);
+    x->tell(x->context, rank == OMITTED ? NOTE_EVENT : NOTE_WARNING, x->note);
+}
+
+/* A start value that differs from the described one was set, whatever calls set it. */
+static void find_ranks(Instance *x) {
+    for (int k = 0; k < VARIABLE_COUNT; k++) {
+        const Variable *v = &VARIABLES[k];
+        if (v->role != ROLE_START) continue;
+        const int set = instance_setting(x, v) != v->start;
+        x->rank[v->state] = set ? SET : v->given ? GIVEN : OMITTED;
+    }
 }
 
 static void choose_settings(Instance *x) {
@@ -245,7 +262,8 @@ Status instance_start(Instance *x) {
     choose_settings(x);
     s->stop_time = x->stop_time;
     s->drive.since = x->start_time;
-    if (solver_start(s, x->start_time, x->q0, x->v0, tell_moved, x) != OK) return FAILED;
+    find_ranks(x);
+    if (solver_start(s, x->start_time, x->q0, x->v0, x->rank, tell_moved, x) != OK) return FAILED;
     /* model exchange has no communication step: 1 s stands in for it */
     if (x->exchange && magnitudes_incomplete(s) &&
         magnitudes_complete(s, leg_instant(s, x->start_time), 1) != OK)

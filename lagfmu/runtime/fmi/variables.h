@@ -38,6 +38,7 @@ typedef struct {
     const char *text; /* start of a String */
     double min, max; /* -HUGE_VAL, HUGE_VAL where there is none */
     int positive;    /* zero is refused */
+    int given;       /* role START: the model's `start` says it; otherwise nobody did, and it is 0 */
 } Variable;
 
 extern const Variable VARIABLES[];
