@@ -55,6 +55,9 @@ class System:
     `extent` (n) the positions in p whose values have it, `folded` (n) the largest magnitude of it among
     the parameters that are numbers in the code; `angles` are those without dimension.
 
+    surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
+    is a whole number; `driven`: length of u, the inputs and the levels of jumps behind them.
+
     `outputs` are those of the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
     `restitution` are None too.
@@ -77,6 +80,9 @@ class System:
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
     outputs: tuple[Own, ...] = ()
+    surfaces: Callable[..., Any] | None = None
+    floors: tuple[bool, ...] = ()
+    driven: int = 0
 
     @property
     def n(self) -> int:
