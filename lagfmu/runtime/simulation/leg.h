@@ -18,7 +18,7 @@ void leg_choose_rows(Solver *s);
 /* (m) The rows for states off the constraints: those that act, as many of them as are independent. */
 const int *leg_rows(const Solver *s);
 
-/* Time t with the inputs then (kept in s->u). */
+/* Time t with the inputs then, and the levels of jumps behind them (kept in s->u). */
 Instant leg_instant(Solver *s, double t);
 
 /* One accepted step towards t_bound, none longer than `longest` [s]. */
