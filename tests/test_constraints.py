@@ -345,9 +345,9 @@ def test_undecided_in_regions():
     assert answer.kind is Kind.UNDECIDED
 
 
-@pytest.mark.parametrize(("limit", "value"), [("_LARGEST", 3), ("_SECONDS", -1.0)])
+@pytest.mark.parametrize(("limit", "value"), [("_LARGEST", 3), ("_EFFORT", -1.0)])
 def test_too_long_to_decide(monkeypatch, limit, value):
-    """An expression that outgrows memory or time is undecided, too: no guess, and no crash."""
+    """An expression that outgrows memory or effort is undecided, too: no guess, and no crash."""
     monkeypatch.setattr(f"lagfmu.mechanics.integrability.tower.{limit}", value)
     answer = classify([sin(phi) * d(x) - (x + y + z) * d(y), d(z) - y * d(x)], [x, y, z, phi])
     assert answer.kind is Kind.UNDECIDED

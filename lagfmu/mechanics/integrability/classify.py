@@ -36,7 +36,7 @@ __all__ = ["Classification", "Integral", "Kind", "classify", "pfaffian"]
 
 Expr = Any  # SymPy has no types
 
-_SECONDS = 8.0  # for the integrals of a set, and again for those of its forms one by one
+_EFFORT = 3e6  # for the integrals of a set, and again for those of its forms one by one
 
 
 class Kind(StrEnum):
@@ -87,13 +87,14 @@ def classify(
     `forms` are linear in the velocities q_j' of the `coordinates` q_j (`dynamicsymbols`), and set
     to zero; every other symbol is a generic parameter, every other function an unknown one.
     Numbers with a decimal point are read as the decimal number with 14 digits.  With
-    `integrate=False`, the integrals are not looked for; else, for some seconds.
+    `integrate=False`, the integrals are not looked for; else, with an effort that is
+    counted in operations: the answer is the same on every machine and under any load.
     """
-    return _classify(forms, coordinates, integrate, _SECONDS)
+    return _classify(forms, coordinates, integrate, _EFFORT)
 
 
 def _classify(
-    forms: Sequence[Expr] | Expr, coordinates: Sequence[Expr], integrate: bool, seconds: float
+    forms: Sequence[Expr] | Expr, coordinates: Sequence[Expr], integrate: bool, effort: float
 ) -> Classification:
     forms = tuple(forms) if isinstance(forms, list | tuple) else (forms,)
     forms = tuple(f.lhs - f.rhs if isinstance(f, Eq) else sympify(f) for f in forms)
@@ -105,10 +106,10 @@ def _classify(
     rows = [[chart.there(entry) for entry in row] for row in rows]
     each: tuple[Classification, ...] = ()
     if len(forms) > 1:
-        share = seconds / len(forms)
+        share = effort / len(forms)
         each = tuple(_classify(form, coordinates, integrate, share) for form in forms)
     known = [chart.there(i.f) for c in each for i in c.integrals]
-    return _Analysis(forms, rows, chart, each).run(known, seconds if integrate else 0.0)
+    return _Analysis(forms, rows, chart, each).run(known, effort if integrate else 0.0)
 
 
 class _Analysis:
@@ -126,7 +127,7 @@ class _Analysis:
         self.width = len(self.variables)
         self.tower = Tower(self.variables, [entry for row in rows for entry in row])
 
-    def run(self, known: list[Expr], seconds: float) -> Classification:
+    def run(self, known: list[Expr], effort: float) -> Classification:
         rank = 0
         try:
             for entry in (entry for row in self.rows for entry in row if entry.has(Integral_)):
@@ -159,16 +160,16 @@ class _Analysis:
         else:
             kind = Kind.PARTLY if depth else Kind.NONHOLONOMIC
         found: list[Integral] = []
-        if seconds and depth:
+        if effort and depth:
             rows = [[self.tower.back(entry) for entry in row] for row in bottom]
-            with within(seconds):
+            with within(effort):
                 candidates = first_integrals(self.rows, rows, self.variables, known)
             for f in candidates:
                 with suppress(Undecided):  # it has passed, but its factors may be too long
                     found.append(self._integral(f, reduced[:rank], pivots))
         witness = self.chart.back(factor_terms(self.tower.back(witness)))
         text = self._certificate(kind, flag, first, witness, where)
-        if seconds and len(found) < depth:
+        if effort and len(found) < depth:
             text += (
                 f"; of {depth} integrals, {len(found)} "
                 f"{'was' if len(found) == 1 else 'were'} found in closed form"
