@@ -21,6 +21,7 @@
 
 #include "digits.h"
 #include "exchange.h"
+#include "indicators.h"
 #include "instance.h"
 #include "parts.h"
 #include "restored.h"
@@ -934,7 +935,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component component, fmi2Real derivatives[], s
 fmi2Status fmi2GetEventIndicators(fmi2Component component, fmi2Real eventIndicators[],
                                   size_t ni) {
     return read_array(component, "fmi2GetEventIndicators", READABLE, exchange_indicators,
-                      eventIndicators, ni, MODEL_SYSTEM->contacts);
+                      eventIndicators, ni, indicators_count(MODEL_SYSTEM));
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component component, fmi2Real x[], size_t nx) {
