@@ -50,7 +50,7 @@ Names are the model's: der_theta is the velocity of theta, lambda stands on the 
 """
 
 from {package}.fmu.slave import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
-from {package}.solver.system import Embedding, Row, System
+from {package}.solver.system import Embedding, Friction, Row, System
 {equations}
 
 # name, type, what may set it, start, min, max, positive; the position is the reference

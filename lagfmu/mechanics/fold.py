@@ -123,6 +123,7 @@ def _expressions(eom: EquationsOfMotion) -> list[Expr]:
     flat = [*eom.M.todok().values(), *eom.F, *eom.G.todok().values(), *eom.nu, *eom.gamma]
     flat += [*eom.f, eom.kinetic, eom.potential]
     flat += [eom.plain(c.restitution) for c in eom.constraints if isinstance(c, Contact)]
+    flat += [e for law in eom.frictions for e in law.expressions]
     return [sp.sympify(e) for e in flat if e is not None]
 
 

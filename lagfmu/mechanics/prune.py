@@ -97,6 +97,7 @@ def subjects(
             for name in (f"{c.name}.{q}", f"{c.name}.velocity.{q}"):
                 found[f"departure.{name}"] = frozenset({j}), row
             found[f"Q.{c.name}.{q}"] = frozenset({j}), row
+    found |= _of_frictions(eom)
     for name, parts in (
         ("kinetic", [eom.kinetic]),
         ("potential", [eom.potential]),
@@ -113,6 +114,27 @@ def subjects(
     return found
 
 
+def _of_frictions(eom: EquationsOfMotion) -> dict[str, tuple[Indices, Indices]]:
+    """What frictions show: all of it is of the rows that they limit."""
+    none: Indices = frozenset()
+    position = {c.name: k for k, c in enumerate(eom.constraints)}
+    found = {}
+    every: Indices = frozenset()
+    for law in eom.frictions:
+        rows = frozenset(position[name] for name in law.of)
+        every |= rows
+        names = [f"{head}.{law.name}" for head in ("sticks", "margin", "power")]
+        names += [f"slipping.{law.name}.{tail}" for tail in ("count", "time")]
+        names += [f"slip.{name}" for name in law.of]
+        found |= dict.fromkeys(names, (none, rows))
+        for j, q in enumerate(eom.q):
+            for tail in (f"{q}", f"velocity.{q}"):
+                found[f"slipping.{law.name}.{tail}"] = frozenset({j}), rows
+    if every:
+        found["energy.dissipated"] = none, every
+    return found
+
+
 def _behind(eom: EquationsOfMotion, coordinates: Indices, rows: Indices) -> set[Expr]:
     """The symbols in the equations of a group."""
     flat = [m for (i, _), m in eom.M.todok().items() if i in coordinates]
@@ -120,6 +142,8 @@ def _behind(eom: EquationsOfMotion, coordinates: Indices, rows: Indices) -> set[
     flat += [eom.F[j] for j in coordinates]
     for k in rows:
         flat += [eom.nu[k], eom.gamma[k], *([] if eom.f[k] is None else [eom.f[k]])]
+        law = eom.limited.get(eom.constraints[k].name)
+        flat += law.expressions if law is not None else ()
     return set().union(*(sp.sympify(e).free_symbols for e in flat)) if flat else set()
 
 
@@ -150,6 +174,7 @@ def only(
         )
 
     gone = {s for j in range(eom.n) if j not in js for s in (eom.q[j], eom.v[j])}
+    kept = {eom.constraints[k].name for k in ks}
 
     def whole(energy: Expr) -> Expr:
         return None if energy is None or energy.free_symbols & gone else energy
@@ -167,6 +192,7 @@ def only(
         kinetic=whole(eom.kinetic),
         potential=whole(eom.potential),
         constraints=pick(eom.constraints, ks),
+        frictions=tuple(law for law in eom.frictions if kept.issuperset(law.of)),
     )
 
 

@@ -13,9 +13,10 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
+from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
-from .reactions import reactions_in
+from .reactions import reaction_units, reactions_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
 
@@ -34,6 +35,7 @@ def problems_of(model: ModelFields) -> list[str]:
     units = declared_units(model, problems)
     if not problems:
         _check_dimensions(model, units, problems)
+        problems += check_frictions(model, units, reaction_units(model, units))
     return problems
 
 

@@ -16,6 +16,7 @@ from sympy.core.function import AppliedUndef
 
 from ..errors import ModelError
 from .check import declared_units, problems_of
+from .frictions import split
 from .kinds import check_containers
 from .parts import (
     NAME,
@@ -24,6 +25,7 @@ from .parts import (
     Contact,
     Embedding,
     Expr,
+    Friction,
     Holonomic,
     Input,
     ModelFields,
@@ -41,6 +43,7 @@ __all__ = [
     "Contact",
     "Embedding",
     "Expr",
+    "Friction",
     "Holonomic",
     "Input",
     "Model",
@@ -57,7 +60,8 @@ class Model(ModelFields):
     Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is
     given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
-    numbers in SI.  `descriptions` may explain coordinates.
+    numbers in SI.  `descriptions` may explain coordinates.  A `Friction` is written among `constraints`
+    and kept in `frictions`.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -72,6 +76,9 @@ class Model(ModelFields):
             object.__setattr__(self, name, dict(getattr(self, name)))
         for name in ("constraints", "parameters", "inputs"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
+        constraints, frictions = split(self.constraints)
+        object.__setattr__(self, "constraints", constraints)
+        object.__setattr__(self, "frictions", (*self.frictions, *frictions))
         problems = problems_of(self)
         if problems:
             raise ModelError(str(self.name), problems)
@@ -96,6 +103,11 @@ class Model(ModelFields):
         for relation in self.embedding.relations.values() if self.embedding else ():
             used |= sp.sympify(relation).atoms(AppliedUndef)
         return tuple(i for i in self.inputs if i.symbol in used)
+
+    @cached_property
+    def limited(self) -> dict[str, Friction]:
+        """The constraints that hold by friction alone, by name."""
+        return {name: f for f in self.frictions for name in f.of}
 
     def constraint(self, name: str) -> Constraint:
         """The constraint called `name`; KeyError if there is none."""

@@ -86,6 +86,28 @@ Constraint = Holonomic | Nonholonomic | Contact
 
 
 @dataclass(frozen=True)
+class Friction:
+    """Coulomb friction: the constraints `of`, one or two, hold while |lambda| <= static * |normal|.
+
+    Beyond that they slip, and lambda = -kinetic * |normal| * s/|s| with the slip velocity s = G v - nu
+    (two constraints: orthogonal velocities).  `normal` [N] is linear in `multiplier(NAME)`s; `static` and
+    `kinetic` (the same as `static` if None) are numbers or expressions without dimension.
+    """
+
+    name: str
+    of: Sequence[str]
+    normal: Expr
+    static: Expr
+    kinetic: Expr = None
+    description: str = ""
+
+    @property
+    def sliding(self) -> Expr:
+        """The coefficient of kinetic friction."""
+        return self.static if self.kinetic is None else self.kinetic
+
+
+@dataclass(frozen=True)
 class Embedding:
     """Dependent coordinates as functions of independent ones, q = phi(s, t).
 
@@ -114,6 +136,7 @@ class ModelFields:
     embedding: Embedding | None = None
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
+    frictions: Sequence[Friction] = ()
 
     @property
     def energy_expression(self) -> Expr:

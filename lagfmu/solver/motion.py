@@ -3,34 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from . import at_friction
 from .failure import StepFailureError
-from .instant import Instant
+from .instant import Instant, Motion
 from .linear import solve, solve_nullspace
 from .solution import Solution
-from .system import NONHOLONOMIC, Matrix, Vector
+from .system import NONHOLONOMIC, Vector
 
 EPS = float(np.finfo(float).eps)
 ITERATIONS = 10
 SMALL = 1e-12  # residual, relative to the constraint's own size, that rounding may leave
-
-
-@dataclass(frozen=True)
-class Motion:
-    """M, F, G, nu, gamma at a state and the solution for the rows that act (`active`)."""
-
-    M: Matrix
-    F: Vector
-    G: Matrix
-    nu: Vector
-    gamma: Vector
-    vdot: Vector
-    lam: Vector
-    unique: NDArray[np.bool_]
 
 
 def motion(
@@ -40,9 +25,11 @@ def motion(
     active: Sequence[int],
 ) -> Motion:
     """Accelerations (n) and multipliers (m; 0 for rows that do not act) at a state."""
+    method = solve_nullspace if at.system.formulation == "nullspace" else solve
+    if at.slides:
+        return at_friction.motion_with_friction(at, q, v, active, method)
     M, F, G, nu, gamma = at.evaluate(q, v)
     rows = list(active)
-    method = solve_nullspace if at.system.formulation == "nullspace" else solve
     found: Solution = method(M, F, G[rows], gamma[rows])
     lam = np.zeros(at.system.m)
     lam[rows] = found.lam
@@ -68,6 +55,8 @@ def project(
     constraints if Newton's method does not arrive.
     """
     rows = list(active)
+    if at.slides:
+        rows = sorted({*rows, *at_friction.sticking(at, rows)})
     if not rows:
         return q, v
     fixed = [k for k in rows if at.system.rows[k].kind != NONHOLONOMIC]

@@ -36,6 +36,21 @@ class Departure:
 
 
 @dataclass(frozen=True)
+class Slide:
+    """How a friction stands: it sticks, or slips.
+
+    `sign` is that of the multipliers' sum N, so that the normal force is sign * N; `direction` the unit
+    vector of the slip velocity, where that is zero or was last known; slip velocities up to `noise` [m/s]
+    are rounding.
+    """
+
+    sticks: bool = False
+    sign: float = 1.0
+    direction: tuple[float, float] = (1.0, 0.0)
+    noise: float = 0.0
+
+
+@dataclass(frozen=True)
 class State:
     """Time, motion, contact modes, step-size memory.
 
@@ -43,7 +58,8 @@ class State:
     constraint keeps which came back with its contact; scale (2 n): the magnitudes below which errors
     in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
     below which a contact touches; step [s]: the next step to try; rate [1/s]: the motion's
-    natural rate at the start; choice: what `auto` remembers.
+    natural rate at the start; choice: what `auto` remembers; slides, slippings: one entry a friction,
+    how it stands and its latest start of slipping; dissipated [J]: by frictions and impacts so far.
     """
 
     t: float
@@ -60,6 +76,9 @@ class State:
     steps: int
     departures: tuple[Departure, ...]
     choice: Choice = field(default_factory=Choice)
+    slides: tuple[Slide, ...] = ()
+    slippings: tuple[Departure, ...] = ()
+    dissipated: float = 0.0
 
     def to_json(self) -> str:
         """Text that `from_json` turns into an equal state; floats keep every bit."""
@@ -72,9 +91,12 @@ class State:
         for f in fields(State):
             if isinstance(raw[f.name], list):
                 raw[f.name] = tuple(raw[f.name])
-        raw["departures"] = tuple(
-            Departure(d["count"], d["time"], tuple(d["q"]), tuple(d["v"]))
-            for d in raw["departures"]
+        for name in ("departures", "slippings"):
+            raw[name] = tuple(
+                Departure(d["count"], d["time"], tuple(d["q"]), tuple(d["v"])) for d in raw[name]
+            )
+        raw["slides"] = tuple(
+            Slide(x["sticks"], x["sign"], tuple(x["direction"]), x["noise"]) for x in raw["slides"]
         )
         raw["choice"] = Choice(**raw["choice"])
         return State(**raw)
