@@ -61,7 +61,7 @@ PROJECTED = [
     *(("ida", method) for method in ("newton", "exact")),
 ]
 UNPROJECTED = [("cvode", "adams"), ("cvode", "adams-newton")]
-OURS = [("dop853", 0.1), ("dop853", 0.01), ("dop853", 0.001), ("dopri5", 0.1)]
+OURS = [("dop853", 0.1), ("dop853", 0.01), ("dop853", 0.001)]
 SIZES = (8, 32, 128, 512)
 Command = Callable[[float], list[Any]]
 

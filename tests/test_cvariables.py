@@ -16,6 +16,7 @@ from runtime import RUNTIME_FILES, compile_library
 from lagfmu.codegen.c.equations import model_source
 from lagfmu.codegen.c.printer import string
 from lagfmu.codegen.c.variables import variables_source
+from lagfmu.methods import NUMBERS
 from lagfmu.prepare.prepare import Prepared
 from lagfmu.solver.initial import start
 from lagfmu.solver.observe import observe
@@ -52,12 +53,12 @@ def places() -> list[str]:
     return re.findall(r"AT_(\w+)", inside[: inside.index("}")])
 
 
-def methods() -> list[str]:
-    """The enumerators of MethodName, from the header, in order."""
+def methods() -> dict[str, int]:
+    """The enumerators of MethodName and their values, from the header."""
     header = RUNTIME_FILES["state.h"].read_text(encoding="utf-8")
     found = re.search(r"enum \{([^}]*)\} MethodName", header)
     assert found is not None
-    return re.findall(r"\w+", found[1])
+    return {k: int(v) for k, v in re.findall(r"(\w+) = (\d+)", found[1])}
 
 
 @pytest.fixture(scope="session")
@@ -103,7 +104,8 @@ def test_every_variable_is_there_in_order(table: Any, name: str) -> None:
     assert ctypes.c_char_p.in_dll(library, "MODEL_GUID").value == b"{1234}"
     assert ctypes.c_double.in_dll(library, "DEFAULT_TOLERANCE").value == p.scene.tolerance
     method = ctypes.c_int.in_dll(library, "DEFAULT_METHOD").value
-    assert methods()[method] == p.scene.method.upper()
+    assert methods()[p.scene.method.upper()] == method
+    assert methods() == {k.upper(): number for k, number in NUMBERS.items()}
 
 
 @pytest.mark.parametrize("name", NAMES)

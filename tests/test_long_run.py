@@ -60,7 +60,7 @@ def test_rattle_does_not_gain_or_lose_on_the_way(pendulum):
     assert energy[-tenth:].max() < 2 * energy[:tenth].max() + 1e-12 * M * G * L
 
 
-@pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4"])
+@pytest.mark.parametrize("method", ["dop853", "rk4"])
 def test_the_rod_keeps_its_length_with_every_method(pendulum, method):
     """1e4 s with projection: f stays at rounding, whatever the energy's drift, which is linear in time."""
     f, energy, _ = run(pendulum, 1e4, 9.7, {"solver.method": method}, 1e-8)

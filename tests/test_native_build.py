@@ -447,3 +447,9 @@ def test_rattle_is_refused_at_the_build_where_it_cannot_step(prepared, tmp_path)
     with pytest.raises(BuildError, match="native"):
         write(prepare(made.model, replace(made.scene, method="rattle")), tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_an_empty_cache_folder_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """LAGFMU_CACHE= is not the working folder: no compiled files are strewn about it."""
+    monkeypatch.setenv("LAGFMU_CACHE", "")
+    assert compiler._cache() != Path("")

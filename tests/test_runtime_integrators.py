@@ -19,7 +19,6 @@ SOURCES = (
     "integrator.c",
     "step_size.c",
     "dop853.c",
-    "dopri5.c",
     "rk4.c",
     "radau5.c",
     "rattle.c",
@@ -131,7 +130,7 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
     return OK;
 }
 
-static const Method *const METHODS[] = {&dop853, &dopri5, &rk4, &radau5};
+static const Method *const METHODS[] = {&dop853, &rk4, &radau5};
 
 Run *run_new(int method, int problem, int ny, const double *y, double t, double h) {
     Run *r = calloc(1, sizeof *r);
@@ -140,11 +139,11 @@ Run *run_new(int method, int problem, int ny, const double *y, double t, double 
     r->ode = (Ode){r, rate, jacobian, &r->why};
     for (int k = 0; k < 8; k++) r->scale[k] = 1;
     r->control = (Control){1e-8, r->scale, 0, 0.1};
-    integrator_layout(&r->i, &r->saved, &r->scratch, ny, METHODS, 4);
+    integrator_layout(&r->i, &r->saved, &r->scratch, ny, METHODS, 3);
     r->saved.base = calloc(1, r->saved.used);
     r->scratch.base = calloc(1, r->scratch.used);
     r->saved.used = r->scratch.used = 0;
-    integrator_layout(&r->i, &r->saved, &r->scratch, ny, METHODS, 4);
+    integrator_layout(&r->i, &r->saved, &r->scratch, ny, METHODS, 3);
     integrator_start(&r->i, METHODS[method], t, y, h);
     return r;
 }
@@ -346,9 +345,9 @@ int swing_dense(Swing *w, double t, double *y) {
 }
 const char *swing_why(const Swing *w) { return w->why.text; }
 """
-METHODS = ("dop853", "dopri5", "rk4", "radau5")
-ADAPTIVE = ("dop853", "dopri5", "radau5")
-ORDER = {"dop853": 8, "dopri5": 5, "rk4": 4, "radau5": 5}
+METHODS = ("dop853", "rk4", "radau5")
+ADAPTIVE = ("dop853", "radau5")
+ORDER = {"dop853": 8, "rk4": 4, "radau5": 5}
 SIZES = (4, 2, 3, 4, 1, 1, 1, 2, 1, 4)
 ELLIPTIC, VAN_DER_POL, ROBERTSON, SPRING, ESCAPE, REST, ROOT, CIRCLE, PROTHERO, CHEAP = range(10)
 POINTER, DOUBLE, INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int
@@ -545,12 +544,11 @@ def fixed_steps(r: Run, t: float, n: int) -> None:
     ("method", "t", "counts"),
     [
         ("dop853", 4.0, (12, 16, 24, 32)),
-        ("dopri5", 6.0, (96, 128, 192, 384)),
         ("rk4", 6.0, (64, 128, 256)),
     ],
 )
 def test_order(library: ctypes.CDLL, method: str, t: float, counts: tuple[int, ...]) -> None:
-    """The error of n equal steps falls as h^p: p = 8, 5, 4."""
+    """The error of n equal steps falls as h^p: p = 8, 4."""
     errors = []
     for n in counts:
         r = Run(library, method, tolerance=1e30, h=t / n, fixed=t / n)
@@ -574,7 +572,6 @@ def test_order_of_radau5(library: ctypes.CDLL) -> None:
     ("method", "order", "counts", "tolerance"),
     [
         ("dop853", 7, (32, 48, 64, 80), 1e30),
-        ("dopri5", 4, (32, 64, 128), 1e30),
         ("rk4", 3, (32, 64, 128), 1e30),
         ("radau5", 3, (128, 256, 512), 1e-1),
     ],
@@ -582,7 +579,7 @@ def test_order_of_radau5(library: ctypes.CDLL) -> None:
 def test_order_of_dense_output(
     library: ctypes.CDLL, method: str, order: int, counts: tuple[int, ...], tolerance: float
 ) -> None:
-    """Within one step from an exact state the interpolation's error falls as h^(q + 1): q = 7, 4, 3, 3."""
+    """Within one step from an exact state the interpolation's error falls as h^(q + 1): q = 7, 3, 3."""
     errors = []
     for n in counts:
         h = 6 / n
@@ -755,9 +752,9 @@ def test_moving_to_the_same_state_changes_nothing(library: ctypes.CDLL, method: 
     assert runs[0].y.tolist() != runs[2].y.tolist()
 
 
-@pytest.mark.parametrize(("method", "calls"), [("dop853", 12), ("dopri5", 6), ("rk4", 4)])
+@pytest.mark.parametrize(("method", "calls"), [("dop853", 12), ("rk4", 4)])
 def test_evaluations_a_step(library: ctypes.CDLL, method: str, calls: int) -> None:
-    """A step that is accepted needs 12, 6 and 4 evaluations of f; one more after a move, but for dop853."""
+    """A step that is accepted needs 12 and 4 evaluations of f; one more after a move, but for dop853."""
     r = Run(library, method, CIRCLE, [1.0, 0.0], fixed=0.01, h=1e-3, maximum=1e-3)
     assert r.step(10.0)
     before = r.calls

@@ -23,6 +23,7 @@ from ..fmu.write import write
 from ..interface.variables import VariableTable
 from ..model.file import ModelFile, load
 from ..model.scene import Scene
+from ..page.live.command import write_page
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.goal import parse
@@ -301,6 +302,31 @@ def simulate_command(
                 f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
                 soft_wrap=True,
             )
+
+
+@app.command()
+def page(
+    target: Annotated[
+        Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or a native FMU.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
+    ] = None,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+) -> None:
+    """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
+    with _plainly():
+        chosen = None
+        if target.suffix == ".py":
+            chosen = _chosen(load(target), None if scene is None else [scene])[0]
+        elif scene is not None:
+            raise LagfmuError(f"--scene {scene}: an FMU is one scene; leave it out")
+        with console.status("compiling to WebAssembly"):
+            path = write_page(target, out, chosen)
+        console.print(
+            f"[green]wrote[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
+            soft_wrap=True,
+        )
 
 
 @app.command()

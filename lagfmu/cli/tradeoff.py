@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 
 from ..errors import BuildError, LagfmuError
 from ..fmu.write import write, write_whole
+from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile, load
 from ..model.model import Model
 from ..model.scene import Scene
@@ -24,7 +25,6 @@ from ..study.tradeoff.goal import Goal
 from ..study.tradeoff.importer import Importer
 from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure
 from ..study.tradeoff.report import as_csv, as_json, digits, remarks, summary, table
-from ..study.tradeoff.setting import METHODS
 
 WIDTH = 110  # of tables that go into a file
 
@@ -63,9 +63,9 @@ def compare(
 
     Raises LagfmuError with the causes for what cannot be built or run, when the rest is done.
     """
-    unknown = [m for m in methods if m not in METHODS]
-    if unknown:
-        raise BuildError(f"method {unknown[0]!r} is unknown, expected some of {', '.join(METHODS)}")
+    wrong = [m for m in methods if m not in INTEGRATORS]
+    if wrong:
+        raise BuildError("; ".join(unknown(m, INTEGRATORS) for m in wrong))
     numbers = [*communications, *tolerances, *([] if repeats is None else [repeats])]
     if not all(0 < x < float("inf") for x in numbers):
         raise BuildError("communication steps, tolerances and repeats must be positive numbers")

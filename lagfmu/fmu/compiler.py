@@ -76,6 +76,7 @@ PLATFORMS = (
     Platform("aarch64-darwin", ".dylib", ("aarch64-macos.11.0",), (("darwin", "aarch64"),)),
 )
 NAMES = tuple(p.folder for p in PLATFORMS)
+WASM = Platform("wasm32", ".wasm", ("wasm32-wasi",), ())  # for a page: no FMU has a binary of it
 
 
 @dataclass(frozen=True)
@@ -240,8 +241,8 @@ def _objects_folder(compiler: Compiler, target: str, runtime: Mapping[str, bytes
 
 
 def _cache() -> Path:
-    """The user's cache folder of lagfmu, below LAGFMU_CACHE if that is set."""
-    if "LAGFMU_CACHE" in os.environ:
+    """The user's cache folder of lagfmu, below LAGFMU_CACHE if that is set, and not empty."""
+    if os.environ.get("LAGFMU_CACHE"):
         return Path(os.environ["LAGFMU_CACHE"])
     if sys.platform == "win32" and "LOCALAPPDATA" in os.environ:
         return Path(os.environ["LOCALAPPDATA"], "lagfmu")
@@ -251,7 +252,7 @@ def _cache() -> Path:
 def _suffix(target: str) -> str:
     if not target:
         return host().suffix
-    return next(p.suffix for p in PLATFORMS if target in p.targets)
+    return next(p.suffix for p in (*PLATFORMS, WASM) if target in p.targets)
 
 
 def _link_flags(target: str, library: str) -> list[str]:
@@ -259,6 +260,8 @@ def _link_flags(target: str, library: str) -> list[str]:
         return [*SHARED, "-Wl,-dead_strip", f"-Wl,-install_name,@rpath/{library}"]
     if _suffix(target) == ".dll":
         return [*SHARED, "-Wl,--gc-sections"]
+    if _suffix(target) == WASM.suffix:  # what the sources mark as exported
+        return ["-mexec-model=reactor", "-s", "-Os", "-Wl,--gc-sections"]
     return [*SHARED, "-Wl,--gc-sections", "-Wl,--build-id=none", f"-Wl,-soname,{library}"]
 
 
@@ -267,7 +270,9 @@ def _compile(compiler: Compiler, target: str, file: str, made: str, folder: str)
 
 
 def _flags(target: str) -> tuple[str, ...]:
-    flags = FLAGS if _suffix(target) == ".dll" else (*FLAGS, *NO_UNWINDING)
+    flags: tuple[str, ...] = FLAGS if _suffix(target) == ".dll" else (*FLAGS, *NO_UNWINDING)
+    if _suffix(target) == WASM.suffix:
+        flags = tuple(f for f in flags if f != "-fPIC")
     return (*flags, "-fno-sanitize=undefined") if target else flags
 
 

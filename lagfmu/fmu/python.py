@@ -19,8 +19,8 @@ from ..errors import BuildError
 from ..interface.variables import VariableTable
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
+from ..methods import IN_PYTHON
 from ..model.scene import Scene
-from ..solver.state import METHODS
 from ..solver.system import System
 from .archive import pack, version
 from .description import model_description
@@ -80,12 +80,12 @@ def build(
     extra: Mapping[str, bytes],
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
-    if scene.method not in METHODS:
+    if scene.method not in IN_PYTHON:
         raise BuildError(
             f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
-            f"{', '.join(METHODS)}, or the target native"
+            f"{', '.join(IN_PYTHON)}, or the target native"
         )
-    methods = tuple(m for m in scene.selectable if m in METHODS)
+    methods = tuple(m for m in scene.selectable if m in IN_PYTHON)
     table = table.offering(methods)
     runtime = _runtime(scene, system)
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"

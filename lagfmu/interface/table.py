@@ -15,6 +15,7 @@ from ..errors import ModelError
 from ..mechanics.coupling import coupled
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
+from ..methods import FIXED_STEP, described
 from ..model.model import Contact, Nonholonomic, name_of
 from ..model.scene import Scene
 from ..model.units import (
@@ -26,11 +27,10 @@ from ..model.units import (
     generalized_force_unit,
     multiplier_unit,
 )
-from .variables import Value, Variable, VariableTable, menu
+from .variables import Value, Variable, VariableTable
 
 Expr = Any
 SPEED = METRE / SECOND
-FIXED = {"rk4", "rattle"}  # methods with a fixed step
 
 
 def variable_table(
@@ -260,7 +260,7 @@ class _Builder:
             )
 
         methods = self.scene.selectable
-        choice = setting("method", self.scene.method, None, menu(methods))
+        choice = setting("method", self.scene.method, None, described(methods))
         step = setting(
             "step", self.scene.step, SECOND, "largest fixed step of rk4; 0: chosen from the start"
         )
@@ -274,7 +274,7 @@ class _Builder:
                 f"{self.scene.tolerance!r}",
                 1.0,
             ),
-            *([step] if FIXED.intersection(methods) else []),
+            *([step] if set(FIXED_STEP).intersection(methods) else []),
             setting("maximum_step", 0.0, SECOND, "largest adaptive step; 0: no limit"),
         ]
 

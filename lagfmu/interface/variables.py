@@ -8,24 +8,13 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
+from ..methods import described
 from ..model.units import Unit
 
 Value = float | int | bool | str
 RECORD = re.compile(
     r"contact\.\w+\Z|departure\.\w+\.count\Z|solver\.steps\Z|sticks\.\w+\Z|slipping\.\w+\.count\Z"
 )
-
-
-def menu(methods: Collection[str]) -> str:
-    """The description of solver.method."""
-    remarks = {
-        "auto": " (dop853, but radau5 where it is stiff)",
-        "rk4": " (fixed step)",
-        "rattle": " (fixed step)",
-        "radau5": " (stiff)",
-    }
-    *most, last = [m + remarks.get(m, "") for m in methods]
-    return f"integrator: {', '.join(most)} or {last}" if most else f"integrator: {last}"
 
 
 @dataclass(frozen=True)
@@ -95,7 +84,7 @@ class VariableTable:
     def offering(self, methods: Collection[str]) -> VariableTable:
         """The same, where `solver.method` can only be one of these."""
         variables = [
-            replace(v, description=menu(methods)) if v.name == "solver.method" else v
+            replace(v, description=described(methods)) if v.name == "solver.method" else v
             for v in self.variables
         ]
         return replace(self, variables=tuple(variables))

@@ -11,13 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..errors import ModelError
+from ..methods import METHODS, integrators, unknown
 from ..solver.state import DEFAULT_TOLERANCE
-from ..solver.state import METHODS as PYTHON_METHODS
 from .model import NAME
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
-METHODS = (*PYTHON_METHODS, "rattle")  # the last of native FMUs only
-STEPPED_BY = {"auto": ("dop853", "radau5")}  # a method that is made of others
 EVERYTHING = ("*",)
 
 
@@ -79,9 +77,7 @@ class Scene:
             )
         for method in (self.method, *(self.methods or ())):
             if method not in METHODS:
-                problems.append(
-                    f"method {method!r} is unknown, expected one of {', '.join(METHODS)}"
-                )
+                problems.append(unknown(method))
         for what in ("stop_time", "step_size", "tolerance"):
             value = getattr(self, what)
             if not 0 < value < float("inf"):
@@ -135,8 +131,7 @@ class Scene:
     @property
     def integrators(self) -> tuple[str, ...]:
         """The integrators behind the methods that can be chosen."""
-        wanted = {part for m in self.selectable for part in STEPPED_BY.get(m, (m,))}
-        return tuple(m for m in METHODS if m in wanted)
+        return integrators(self.selectable)
 
     @property
     def differentiable(self) -> bool:

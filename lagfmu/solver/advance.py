@@ -41,8 +41,8 @@ def advance(
         )
     with np.errstate(all="ignore"):
         at = Instant(system, state.t, system.inputs_at(u, 0.0), p)
-        if system.contacts:
-            state = at_contacts.released(at, state)
+        if system.contacts and system.prescribed:
+            state = at_contacts.released(at, state, state.span)
         if is_incomplete(state):
             state = complete(at, settings, state, t_end - state.t)
         while state.t < t_end:
@@ -54,7 +54,7 @@ def advance(
                     f"{CHATTER} contacts open or close in {events[-1] - events[0]:.1g} s at "
                     f"t = {state.t!r} s: the contacts chatter without end"
                 )
-    return state
+    return replace(state, span=t_end - begun)
 
 
 def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> State:

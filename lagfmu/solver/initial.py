@@ -91,6 +91,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
         gap=tuple(gap.tolist()),
         rate=0.0,
         step=0.0,
+        span=0.0,
         steps=0,
         departures=(nothing,) * len(system.contacts),
     )

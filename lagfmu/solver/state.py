@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, field, fields
 
 from .stiffness import Choice
 
-METHODS = ("auto", "dop853", "dopri5", "rk4", "radau5")
 DEFAULT_TOLERANCE = 1e-8
 SMALLEST_TOLERANCE = 1e-14
 
@@ -57,7 +56,8 @@ class State:
     q, v (n); closed, armed, departures: one entry a contact; offset (m): the level f = offset that a
     constraint keeps which came back with its contact; scale (2 n): the magnitudes below which errors
     in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
-    below which a contact touches; step [s]: the next step to try; rate [1/s]: the motion's
+    below which a contact touches; step [s]: the next step to try; span [s]: the communication step that
+    led to t (0: none); rate [1/s]: the motion's
     natural rate at the start; choice: what `auto` remembers; slides, slippings: one entry a friction,
     how it stands and its latest start of slipping; dissipated [J]: by frictions and impacts so far.
     """
@@ -73,6 +73,7 @@ class State:
     gap: tuple[float, ...]
     rate: float
     step: float
+    span: float
     steps: int
     departures: tuple[Departure, ...]
     choice: Choice = field(default_factory=Choice)

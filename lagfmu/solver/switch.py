@@ -15,19 +15,51 @@ from .motion import motion, project
 from .state import Departure, State
 from .system import Vector
 
+SLOW = 1e-9  # speed of a gap, relative to the motion's own, that counts as none
 ROUNDS = 50  # in which an impact is passed on between contacts that touch
 
 
-def released(at: Instant, state: State) -> State:
-    """Contacts opened that a jump of a prescribed motion has left a gap in."""
-    if not (at.system.prescribed and any(state.closed)):
-        return state
-    f = at.residual(np.array(state.q))[list(at.system.contacts)]
-    gone = [shut and a > g for shut, a, g in zip(state.closed, f, state.gap, strict=True)]
+def released(at: Instant, state: State, span: float) -> State:
+    """Contacts opened that a jump of a prescribed motion has left a gap in, or a speed at which they part:
+    departures; the state on the rows that go on acting, which go with the motion.
+
+    A gap that the contact, pressed as it is, would have closed within `span` [s] is none: the motion went
+    on a little otherwise than its derivatives had foreseen over a step of that length.
+    """
+    system, q, v = at.system, np.array(state.q), np.array(state.v)
+    closed, armed, departures = list(state.closed), list(state.armed), list(state.departures)
+    for c, shut in enumerate(state.closed):
+        if shut and _has_parted(at, q, v, closed, c, state, span):
+            closed[c], armed[c] = False, True
+            departures[c] = Departure(departures[c].count + 1, state.t, state.q, state.v)
+    size, offset = np.array(state.size), np.array(state.offset)
+    q, v = project(at, q, v, system.active(closed), offset, size)
     return replace(
         state,
-        closed=tuple(bool(c and not g) for c, g in zip(state.closed, gone, strict=True)),
-        armed=tuple(bool(a or g) for a, g in zip(state.armed, gone, strict=True)),
+        q=tuple(q.tolist()),
+        v=tuple(v.tolist()),
+        closed=tuple(closed),
+        armed=tuple(armed),
+        departures=tuple(departures),
+    )
+
+
+def _has_parted(
+    at: Instant, q: Vector, v: Vector, closed: Sequence[bool], c: int, state: State, span: float
+) -> bool:
+    """True if contact c opens by more than it would have closed by itself, had it been free for `span`."""
+    k = at.system.contacts[c]
+    _, _, G, nu, _ = at.evaluate(q, v)
+    gap, speed = at.residual(q)[k], G[k] @ v - nu[k]
+    natural = np.abs(G[k]) @ np.array(state.size) * state.rate
+    slow = SLOW * max(natural, np.abs(G[k]) @ np.abs(v) + abs(nu[k]))
+    if not (gap > state.gap[c] or speed > slow):
+        return False
+    others = [shut and i != c for i, shut in enumerate(closed)]
+    free = motion(at, q, v, at.system.active(others))
+    approach = max(free.gamma[k] - free.G[k] @ free.vdot, 0.0)
+    return bool(
+        gap > max(state.gap[c], approach * span**2 / 2) or speed > max(slow, approach * span)
     )
 
 

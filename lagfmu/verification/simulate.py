@@ -17,6 +17,7 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from ..errors import SimulationError, VerificationError
+from ..methods import IN_PYTHON, unknown
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import Prepared, prepare
@@ -24,7 +25,7 @@ from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import observe
-from ..solver.state import METHODS, SMALLEST_TOLERANCE, Settings
+from ..solver.state import SMALLEST_TOLERANCE, Settings
 
 MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
@@ -162,8 +163,8 @@ def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[
             hint = f"; did you mean {near[0]!r}?" if near else ""
             problems.append(f"{name!r} cannot be set, expected one of {', '.join(settable)}{hint}")
         elif v.kind == "String":
-            if value not in METHODS:
-                problems.append(f"{name!r} = {value!r}, expected one of {', '.join(METHODS)}")
+            if value not in IN_PYTHON:
+                problems.append(f"{name!r} = {value!r}: {unknown(value, IN_PYTHON)}")
         elif not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
             problems.append(f"{name!r} = {value!r}, expected a finite number")
         elif (v.minimum is not None and value < v.minimum) or (

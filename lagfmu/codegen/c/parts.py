@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ...model.scene import METHODS, Scene
+from ...methods import INTEGRATORS, METHODS
+from ...model.scene import Scene
 from ...solver.system import System
 
-PLACES = ("auto", "dop853", "dopri5", "rk4", "rattle", "radau5")  # MethodName in state.h
 AT_CONTACTS = {
     "events_find": "events.c",
     "contacts_modes": "contacts.c",
@@ -44,7 +44,7 @@ def parts_source(scene: Scene, system: System) -> str | None:
     if "auto" in scene.selectable:
         menu["auto"] = "dop853"
     rows = [
-        f"    .methods[{place.upper()}] = &{menu[place]},\n" for place in PLACES if place in menu
+        f"    .methods[{place.upper()}] = &{menu[place]},\n" for place in METHODS if place in menu
     ]
     rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
@@ -60,7 +60,7 @@ def needs_tangents(scene: Scene) -> bool:
 
 def files_left_out(scene: Scene, system: System) -> frozenset[str]:
     """The runtime's files that the FMU does without."""
-    gone = {f"{m}.c" for m in METHODS if m != "auto" and m not in scene.integrators}
+    gone = {f"{m}.c" for m in INTEGRATORS if m not in scene.integrators}
     if not system.contacts:
         gone |= {*AT_CONTACTS.values(), *BEHIND_CONTACTS}
     if not system.is_constrained:

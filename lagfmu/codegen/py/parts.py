@@ -12,7 +12,6 @@ CONTACTS = ("contacts.py", "events.py", "looks.py", "switch.py")
 CONSTRAINTS = ("nullspace.py", "orthogonal.py")
 CLASSES = {
     "dop853": ("from .dop853 import Dop853", "Dop853"),
-    "dopri5": ("from scipy.integrate import RK45", "RK45"),
     "radau5": ("from scipy.integrate import Radau", "Radau"),
     "rk4": ("from .rk4 import RK4", "RK4"),
 }

@@ -19,6 +19,7 @@
 #include "parts.h"
 
 static const double GAIN = 3;     /* of the stabilization, in units of the motion's natural rate */
+static const double SHORT = 1e-2; /* natural time in which a contact closes what drift has opened */
 static const double LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
 
 void exchange_set_time(Instance *x, double t) {
@@ -175,7 +176,7 @@ Status exchange_event(Instance *x, int *moved) {
     double worst;
     *moved = 0;
     if (instance_start(x) != OK) return FAILED;
-    if (s->system->contacts > 0 && PARTS.switch_released(s) != OK) return FAILED;
+    if (s->system->contacts > 0 && PARTS.switch_released(s, SHORT / s->state.now.rate) != OK) return FAILED;
     x->observed = x->evaluated = 0;
     if (find_happened(x, &any) != OK) return FAILED;
     if (any) {

@@ -1,6 +1,6 @@
 /* integrator.h -- y' = f(t, y): one step of any method, and dense output over the step just taken.
  *
- * Each method is a file with its tableau's source: dop853.c, dopri5.c, rk4.c, radau5.c (rattle.c
+ * Each method is a file with its tableau's source: dop853.c, rk4.c, radau5.c (rattle.c
  * steps a mechanical system, not an ODE, and fills the same Integrator).  Error weights: an
  * accepted step has a root-mean-square error below 1 in units of tolerance * max(|y_i|, scale_i);
  * radau5's estimate is of low order: it is kept below 0.1 tolerance^(2/3), so that the error is. */
@@ -68,7 +68,7 @@ struct Method {
 
 enum { RADAU5_MOST_STATES = 800 }; /* for which radau5 keeps dense matrices */
 
-extern const Method dop853, dopri5, rk4, radau5;
+extern const Method dop853, rk4, radau5;
 
 /* rk4: estimate of the error of one component in the step just taken. */
 double rk4_error(const Integrator *i, int component);

@@ -202,6 +202,16 @@ static Status complete_magnitudes(Solver *s, double span) {
     return magnitudes_complete(s, at, span);
 }
 
+/* The inputs may have been set: contacts whose surface went away open, the others go with it. */
+static Status follow_surfaces(Solver *s) {
+    const System *system = s->system;
+    if (system->contacts == 0 || system->prescribed_count == 0) return OK;
+    if (PARTS.switch_released(s, s->state.now.span) != OK) return FAILED;
+    const Instant at = leg_instant(s, s->state.now.t);
+    return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                             s->state.size);
+}
+
 Status solver_advance(Solver *s, double t_end) {
     Numbers *now = &s->state.now;
     const double begun = now->t;
@@ -212,7 +222,7 @@ Status solver_advance(Solver *s, double t_end) {
         return fail(&s->why, "a communication step must end after t = %.17g s, got %.17g s", begun,
                     t_end);
     resume(s);
-    if (s->system->contacts > 0 && PARTS.switch_released(s) != OK) return FAILED;
+    if (follow_surfaces(s) != OK) return FAILED;
     if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
     while (now->t < t_end) {
         int met;
@@ -229,6 +239,7 @@ Status solver_advance(Solver *s, double t_end) {
                         "without end",
                         CHATTER, now->t - since, now->t);
     }
+    now->span = t_end - begun;
     keep(s);
     return OK;
 }

@@ -4,7 +4,6 @@
 const Parts PARTS = {
     .methods = {[AUTO] = &dop853,
                 [DOP853] = &dop853,
-                [DOPRI5] = &dopri5,
                 [RK4] = &rk4,
                 [RATTLE] = &rattle,
                 [RADAU5] = &radau5},

@@ -22,7 +22,7 @@ typedef struct {
     Status (*contacts_modes)(Solver *s, Instant at, const double *q, const double *v, int *closed,
                              const int *touching, const int *leaving);
     Status (*switch_modes)(Solver *s, const int *happened);
-    Status (*switch_released)(Solver *s);
+    Status (*switch_released)(Solver *s, double span);
 } Parts;
 
 extern const Parts PARTS;

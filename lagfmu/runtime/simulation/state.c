@@ -6,8 +6,8 @@
  * that the three stay derivatives of each other. */
 #include "state.h"
 
-const char *const METHOD_NAMES[METHOD_COUNT] = {"auto",   "dop853", "dopri5",
-                                                 "rk4",    "rattle", "radau5"};
+const char *const METHOD_NAMES[METHOD_COUNT] = {
+    [AUTO] = "auto", [DOP853] = "dop853", [RK4] = "rk4", [RADAU5] = "radau5", [RATTLE] = "rattle"};
 
 void drive_at(const System *s, const Drive *drive, double t, double *u) {
     const double e = t - drive->since, *value = drive->value;

@@ -8,8 +8,8 @@
 #include "stiffness.h"
 #include "system.h"
 
-/* In the order of METHOD_NAMES. */
-typedef enum { AUTO, DOP853, DOPRI5, RK4, RATTLE, RADAU5 } MethodName;
+/* The numbers that an importer sees; they never change (lagfmu/methods.py).  METHOD_NAMES[0] is NULL. */
+typedef enum { AUTO = 1, DOP853 = 2, RK4 = 3, RADAU5 = 4, RATTLE = 5 } MethodName;
 enum { METHOD_COUNT = 6 };
 extern const char *const METHOD_NAMES[METHOD_COUNT];
 
@@ -35,6 +35,7 @@ typedef struct {
     double t;            /* [s] the communication point */
     double rate;         /* [1/s] the motion's natural rate at the start */
     double step;         /* [s] the step to try next */
+    double span;         /* [s] the communication step that led to t; 0: none */
     int steps;           /* internal steps taken so far */
     int ahead;           /* 1: the integrator stands at integrator->t >= t, and dense output answers */
     double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */

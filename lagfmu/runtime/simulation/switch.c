@@ -122,17 +122,43 @@ Status switch_modes(Solver *s, const int *happened) {
     return OK;
 }
 
-Status switch_released(Solver *s) {
+/* Contact c is closed, but the motion of its surface has just been set anew and leaves a gap, or a speed at
+ * which it opens; `parted`: more of it than the contact, had it not been there for the last `span` seconds,
+ * would have closed by itself: then it did not only lose what the surface did otherwise than foreseen. */
+static Status has_parted(Solver *s, Instant at, int c, double span, int *parted) {
     const System *system = s->system;
-    int any = 0;
-    for (int c = 0; c < system->contacts; c++) any |= s->state.closed[c];
-    if (!any || system->prescribed_count == 0) return OK;
+    Mechanism *b = &s->stepped;
+    const int k = system->contact[c];
+    *parted = 0;
+    if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
+    if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
+    const double gap = b->f[k], speed = mechanism_slip(b, k, s->state.v);
+    const double natural = mechanism_row_size(b, k, s->state.size) * s->state.now.rate;
+    const double slow = SLOW * fmax(natural, mechanism_row_size(b, k, s->state.v) + fabs(b->nu[k]));
+    if (!(gap > s->state.gap[c] || speed > slow)) return OK;
+    s->state.closed[c] = 0;
+    system_active(system, s->state.closed, s->active);
+    s->state.closed[c] = 1;
+    if (mechanism_motion(b, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
+    const double approach = fmax(b->gamma[k] - mechanism_row(b, k, b->vdot), 0);
+    *parted = gap > fmax(s->state.gap[c], approach * span * span / 2) ||
+              speed > fmax(slow, approach * span);
+    return OK;
+}
+
+Status switch_released(Solver *s, double span) {
+    const System *system = s->system;
+    if (system->prescribed_count == 0) return OK;
     const Instant at = leg_instant(s, s->state.now.t);
-    if (mechanism_residual(&s->stepped, at, s->state.q, s->stepped.f) != OK) return FAILED;
-    for (int c = 0; c < system->contacts; c++)
-        if (s->state.closed[c] && s->stepped.f[system->contact[c]] > s->state.gap[c]) {
-            s->state.closed[c] = 0;
-            s->state.armed[c] = 1;
-        }
+    for (int c = 0; c < system->contacts; c++) {
+        int parted;
+        if (!s->state.closed[c]) continue;
+        if (has_parted(s, at, c, span, &parted) != OK) return FAILED;
+        if (!parted) continue;
+        s->state.closed[c] = 0;
+        s->state.armed[c] = 1;
+        note_departure(s, c);
+    }
+    system_active(system, s->state.closed, s->active);
     return OK;
 }

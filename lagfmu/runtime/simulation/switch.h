@@ -8,7 +8,9 @@
  * a closed one opens, an open one is struck. */
 Status switch_modes(Solver *s, const int *happened);
 
-/* Opens contacts that a jump of a prescribed motion has left a gap in. */
-Status switch_released(Solver *s);
+/* Opens contacts that a jump of a prescribed motion has left a gap in, or a speed at which they part: a
+ * departure.  A gap that the contact, pressed as it is, would have closed within `span` [s] is none: the
+ * motion went on a little otherwise than its derivatives had foreseen over a step of that length. */
+Status switch_released(Solver *s, double span);
 
 #endif

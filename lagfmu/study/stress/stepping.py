@@ -7,15 +7,13 @@ from functools import partial
 
 import numpy as np
 
+from ...methods import FIXED_STEP, INTEGRATORS
 from .bench import REFERENCE, Bench, Finding
 from .facts import Facts
 from .judge import Check
 from .parameters import departures
 from .player import RefusalError, Run
 from .probe import Probe
-
-METHODS = ("dop853", "dopri5", "radau5", "rk4", "rattle")
-FIXED = ("rk4", "rattle")
 
 
 def probes(facts: Facts, quick: bool) -> list[Probe]:
@@ -34,7 +32,7 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
         found.append(Probe("tolerance", f"1e-{k}", partial(_tolerance, 10.0**-k), k < 2 or k > 12))
     for bad in (0.0, -1e-6, float("nan"), 1e-300, 1e3):
         found.append(Probe("tolerance", f"{bad:g}", partial(_tolerance, bad)))
-    for method in METHODS:
+    for method in INTEGRATORS:
         found.append(Probe("method", method, partial(_method, method)))
     found.append(Probe("method", "another name", partial(_method, "euler")))
     for factor in (10,) if quick else (100, 1000) if facts.target == "native" else (10,):
@@ -116,10 +114,10 @@ def _tolerance(tolerance: float, bench: Bench) -> Finding:
 def _method(method: str, bench: Bench) -> Finding:
     """Those with a fixed step have no tolerance: judged as at 1e-6, with a step made for that."""
     values: dict[str, float | str] = {"solver.method": method}
-    if method in FIXED:
+    if method in FIXED_STEP:
         values["solver.step"] = 1e-3 / bench.ordinary_rate
     run = bench.run(values, bench.times(bench.facts.stop_time))
-    if method in FIXED:
+    if method in FIXED_STEP:
         run = replace(run, tolerance=1e-6)
     if run.refusal is not None:
         return bench.judged(run)

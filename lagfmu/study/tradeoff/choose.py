@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 from ...errors import BuildError, LagfmuError
 from ...fmu.write import write
+from ...methods import METHODS
 from ...model.closed_form import ClosedForm, Conserved
 from ...model.model import Model
-from ...model.scene import METHODS, Scene
+from ...model.scene import Scene
 from ...prepare.prepare import prepare
 from ...verification.verify import claims_in
 from .goal import Goal

@@ -21,12 +21,11 @@ from .quantities import EVENT, FORCE, MULTIPLIER
 
 COLOURS = {
     "dop853": "#0b6e99",
-    "dopri5": "#d9730d",
     "radau5": "#6940a5",
     "rk4": "#0f7b6c",
     "rattle": "#ad1a72",
 }
-MARKERS = {"dop853": "o", "dopri5": "s", "radau5": "^", "rk4": "D", "rattle": "v"}
+MARKERS = {"dop853": "o", "radau5": "^", "rk4": "D", "rattle": "v"}
 STYLE: dict[str, Any] = {
     "svg.hashsalt": "lagfmu",
     "font.size": 10,

@@ -14,12 +14,13 @@ import numpy as np
 
 from ...errors import LagfmuError, SimulationError, VerificationError
 from ...fmu.claims import Claim
+from ...methods import FIXED_STEP, INTEGRATORS
 from ...verification.verify import check_claim, claims_in
 from .front import front
 from .importer import Importer
 from .quantities import GROUPS, MULTIPLIER, Quantity, residual
 from .reference import Reference, refer
-from .setting import FIXED, METHODS, Setting, dials, tolerances
+from .setting import Setting, dials, tolerances
 
 REPEATS = 7  # timed runs a setting, if the budget allows
 QUICK_REPEATS = 31
@@ -41,7 +42,7 @@ class Plan:
 
     communications: tuple[float, ...]
     tolerances: tuple[float, ...] = tolerances()
-    methods: tuple[str, ...] = METHODS
+    methods: tuple[str, ...] = INTEGRATORS
     halvings: int = 7
     repeats: int = REPEATS
     limit: float = 3.0
@@ -218,7 +219,7 @@ def _errors(
             own = [r for r in rows if r.setting.method == method and r.setting.communication == h]
             if len(own) > 1 and all(len(r.below) == len(reference.known) for r in own[-2:]):
                 break  # what is finer cannot be told apart
-            if method in FIXED and len(own) > 2 and _largest(own[-1]) > _largest(own[-3]):
+            if method in FIXED_STEP and len(own) > 2 and _largest(own[-1]) > _largest(own[-3]):
                 break  # the rounding of the many steps has taken over
             if time.perf_counter() - begun > plan.limit:
                 cut.append(f"{setting}: a run takes longer than {plan.limit:.3g} s, no finer ones")
@@ -232,7 +233,7 @@ def _largest(row: Row) -> float:
 
 def accepts(importer: Importer, method: str) -> bool:
     """Whether an FMU starts with a method at all: then what failed was the step, not the method."""
-    step = importer.step_size if method in FIXED else 0.0
+    step = importer.step_size if method in FIXED_STEP else 0.0
     setting = Setting(method, 0.0 if step else 1e-8, step / 64, importer.step_size)
     try:
         importer.observe(setting, stop=importer.step_size)

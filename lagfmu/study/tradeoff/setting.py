@@ -6,10 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-ADAPTIVE = ("dop853", "dopri5", "radau5")
-FIXED = ("rk4", "rattle")
-METHODS = (*ADAPTIVE, *FIXED)  # asked for; the FMU says which of them it has
-EVALUATIONS = {"dop853": 12, "dopri5": 6, "radau5": 20, "rk4": 4, "rattle": 21}  # a step, about
+from ...methods import FIXED_STEP
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,7 @@ def dials(method: str, communication: float, grid: Sequence[float], halvings: in
 
     A fixed step divides the communication step evenly, hence H, H/2, H/4, ...
     """
-    if method in FIXED:
+    if method in FIXED_STEP:
         return [
             Setting(method, 0.0, communication / 2**k, communication) for k in range(halvings + 1)
         ]

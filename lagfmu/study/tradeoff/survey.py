@@ -16,9 +16,10 @@ from pathlib import Path
 
 from ...errors import LagfmuError, SimulationError
 from ...fmu.write import write
+from ...methods import EVALUATIONS, METHODS
 from ...model.closed_form import ClosedForm, Conserved
 from ...model.model import Model
-from ...model.scene import METHODS, Scene
+from ...model.scene import Scene
 from ...prepare.prepare import prepare
 from ...verification.verify import claims_in
 from .goal import Goal
@@ -26,7 +27,7 @@ from .importer import Importer
 from .measure import Plan, Row, Tick, accepts, default_plan, take_turns, weigh, wider
 from .quantities import selected
 from .reference import Reference, refer
-from .setting import EVALUATIONS, dials
+from .setting import dials
 
 BUDGET = 20.0  # [s] of timing
 ENOUGH = 3  # settings of a method that hold the accuracy, before no finer one is measured

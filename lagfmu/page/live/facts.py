@@ -1,0 +1,100 @@
+"""modelDescription.xml -> what the page has to know of an FMU: variables, their groups, the experiment.
+
+Everything comes from the variables as any importer sees them, so that a page can be made of an FMU
+alone, and new kinds of outputs need nothing here.
+"""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import fmpy
+
+from ...fmu.archive import pack
+from .markup import shown_name
+
+NUMBERS = ("Real", "Integer", "Boolean")
+GROUPS = {  # by the first part of a name
+    "lambda": "Multipliers λ",
+    "margin": "Friction",
+    "slip": "Friction",
+    "sticks": "Friction",
+    "slipping": "Friction",
+    "power": "Friction",
+    "Q": "Generalized forces of constraint",
+    "energy": "Energies",
+    "residual": "Residuals",
+    "unique": "Residuals",
+    "contact": "Contacts and departures",
+    "departure": "Contacts and departures",
+    "error": "Error bars",
+    "solver": "Solver",
+}
+
+
+def facts(description: bytes, picture: dict[str, Any] | None) -> dict[str, Any]:
+    """The facts as the page's scripts read them (web/api.js); numbers in SI, times in s."""
+    archive = io.BytesIO(pack({"modelDescription.xml": description}))  # fmpy reads archives only
+    read = fmpy.read_model_description(archive, validate=False)
+    experiment = read.defaultExperiment
+    stop = float(getattr(experiment, "stopTime", None) or 1.0)
+    named = {v.name for v in read.modelVariables}
+    return {
+        "name": read.modelName,
+        "description": read.description or "",
+        "experiment": {
+            "stopTime": stop,
+            "stepSize": float(getattr(experiment, "stepSize", None) or stop / 500),
+            "tolerance": float(getattr(experiment, "tolerance", None) or 1e-8),
+        },
+        "variables": [_variable(v, named) for v in read.modelVariables],
+        "picture": picture,
+    }
+
+
+def _variable(v: Any, named: set[str]) -> dict[str, Any]:
+    """One variable.  `column`: a run records it; `event`: the count of an event whose time is known."""
+    role = _role(v)
+    return {
+        "name": v.name,
+        "reference": int(v.valueReference),
+        "type": v.type,
+        "role": role,
+        "group": _group(v, role, named),
+        "unit": shown_name(v.unit),
+        "start": _number(v),
+        "min": None if v.min is None else float(v.min),
+        "max": None if v.max is None else float(v.max),
+        "description": v.description or "",
+        "column": v.causality == "output" and v.type in NUMBERS,
+        "discrete": v.variability == "discrete",
+        "event": v.name.endswith(".count") and f"{v.name[:-6]}.time" in named,
+    }
+
+
+def _role(v: Any) -> str:
+    """What may set it: parameter, start, input, solver; or output: nothing."""
+    if v.causality == "parameter":
+        return "solver" if v.name.startswith("solver.") else "parameter"
+    if v.causality == "input":
+        return "input"
+    return "start" if v.initial in ("exact", "approx") else "output"
+
+
+def _number(v: Any) -> float | str | None:
+    if v.start is None or v.type == "String":
+        return None if v.start is None else str(v.start)
+    if v.type == "Boolean":
+        return float(str(v.start).lower() in ("true", "1"))
+    return float(v.start)
+
+
+def _group(v: Any, role: str, named: set[str]) -> str:
+    """The heading under which a curve stands."""
+    head = v.name.split(".")[0]
+    if head in GROUPS and head != v.name:
+        return GROUPS[head]
+    if v.name.startswith("der("):
+        return "Accelerations" if v.name.endswith(",2)") else "Velocities"
+    return "Coordinates" if role == "start" or f"der({v.name})" in named else "Outputs"

@@ -1,0 +1,87 @@
+"""The live page: one HTML file that holds an FMU as WebAssembly, and asks nobody for anything.
+
+What it may do is said in its content security policy: the scripts of this file by their hashes, and no
+connection at all.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from .markup import Section, as_json
+
+APPLICATION = ("api.js",)
+WORKER = ("fmu.js", "worker.js")
+LIBRARY, LIBRARY_STYLE, LICENCE = "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"
+
+
+@dataclass(frozen=True)
+class Playable:
+    """What a page is made of: facts (facts.py), equations to read, and the compiled module."""
+
+    facts: dict[str, Any]
+    equations: Sequence[Section]
+    module: bytes
+
+    @property
+    def name(self) -> str:
+        """The FMU's name."""
+        return str(self.facts["name"])
+
+
+def render(playable: Playable) -> str:
+    """The HTML text; the same for the same parts."""
+    application = _script(_joined(APPLICATION))
+    library = _script(f"/*\n{_text('vendor', LICENCE)}*/\n{_text('vendor', LIBRARY)}")
+    packed = base64.b64encode(zlib.compress(playable.module, 9)).decode()
+    return _template().render(
+        name=playable.name,
+        description=playable.facts["description"],
+        equations=playable.equations,
+        facts=as_json(playable.facts),
+        module=packed,
+        style=Markup(_text("vendor", LIBRARY_STYLE) + _text("page.css")),
+        library=Markup(library),
+        application=Markup(application),
+        worker=Markup(_script(_joined(WORKER))),
+        hashes=" ".join(f"'sha256-{_hash(text)}'" for text in (library, application)),
+    )
+
+
+def _joined(names: Sequence[str]) -> str:
+    """Scripts that share one scope of their own."""
+    body = "\n".join(_text(name) for name in names)
+    return f'\n(() => {{\n"use strict";\n{body}}})();\n'
+
+
+def _script(text: str) -> str:
+    if "</script" in text.lower() or "<!--" in text:
+        raise ValueError("a script of the page would end its own element")
+    return text
+
+
+def _hash(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+@cache
+def _text(*parts: str) -> str:
+    return files("lagfmu").joinpath("page", "live", "web", *parts).read_text(encoding="utf-8")
+
+
+@cache
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    return environment.from_string(_text("page.html.j2"))

@@ -1,0 +1,106 @@
+/* api.js -- window.lagfmu: the page's FMU for scripts; the page itself uses it too.
+ *
+ *   await lagfmu.run({parameters: {m: 2.5}, start: {theta: 0.3}, inputs: {F: 1}, tolerance: 1e-9,
+ *                     method: "auto", stopTime: 2, stepSize: 0.01})
+ *   -> {time: [...], values: {"lambda.surface": [...], ...}, log: [{status, message}, ...]}
+ *
+ * A row a communication point, as fmpy has it.  What is left out is as in the FMU.  A run that the FMU
+ * refuses rejects with its message; `error.log` holds the rest, and if a step failed, `error.result` the
+ * rows up to there. */
+
+const FACTS = JSON.parse(document.getElementById("facts").textContent);
+
+async function inflated(base64) {
+  const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(stream).arrayBuffer();
+}
+
+class Computation {
+  constructor() {
+    const text = document.getElementById("worker-source").textContent;
+    const url = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
+    this.worker = new Worker(url);
+    this.waiting = new Map();
+    this.count = 0;
+    this.worker.onmessage = ({ data }) => this.answered(data);
+    this.worker.onerror = (event) => {
+      for (const { reject } of this.waiting.values()) reject(new Error(event.message));
+      this.waiting.clear();
+    };
+    this.loaded = this.load();
+  }
+
+  async load() {
+    const module = await inflated(document.getElementById("module").textContent.trim());
+    return this.ask({ kind: "load", module, variables: FACTS.variables }, [module]);
+  }
+
+  ask(job, transfer = []) {
+    const id = ++this.count;
+    return new Promise((resolve, reject) => {
+      this.waiting.set(id, { resolve, reject });
+      this.worker.postMessage({ ...job, id }, transfer);
+    });
+  }
+
+  answered({ id, result, error, log }) {
+    const { resolve, reject } = this.waiting.get(id);
+    this.waiting.delete(id);
+    if (error === undefined) resolve(result);
+    else reject(Object.assign(new Error(error), { log }));
+  }
+
+  async run(settings) {
+    await this.loaded;
+    return this.ask({ kind: "run", settings });
+  }
+
+  async compare(settings, tight) {
+    await this.loaded;
+    return this.ask({ kind: "compare", settings, tight });
+  }
+}
+
+const COLUMNS = FACTS.variables.filter((v) => v.column);
+const computation = new Computation();
+
+/* Settings with what was left out; a key that is unknown is an error. */
+function complete(settings) {
+  const whole = {
+    parameters: {},
+    start: {},
+    inputs: {},
+    tolerance: null,
+    method: null,
+    stopTime: FACTS.experiment.stopTime,
+    stepSize: FACTS.experiment.stepSize,
+  };
+  const unknown = Object.keys(settings).filter((key) => !(key in whole));
+  if (unknown.length) {
+    const known = Object.keys(whole).join(", ");
+    throw new RangeError(`${unknown.join(", ")}: no such setting, expected some of ${known}`);
+  }
+  return { ...whole, ...settings };
+}
+
+/* Columns as plain arrays by name: numbers, and true or false. */
+function byName(run) {
+  const values = {};
+  COLUMNS.forEach((v, k) => {
+    const column = Array.from(run.columns[k]);
+    values[v.name] = v.type === "Boolean" ? column.map(Boolean) : column;
+  });
+  return { time: Array.from(run.time), values, log: run.log };
+}
+
+window.lagfmu = {
+  name: FACTS.name,
+  variables: FACTS.variables,
+  async run(settings = {}) {
+    const run = await computation.run(complete(settings));
+    const result = byName(run);
+    if (run.failed) throw Object.assign(new Error(run.failed), { log: run.log, result });
+    return result;
+  },
+};

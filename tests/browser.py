@@ -1,0 +1,70 @@
+"""Chromium without a window and without a network, as the tests of the live page use it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+FLAGS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+
+
+def program() -> str | None:
+    """The browser's path: $CHROMIUM, or what is on the path."""
+    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """A browser of playwright's; the tests that need it skip where there is none."""
+    path = program()
+    if path is None:
+        pytest.skip("no Chromium: install it (Debian: apt-get install chromium) or set CHROMIUM")
+    api = pytest.importorskip("playwright.sync_api", reason="pip install -e '.[test]'")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+class Page:
+    """One page of a browser, opened from disk with the network off; keeps what went wrong."""
+
+    def __init__(self, browser: Any, path: Any, **options: Any) -> None:
+        self.context = browser.new_context(offline=True, **options)
+        self.tab = self.context.new_page()
+        self.problems: list[str] = []
+        self.requests: list[str] = []
+        self.tab.on(
+            "console",
+            lambda m: self.problems.append(m.text) if m.type in ("error", "warning") else None,
+        )
+        self.tab.on("pageerror", lambda error: self.problems.append(str(error)))
+        self.tab.on("request", lambda request: self.requests.append(request.url))
+        self.tab.goto(f"file://{path}" if "://" not in str(path) else str(path))
+
+    def run(self, settings: dict[str, Any] | None = None) -> dict[str, Any]:
+        """await window.lagfmu.run(settings)"""
+        found: dict[str, Any] = self.tab.evaluate("s => lagfmu.run(s)", settings or {})
+        return found
+
+    def refusal(self, settings: dict[str, Any]) -> str:
+        """The message with which a run is refused."""
+        script = "s => lagfmu.run(s).then(() => 'not refused', e => e.message)"
+        return str(self.tab.evaluate(script, settings))
+
+    def close(self) -> None:
+        self.context.close()

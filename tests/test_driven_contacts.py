@@ -1,0 +1,112 @@
+"""Contacts with surfaces that an importer moves: a block on a table whose height u, with der(u) and der(u,2),
+is an input, in FMUs of both targets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from instance import instance
+from lagfmu.compiler import find_compiler
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu
+
+G = 9.81
+y, u = dynamicsymbols("y u")
+m, g = symbols("m g", positive=True)
+
+
+@pytest.fixture(scope="module")
+def driven(target, tmp_path_factory):
+    """The FMU of a block of 2 kg on a table at the height u."""
+    if target == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine: native FMUs are not tested")
+    model = Model(
+        name="Driven",
+        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
+        coordinates={y: "m"},
+        constraints=[Contact("table", y - u)],
+        parameters=[Parameter(m, 2.0, "kg"), Parameter(g, G, "m/s^2")],
+        inputs=[Input(u, "m")],
+        start={y: 0.0},
+    )
+    return build_fmu(model, tmp_path_factory.mktemp(target), Scene("Driven"), target=target)
+
+
+def drive(one, motion):
+    for name, value in zip(("u", "der(u)", "der(u,2)"), motion, strict=True):
+        one.set(name, value)
+
+
+def thrown(amplitude, frequency, periods):
+    """Times at which a block leaves a table that moves as A sin(w t): where -A w^2 sin(w t) = -g, if it
+    has come back by then."""
+    phase = np.arcsin(G / (amplitude * frequency**2))
+    return (phase + 2 * np.pi * np.arange(periods)) / frequency
+
+
+@pytest.mark.parametrize("step", [0.002, 0.01])
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_shaken_block_leaves_the_table_once_a_period(driven, step, order):
+    """u = 0.05 sin 20 t has u'' down to -20 m/s^2: the block leaves where u'' = -g in each of seven
+    periods, as it does where t stands in the model; whether u'' is given or only u and u'."""
+    A, w = 0.05, 20.0
+    with instance(driven) as one:
+        one.start({"u": 0.0, "der(u)": A * w, "der(y)": A * w}, tolerance=1e-8)
+        times = []
+        while one.time < 2.2:
+            wt = w * one.time
+            rate = -A * w**2 * np.sin(wt) if order == 2 else 0.0
+            drive(one, (A * np.sin(wt), A * w * np.cos(wt), rate))
+            one.step(step)
+            if one.get("departure.table.count") > len(times):
+                times.append(one.get("departure.table.time"))
+        assert one.get("departure.table.count") == len(times) == 7
+    np.testing.assert_allclose(times, thrown(A, w, 7), atol=1.5 * step)
+
+
+def test_a_slowly_shaken_block_never_leaves(driven):
+    """u = 0.02 sin 20 t has |u''| <= 8 m/s^2 < g: lambda = m (g + u'') > 0, however the motion is
+    sampled, and nothing is counted."""
+    A, w = 0.02, 20.0
+    with instance(driven) as one:
+        one.start({"u": 0.0, "der(u)": A * w, "der(y)": A * w}, tolerance=1e-8)
+        while one.time < 0.7:
+            wt = w * one.time
+            rate = -A * w**2 * np.sin(wt)
+            drive(one, (A * np.sin(wt), A * w * np.cos(wt), rate))
+            assert one.get("lambda.table") == pytest.approx(2 * (G + rate), rel=1e-6)
+            one.step(0.01)
+            assert one.get("contact.table")
+        assert one.get("departure.table.count") == 0
+
+
+def test_a_table_that_stops_throws_the_block_up(driven):
+    """From a table that goes up at 1 m/s and stops at once the block flies on: up to v^2/2 g, back at
+    2 v/g, one departure at the moment of the stop."""
+    with instance(driven) as one:
+        one.start({"u": 0.0, "der(u)": 1.0, "der(y)": 1.0}, tolerance=1e-10)
+        one.step(0.1)
+        assert one.get("contact.table")
+        drive(one, (0.1, 0.0, 0.0))
+        one.step(1.0 / G)
+        assert not one.get("contact.table")
+        assert one.get("y") == pytest.approx(0.1 + 1 / (2 * G), abs=1e-9)
+        assert one.get("departure.table.count") == 1
+        assert one.get("departure.table.time") == pytest.approx(0.1, abs=1e-12)
+        assert one.get("departure.table.velocity.y") == pytest.approx(1.0, abs=1e-12)
+        one.step(1.1 / G)
+        assert one.get("contact.table")
+
+
+def test_a_table_that_drops_away_is_left(driven):
+    """A table that jumps down by 0.2 m leaves the block in free fall: one departure, lambda = 0."""
+    with instance(driven) as one:
+        one.start({"u": 0.0}, tolerance=1e-10)
+        one.step(0.01)
+        drive(one, (-0.2, 0.0, 0.0))
+        one.step(0.1)
+        assert one.get("departure.table.count") == 1
+        assert one.get("lambda.table") == 0
+        assert one.get("y") == pytest.approx(-G * 0.1**2 / 2, abs=1e-9)

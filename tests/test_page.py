@@ -1,0 +1,229 @@
+"""The live page: the FMU that runs in it is the native one, it needs no network, and it tells why
+it refuses a run."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import Page, chromium
+from conftest import FILES
+from typer.testing import CliRunner
+
+from lagfmu.cli.app import app
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.page.live.playable import of_fmu
+from lagfmu.page.live.render import Playable, render
+from lagfmu.verification.simulate import read_description, simulate
+
+pytest.importorskip("wasmtime", reason="pip install -e '.[test]'")
+
+from wasm import Module
+
+ROUNDING = 1e-14  # relative: the two C libraries differ in the last place of sin, cos and pow
+Playables = Callable[[str], Playable]
+
+
+@pytest.fixture(scope="module")
+def playable(native_fmu: Callable[[str], Path]) -> Playables:
+    """playable(NAME): the parts of the page of an FMU of models/, compiled once."""
+    compiler = find_compiler()
+    if compiler is None or not compiler.cross:
+        pytest.skip("no ziglang: pip install -e '.[native]'")
+    made: dict[str, Playable] = {}
+
+    def get(name: str) -> Playable:
+        if name not in made:
+            made[name] = of_fmu(native_fmu(name))
+        return made[name]
+
+    return get
+
+
+@pytest.fixture(scope="module")
+def page_file(playable: Playables, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """page_file(NAME): the page on disk."""
+    folder = tmp_path_factory.mktemp("pages")
+
+    def get(name: str) -> Path:
+        path = folder / f"{name}.html"
+        if not path.exists():
+            path.write_text(render(playable(name)), encoding="utf-8")
+        return path
+
+    return get
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture
+def opened(browser: Any, page_file: Any) -> Iterator[Callable[..., Page]]:
+    """opened(NAME): its page in Chromium; at the end nothing must have gone wrong in it."""
+    pages: list[Page] = []
+
+    def get(name: str, **options: Any) -> Page:
+        pages.append(Page(browser, page_file(name), **options))
+        return pages[-1]
+
+    yield get
+    for page in pages:
+        page.close()
+        assert page.problems == []
+        assert all(r.startswith(("file:", "blob:", "data:")) for r in page.requests)
+
+
+@pytest.fixture(scope="module")
+def native(native_fmu: Callable[[str], Path]) -> Callable[[str], Any]:
+    """native(NAME): the native FMU's run, and how far rounding may carry each of its real outputs."""
+    made: dict[str, Any] = {}
+
+    def get(name: str) -> Any:
+        if name not in made:
+            run = simulate(native_fmu(name))
+            made[name] = run, allowed(native_fmu(name), run)
+        return made[name]
+
+    return get
+
+
+def allowed(fmu: Path, run: Any) -> dict[str, float]:
+    """1e-14 of the largest output in a unit, and what changes of 1e-14 of each parameter and start value
+    grow to over the run.  A residual is left out: it is nothing but rounding."""
+    variables = {v.name: v for v in read_description(fmu).modelVariables}
+    names = [n for n in run.dtype.names if run[n].dtype.kind == "f" and n != "time"]
+    names = [n for n in names if not n.startswith("residual.")]
+    sizes: dict[str, float] = {}
+    for n in names:
+        unit = variables[n].unit
+        sizes[unit] = max(sizes.get(unit, 0.0), float(np.max(np.abs(run[n]))))
+    bounds = {n: ROUNDING * sizes[variables[n].unit] for n in names}
+    for v in variables.values():
+        settable = v.causality == "parameter" or v.initial in ("exact", "approx")
+        if settable and v.type == "Real" and not v.name.startswith("solver."):
+            start = float(v.start)
+            other = simulate(fmu, start_values={v.name: start + ROUNDING * (abs(start) or 1.0)})
+            for n in names:
+                bounds[n] += float(np.max(np.abs(other[n] - run[n])))
+    return bounds
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_module_is_the_native_fmu(
+    name: str, playable: Playables, native: Callable[[str], Any]
+) -> None:
+    """In wasmtime: what the module answers is what the machine's own binary answers, but for rounding in
+    the C library; and it asks nothing of its host."""
+    run, bounds = native(name)
+    module = Module(playable(name).module, playable(name).facts)
+    assert module.imports == []
+    found = module.simulate(run["time"])
+    assert set(found.dtype.names) == set(run.dtype.names)
+    for n, bound in bounds.items():
+        assert np.max(np.abs(found[n] - run[n])) <= bound, n
+    for n in run.dtype.names:
+        if run[n].dtype.kind in "bi":
+            assert (found[n] == run[n]).all(), n
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_page_runs_the_native_fmu_without_a_network(
+    name: str, opened: Callable[..., Page], native: Callable[[str], Any]
+) -> None:
+    """In Chromium, from disk: every lambda at the end of the run is the native FMU's."""
+    expected, bounds = native(name)
+    run = opened(name).run()
+    assert run["time"] == list(expected["time"])
+    for n in (n for n in expected.dtype.names if n.startswith(("lambda.", "departure."))):
+        assert run["values"][n][-1] == pytest.approx(
+            expected[n][-1], abs=bounds.get(n, 0), rel=0
+        ), n
+
+
+def test_the_particle_leaves_at_two_thirds(opened: Callable[..., Page]) -> None:
+    """cos(theta) = (2/3) cos(theta0) at the departure, for the start that a script asks for."""
+    run = opened("Hemisphere").run({"start": {"theta": 0.3}, "parameters": {"m": 2.5}})
+    angle = run["values"]["departure.surface.theta"][-1]
+    assert np.cos(angle) == pytest.approx(2 * np.cos(0.3) / 3, rel=1e-8)
+    assert run["values"]["lambda.surface"][0] == pytest.approx(2.5 * 9.81 * np.cos(0.3), rel=1e-14)
+    assert any("opened at" in m["message"] for m in run["log"])
+
+
+def test_a_refused_run_shows_the_reason(opened: Callable[..., Page]) -> None:
+    """A mass of zero is refused in the FMU's words; names that it does not have, all at once."""
+    page = opened("Hemisphere")
+    assert "'m' = 0" in page.refusal({"parameters": {"m": 0}})
+    told = page.refusal({"parameters": {"q": 1}, "start": {"m": 2}, "method": "euler"})
+    assert all(part in told for part in ("'q'", "'m'", "'euler'", "theta", "dop853"))
+    assert "stepsize" in page.refusal({"stepsize": 0.1})
+
+
+def test_what_an_fmu_says_is_text(
+    native_fmu: Callable[[str], Path], tmp_path: Path, browser: Any
+) -> None:
+    """A description with markup in it is shown as it is written, and runs nothing."""
+    evil = "<img src=x onerror=alert(1)></script><script>document.title='taken'</script>"
+    source = native_fmu("Hemisphere")
+    path = tmp_path / "Evil.fmu"
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            text = old.read(name)
+            if name == "modelDescription.xml":
+                mark = evil.replace("<", "&lt;").replace(">", "&gt;").encode()
+                text = text.replace(b"radius of the hemisphere", mark)
+                text = text.replace(b"Particle that slides", mark)
+            if name == "documentation/index.html":
+                text = text.replace(b"<math", b"<script>document.title='taken'</script><math", 1)
+            new.writestr(name, text)
+    out = tmp_path / "evil.html"
+    out.write_text(render(of_fmu(path)), encoding="utf-8")
+    page = Page(browser, out)
+    assert page.run()["time"][-1] == 2.0
+    assert page.tab.title().startswith("Hemisphere")
+    assert page.tab.locator(".lead").inner_text().startswith(evil)
+    assert page.tab.locator("main img, main script").count() == 0
+    page.close()
+    assert page.problems == []
+
+
+def test_a_python_fmu_has_no_sources_to_compile(
+    python_fmu: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """The message says what to do."""
+    fmu = str(python_fmu("Hemisphere"))
+    result = CliRunner().invoke(app, ["page", fmu, "--out", str(tmp_path / "p.html")])
+    assert result.exit_code == 1
+    assert "--target native" in result.stderr
+    assert not (tmp_path / "p.html").exists()
+
+
+def test_without_zig_the_message_says_what_to_do(
+    native_fmu: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The system's cc knows no WebAssembly."""
+    monkeypatch.setattr("lagfmu.page.live.wasm.find_compiler", lambda: None)
+    fmu = str(native_fmu("Hemisphere"))
+    result = CliRunner().invoke(app, ["page", fmu, "--out", str(tmp_path / "p.html")])
+    assert result.exit_code == 1
+    assert "pip install lagfmu[native]" in result.stderr
+
+
+def test_a_page_is_the_same_from_model_and_fmu(
+    playable: Playables, native_fmu: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """lagfmu page MODEL.py and lagfmu page of the FMU built of it: one page, byte for byte."""
+    model = Path(__file__).parent.parent / "models" / "hemisphere.py"
+    pages = []
+    for target in (model, native_fmu("Hemisphere")):
+        out = tmp_path / f"{target.suffix[1:]}.html"
+        result = CliRunner().invoke(app, ["page", str(target), "--out", str(out)])
+        assert result.exit_code == 0, result.output
+        pages.append(out.read_bytes())
+    assert pages[0] == pages[1]
