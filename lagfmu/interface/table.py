@@ -20,7 +20,10 @@ from ..model.model import Contact, Nonholonomic, name_of
 from ..model.scene import Scene
 from ..model.units import (
     ENERGY,
+    FORCE,
+    METRE,
     ONE,
+    POWER,
     SECOND,
     Unit,
     dimension_of,

@@ -180,7 +180,7 @@ def _check_coefficients(
             problems += _dimension(mu, ONE, units, what)
         if len(problems) > before:
             continue
-        value = mu.xreplace(values)
+        value = sp.sympify(mu.xreplace(values))
         if value.is_number:
             numbers[kind] = float(value) if value.is_real else math.nan
             if not 0 <= numbers[kind] < math.inf:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import at_contacts
+from . import at_contacts, at_slides
 from .failure import StepFailureError
 from .indicators import indicators, is_watched
 from .instant import Instant
@@ -40,9 +40,12 @@ def advance(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
         )
     with np.errstate(all="ignore"):
-        at = Instant(system, state.t, system.inputs_at(u, 0.0), p)
+        at = Instant(system, state.t, system.inputs_at(u, 0.0), p, state.slides)
         if system.contacts and system.prescribed:
             state = at_contacts.released(at, state, state.span)
+        if system.frictions:
+            state = at_slides.renewed(at, state)
+            at = replace(at, slides=state.slides)
         if is_incomplete(state):
             state = complete(at, settings, state, t_end - state.t)
         while state.t < t_end:
@@ -66,7 +69,7 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
     solver = leg.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
     steps, choice = state.steps, state.choice
-    watch = is_watched(leg.system)
+    watch, lost = is_watched(leg.system), state.dissipated
     before = indicators(leg, state.t, y) if watch else np.zeros(0)
     while True:
         t0, y0 = solver.t, solver.y
@@ -90,7 +93,13 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)
                 here = replace(state, step=step, steps=steps, armed=tuple(armed), choice=choice)
+                if leg.system.frictions:
+                    lost += at_slides.dissipated(leg, solver.dense_output(), t0, event[0])
+                    here = replace(here, slides=leg.state.slides, dissipated=lost)
                 return at_contacts.switched(leg, here, t0, y0, *event)
+        if leg.system.frictions:
+            lost += at_slides.dissipated(leg, solver.dense_output(), t0, solver.t)
+            leg.state = replace(leg.state, slides=at_slides.turned(leg, solver.t, y1))
         if choice.implicit:
             choice = implicit_step(choice, float(solver.t - t0))
         if solver.t == t_end:
@@ -107,6 +116,8 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
                 step=step,
                 steps=steps,
                 choice=choice,
+                slides=leg.state.slides,
+                dissipated=lost,
             )
         solver.y, solver.f = y1, leg.rate(solver.t, y1)
         if leg.auto and leg.settings.method == "dop853":

@@ -26,8 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .failure import StepFailureError
-from .instant import Instant
-from .motion import Motion
+from .instant import Instant, Motion
 from .share import best_share
 from .solution import Solution
 from .state import Slide

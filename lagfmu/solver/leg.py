@@ -55,7 +55,8 @@ class Leg:
         self.settings = replace(self.settings, method=method)
 
     def at(self, t: float) -> Instant:
-        return Instant(self.system, t, self.system.inputs_at(self.u, t - self.begun), self.p)
+        u = self.system.inputs_at(self.u, t - self.begun)
+        return Instant(self.system, t, u, self.p, self.state.slides)
 
     def split(self, y: Vector) -> tuple[Vector, Vector]:
         return y[: self.system.n], y[self.system.n :]

@@ -19,11 +19,11 @@ import numpy as np
 
 from .failure import StepFailureError
 from .friction import heading, loaded, paradox, slip_velocity
-from .indicators import Range
 from .instant import Instant, Motion
 from .leg import Leg
 from .motion import motion
-from .state import Slide, State
+from .ranges import Range, first_of_frictions
+from .state import Departure, Slide, State
 from .system import Matrix, System, Vector
 
 MOST = 6  # frictions whose combinations are tried one by one
@@ -41,9 +41,12 @@ def noises(system: System, G: Matrix, nu: Vector, speed: Vector) -> Vector:
     return np.array([SLACK * unit[list(f.rows)].sum() for f in system.frictions])
 
 
-def begun(at: Instant, q: Vector, v: Vector, speed: Vector) -> tuple[Slide, ...]:
+def begun(at: Instant, q: Vector, v: Vector, size: Vector) -> tuple[Slide, ...]:
     """How frictions stand before anything is settled: slipping where there is a slip velocity."""
-    _, _, G, nu, _ = at.evaluate(q, v)
+    M, F, G, nu, _ = at.evaluate(q, v)
+    mass = M.diagonal()
+    natural = np.sqrt(size * np.abs(F) / np.where(mass > 0, mass, np.inf))
+    speed = np.maximum(np.abs(v), natural)
     s = slip_velocity(at.system, G, v, nu)
     return tuple(
         _along(Slide(noise=float(n)), x)
@@ -350,6 +353,86 @@ def renewed(at: Instant, state: State) -> State:
         for slide, x in zip(state.slides, s, strict=True)
     )
     return state if moved == state.slides else replace(state, slides=moved)
+
+
+def switched_slides(
+    at: Instant,
+    q: Vector,
+    v: Vector,
+    arriving: Vector,
+    state: State,
+    left: Collection[int],
+    contacts: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]],
+) -> tuple[Instant, State]:
+    """After the event at which the indicators `left` left their ranges, and after its impacts: the
+    frictions and contacts settled together, with the level that sticking rows keep, what impacts have
+    dissipated (`arriving`: velocities before them) and the latest starts of slipping.
+
+    state.closed are the contacts as they were settled without frictions.
+    """
+    system, before = at.system, at.slides
+    mine = [i - first_of_frictions(system) for i in left if i >= first_of_frictions(system)]
+    M, _, G, nu, _ = at.evaluate(q, v)
+    speed = np.maximum(np.abs(v), np.array(state.size) * state.rate)
+    noise = noises(system, G, nu, speed)
+    slides = [replace(s, noise=float(n)) for s, n in zip(before, noise, strict=True)]
+    for i in mine:
+        if i % 2:  # the normal force of a bilateral constraint turns over
+            slides[i // 2] = replace(slides[i // 2], sign=-slides[i // 2].sign)
+    begins = {i // 2 for i in mine if i % 2 == 0 and before[i // 2].sticks}
+    ended = {i // 2 for i in mine if i % 2 == 0} - begins
+    at = replace(at, slides=tuple(slides))
+    at, closed = settle(at, q, v, state.closed, contacts, ended, begins)
+    offset, f = np.array(state.offset), at.residual(q)
+    slippings = list(state.slippings)
+    on = loaded(system, system.active(closed))
+    for i, (old, new) in enumerate(zip(before, at.slides, strict=True)):
+        if new.sticks and not old.sticks:
+            rows = list(system.frictions[i].rows)
+            offset[rows] = f[rows]
+        if on[i] and old.sticks and not new.sticks:
+            count = slippings[i].count + 1
+            slippings[i] = Departure(count, at.t, tuple(q.tolist()), tuple(v.tolist()))
+    return at, replace(
+        state,
+        closed=closed,
+        offset=tuple(offset.tolist()),
+        slides=at.slides,
+        slippings=tuple(slippings),
+        dissipated=state.dissipated + _lost(M, G, nu, arriving, v),
+    )
+
+
+def _lost(M: Matrix, G: Matrix, nu: Vector, before: Vector, after: Vector) -> float:
+    """- Lambda . (s+ + s-)/2 = T- - T+ + Lambda . nu [J] of an impact M (v+ - v-) = G^T Lambda."""
+    push = M @ (after - before)
+    if not push.any():
+        return 0.0
+    loss = -float(push @ (after + before)) / 2
+    if nu.any():
+        loss += float(np.linalg.lstsq(G.T, push, rcond=None)[0] @ nu)
+    return loss
+
+
+def observed(system: System, state: State, now: Motion) -> dict[str, float | int | bool]:
+    """What frictions report, by the names of table.py."""
+    press, work = now.press, power(now)
+    values: dict[str, float | int | bool] = {"energy.dissipated": state.dissipated}
+    for i, (f, slide) in enumerate(zip(system.frictions, state.slides, strict=True)):
+        on = bool(press.loaded[i])
+        force = float(np.hypot(*press.tangential[i]))
+        values[f"sticks.{f.name}"] = on and slide.sticks
+        for j, k in enumerate(f.rows):
+            values[f"slip.{system.rows[k].name}"] = float(press.slip[i, j])
+        values[f"margin.{f.name}"] = float(press.static[i] * press.normal[i]) - force
+        values[f"power.{f.name}"] = 0.0 if slide.sticks else float(work[i])
+        latest = state.slippings[i]
+        values[f"slipping.{f.name}.count"] = latest.count
+        values[f"slipping.{f.name}.time"] = latest.time
+        for j, name in enumerate(system.coordinates):
+            values[f"slipping.{f.name}.{name}"] = latest.q[j]
+            values[f"slipping.{f.name}.velocity.{name}"] = latest.v[j]
+    return values
 
 
 def indicators(leg: Leg, now: Motion) -> list[float]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from . import at_slides
 from .contacts import complementary_modes, impact
 from .instant import Instant
 from .leg import Leg
@@ -63,10 +64,14 @@ def _has_parted(
     )
 
 
-def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, contacts: list[int]) -> State:
-    """The state right after the event at t: contacts opened or struck, modes settled together."""
+def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list[int]) -> State:
+    """The state right after the event at t: contacts opened or struck, modes settled together.
+
+    `left`: the indicators that leave their ranges, of which the first are the contacts'.
+    """
     system, at = leg.system, leg.at(t)
     q, v = leg.split(leg.reach(t0, y0, t))
+    contacts, arriving = [c for c in left if c < len(system.contacts)], v
     closed, armed = list(state.closed), list(state.armed)
     offset = np.array(state.offset)
     leaving = [c for c in contacts if closed[c]]
@@ -88,6 +93,14 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, contacts: 
         v = _pass_on(at, q, v, closed, state)
     touching = _touching(at, q, v, state, closed)
     modes = complementary_modes(at, q, v, closed, touching, leaving)
+    if system.frictions:
+
+        def settled(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
+            return complementary_modes(at, q, v, shut, touching, leaving)
+
+        here = replace(state, t=t, closed=modes, offset=tuple(offset.tolist()))
+        at, here = at_slides.switched_slides(at, q, v, arriving, here, left, settled)
+        state, modes, offset = replace(here, closed=state.closed), here.closed, np.array(here.offset)
     q, v = project(at, q, v, system.active(modes), offset, leg.size)
     departures = list(state.departures)
     for c, (old, new) in enumerate(zip(leg.state.closed, modes, strict=True)):
