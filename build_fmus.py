@@ -22,11 +22,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.text import Text
 
 from lagfmu import LagfmuError, Verification, verify
-from lagfmu.api import settled
+from lagfmu.api import package, settled
 from lagfmu.cli.terminal import prepare_streams
 from lagfmu.fmu.compiler import HOST, find_compiler
 from lagfmu.fmu.native import takes_long
-from lagfmu.fmu.write import TARGETS, write
+from lagfmu.fmu.write import TARGETS
 from lagfmu.model.file import ModelFile, load
 from lagfmu.model.scene import Scene
 from lagfmu.prepare.prepare import prepare
@@ -54,11 +54,11 @@ def build_one(
     begun = time.perf_counter()
     scene, choice = settled(file.model, scene, file.closed_forms, target)
     prepared = prepare(file.model, scene)
-    path = write(prepared, out, file.closed_forms, (), target, platforms, choice)
-    built = time.perf_counter() - begun
-    runs = [verify(path) for _ in range(RUNS)]
-    write(prepared, out, file.closed_forms, runs[0].rows(), target, platforms, choice)
-    return path, built, runs[0], statistics.median(r.seconds for r in runs)
+    built = package(prepared, out, file.closed_forms, target, platforms, choice)
+    spent = time.perf_counter() - begun
+    found = built.verification or verify(built.path)
+    runs = [found, *(verify(built.path) for _ in range(RUNS - 1))]
+    return built.path, spent, found, statistics.median(r.seconds for r in runs)
 
 
 def first(target: str, platforms: Sequence[str]) -> bool:

@@ -120,7 +120,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as out:
         for name, model, values, stop in cases():
             if model.name not in made:
-                made[model.name] = build_fmu(model, out, Scene(model.name), target="native")
+                made[model.name] = build_fmu(
+                    model, out, Scene(model.name), target="native", check=False
+                )
             fmu = made[model.name]
             folder = fmpy.extract(str(fmu))
             right = None

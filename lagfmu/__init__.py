@@ -1,7 +1,7 @@
 """Lagrange's equations with multipliers, from SymPy to FMUs that report the forces of constraint."""
 
 from .api import build_fmu
-from .errors import LagfmuError
+from .errors import LagfmuError, VerificationError
 from .mechanics.equations import EquationsOfMotion, derive
 from .mechanics.integrability.classify import classify
 from .model.closed_form import ClosedForm, Conserved, departure, initial, output
@@ -36,6 +36,7 @@ __all__ = [
     "Parameter",
     "Scene",
     "Verification",
+    "VerificationError",
     "build_fmu",
     "classify",
     "departure",

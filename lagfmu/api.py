@@ -1,20 +1,31 @@
-"""A model and a scene -> one FMU file, with solver settings that are measured if an accuracy is asked for."""
+"""A model and a scene -> one FMU file, verified: what the commands and Python users call."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from .fmu.compiler import HOST
-from .fmu.write import write
+from .errors import VerificationError
+from .fmu.compiler import HOST, chosen, host
+from .fmu.write import put_figures, write
 from .model.closed_form import ClosedForm, Conserved
 from .model.model import Model
 from .model.scene import Scene
-from .prepare.prepare import prepare
+from .prepare.prepare import Prepared, prepare
 from .study.tradeoff.choose import choose
 from .study.tradeoff.goal import parse
 from .study.tradeoff.page import section
+from .verification.verify import Verification, verify
+
+
+@dataclass(frozen=True)
+class Built:
+    """An FMU that stands at `path`, and what its verification found (None where it was not asked for)."""
+
+    path: Path
+    verification: Verification | None
 
 
 def build_fmu(
@@ -22,20 +33,49 @@ def build_fmu(
     out: str | os.PathLike[str] = ".",
     scene: Scene | None = None,
     closed_forms: Sequence[ClosedForm | Conserved] = (),
-    figures: Sequence[tuple[str, ...]] = (),
     target: str = "python",
     platforms: Sequence[str] = (HOST,),
+    check: bool = True,
 ) -> Path:
-    """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu).
+    """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
     `target` is 'python' or 'native'; a native FMU has binaries for `platforms`, see compiler.PLATFORMS.
     A scene with an `accuracy` takes half a minute more: its settings and formulation are measured.
 
-    `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them; `figures` are
-    verification results for its documentation page.  Raises ModelError, DerivationError, BuildError.
+    `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them.  With `check` the
+    FMU is simulated through fmpy and held against them here, and its page shows the figures; a native FMU
+    is simulated only if it has a binary for this machine.
+
+    Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
+    VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
     scene, choice = settled(model, scene or Scene(model.name), closed_forms, target)
-    return write(prepare(model, scene), out, closed_forms, figures, target, platforms, choice)
+    prepared = prepare(model, scene)
+    built = package(prepared, out, closed_forms, target, platforms, choice, check)
+    found = built.verification
+    if found is not None and not found.passed:
+        failed = "; ".join(str(c) for c in found.checks if not c.passed)
+        raise VerificationError(f"{str(built.path)!r} was built, but does not hold: {failed}")
+    return built.path
+
+
+def package(
+    prepared: Prepared,
+    out: str | os.PathLike[str],
+    closed_forms: Sequence[ClosedForm | Conserved] = (),
+    target: str = "python",
+    platforms: Sequence[str] = (HOST,),
+    choice: str = "",
+    check: bool = True,
+) -> Built:
+    """What `prepare` made as an FMU: built once, verified once, its figures put in."""
+    path = write(prepared, out, closed_forms, target, platforms, choice)
+    runs_here = target == "python" or host() in chosen(platforms)
+    if not (check and runs_here):
+        return Built(path, None)
+    found = verify(path)
+    put_figures(path, prepared, found.rows(), target, choice)
+    return Built(path, found)
 
 
 def settled(
@@ -44,5 +84,5 @@ def settled(
     """The scene with the settings that hold its accuracy, and HTML on how they were chosen."""
     if scene.accuracy is None:
         return scene, ""
-    chosen = choose(model, scene, closed_forms, parse(scene.accuracy), target=target)
-    return chosen.scene, section(chosen)
+    found = choose(model, scene, closed_forms, parse(scene.accuracy), target=target)
+    return found.scene, section(found)

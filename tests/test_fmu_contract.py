@@ -112,7 +112,10 @@ def test_names_are_those_of_the_design(name, xml, prepared):
             expected |= {f"departure.{c}.{s}" for s in q}
             expected |= {f"departure.{c}.velocity.{s}" for s in q}
     expected |= {f"energy.{e}" for e in ("kinetic", "potential", "total")}
-    expected |= {f"solver.{s}" for s in ("method", "tolerance", "step", "maximum_step", "steps")}
+    expected |= {
+        f"solver.{s}"
+        for s in ("method", "tolerance", "step", "maximum_step", "maximum_steps", "steps")
+    }
     constraints = "|".join(c.name for c in model.constraints)
     found = {v for v in variables(xml) if not re.fullmatch(rf"Q\.({constraints})\.\w+", v)}
     assert found == expected
@@ -284,7 +287,7 @@ def test_awkward_start_values_survive(tmp_path):
         parameters=[Parameter(m, Rational(1, 3), "kg"), Parameter(k, 1e-300, "N")],
         start={x: 0.1 + 0.2, x.diff(): -2 / 3},
     )
-    path = build_fmu(model, tmp_path)
+    path = build_fmu(model, tmp_path, check=False)
     expected = {"x": 0.1 + 0.2, "der(x)": -2 / 3, "m": 1 / 3, "k": 1e-300}
     described = {v.name: v for v in read_model_description(str(path)).modelVariables}
     with instance(path) as one:
@@ -696,7 +699,7 @@ def test_constraints_that_mix_give_every_variable_its_dependencies(tmp_path):
         inputs=[Input(u, "m")],
         start={x.diff(): 9.81, y.diff(): 9.81},
     )
-    path = build_fmu(model, tmp_path, Scene("Mixed"))
+    path = build_fmu(model, tmp_path, Scene("Mixed"), check=False)
     assert validate_fmu(str(path)) == []
     with instance(path) as one:
         one.start()

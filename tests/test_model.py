@@ -280,7 +280,7 @@ def test_a_prescribed_motion_gives_three_inputs():
 
 def test_the_drives_force_carries_inertia_damping_and_spring(tmp_path):
     """lambda = m u'' + c u' + k u for u = 0.1 sin 3t, held by Taylor's rule between the points."""
-    path = build_fmu(driven(), tmp_path, Scene("Driven"))
+    path = build_fmu(driven(), tmp_path, Scene("Driven"), check=False)
     step, worst = 1e-3, 0.0
     with instance(path) as one:
         one.start({"u": 0.0, "der(u)": 0.3, "der(u,2)": 0.0})

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from lagfmu.cli.app import app
 from lagfmu.fmu.compiler import find_compiler
-from lagfmu.page.live.playable import of_fmu
-from lagfmu.page.live.render import Playable, render
+from lagfmu.live.playable import of_fmu
+from lagfmu.live.render import Playable, render
 from lagfmu.verification.simulate import read_description, simulate
 
 pytest.importorskip("wasmtime", reason="pip install -e '.[test]'")
@@ -208,7 +208,7 @@ def test_without_zig_the_message_says_what_to_do(
     native_fmu: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The system's cc knows no WebAssembly."""
-    monkeypatch.setattr("lagfmu.page.live.wasm.find_compiler", lambda: None)
+    monkeypatch.setattr("lagfmu.live.wasm.find_compiler", lambda: None)
     fmu = str(native_fmu("Hemisphere"))
     result = CliRunner().invoke(app, ["page", fmu, "--out", str(tmp_path / "p.html")])
     assert result.exit_code == 1

@@ -109,7 +109,7 @@ def test_numbers_in_the_code_are_the_parameters_values(name: str, fmu: Any, make
     names = [n for n in run.dtype.names if n != "time"]
     assert largest_difference(full, run, names) < 1e-8
     settable = {n for n, v in variables(path).items() if v.causality == "parameter"}
-    assert settable == {"solver.tolerance", "solver.maximum_step"}
+    assert settable == {"solver.tolerance", "solver.maximum_step", "solver.maximum_steps"}
     found = verify(path)  # what is left of the closed forms, with the numbers for the parameters
     assert found.claims > 0
     assert found.passed, [c for c in found.checks if not c.passed]
@@ -303,7 +303,7 @@ def test_without_constraints_there_are_no_rungs_for_them(tmp_path: Path, target:
         parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1.0, "N/m")],
         start={x: 1.0},
     )
-    path = build_fmu(spring, tmp_path, target=target)
+    path = build_fmu(spring, tmp_path, target=target, check=False)
     for fmu in (place, path):
         with zipfile.ZipFile(fmu) as archive:
             held = {Path(n).stem for n in archive.namelist() if n.endswith((".c", ".py"))}
@@ -467,7 +467,7 @@ def test_a_scene_may_ask_for_an_accuracy(tmp_path: Path) -> None:
     """Scene(accuracy='1e-4:lambda.string'): settings are measured, and the FMU holds lambda to that."""
     file, scene = scene_of("Atwood")
     needs = replace(scene, accuracy="1e-4:lambda.string", outputs=["lambda.string"])
-    path = build_fmu(file.model, tmp_path, needs, file.closed_forms, target="native")
+    path = build_fmu(file.model, tmp_path, needs, file.closed_forms, target="native", check=False)
     m1, m2, g = (float(p.value) for p in file.model.parameters)
     run = simulate(path)
     assert run["lambda.string"] == pytest.approx(-2 * m1 * m2 * g / (m1 + m2), rel=1e-4)

@@ -15,15 +15,15 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from ..api import package
 from ..errors import LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
-from ..fmu.write import write
 from ..interface.variables import VariableTable
+from ..live.command import write_page
 from ..model.file import ModelFile, load
 from ..model.scene import Scene
-from ..page.live.command import write_page
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.goal import parse
@@ -174,20 +174,21 @@ def build(
             if s.accuracy is not None:
                 chosen = chosen_for(file, s, parse(s.accuracy), kind, console)
                 s, choice = chosen.scene, section(chosen)
-            with console.status(f"building {s.name}{_first_time(target, places)}"):
+            with console.status(
+                f"building {'and verifying ' if check else ''}{s.name}{_first_time(target, places)}"
+            ):
                 prepared = prepare(file.model, s)
                 if name is None and any(v is not None for v in narrowing):
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
-                path = write(prepared, out / kind, file.closed_forms, (), kind, places, choice)
+                built = package(
+                    prepared, out / kind, file.closed_forms, kind, places, choice, check
+                )
+            path, found = built.path, built.verification
             console.print(
                 f"[green]built[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
                 soft_wrap=True,
             )
-            if check:
-                with console.status(f"verifying {s.name}"):
-                    found = verify(path)
-                    rows = found.rows()
-                    write(prepared, out / kind, file.closed_forms, rows, kind, places, choice)
+            if found is not None:
                 _print(found)
                 failed |= not found.passed
     if failed:

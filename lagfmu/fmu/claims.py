@@ -9,15 +9,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
-from sympy.parsing.sympy_parser import parse_expr
 
 from ..errors import ModelError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
 from ..model.scene import Scene
+from .formula import read_formula, text_of
 
 Expr = Any
 FORMAT = 1
+LARGEST_RECORD = 1 << 24  # bytes
 EXPRESSIONS = ("actual", "expected", "scale", "when")
 CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 
@@ -145,11 +146,8 @@ def pack_closed_forms(
                     f"closed form {claim.name!r} uses {name!r}, which is no variable of the FMU"
                     + (f"; did you mean {near[0]!r}?" if near else "")
                 )
-    if problems:
-        raise ModelError(scene.name, problems)
-    claims = kept
     packed = []
-    for claim in claims:
+    for claim in kept:
         entry: dict[str, Any] = {
             key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
         }
@@ -159,17 +157,30 @@ def pack_closed_forms(
             entry[key] = None if e is None else _text(sp.sympify(e), names)
         entry["symbols"] = {short: str(symbol) for symbol, short in names.items()}
         packed.append(entry)
+        try:
+            _claim(entry)  # it has to come back
+        except ValueError as error:
+            problems.append(f"closed form {claim.name!r} cannot be carried by an FMU: {error}")
+    if problems:
+        raise ModelError(scene.name, problems)
     return json.dumps({"format": FORMAT, "closed_forms": packed}, indent=1).encode()
 
 
 def unpack_closed_forms(content: bytes, name: str) -> list[Claim]:
-    """The claims in an FMU.  Raises VerificationError if the file is not lagfmu's."""
+    """The claims in an FMU, none of whose text is run (fmu/formula.py).
+
+    Raises VerificationError if the file is not lagfmu's.
+    """
     try:
+        if len(content) > LARGEST_RECORD:
+            raise ValueError(f"{len(content)} bytes, expected at most {LARGEST_RECORD}")
         data = json.loads(content)
-        if data["format"] != FORMAT:
-            raise ValueError(f"format {data['format']!r}, expected {FORMAT}")
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise ValueError(f"expected format {FORMAT}")
+        if not isinstance(data.get("closed_forms"), list):
+            raise ValueError("expected a list of closed forms")
         return [_claim(entry) for entry in data["closed_forms"]]
-    except (ValueError, KeyError, TypeError, SyntaxError, AttributeError) as error:
+    except (ValueError, RecursionError) as error:
         raise VerificationError(
             f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "
             "version of lagfmu"
@@ -179,12 +190,30 @@ def unpack_closed_forms(content: bytes, name: str) -> list[Claim]:
 def _text(e: Expr, names: dict[Expr, str]) -> str:
     for symbol in sorted(e.free_symbols, key=str):
         names.setdefault(symbol, f"s{len(names)}")
-    return str(sp.sstr(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}), full_prec=True))
+    return text_of(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}))
 
 
-def _claim(entry: dict[str, Any]) -> Claim:
-    symbols = {short: output(name) for short, name in entry.pop("symbols").items()}
+def _claim(entry: Any) -> Claim:
+    """One entry of the record.  Raises ValueError with what is wrong in it."""
+    texts = {"name", *CONDITIONS, *EXPRESSIONS}
+    numbers = {"within", "rounding"}
+    if not isinstance(entry, dict) or set(entry) != texts | numbers | {"symbols"}:
+        raise ValueError("a closed form with other fields than this version of lagfmu knows")
+    for key in texts:
+        optional = key not in ("name", "actual")
+        if not isinstance(entry[key], str) and not (optional and entry[key] is None):
+            raise ValueError(f"{key!r} of a closed form is {entry[key]!r}, expected text")
+    for key in numbers:
+        number = entry[key]
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not number >= 0:
+            raise ValueError(f"{key!r} of {entry['name']!r} is {number!r}, expected a number >= 0")
+    names = entry["symbols"]
+    if not isinstance(names, dict) or not all(isinstance(n, str) for n in names.values()):
+        raise ValueError(f"the symbols of {entry['name']!r} are not names")
+    symbols = {short: output(name) for short, name in names.items()}
+    fields: dict[str, Any] = {key: entry[key] for key in ("name", *CONDITIONS)}
+    fields |= {key: float(entry[key]) for key in numbers}
     for key in EXPRESSIONS:
-        if entry.get(key) is not None:
-            entry[key] = parse_expr(entry[key], local_dict=symbols)
-    return Claim(**entry)
+        text = entry[key]
+        fields[key] = None if text is None else read_formula(text, symbols)
+    return Claim(**fields)

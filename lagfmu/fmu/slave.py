@@ -305,6 +305,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             tolerance=max(tolerance, SMALLEST_TOLERANCE),
             step=value.get("solver.step", self.default_step),
             maximum_step=value["solver.maximum_step"],
+            maximum_steps=value["solver.maximum_steps"],
         )
         self.p = self._values(self.parameters)
         q = [value[c] for c in self.system.coordinates]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import zipfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,31 +14,31 @@ from ..model.closed_form import ClosedForm, Conserved
 from ..page.documentation import page
 from ..prepare.prepare import Prepared
 from . import native, python
+from .archive import pack
 from .claims import pack_closed_forms
 from .compiler import HOST
 
 TARGETS = ("python", "native")
+PAGE = "documentation/index.html"
 
 
 def write(
     prepared: Prepared,
     out: str | os.PathLike[str] = ".",
     closed_forms: Sequence[ClosedForm | Conserved] = (),
-    figures: Sequence[tuple[str, ...]] = (),
     target: str = "python",
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
 ) -> Path:
     """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
 
-    `choice` is HTML on how the solver settings were chosen.  For the rest see make.build_fmu.
+    `choice` is HTML on how the solver settings were chosen.  For the rest see api.build_fmu.
     """
     if target not in TARGETS:
         raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
-    if target == "python":  # it has no model exchange
-        prepared = replace(prepared, table=prepared.table.without_local_derivatives())
+    prepared = _as_built(prepared, target)
     extra = {
-        "documentation/index.html": page(prepared, figures, choice).encode(),
+        PAGE: page(prepared, choice=choice).encode(),
         "resources/lagfmu.json": pack_closed_forms(
             prepared.scene, closed_forms, prepared.table, prepared.numbers, prepared.held
         ),
@@ -50,6 +51,27 @@ def write(
         path = path / f"{prepared.scene.name}.fmu"
     write_whole(path, content)
     return path
+
+
+def put_figures(
+    path: Path,
+    prepared: Prepared,
+    figures: Sequence[tuple[str, ...]],
+    target: str,
+    choice: str = "",
+) -> None:
+    """Put verification results into the page of an FMU that stands at `path`; nothing else changes."""
+    with zipfile.ZipFile(path) as archive:
+        contents = {name: archive.read(name) for name in archive.namelist()}
+    contents[PAGE] = page(_as_built(prepared, target), figures, choice).encode()
+    write_whole(path, pack(contents))
+
+
+def _as_built(prepared: Prepared, target: str) -> Prepared:
+    """A python FMU has no model exchange."""
+    if target == "native":
+        return prepared
+    return replace(prepared, table=prepared.table.without_local_derivatives())
 
 
 def write_whole(path: Path, content: bytes) -> None:

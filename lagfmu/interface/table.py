@@ -30,6 +30,7 @@ from ..model.units import (
     generalized_force_unit,
     multiplier_unit,
 )
+from ..solver.state import MAXIMUM_STEPS
 from .variables import Value, Variable, VariableTable
 
 Expr = Any
@@ -279,6 +280,13 @@ class _Builder:
             ),
             *([step] if set(FIXED_STEP).intersection(methods) else []),
             setting("maximum_step", 0.0, SECOND, "largest adaptive step; 0: no limit"),
+            setting(
+                "maximum_steps",
+                MAXIMUM_STEPS,
+                ONE,
+                "steps shorter than 1e-6 of the natural time that a communication step may take; "
+                "0: no limit",
+            ),
         ]
 
     def drives(self) -> list[Variable]:

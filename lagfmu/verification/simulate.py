@@ -108,6 +108,7 @@ def _simulate_model(
         max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
         known.get("solver.step", scene.step),
         known["solver.maximum_step"],
+        known["solver.maximum_steps"],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
     drives = [v for v in table.variables if v.role == "input"]
@@ -191,6 +192,11 @@ def read_description(path: Path) -> Any:
         raise VerificationError(
             f"{str(path)!r}: modelDescription.xml cannot be read ({error})"
         ) from None
+
+
+def file_stem(description: Any) -> str:
+    """The name of the model as the name of a file in the folder that is meant, whatever it holds."""
+    return re.sub(r"[^\w-]", "_", description.modelName or "") or "FMU"
 
 
 def _simulate_fmu(

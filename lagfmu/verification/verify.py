@@ -17,7 +17,7 @@ from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
 from ..errors import SimulationError, VerificationError
-from ..fmu.claims import Claim, unpack_closed_forms
+from ..fmu.claims import LARGEST_RECORD, Claim, unpack_closed_forms
 from .simulate import Trajectory, read_description, simulate
 
 Expr = Any
@@ -151,6 +151,7 @@ def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
 
 def claims_in(path: Path) -> list[Claim]:
     """The closed forms that an FMU carries.  Raises VerificationError if it is none of lagfmu's."""
+    variables = {v.name: v for v in read_description(path).modelVariables}
     try:
         with zipfile.ZipFile(path) as archive:
             if RECORD not in archive.namelist():
@@ -158,9 +159,26 @@ def claims_in(path: Path) -> list[Claim]:
                     f"{str(path)!r} carries no closed forms ({RECORD} is missing): it was not built "
                     "by lagfmu, and there is nothing to hold it against"
                 )
-            return unpack_closed_forms(archive.read(RECORD), str(path))
+            claims = unpack_closed_forms(_record(archive), str(path))
     except (zipfile.BadZipFile, OSError) as error:
         raise VerificationError(f"{str(path)!r} cannot be read as an FMU ({error})") from None
+    problems = []
+    for claim in claims:
+        for name in sorted(claim.variables):
+            v = variables.get(name)
+            if v is None:
+                problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
+            elif (v.type == "Boolean") != name.startswith("contact.") or v.type == "String":
+                problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
+    if problems:
+        raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
+    return claims
+
+
+def _record(archive: zipfile.ZipFile) -> bytes:
+    """Its content, but no more of it than is ever looked at."""
+    with archive.open(RECORD) as file:
+        return file.read(LARGEST_RECORD + 1)
 
 
 def _finite(result: Trajectory) -> Check:
@@ -254,8 +272,9 @@ def evaluate(
     columns = []
     for symbol in symbols:
         text = str(symbol)
-        if text.startswith("initial("):
-            column = result[text[len("initial(") : -1]][0]
+        inner = text[len("initial(") : -1] if text.startswith("initial(") else ""
+        if inner in names:
+            column = result[inner][0]
         elif text in names:
             column = rows[text]
         elif text in values:
@@ -265,6 +284,6 @@ def evaluate(
                 f"closed form {name!r} uses {text!r}, which is no output or parameter of the FMU"
             )
         columns.append(np.asarray(column, dtype=float))
-    function = sp.lambdify(symbols, expression, modules=["scipy", "numpy"])
+    function = sp.lambdify(symbols, expression, modules=["scipy", "numpy"], dummify=True)
     with np.errstate(all="ignore"):
         return np.broadcast_to(np.asarray(function(*columns), dtype=float), len(rows)).copy()

@@ -67,6 +67,7 @@ def places(system: System, inputs: list[str], parameters: list[str]) -> dict[str
         "solver.tolerance": ("TOLERANCE", 0, NONE),
         "solver.step": ("STEP", 0, NONE),
         "solver.maximum_step": ("MAXIMUM_STEP", 0, NONE),
+        "solver.maximum_steps": ("MAXIMUM_STEPS", 0, NONE),
         "solver.steps": ("STEPS", 0, NONE),
         "energy.kinetic": ("KINETIC", 0, NONE),
         "energy.potential": ("POTENTIAL", 0, NONE),

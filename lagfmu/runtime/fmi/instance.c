@@ -82,6 +82,7 @@ static int ready(const Instance *x, const Variable *v, double *value) {
         case AT_TOLERANCE: *value = x->given.tolerance; return 1;
         case AT_STEP: *value = x->given.step; return 1;
         case AT_MAXIMUM_STEP: *value = x->given.maximum_step; return 1;
+        case AT_MAXIMUM_STEPS: *value = x->given.maximum_steps; return 1;
         case AT_INPUT: *value = s->drive.value[v->index]; return 1;
         default: break;
     }
@@ -181,6 +182,7 @@ void instance_set(Instance *x, const Variable *v, double value) {
         case AT_TOLERANCE: x->given.tolerance = value; break;
         case AT_STEP: x->given.step = value; break;
         case AT_MAXIMUM_STEP: x->given.maximum_step = value; break;
+        case AT_MAXIMUM_STEPS: x->given.maximum_steps = value; break;
         default: break;
     }
 }

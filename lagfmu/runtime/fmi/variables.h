@@ -13,7 +13,7 @@ typedef enum { ROLE_PARAMETER, ROLE_START, ROLE_INPUT, ROLE_SOLVER, ROLE_OUTPUT 
 /* where its value lies (`index`, and for departures `contact`) */
 typedef enum {
     AT_PARAMETER,      /* p[index] */
-    AT_METHOD, AT_TOLERANCE, AT_STEP, AT_MAXIMUM_STEP,
+    AT_METHOD, AT_TOLERANCE, AT_STEP, AT_MAXIMUM_STEP, AT_MAXIMUM_STEPS,
     AT_INPUT,          /* u[index] */
     AT_Q, AT_V, AT_VDOT,       /* full coordinates */
     AT_S, AT_SDOT, AT_SDDOT,   /* stepped coordinates of an embedding that are not full ones */

@@ -62,7 +62,9 @@ class Compiled:
     def __init__(self, expression: Expr, name: str) -> None:
         self.name = name
         self.symbols = sorted(sp.sympify(expression).free_symbols, key=str)
-        self.function = sp.lambdify(self.symbols, expression, modules=["scipy", "numpy"])
+        self.function = sp.lambdify(
+            self.symbols, expression, modules=["scipy", "numpy"], dummify=True
+        )
 
     def at(
         self, chosen: NDArray[np.bool_], run: Run, floors: Mapping[str, float] | None = None

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...errors import VerificationError
 from ...fmu.claims import Claim, unpack_closed_forms
-from ...verification.simulate import read_description
+from ...verification.simulate import file_stem, read_description
 from ...verification.verify import claims_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
@@ -113,7 +113,7 @@ def facts_of(path: Path) -> Facts:
     moving = {*coordinates, *(f"der({c})" for c in coordinates)}
     return Facts(
         path=path,
-        name=description.modelName,
+        name=file_stem(description),
         target="python" if python else "native",
         description=description,
         variables=variables,

@@ -15,6 +15,7 @@ import numpy as np
 from ...errors import LagfmuError, SimulationError, VerificationError
 from ...fmu.claims import Claim
 from ...methods import FIXED_STEP, INTEGRATORS
+from ...verification.simulate import file_stem
 from ...verification.verify import check_claim, claims_in
 from .front import front
 from .importer import Importer
@@ -171,7 +172,7 @@ def measure(
         timed = take_turns(work, plan, say)
         floor = [float(np.median(s)) for s in timed[len(rows) :]]
         return Tradeoff(
-            name=importer.description.modelName,
+            name=file_stem(importer.description),
             target=importer.target,
             simulated=importer.stop_time,
             step_size=importer.step_size,

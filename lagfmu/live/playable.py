@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...errors import BuildError
-from ...fmu.native import IDENTITY, sources_of
-from ...prepare.prepare import Prepared
-from ..documentation import mathml
-from ..typeset import typeset
+from ..errors import BuildError
+from ..fmu.native import IDENTITY, sources_of
+from ..page.documentation import mathml
+from ..page.typeset import typeset
+from ..prepare.prepare import Prepared
 from .facts import facts
 from .markup import Section, equations_of, safe_mathml
 from .render import Playable

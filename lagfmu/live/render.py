@@ -76,7 +76,7 @@ def _hash(text: str) -> str:
 
 @cache
 def _text(*parts: str) -> str:
-    return files("lagfmu").joinpath("page", "live", "web", *parts).read_text(encoding="utf-8")
+    return files("lagfmu").joinpath("live", "web", *parts).read_text(encoding="utf-8")
 
 
 @cache

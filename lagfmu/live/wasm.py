@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.resources import files
 
-from ...errors import BuildError
-from ...fmu.compiler import WASM, compile_libraries, find_compiler
-from ...fmu.native import runtime_files
+from ..errors import BuildError
+from ..fmu.compiler import WASM, compile_libraries, find_compiler
+from ..fmu.native import runtime_files
 
 IMPORTER = "importer.c"
 
@@ -27,6 +27,6 @@ def compile_module(name: str, sources: Mapping[str, bytes]) -> bytes:
         )
     runtime = runtime_files()
     own = {file: text for file, text in sources.items() if runtime.get(file) != text}
-    own[IMPORTER] = files("lagfmu").joinpath("page/live/web", IMPORTER).read_bytes()
+    own[IMPORTER] = files("lagfmu").joinpath("live/web", IMPORTER).read_bytes()
     gone = runtime.keys() - sources.keys()
     return compile_libraries(name, own, runtime, [WASM], gone)[WASM.folder]

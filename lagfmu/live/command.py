@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...fmu.write import write_whole
-from ...model.file import load
-from ...model.scene import Scene
-from ...prepare.prepare import prepare
+from ..fmu.write import write_whole
+from ..model.file import load
+from ..model.scene import Scene
+from ..prepare.prepare import prepare
 from .playable import of_fmu, of_prepared
 from .render import Playable, render
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import fmpy
 
-from ...fmu.archive import pack
+from ..fmu.archive import pack
 from .markup import shown_name
 
 NUMBERS = ("Real", "Integer", "Boolean")

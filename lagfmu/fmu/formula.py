@@ -1,0 +1,379 @@
+"""A formula as it travels inside an FMU: text that is read back without being run.
+
+An FMU comes from anyone.  SymPy's own readers (`sympify`, `parse_expr`) hand text to Python's eval; here
+the text is parsed to a syntax tree (`ast.parse`, which runs nothing), and a SymPy expression is put together
+from the kinds of node in the whitelist below.  Everything else is refused by name.  A short text can still
+ask for endless work (9**9**9), so the sizes are limited: of the text, of the tree, of exact numbers, and
+what holds no symbol must be a finite double.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+from sympy.printing.str import StrPrinter
+
+Expr = Any
+
+LONGEST = 200_000  # characters of one formula
+MOST_NODES = 50_000  # of its syntax tree
+DEEPEST = 60  # levels of it, a sum or a product being one
+LONGEST_SUM = 500  # terms: Python's parser nests each inside of the one before
+MOST_DIGITS = 400  # of an exact number
+LARGEST_EXPONENT = 100  # of a power whose exponent is a number
+HIGHEST = 20  # order of a Bessel function
+MOST_JOINED = 12  # comparisons inside of "and" and "or", which SymPy multiplies out
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function with its arity, and its value for doubles."""
+
+    make: Callable[..., Expr]
+    arities: tuple[int, ...]
+    value: Callable[..., float]
+
+
+def _one(make: Any, value: Callable[..., float]) -> _Function:
+    return _Function(make, (1,), value)
+
+
+def _heaviside(x: float, middle: float = 0.5) -> float:
+    return middle if x == 0 else float(x > 0)
+
+
+def _loggamma(x: float) -> float:
+    """SymPy takes that of an integer by its factorial."""
+    return math.lgamma(x) if abs(x) <= 1000 else math.inf
+
+
+def _no_number(*_: float) -> float:
+    """A function whose value SymPy looks for without end is not taken of numbers."""
+    return math.nan
+
+
+FUNCTIONS = {
+    "sin": _one(sp.sin, math.sin),
+    "cos": _one(sp.cos, math.cos),
+    "tan": _one(sp.tan, math.tan),
+    "cot": _one(sp.cot, lambda x: 1 / math.tan(x)),
+    "sec": _one(sp.sec, lambda x: 1 / math.cos(x)),
+    "csc": _one(sp.csc, lambda x: 1 / math.sin(x)),
+    "asin": _one(sp.asin, math.asin),
+    "acos": _one(sp.acos, math.acos),
+    "atan": _one(sp.atan, math.atan),
+    "acot": _one(sp.acot, lambda x: math.atan(1 / x) if x else math.pi / 2),
+    "atan2": _Function(sp.atan2, (2,), math.atan2),
+    "sinh": _one(sp.sinh, math.sinh),
+    "cosh": _one(sp.cosh, math.cosh),
+    "tanh": _one(sp.tanh, math.tanh),
+    "coth": _one(sp.coth, lambda x: 1 / math.tanh(x)),
+    "sech": _one(sp.sech, lambda x: 1 / math.cosh(x)),
+    "csch": _one(sp.csch, lambda x: 1 / math.sinh(x)),
+    "asinh": _one(sp.asinh, math.asinh),
+    "acosh": _one(sp.acosh, math.acosh),
+    "atanh": _one(sp.atanh, math.atanh),
+    "exp": _one(sp.exp, math.exp),
+    "log": _one(sp.log, math.log),
+    "sqrt": _one(sp.sqrt, math.sqrt),
+    "Abs": _one(sp.Abs, abs),
+    "sign": _one(sp.sign, lambda x: float((x > 0) - (x < 0))),
+    "floor": _one(sp.floor, math.floor),
+    "ceiling": _one(sp.ceiling, math.ceil),
+    "sinc": _one(sp.sinc, lambda x: math.sin(x) / x if x else 1.0),
+    "Heaviside": _Function(sp.Heaviside, (1, 2), _heaviside),
+    "Min": _Function(sp.Min, (1, 2, 3, 4), lambda *x: min(x)),
+    "Max": _Function(sp.Max, (1, 2, 3, 4), lambda *x: max(x)),
+    "erf": _one(sp.erf, math.erf),
+    "erfc": _one(sp.erfc, math.erfc),
+    "gamma": _one(sp.gamma, math.gamma),
+    "loggamma": _one(sp.loggamma, _loggamma),
+    "besselj": _Function(sp.besselj, (2,), _no_number),
+    "bessely": _Function(sp.bessely, (2,), _no_number),
+}
+CONSTANTS = {"pi": (sp.pi, math.pi), "E": (sp.E, math.e)}
+COMPARISONS: dict[type, Any] = {ast.Lt: sp.Lt, ast.LtE: sp.Le, ast.Gt: sp.Gt, ast.GtE: sp.Ge}
+EQUALITIES = {"Eq": sp.Eq, "Ne": sp.Ne}
+JOINTS: dict[type, Any] = {ast.BitAnd: sp.And, ast.BitOr: sp.Or}
+
+
+class _Printer(StrPrinter):  # type: ignore[misc]
+    """SymPy's text, with every double to its last digit, and long sums in brackets of LONGEST_SUM."""
+
+    def _print_Mod(self, expr: Expr) -> str:
+        a, b = (self._print(x) for x in expr.args)
+        return f"({a} - ({b})*floor(({a})/({b})))"
+
+    def _print_Add(self, expr: Expr, order: str | None = None) -> str:
+        terms = list(expr.args)
+        if len(terms) <= LONGEST_SUM:
+            return str(super()._print_Add(expr, order))
+        parts = [sp.Add(*terms[k : k + LONGEST_SUM]) for k in range(0, len(terms), LONGEST_SUM)]
+        return " + ".join(f"({self._print(part)})" for part in parts)
+
+    def _print_Float(self, expr: Expr) -> str:
+        return repr(float(expr))
+
+
+def text_of(e: Expr) -> str:
+    """The text from which `read_formula` makes the expression again, its symbols being s0, s1, ..."""
+    return str(_Printer({"order": None}).doprint(e))
+
+
+def read_formula(text: str, symbols: Mapping[str, Expr]) -> Expr:
+    """The expression that a text says; `symbols` are the names that it may use.
+
+    Nothing of the text is run.  Raises ValueError with what is not allowed in it.
+    """
+    if not isinstance(text, str):
+        raise ValueError(f"a formula is {type(text).__name__}, expected text")
+    if len(text) > LONGEST:
+        raise ValueError(f"a formula of {len(text)} characters, expected at most {LONGEST}")
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        raise ValueError(f"{_short(text)} is no formula ({error})") from None
+    try:
+        return _Reader(symbols).read(tree)
+    except (ArithmeticError, TypeError, AttributeError, RecursionError) as error:
+        raise ValueError(f"{_short(text)} is no formula ({error})") from None
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 60 else text[:57] + "...")
+
+
+@dataclass(frozen=True)
+class _Read:
+    """An expression; `value`: that of one without symbols, as a double; `logical`: true or false."""
+
+    expr: Expr
+    value: float | None = None
+    logical: bool = False
+
+
+class _Reader:
+    def __init__(self, symbols: Mapping[str, Expr]) -> None:
+        self.symbols = symbols
+        self.nodes = self.joined = 0
+
+    def read(self, tree: ast.expr) -> Expr:
+        expr = self._any(tree, 0).expr
+        if expr.has(sp.zoo, sp.nan, sp.oo, sp.S.NegativeInfinity, sp.I):
+            raise ValueError("a number that is not finite")
+        return expr
+
+    def _any(self, node: ast.AST, depth: int) -> _Read:
+        self.nodes += 1
+        if self.nodes > MOST_NODES or depth > DEEPEST:
+            raise ValueError(
+                f"a formula of more than {MOST_NODES} operations, or more than {DEEPEST} inside of one "
+                "another"
+            )
+        if isinstance(node, ast.Constant):
+            return _constant(node.value)
+        if isinstance(node, ast.Name):
+            return self._name(node.id)
+        if isinstance(node, ast.UnaryOp):
+            return self._unary(node, depth)
+        if isinstance(node, ast.BinOp):
+            return self._binary(node, depth)
+        if isinstance(node, ast.Compare):
+            return self._comparison(node, depth)
+        if isinstance(node, ast.Call):
+            return self._call(node, depth)
+        raise ValueError(
+            f"{_short(ast.unparse(node))} is none of the things that a formula is made of"
+        )
+
+    def _number(self, node: ast.AST, depth: int) -> _Read:
+        found = self._any(node, depth + 1)
+        if found.logical:
+            raise ValueError(f"{_short(str(found.expr))} is true or false, expected a number")
+        return found
+
+    def _condition(self, node: ast.AST, depth: int) -> _Read:
+        found = self._any(node, depth + 1)
+        if not found.logical:
+            raise ValueError(f"{_short(str(found.expr))} is a number, expected a comparison")
+        return found
+
+    def _name(self, name: str) -> _Read:
+        if name in self.symbols:
+            return _Read(self.symbols[name])
+        if name in CONSTANTS:
+            return _Read(*CONSTANTS[name])
+        raise ValueError(f"the name {_short(name)} means nothing in a formula")
+
+    def _unary(self, node: ast.UnaryOp, depth: int) -> _Read:
+        if isinstance(node.op, ast.Invert):
+            return _Read(sp.Not(self._condition(node.operand, depth).expr), logical=True)
+        inner = self._number(node.operand, depth)
+        if isinstance(node.op, ast.USub):
+            return _made(operator.neg, [inner], operator.neg)
+        if isinstance(node.op, ast.UAdd):
+            return inner
+        raise ValueError("'not' is none of the operations of a formula")
+
+    def _binary(self, node: ast.BinOp, depth: int) -> _Read:
+        if isinstance(node.op, (ast.Add, ast.Sub)):
+            return self._sum(node, depth)
+        if isinstance(node.op, (ast.Mult, ast.Div)):
+            return self._product(node, depth)
+        if isinstance(node.op, ast.Pow):
+            return _power(self._number(node.left, depth), self._number(node.right, depth))
+        joint = JOINTS.get(type(node.op))
+        if joint is None:
+            what = type(node.op).__name__
+            raise ValueError(f"the operator {what} is none of the operations of a formula")
+        parts = [self._condition(part, depth) for part, _ in _chain(node, (type(node.op),))]
+        self.joined += len(parts)
+        if self.joined > MOST_JOINED:
+            raise ValueError(f"more than {MOST_JOINED} comparisons joined by 'and' and 'or'")
+        return _Read(joint(*(p.expr for p in parts)), logical=True)
+
+    def _sum(self, node: ast.BinOp, depth: int) -> _Read:
+        chain = _chain(node, (ast.Add, ast.Sub))
+        minus = [isinstance(op, ast.Sub) for _, op in chain]
+
+        def signed(parts: Sequence[Any]) -> list[Any]:
+            return [-p if m else p for p, m in zip(parts, minus, strict=True)]
+
+        return _made(
+            lambda *parts: sp.Add(*signed(parts)),
+            [self._number(part, depth) for part, _ in chain],
+            lambda *values: math.fsum(signed(values)),
+        )
+
+    def _product(self, node: ast.BinOp, depth: int) -> _Read:
+        chain = _chain(node, (ast.Mult, ast.Div))
+        below = [isinstance(op, ast.Div) for _, op in chain]
+        factors = [self._number(part, depth) for part, _ in chain]
+        if any(f.expr.is_zero and b for f, b in zip(factors, below, strict=True)):
+            raise ValueError("a division by zero")
+
+        def inverted(parts: Sequence[Any]) -> list[Any]:
+            return [1 / p if b else p for p, b in zip(parts, below, strict=True)]
+
+        return _made(
+            lambda *parts: sp.Mul(*inverted(parts)),
+            factors,
+            lambda *values: math.prod(inverted(values)),
+        )
+
+    def _comparison(self, node: ast.Compare, depth: int) -> _Read:
+        compare = COMPARISONS.get(type(node.ops[0]))
+        if len(node.ops) != 1 or compare is None:
+            raise ValueError(f"{_short(ast.unparse(node))} is none of the comparisons of a formula")
+        left = self._number(node.left, depth)
+        right = self._number(node.comparators[0], depth)
+        return self._compared(compare, left, right)
+
+    def _compared(self, compare: Any, left: _Read, right: _Read) -> _Read:
+        """SymPy tries to decide it, which is quick only where no Piecewise stands in it."""
+        if left.expr.has(sp.Piecewise) or right.expr.has(sp.Piecewise):
+            raise ValueError("a Piecewise inside of a comparison")
+        return _Read(compare(left.expr, right.expr), logical=True)
+
+    def _call(self, node: ast.Call, depth: int) -> _Read:
+        name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
+        if node.keywords:
+            raise ValueError(f"{_short(name)} is called with {node.keywords[0].arg!r}=...")
+        if name == "Piecewise":
+            return self._piecewise(node.args, depth)
+        known = FUNCTIONS.get(name)
+        arities = (2,) if name in EQUALITIES else known.arities if known else ()
+        if not arities:
+            raise ValueError(
+                f"{_short(name)} is no function of a formula, expected one of "
+                + ", ".join([*FUNCTIONS, *EQUALITIES, "Piecewise"])
+            )
+        if len(node.args) not in arities:
+            raise ValueError(f"{name} of {len(node.args)} arguments")
+        arguments = [self._number(a, depth) for a in node.args]
+        if name.startswith("bessel") and not _is_order(arguments[0].value):
+            raise ValueError(f"the order of {name} is no number between -{HIGHEST} and {HIGHEST}")
+        if known is None:
+            return self._compared(EQUALITIES[name], *arguments)
+        return _made(known.make, arguments, known.value)
+
+    def _piecewise(self, pieces: Sequence[ast.expr], depth: int) -> _Read:
+        pairs = []
+        for piece in pieces:
+            if not isinstance(piece, ast.Tuple) or len(piece.elts) != 2:
+                raise ValueError("Piecewise of something else than (value, condition)")
+            value, condition = piece.elts
+            pairs.append((self._number(value, depth).expr, self._condition(condition, depth).expr))
+        if not pairs or all(c == sp.false for _, c in pairs):
+            raise ValueError("Piecewise of nothing")
+        expr = sp.Piecewise(*pairs)
+        return _Read(expr, None if expr.free_symbols else _double(float, [expr]))
+
+
+def _is_order(value: float | None) -> bool:
+    return value is not None and abs(value) <= HIGHEST and float(2 * value).is_integer()
+
+
+def _chain(node: ast.AST, operators: tuple[type, ...]) -> list[tuple[ast.AST, ast.operator]]:
+    """The parts of a + b - c, each with the operator before it: as deep as the chain is long."""
+    parts: list[tuple[ast.AST, ast.operator]] = []
+    while isinstance(node, ast.BinOp) and isinstance(node.op, operators):
+        parts.append((node.right, node.op))
+        node = node.left
+    parts.append((node, ast.Add()))
+    return parts[::-1]
+
+
+def _constant(value: object) -> _Read:
+    if isinstance(value, bool):
+        return _Read(sp.true if value else sp.false, logical=True)
+    if isinstance(value, int):
+        return _made(lambda: sp.Integer(value), [], lambda: value)
+    if isinstance(value, float):
+        return _made(lambda: sp.Float(value), [], lambda: value)
+    raise ValueError(f"{_short(repr(value))} is no number")
+
+
+def _power(base: _Read, exponent: _Read) -> _Read:
+    if exponent.value is not None and abs(exponent.value) > LARGEST_EXPONENT:
+        raise ValueError(f"the exponent {exponent.value:g}, expected at most {LARGEST_EXPONENT}")
+    if base.expr.is_zero and exponent.value is not None and exponent.value < 0:
+        raise ValueError("a division by zero")
+    _digits(base.expr)
+    found = _made(operator.pow, [base, exponent], operator.pow)
+    _digits(found.expr)
+    return found
+
+
+def _digits(e: Expr) -> None:
+    """Raises ValueError where an exact number in it is longer than any that means something."""
+    for number in e.atoms(sp.Rational):
+        if max(abs(number.p), number.q) >= 10**MOST_DIGITS:
+            raise ValueError(f"an exact number of more than {MOST_DIGITS} digits")
+
+
+def _made(make: Callable[..., Expr], parts: Sequence[_Read], value: Callable[..., float]) -> _Read:
+    """make(*parts); where no part holds a symbol, `value` of theirs has to be a finite double first."""
+    expressions = [p.expr for p in parts]
+    values = [p.value for p in parts if p.value is not None]
+    if len(values) == len(parts):
+        number = _double(value, values)
+        return _Read(make(*expressions), number)
+    expr = make(*expressions)
+    return _Read(expr, None if expr.free_symbols else _double(float, [expr]))  # they cancelled
+
+
+def _double(value: Callable[..., float], arguments: Sequence[Any]) -> float:
+    try:
+        found = float(value(*arguments))
+    except (ValueError, OverflowError, ZeroDivisionError, TypeError):
+        found = math.nan
+    if not math.isfinite(found):
+        raise ValueError("a number that is not finite")
+    return found

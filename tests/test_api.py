@@ -1,0 +1,65 @@
+"""build_fmu(): built once, verified once, the figures in the FMU's page."""
+
+from __future__ import annotations
+
+import zipfile
+
+import pytest
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import ClosedForm, Contact, Model, Parameter, Scene, VerificationError, build_fmu
+
+m, g = symbols("m g", positive=True)
+z = dynamicsymbols("z")
+RESTING = Model(
+    name="Resting",
+    lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
+    coordinates={z: "m"},
+    constraints=[Contact("floor", z)],
+    parameters=[Parameter(m, 2.0, "kg"), Parameter(g, 9.81, "m/s^2")],
+)
+WEIGHT = ClosedForm("lambda.floor", m * g)
+
+
+def page(path) -> str:
+    with zipfile.ZipFile(path) as archive:
+        return archive.read("documentation/index.html").decode()
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_particle_at_rest_is_verified_when_it_is_built(tmp_path, target):
+    """The floor carries the weight, lambda = m g, and the page of the FMU says that this was found."""
+    path = build_fmu(RESTING, tmp_path, Scene("Resting"), [WEIGHT], target)
+    assert path == tmp_path / "Resting.fmu"
+    assert "lambda.floor" in page(path).split("Verification")[-1]
+
+
+def test_a_statement_that_does_not_hold_is_an_error_and_the_file_is_kept(tmp_path):
+    """A floor that would carry twice the weight: the message names the statement, its error and what is
+    allowed; the FMU stands, and its page shows the failure."""
+    twice = ClosedForm("lambda.floor", 2 * m * g)
+    with pytest.raises(VerificationError, match=r"lambda\.floor: FAIL 5\.0e-01") as refused:
+        build_fmu(RESTING, tmp_path, Scene("Resting"), [twice], "native")
+    assert "Resting.fmu" in str(refused.value)
+    assert "FAIL" in page(tmp_path / "Resting.fmu")
+
+
+def test_figures_change_nothing_but_the_page(tmp_path):
+    """With and without verification the FMU is the same, byte for byte, in all but its page."""
+    contents = []
+    for check in (True, False):
+        path = build_fmu(RESTING, tmp_path, None, [WEIGHT], "native", check=check)
+        with zipfile.ZipFile(path) as archive:
+            contents.append({n: archive.read(n) for n in archive.namelist()})
+    with_figures, without = contents
+    assert with_figures.pop("documentation/index.html") != without.pop("documentation/index.html")
+    assert with_figures == without
+
+
+def test_an_fmu_for_other_machines_builds(tmp_path):
+    """One without a binary for this machine cannot be simulated here, and is built all the same."""
+    foreign = "darwin64"
+    path = build_fmu(RESTING, tmp_path, None, [WEIGHT], "native", [foreign])
+    with zipfile.ZipFile(path) as archive:
+        assert any(n.startswith(f"binaries/{foreign}/") for n in archive.namelist())

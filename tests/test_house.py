@@ -1,0 +1,95 @@
+"""The house: what stands where, and that imports run in one direction."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import lagfmu
+
+ROOT = Path(lagfmu.__file__).parent
+ROOMS = (  # each imports from those before it, and from no other; `solver` from nothing, it travels alone
+    "errors",
+    "methods",
+    "solver",
+    "model",
+    "mechanics",
+    "interface",
+    "codegen",
+    "prepare",
+    "page",
+    "fmu",
+    "live",
+    "verification",
+    "study",
+    "api",
+    "cli",
+)
+FLOORS = ("base", "linear", "ode", "mechanics", "simulation", "fmi")  # of the C runtime
+MODULES = sorted(p for p in ROOT.rglob("*.py") if p.parent != ROOT or p.stem in ROOMS)
+
+
+def room(path: Path) -> str:
+    """The folder or file directly in lagfmu/ that a module belongs to."""
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def imported(path: Path) -> set[str]:
+    """The rooms that a module imports from, whenever it does."""
+    package = ["lagfmu", *path.relative_to(ROOT).parts[:-1]]
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            names = [*base, *(node.module or "").split(".")]
+            if names[0] == "lagfmu" and len(names) > 1 and names[1]:
+                found.add(names[1])
+            elif names[0] == "lagfmu":
+                found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.Import):
+            found |= {a.name.split(".")[1] for a in node.names if a.name.startswith("lagfmu.")}
+    return found
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_run_in_one_direction(path: Path) -> None:
+    """A room knows those below it: the model no solver's inside, the solver no model, and only fmu/ and
+    what stands above it any FMU."""
+    own = ROOMS.index(room(path))
+    above = {name for name in imported(path) if ROOMS.index(name) > own}
+    assert not above
+
+
+def test_the_solver_stands_alone() -> None:
+    """It travels inside python FMUs, where there is no lagfmu."""
+    for path in ROOT.joinpath("solver").glob("*.py"):
+        assert imported(path) <= {"solver"}, path.name
+
+
+def test_the_rooms_can_be_counted() -> None:
+    """What lies directly in lagfmu/ is these rooms, besides the runtime's C and the two
+    files that Python asks for."""
+    found = {p.stem for p in ROOT.iterdir() if p.suffix == ".py" or p.is_dir()}
+    assert found - {"__init__", "__main__", "__pycache__", "runtime"} == set(ROOMS)
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_the_runtime_stands_in_layers(floor: str) -> None:
+    """A C file includes headers of its own floor and of those below, and no two files share a name: in an
+    FMU's sources/ they lie side by side."""
+    place = {p.name: p.parent.name for p in ROOT.glob("runtime/*/*.[ch]")}
+    assert len(place) == len(list(ROOT.glob("runtime/*/*.[ch]")))
+    for path in ROOT.glob(f"runtime/{floor}/*.[ch]"):
+        for header in re.findall(r'^#include "(\w+\.h)"', path.read_text(), re.MULTILINE):
+            if header in place:
+                assert FLOORS.index(place[header]) <= FLOORS.index(floor), (path.name, header)
+
+
+def test_only_the_fmi_layer_says_fmi() -> None:
+    """Nothing below runtime/fmi/ names a function or a type of the standard."""
+    for path in ROOT.glob("runtime/*/*.[ch]"):
+        if path.parent.name != "fmi":
+            assert not re.search(r"\bfmi2[A-Z]\w+", path.read_text()), path.name
