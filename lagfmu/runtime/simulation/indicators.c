@@ -1,20 +1,24 @@
 /* indicators.c -- the functions that are watched within a step, and the ranges that they leave at events:
  *
  *   contact, closed   lambda >= 0
- *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch */
+ *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch
+ *   friction          see slides.c */
 #include "indicators.h"
 
 #include <math.h>
 
 #include "leg.h"
+#include "parts.h"
 
-int indicators_count(const System *s) { return s->contacts; }
+int indicators_count(const System *s) { return s->contacts + 2 * s->frictions; }
+
+int indicators_first_of_frictions(const System *s) { return s->contacts; }
 
 static Status of_contacts(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
     const Instant at = leg_instant(s, t);
     Mechanism *b = &s->stepped;
-    int any = 0;
+    int any = system->frictions > 0;
     for (int c = 0; c < system->contacts; c++) any |= s->state.closed[c];
     if (mechanism_residual(b, at, y, b->f) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++) values[c] = b->f[system->contact[c]];
@@ -22,13 +26,17 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
     if (mechanism_motion(b, at, y, y + system->n, s->active) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++)
         if (s->state.closed[c]) values[c] = b->lambda[system->contact[c]];
+    if (system->frictions > 0)
+        PARTS.slides->indicators(s, values + indicators_first_of_frictions(system));
     return OK;
 }
 
 Status indicators_at(Solver *s, double t, const double *y, double *values) {
-    return s->system->contacts == 0 ? OK : of_contacts(s, t, y, values);
+    return indicators_count(s->system) == 0 ? OK : of_contacts(s, t, y, values);
 }
 
 Range indicators_range(const Solver *s, int indicator) {
-    return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator]};
+    const int of_friction = indicator - indicators_first_of_frictions(s->system);
+    if (of_friction >= 0) return PARTS.slides->range(s, of_friction);
+    return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator], 0};
 }

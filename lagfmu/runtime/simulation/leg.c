@@ -36,6 +36,7 @@ static Status rate(void *context, double t, const double *y, double *dydt) {
 
 static Status jacobian(void *context, double t, const double *y, double *J, double *dfdt) {
     Solver *s = context;
+    if (s->system->frictions > 0) return PARTS.slides->jacobian(s, t, y, J, dfdt);
     return sensitivity_jacobian(&s->sensitivity, &s->stepped, leg_instant(s, t), s->active, y, J,
                                 dfdt);
 }

@@ -13,4 +13,5 @@ const Parts PARTS = {
     .contacts_modes = contacts_modes,
     .switch_modes = switch_modes,
     .switch_released = switch_released,
+    .slides = &SLIDES,
 };

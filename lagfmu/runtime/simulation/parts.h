@@ -8,6 +8,7 @@
 #include "contacts.h"
 #include "events.h"
 #include "rattle.h"
+#include "slides.h"
 #include "switch.h"
 
 typedef struct {
@@ -23,6 +24,8 @@ typedef struct {
                              const int *touching, const int *leaving);
     Status (*switch_modes)(Solver *s, const int *happened);
     Status (*switch_released)(Solver *s, double span);
+    /* What constraints that hold by friction need; NULL where there are none. */
+    const Slides *slides;
 } Parts;
 
 extern const Parts PARTS;

@@ -27,6 +27,9 @@ typedef struct {
     double *work_advance;      /* (4 n) of advance.c */
     double *work_events;       /* (2 n + indicators and all looks) of events.c */
     int *iwork_events;         /* (5 contacts) of events.c and switch.c */
+    Slide *trial_slides;       /* (frictions) of slides.c, with */
+    double *work_slides;       /* (2 frictions + 5 n) */
+    int *iwork_slides;         /* (4 frictions + contacts) */
     Why why;
 } Solver;
 
@@ -61,6 +64,8 @@ typedef struct {
     double energy[2];              /* kinetic, potential */
     double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
     double *departure_q, *departure_v; /* (contacts * n) in full coordinates */
+    double *slip, *margin, *power; /* (2 frictions), (frictions), (frictions) */
+    int *sticks;                   /* (frictions) */
 } Observed;
 
 void observed_layout(Observed *o, Arena *arena, const System *system);

@@ -6,7 +6,9 @@
 #include <string.h>
 
 #include "contacts.h"
+#include "indicators.h"
 #include "leg.h"
+#include "parts.h"
 
 enum { ROUNDS = 50 }; /* in which an impact is passed on between contacts that touch */
 static const double SLOW = 1e-9; /* speed of a gap, relative to the motion's own, that counts as none */
@@ -96,6 +98,9 @@ Status switch_modes(Solver *s, const int *happened) {
     const Instant at = leg_instant(s, s->state.now.t);
     int *closed = s->iwork_events + 2 * contacts, *touching = closed + contacts;
     int *leaving = touching + contacts, landed = 0;
+    const int rubs = system->frictions > 0;
+    double *arriving = rubs ? s->work_slides + 2 * system->frictions + 4 * system->n : NULL;
+    if (rubs) memcpy(arriving, s->state.v, (size_t)system->n * sizeof *arriving);
     for (int c = 0; c < contacts; c++) {
         closed[c] = s->state.closed[c];
         leaving[c] = happened[c] && closed[c];
@@ -110,6 +115,9 @@ Status switch_modes(Solver *s, const int *happened) {
     if (landed && pass_on(s, at, closed) != OK) return FAILED;
     if (find_touching(s, at, closed, touching) != OK) return FAILED;
     if (contacts_modes(s, at, s->state.q, s->state.v, closed, touching, leaving) != OK)
+        return FAILED;
+    if (rubs && PARTS.slides->change(s, at, happened + indicators_first_of_frictions(system), arriving,
+                                     closed, touching, leaving) != OK)
         return FAILED;
     system_active(system, closed, s->active);
     if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
