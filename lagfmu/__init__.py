@@ -14,6 +14,7 @@ from .model.model import (
     Input,
     Model,
     Nonholonomic,
+    Output,
     Parameter,
 )
 from .model.reactions import force_of_constraint, multiplier
@@ -33,6 +34,7 @@ __all__ = [
     "LagfmuError",
     "Model",
     "Nonholonomic",
+    "Output",
     "Parameter",
     "Scene",
     "Verification",

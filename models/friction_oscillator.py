@@ -8,13 +8,12 @@ comes to rest within |x| <= mu_s m g/k.
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Friction, Model, Nonholonomic, Parameter, Scene, multiplier
+from lagfmu import Friction, Holonomic, Model, Nonholonomic, Parameter, Scene, multiplier
 
 t = dynamicsymbols._t
 x, z = dynamicsymbols("x z")
 m, k, g = symbols("m k g", positive=True)
 mu_s, mu_k = symbols("mu_s mu_k", nonnegative=True)
-from lagfmu import Holonomic
 
 model = Model(
     name="FrictionOscillator",

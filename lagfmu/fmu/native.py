@@ -93,7 +93,9 @@ def sources_of(
     gone = files_left_out(scene, system)
     runtime = {file: text for file, text in everything.items() if file not in gone}
     generated = {
-        "model.c": model_source(eom, reduction, formulation, needs_tangents(scene, system)).encode(),
+        "model.c": model_source(
+            eom, reduction, formulation, needs_tangents(scene, system)
+        ).encode(),
         "variables.c": variables_source(table, eom, reduction, scene, system).encode(),
     }
     parts = parts_source(scene, system)

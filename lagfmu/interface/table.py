@@ -13,7 +13,7 @@ import sympy as sp
 
 from ..errors import ModelError
 from ..mechanics.coupling import coupled
-from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.equations import EquationsOfMotion, symbols_of
 from ..mechanics.formulations.minimal import Reduction
 from ..methods import FIXED_STEP, described
 from ..model.model import Contact, Nonholonomic, name_of
@@ -29,6 +29,7 @@ from ..model.units import (
     dimension_of,
     generalized_force_unit,
     multiplier_unit,
+    parse_unit,
 )
 from ..solver.state import MAXIMUM_STEPS
 from .variables import Value, Variable, VariableTable
@@ -86,7 +87,8 @@ class _Builder:
         self.known = {*self.state_names, *self.inputs}
         self.descriptions = {name_of(s): text for s, text in self.model.descriptions.items()}
         self.movable = self._movable()
-        self.starts = self._starts()
+        self.given = self._given()
+        self.starts = {name: self.given.get(name, 0.0) for name in self.state_names}
 
     # ------------------------------------------------------------------ dependencies
 
@@ -94,22 +96,23 @@ class _Builder:
         """States that the projection of the start values can move."""
         moved: set[str] = set()
         eom = self.stepped
-        for coordinates, rows in coupled(eom):
-            rows = {k for k in rows if eom.constraints[k].name not in eom.limited}
+        for coordinates, group in coupled(eom):
+            rows = {k for k in group if eom.constraints[k].name not in eom.limited}
             if any(eom.f[k] is not None for k in rows):
                 moved |= {str(eom.q[j]) for j in coordinates}
             if rows:
                 moved |= {str(eom.v[j]) for j in coordinates}
         return moved
 
-    def _starts(self) -> dict[str, float]:
+    def _given(self) -> dict[str, float]:
+        """The start values that the model says, by name."""
         model, given = self.model, {}
         for state, value in model.start.items():
             given[str(self.eom.symbols[state])] = float(value)
         if model.embedding is not None:
             for state, value in model.embedding.start.items():
                 given[str(self.eom.symbols[state])] = float(value)
-        return {name: given.get(name, 0.0) for name in self.state_names}
+        return given
 
     def symbols(self, *expressions: Expr) -> set[str]:
         """Names of the symbols that the expressions hold, reduced coordinates put in."""
@@ -202,6 +205,7 @@ class _Builder:
             initial="approx" if approx else "exact",
             description=description,
             start=self.starts[name],
+            given=name in self.given,
             unit=self.units[name],
             derivative_of=derivative_of,
             depends=(name,),
@@ -216,6 +220,7 @@ class _Builder:
             *self.motion(),
             *self.constraint_outputs(),
             *self.energies(),
+            *self.own_outputs(),
             *self.contact_outputs(),
             *self.friction_outputs(),
             self.output("solver.steps", "internal steps taken so far", None, (), "Integer"),
@@ -415,6 +420,22 @@ class _Builder:
             variables.append(self.output("energy.total", text, ENERGY, total))
         return variables
 
+    def own_outputs(self) -> list[Variable]:
+        """The model's own: their dependencies are those of all that stands in them."""
+        variables = []
+        for o in self.eom.outputs:
+            found = symbols_of(o)
+            behind = self.symbols(*found)
+            for j, (a, force) in enumerate(zip(self.eom.vdot, self.eom.Q, strict=True)):
+                if found & {a, force}:
+                    behind |= self.group(coordinate=j)
+            for k, lam in enumerate(self.eom.lam):
+                if lam in found:
+                    behind |= self.group(row=k)
+            text = o.description or f"output {o.name}"
+            variables.append(self.output(o.name, text, parse_unit(o.unit, o.name), behind))
+        return variables
+
     def contact_outputs(self) -> list[Variable]:
         variables = []
         coordinates = [(str(q), str(v)) for q, v in zip(self.eom.q, self.eom.v, strict=True)]
@@ -463,7 +484,9 @@ class _Builder:
             variables.append(self.output(f"power.{law.name}", text, POWER, names))
             tail = f"the latest start of slipping of {law.name}, 0 before the first"
             variables += [
-                self.output(f"{head}.count", f"starts of slipping of {law.name}", None, (), "Integer"),
+                self.output(
+                    f"{head}.count", f"starts of slipping of {law.name}", None, (), "Integer"
+                ),
                 self.output(f"{head}.time", f"time of {tail}", SECOND, (), discrete=True),
             ]
             for q, v in zip(self.eom.q, self.eom.v, strict=True):

@@ -34,7 +34,9 @@ def check_kinds(model: ModelFields, problems: list[str]) -> None:
     seen: set[str] = set()
     for f in model.frictions:
         if not isinstance(f, Friction):
-            problems.append(f"frictions hold {f!r}, expected Friction(...): put it in `constraints`")
+            problems.append(
+                f"frictions hold {f!r}, expected Friction(...): put it in `constraints`"
+            )
             continue
         if not isinstance(f.name, str) or not NAME.match(f.name):
             problems.append(

@@ -25,6 +25,7 @@ from .parts import (
     Input,
     ModelFields,
     Nonholonomic,
+    Output,
     Parameter,
     name_of,
 )
@@ -68,6 +69,7 @@ def check_containers(model: ModelFields) -> list[str]:
             ("constraints", model.constraints, "Holonomic"),
             ("parameters", model.parameters, "Parameter"),
             ("inputs", model.inputs, "Input"),
+            ("outputs", model.outputs, "Output"),
         )
         if isinstance(value, str) or not isinstance(value, Iterable)
     ]
@@ -79,6 +81,7 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
         ("parameters", model.parameters, (Parameter,)),
         ("inputs", model.inputs, (Input,)),
         ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact, Friction)),
+        ("outputs", model.outputs, (Output,)),
     )
     for field_name, items, types in kinds:
         expected = ", ".join(t.__name__ for t in types)
@@ -99,6 +102,8 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
     expressions = [("lagrangian", model.lagrangian), ("kinetic_energy", model.kinetic_energy)]
     expressions += [(f"force on {plain(sp.sympify(q))}", f) for q, f in model.forces.items()]
     expressions += [(f"constraint {c.name!r}", c.expression) for c in model.constraints]
+    expressions += [(f"output {o.name!r}", o.expression) for o in model.outputs]
+    expressions += [(f"otherwise of output {o.name!r}", o.otherwise) for o in model.outputs]
     relations = model.embedding.relations if model.embedding else {}
     expressions += [(f"embedding of {plain(sp.sympify(q))}", e) for q, e in relations.items()]
     for what, expression in expressions:
@@ -126,6 +131,7 @@ def _check_texts(model: ModelFields, problems: list[str]) -> None:
     texts += [(f"parameter {name_of(p.symbol)!r}", p.description) for p in model.parameters]
     texts += [(f"input {name_of(i.symbol)!r}", i.description) for i in model.inputs]
     texts += [(f"constraint {c.name!r}", c.description) for c in model.constraints]
+    texts += [(f"output {o.name!r}", o.description) for o in model.outputs]
     texts += [(f"{plain(sp.sympify(q))}", text) for q, text in model.descriptions.items()]
     for what, text in texts:
         if not isinstance(text, str):
@@ -160,7 +166,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
     named += [("input", name_of(i.symbol)) for i in model.inputs]
     seen: dict[str, str] = {}
     for kind, name in named:
-        _check_name(kind, name, problems)
+        check_name(kind, name, problems)
         if kind == "model":
             continue
         if name in seen:
@@ -171,7 +177,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
     contacts = {c.name for c in model.constraints if isinstance(c, Contact)}
     names = set()
     for constraint in model.constraints:
-        _check_name("constraint", constraint.name, problems)
+        check_name("constraint", constraint.name, problems)
         if constraint.name in names:
             problems.append(f"two constraints are called {constraint.name!r}: rename one")
         names.add(constraint.name)
@@ -189,7 +195,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
             )
 
 
-def _check_name(kind: str, name: object, problems: list[str]) -> None:
+def check_name(kind: str, name: object, problems: list[str]) -> None:
     if not isinstance(name, str) or not NAME.match(name):
         problems.append(
             f"{kind} name {name!r} is no FMI name: use letters a-z, A-Z, digits and _, "

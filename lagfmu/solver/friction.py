@@ -164,7 +164,9 @@ def motion_with_friction(
     stuck = [i for i, s in enumerate(at.slides) if on[i] and s.sticks]
     if stuck:
         best = lam
-        touched = {k for i in stuck for k in (*system.frictions[i].rows, *system.frictions[i].normal)}
+        touched = {
+            k for i in stuck for k in (*system.frictions[i].rows, *system.frictions[i].normal)
+        }
         if not all(unique[k] for k in touched):
             lam, best = best_share(system, G, rows, lam, now.C, now.load, now.static, stuck)
         for i in stuck:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
 from typing import Any
 
 import numpy as np
@@ -48,8 +47,10 @@ class Instant:
 
 @dataclass(frozen=True)
 class Motion:
-    """M, F, G, nu, gamma at a state and the solution for the rows that act (`active`); `press`: what frictions
-    do then (friction.py)."""
+    """M, F, G, nu, gamma at a state and the solution for the rows that act (`active`).
+
+    `press`: what frictions do then (friction.py).
+    """
 
     M: Matrix
     F: Vector

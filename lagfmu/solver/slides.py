@@ -11,7 +11,7 @@ together: the worst slips first; where that goes wrong, every combination is tri
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -227,7 +227,9 @@ class _Rest:
                 return tuple(slides), self.now.motion(slides)
         return None
 
-    def _all(self, guess: dict[int, tuple[float, float]]) -> Any:
+    def _all(
+        self, guess: dict[int, tuple[float, float]]
+    ) -> Iterator[tuple[tuple[Slide, ...], Motion]]:
         """Every combination, those with most sticking first."""
         free = self.resting[:MOST]
         for count in range(len(free) + 1):
@@ -337,7 +339,9 @@ def turned(leg: Leg, t: float, y: Vector) -> tuple[Slide, ...]:
     found = []
     for i, slide in enumerate(slides):
         e = heading(slide, s[i])
-        found.append(slide if slide.sticks else replace(slide, direction=(float(e[0]), float(e[1]))))
+        found.append(
+            slide if slide.sticks else replace(slide, direction=(float(e[0]), float(e[1])))
+        )
     return tuple(found)
 
 

@@ -45,6 +45,18 @@ class Friction:
 
 
 @dataclass(frozen=True)
+class Own:
+    """An output of the model's own: value(t, q, v, vdot, u, p, lam, Q) -> [value].
+
+    `otherwise`, of the same arguments, gives the value where that is not finite.
+    """
+
+    name: str
+    value: Callable[..., Any]
+    otherwise: Callable[..., Any] | None = None
+
+
+@dataclass(frozen=True)
 class System:
     """M, F, G, nu, gamma, f and the energies of n coordinates under m constraint rows.
 
@@ -59,8 +71,9 @@ class System:
     coulomb(t, q, v, u, p) -> (static, kinetic, load, normal) of the `frictions`: coefficients, and
     N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`, one after the other.
 
-    `energies` is None where they are not read.  The full system of an embedding may hold coordinates
-    that are only read: then `dynamics`, `residual` and `restitution` are None too.
+    `outputs` are those of the model's own.  `energies` is None where they are not read.  The full
+    system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
+    `restitution` are None too.
     """
 
     coordinates: tuple[str, ...]
@@ -79,6 +92,7 @@ class System:
     embedding: Embedding | None = None
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
+    outputs: tuple[Own, ...] = ()
     frictions: tuple[Friction, ...] = ()
     coulomb: Callable[..., Any] | None = None
 

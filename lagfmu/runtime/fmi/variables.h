@@ -21,6 +21,7 @@ typedef enum {
     AT_FORCE,          /* Q[index] */
     AT_SHARE,          /* entry index of G */
     AT_KINETIC, AT_POTENTIAL, AT_TOTAL,
+    AT_OUTPUT,         /* own output index */
     AT_CONTACT, AT_COUNT, AT_DEPARTURE_TIME, /* contact index */
     AT_DEPARTURE_Q, AT_DEPARTURE_V,          /* full coordinate index, of `contact` */
     AT_STEPS,
@@ -42,6 +43,7 @@ typedef struct {
     const char *text; /* start of a String */
     double min, max; /* -HUGE_VAL, HUGE_VAL where there is none */
     int positive;    /* zero is refused */
+    int given;       /* role START: the model's `start` says it; otherwise nobody did, and it is 0 */
 } Variable;
 
 extern const Variable VARIABLES[];
