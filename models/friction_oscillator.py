@@ -1,14 +1,26 @@
-"""A mass on a spring that rubs on the floor: Coulomb damping (Rao, Mechanical Vibrations, sect. 2.7).
+"""Mass on a spring that rubs on the floor: Coulomb damping (Rao, Mechanical Vibrations, sect. 2.7).
 
-x [m] from where the spring is slack.  lambda.rest [N] is the friction on the mass.  Each half swing is that
-of a free oscillation about x = -/+ d, d = mu g m/k, so that the amplitude loses 2 d; the mass stays where it
-comes to rest within |x| <= mu_s m g/k.
+x [m] is the spring's extension, z [m] the height above the floor.  lambda.floor [N] is the normal force,
+lambda.rest [N] the friction on the mass along x.  The mass is led along the floor, which can push and pull.
 """
 
-from sympy import symbols
+from sympy import Abs, Max, Min, ceiling, cos, floor, pi, sign, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Friction, Holonomic, Model, Nonholonomic, Parameter, Scene, multiplier
+from lagfmu import (
+    ClosedForm,
+    Conserved,
+    Friction,
+    Holonomic,
+    Model,
+    Nonholonomic,
+    Output,
+    Parameter,
+    Scene,
+    initial,
+    multiplier,
+    output,
+)
 
 t = dynamicsymbols._t
 x, z = dynamicsymbols("x z")
@@ -31,9 +43,42 @@ model = Model(
         Parameter(mu_s, 0.3, "1", "coefficient of static friction", min=0),
         Parameter(mu_k, 0.2, "1", "coefficient of kinetic friction", min=0),
     ],
+    outputs=[Output("spring.force", -k * x, "N", "force of the spring on the mass")],
     start={x: 0.2},
     description="Mass on a spring with Coulomb friction",
     descriptions={x: "extension of the spring", z: "height above the floor"},
 )
 
 scenes = [Scene("FrictionOscillator", stop_time=3.0, step_size=0.01)]
+
+# Released from rest at x0: each half swing is one of a free oscillation about d = mu_k m g/k, on the side from
+# which it comes, so that the amplitude loses 4 d a period; after `last` half swings it stays, within
+# mu_s m g/k.
+d, edge, omega = mu_k * m * g / k, mu_s * m * g / k, sqrt(k / m)
+begin = Abs(initial(x))
+last = Max(0, ceiling((begin - edge) / (2 * d)))
+swing = Min(floor(omega * t / pi), last)
+side = sign(initial(x)) * (1 - 2 * (swing - 2 * floor(swing / 2)))
+released = 1 - sign(Abs(initial(x.diff())))
+swinging = released * sign(last - swing)
+at_rest = released * (1 - sign(last - swing))
+
+closed_forms = [
+    ClosedForm(
+        "x while it swings",
+        side * (d + (begin - (2 * swing + 1) * d) * cos(omega * t - swing * pi)),
+        actual=x,
+        scale=begin,
+        when=swinging,
+    ),
+    ClosedForm(
+        "friction while it swings", side * mu_k * m * g, actual=output("lambda.rest"), when=swinging
+    ),
+    ClosedForm("x at rest", side * (begin - 2 * swing * d), actual=x, scale=begin, when=at_rest),
+    ClosedForm(
+        "friction at rest", k * x, actual=output("lambda.rest"), when=at_rest, scale=k * begin
+    ),
+    ClosedForm("it rests", 1, actual=output("sticks.grip"), when=at_rest),
+    ClosedForm("spring.force", -k * x, scale=k * begin),
+    Conserved("energy and heat", output("energy.total") + output("energy.dissipated")),
+]

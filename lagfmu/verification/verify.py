@@ -168,7 +168,7 @@ def claims_in(path: Path) -> list[Claim]:
             v = variables.get(name)
             if v is None:
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
-            elif (v.type == "Boolean") != name.startswith("contact.") or v.type == "String":
+            elif (v.type == "Boolean") != name.startswith(("contact.", "sticks.")) or v.type == "String":
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
@@ -204,7 +204,7 @@ def check_claim(
     claim: Claim, result: Trajectory, values: Mapping[str, float], tolerance: float
 ) -> Check:
     """One closed form on what a run returned; `values` are the parameters, by name."""
-    chosen = applies(claim, result)
+    chosen = applies(claim, result, values)
     allowed = max(claim.within * tolerance, claim.rounding)
     count = int(chosen.sum())
     if count == 0:
@@ -225,8 +225,10 @@ def check_claim(
     return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
 
 
-def applies(claim: Claim, result: Trajectory) -> NDArray[np.bool_]:
-    """The communication points of a run at which a closed form says something."""
+def applies(
+    claim: Claim, result: Trajectory, values: Mapping[str, float]
+) -> NDArray[np.bool_]:
+    """The communication points of a run, with the parameters `values`, at which a closed form says something."""
     chosen = np.ones(len(result), dtype=bool)
     if claim.while_closed is not None:
         chosen &= result[f"contact.{claim.while_closed}"]
@@ -239,7 +241,7 @@ def applies(claim: Claim, result: Trajectory) -> NDArray[np.bool_]:
         left = result[f"departure.{claim.until_departure}.count"] > 0
         chosen &= np.logical_and.accumulate(closed & ~left)
     if claim.when is not None:
-        chosen &= evaluate(claim.when, result, result, {}, claim.name) != 0
+        chosen &= evaluate(claim.when, result, result, values, claim.name) != 0
     if claim.at_departure is not None:
         left = result[f"departure.{claim.at_departure}.count"] > 0
         chosen &= (np.cumsum(left) == 1) & result[f"contact.{claim.at_departure}"][0]

@@ -226,9 +226,9 @@ class _System:
         mu = [(e, f"{what} of {a.name}") for a in laws for e, what in _coefficients(a)]
         pressing = [(c, f"{a.name}, {name}") for a in laws for name, c in a.normal.items()]
         return {
-            "mu": [Result(sp.sympify(e), text) for e, text in mu],
+            "coefficients": [Result(sp.sympify(e), text) for e, text in mu],
             "load": [Result(sp.sympify(a.load), a.name) for a in laws],
-            "c": [Result(sp.sympify(c), text) for c, text in pressing],
+            "pressing": [Result(sp.sympify(c), text) for c, text in pressing],
         }
 
     def _functions(self) -> dict[str, str]:

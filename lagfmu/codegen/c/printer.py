@@ -61,7 +61,7 @@ OURS = """
     t q v u p s sdot M F G nu gamma f e energy dt dq dv du ds dsdot dM dF dG dnu dgamma df denergy fill
     shared blocks vdot Q dvdot dlambda dQ w dw other dother
     sign heaviside Kind Formulation Row System Plan Type Role Place Variable near far small interface
-    linux unix i386 main
+    linux unix i386 main Friction coefficients load pressing
 """
 TAKEN = frozenset(
     [

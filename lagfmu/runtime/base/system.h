@@ -105,9 +105,9 @@ struct System {
     int frictions, presses;
     const Friction *friction;  /* (frictions) */
     const int *press;          /* (presses) rows whose multipliers make up the normal forces */
-    /* static and kinetic coefficient (2 frictions), load (frictions) [N], c (presses) */
+    /* static and kinetic coefficient (2 frictions), load (frictions) [N], c (presses) of the normal forces */
     void (*coulomb)(double t, const double *q, const double *v, const double *u, const double *p,
-                    double *mu, double *load, double *c);
+                    double *coefficients, double *load, double *pressing);
 };
 
 /* 1 where a row acts while the contacts stand as in `closed` (one entry a contact); 0 for rows that hold by

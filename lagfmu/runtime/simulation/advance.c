@@ -31,7 +31,7 @@ static int runs_ahead(const Solver *s) {
     if (s->system->inputs > 0 || method_of(s)->fixed) return 0;
     for (int c = 0; c < s->system->contacts; c++)
         if (!s->state.closed[c]) return 0;
-    return s->system->frictions == 0 || !slides_turn_round(s);
+    return s->system->frictions == 0 || !PARTS.slides->turns(s);
 }
 
 static void restart(Solver *s, double t, const double *y, double h) {

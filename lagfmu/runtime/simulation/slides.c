@@ -469,7 +469,7 @@ static Range range(const Solver *s, int which) {
     return (Range){0, HUGE_VAL, slide->sticks ? SLACK : slide->noise, 1};
 }
 
-int slides_turn_round(const Solver *s) {
+static int turns(const Solver *s) {
     for (int i = 0; i < s->system->frictions; i++)
         if (s->system->friction[i].rows > 1 && !s->state.slide[i].sticks) return 1;
     return 0;
@@ -477,7 +477,7 @@ int slides_turn_round(const Solver *s) {
 
 static Status turn(Solver *s, double t, const double *y) {
     Mechanism *b = &s->stepped;
-    if (!slides_turn_round(s)) return OK;
+    if (!turns(s)) return OK;
     const double *v = y + s->system->n;
     if (mechanism_evaluate(b, leg_instant(s, t), y, v) != OK) return FAILED;
     for (int i = 0; i < s->system->frictions; i++) {
@@ -548,4 +548,4 @@ static Status jacobian(Solver *s, double t, const double *y, double *J, double *
     return OK;
 }
 
-const Slides SLIDES = {&SLIDING, begin, change, renew, indicators, range, turn, work, jacobian};
+const Slides SLIDES = {&SLIDING, begin, change, renew, indicators, range, turns, turn, work, jacobian};

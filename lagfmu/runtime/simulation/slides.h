@@ -25,6 +25,8 @@ typedef struct {
     /* Two indicators a friction, of the latest motion, and their ranges. */
     void (*indicators)(const Solver *s, double *values);
     Range (*range)(const Solver *s, int which);
+    /* 1: a direction of slip changes within a step, as two rows slip. */
+    int (*turns)(const Solver *s);
     /* Directions of slip at the end of a step (t, y). */
     Status (*turn)(Solver *s, double t, const double *y);
     /* - int sum lambda_t . s dt [J] from t0 to t1, by the integrator's dense output. */
@@ -34,8 +36,5 @@ typedef struct {
 } Slides;
 
 extern const Slides SLIDES;
-
-/* A direction of slip that changes within a step: two rows slip. */
-int slides_turn_round(const Solver *s);
 
 #endif
