@@ -55,8 +55,9 @@ model = Model(
 
 scenes = [Scene("Belt", stop_time=3.0, step_size=0.01)]
 
-# It rides from x0 to x_s = mu_s m g/k, then slips: a swing about x_s - d with d = (mu_s - mu_k) m g/k, back to
-# x_s - 2 d, where it has the belt's speed again.  Riding takes 2 d/v, slipping (2/omega)(pi - atan(d omega/v)).
+# It rides from x0 to x_s = mu_s m g/k, then slips: a swing about x_s - d, d = (mu_s - mu_k) m g/k, back to
+# x_s - 2 d, where it has the belt's speed again.  It rides for 2 d/v and slips for
+# (2/omega)(pi - atan(d omega/v)).
 x_s, d, omega = mu_s * m * g / k, (mu_s - mu_k) * m * g / k, sqrt(k / m)
 first = (x_s - initial(x)) / speed
 ride = 2 * d / speed

@@ -1,4 +1,4 @@
-"""Ball thrown without spin along the lane: it slides, then rolls (Marion & Thornton, problem 11.x; Coriolis 1835).
+"""Ball thrown without spin along the lane: it slides, then rolls (Coriolis 1835).
 
 x [m] along the lane, z [m] above it, phi [rad] the turn.  lambda.touch [N] is the friction along x.
 It rolls after 2 v0/(7 mu g), at (5/7) v0.

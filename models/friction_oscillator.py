@@ -51,8 +51,8 @@ model = Model(
 
 scenes = [Scene("FrictionOscillator", stop_time=3.0, step_size=0.01)]
 
-# Released from rest at x0: each half swing is one of a free oscillation about d = mu_k m g/k, on the side from
-# which it comes, so that the amplitude loses 4 d a period; after `last` half swings it stays, within
+# Released from rest at x0: each half swing is one of a free oscillation about d = mu_k m g/k, on the side
+# from which it comes, so that the amplitude loses 4 d a period; after `last` half swings it stays, within
 # mu_s m g/k.
 d, edge, omega = mu_k * m * g / k, mu_s * m * g / k, sqrt(k / m)
 begin = Abs(initial(x))

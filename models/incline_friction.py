@@ -1,8 +1,8 @@
 """Disk (or sphere, or hoop) on an incline with friction: does it roll? (Marion & Thornton, example 7.9)
 
 y [m] down the incline, z [m] above it, theta [rad] the turn.  lambda.incline [N] is the normal force,
-lambda.rolling [N] the friction, positive down the incline.  kappa is the moment of inertia over M R^2: 1/2 for
-a disk, 2/5 for a solid sphere, 1 for a hoop.  From rest it rolls if tan(alpha) <= mu_s (1 + 1/kappa).
+lambda.rolling [N] the friction, positive down the incline.  kappa is the moment of inertia over M R^2: 1/2
+for a disk, 2/5 for a solid sphere, 1 for a hoop.  From rest it rolls if tan(alpha) <= mu_s (1 + 1/kappa).
 """
 
 from math import pi

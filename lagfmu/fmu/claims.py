@@ -13,6 +13,7 @@ import sympy as sp
 from ..errors import ModelError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
+from ..model.goal import parse
 from ..model.scene import Scene
 from .formula import read_formula, text_of
 
@@ -27,7 +28,8 @@ CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 class Claim:
     """One statement to verify, in symbols named as the FMU's variables.
 
-    `expected` is None for a conserved quantity.
+    `expected` is None for a conserved quantity; `accuracy` is the relative error that the FMU was built
+    to hold, as long as it runs with the settings that it was built with.
     """
 
     name: str
@@ -41,6 +43,13 @@ class Claim:
     within: float
     rounding: float
     when: Expr | None = None
+    accuracy: float | None = None
+
+    def allowed(self, tolerance: float, as_built: bool) -> float:
+        """The relative error that the statement may have; `as_built`: with the FMU's own settings."""
+        if as_built and self.accuracy is not None:
+            return max(self.accuracy, self.rounding)
+        return max(self.within * tolerance, self.rounding)
 
     @property
     def variables(self) -> set[str]:
@@ -146,6 +155,7 @@ def pack_closed_forms(
                     f"closed form {claim.name!r} uses {name!r}, which is no variable of the FMU"
                     + (f"; did you mean {near[0]!r}?" if near else "")
                 )
+    goal = None if scene.accuracy is None else parse(scene.accuracy)
     packed = []
     for claim in kept:
         entry: dict[str, Any] = {
@@ -155,6 +165,9 @@ def pack_closed_forms(
         for key in EXPRESSIONS:
             e = getattr(claim, key)
             entry[key] = None if e is None else _text(sp.sympify(e), names)
+        if goal is not None:
+            symbols = {str(s) for s in sp.sympify(claim.actual).free_symbols}
+            entry["accuracy"] = goal.allowed(symbols, claim.within)
         entry["symbols"] = {short: str(symbol) for symbol, short in names.items()}
         packed.append(entry)
         try:
@@ -197,14 +210,21 @@ def _claim(entry: Any) -> Claim:
     """One entry of the record.  Raises ValueError with what is wrong in it."""
     texts = {"name", *CONDITIONS, *EXPRESSIONS}
     numbers = {"within", "rounding"}
-    if not isinstance(entry, dict) or set(entry) != texts | numbers | {"symbols"}:
+    if not isinstance(entry, dict) or {*entry, "accuracy"} != {
+        *texts,
+        *numbers,
+        "symbols",
+        "accuracy",
+    }:
         raise ValueError("a closed form with other fields than this version of lagfmu knows")
     for key in texts:
         optional = key not in ("name", "actual")
         if not isinstance(entry[key], str) and not (optional and entry[key] is None):
             raise ValueError(f"{key!r} of a closed form is {entry[key]!r}, expected text")
-    for key in numbers:
-        number = entry[key]
+    for key in ("within", "rounding", "accuracy"):
+        number = entry.get(key)
+        if key == "accuracy" and number is None:
+            continue
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not number >= 0:
             raise ValueError(f"{key!r} of {entry['name']!r} is {number!r}, expected a number >= 0")
     names = entry["symbols"]
@@ -213,6 +233,8 @@ def _claim(entry: Any) -> Claim:
     symbols = {short: output(name) for short, name in names.items()}
     fields: dict[str, Any] = {key: entry[key] for key in ("name", *CONDITIONS)}
     fields |= {key: float(entry[key]) for key in numbers}
+    if entry.get("accuracy") is not None:
+        fields["accuracy"] = float(entry["accuracy"])
     for key in EXPRESSIONS:
         text = entry[key]
         fields[key] = None if text is None else read_formula(text, symbols)

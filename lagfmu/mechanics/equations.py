@@ -76,7 +76,8 @@ class EquationsOfMotion:
 
     A scene may need less than the model (prune.py): then some coordinates and constraints are not
     there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
-    equations are of coordinates that are only read: nothing is solved for them.  `frictions` say which
+    equations are of coordinates that are only read: nothing is solved for them.  `levels`: where forces
+    jump, the symbols behind the inputs that say on which side (jumps.py).  `frictions` say which
     constraints hold only as long as their multipliers stay below a part of a normal force.
     """
 
@@ -100,6 +101,12 @@ class EquationsOfMotion:
     outputs: tuple[Output, ...] = ()
     numbers: Mapping[Expr, Expr] = field(default_factory=dict)
     bare: bool = False
+    levels: tuple[Expr, ...] = ()
+
+    @property
+    def driven(self) -> tuple[Expr, ...]:
+        """What the argument u of numeric functions holds: the inputs, then the levels of jumps."""
+        return (*self.u, *self.levels)
 
     @property
     def n(self) -> int:

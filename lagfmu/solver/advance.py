@@ -1,4 +1,4 @@
-"""From one communication point to the next: leg after leg, each up to an event at a contact."""
+"""From one communication point to the next: leg after leg, each up to an event."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from . import at_contacts, at_slides
+from . import at_contacts, at_events, at_slides
 from .failure import StepFailureError
 from .indicators import indicators, is_watched
 from .instant import Instant
+from .jumps import levels_at, passed
 from .leg import Leg
 from .magnitudes import complete, is_incomplete
 from .state import Settings, State
@@ -44,7 +45,11 @@ def advance(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
         )
     with np.errstate(all="ignore"):
-        at = Instant(system, state.t, system.inputs_at(u, 0.0), p, state.slides)
+        inputs = system.inputs_at(u, 0.0)
+        if system.floors:  # the inputs may have been set
+            levels = levels_at(system, state.t, np.array(state.q), inputs, p)
+            state = replace(state, levels=levels)
+        at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
         if system.contacts and system.prescribed:
             state = at_contacts.released(at, state, state.span)
         if system.frictions:
@@ -59,8 +64,8 @@ def advance(
             events.append(state.t)
             if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
                 raise StepFailureError(
-                    f"{CHATTER} contacts open or close in {events[-1] - events[0]:.1g} s at "
-                    f"t = {state.t!r} s: the contacts chatter without end"
+                    f"{CHATTER} events in {events[-1] - events[0]:.1g} s at t = {state.t!r} s: contacts "
+                    "chatter without end, or a force jumps to and fro"
                 )
     return replace(state, span=t_end - begun)
 
@@ -126,7 +131,7 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
             continue
         steps += 1
         if watch:
-            event, before = at_contacts.first_event(leg, solver, t0, y0, y1, before, armed)
+            event, before = at_events.first_event(leg, solver, t0, y0, y1, before, armed)
             if event is not None:
                 headway.check(t0, event[0])
                 step = offered
@@ -136,7 +141,7 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
                 if leg.system.frictions:
                     lost += at_slides.dissipated(leg, solver.dense_output(), t0, event[0])
                     here = replace(here, slides=leg.state.slides, dissipated=lost)
-                return at_contacts.switched(leg, here, t0, y0, *event)
+                return _meet(leg, here, t0, y0, *event)
         if leg.system.frictions:
             lost += at_slides.dissipated(leg, solver.dense_output(), t0, solver.t)
             leg.state = replace(leg.state, slides=at_slides.turned(leg, solver.t, y1))
@@ -165,6 +170,23 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
         if leg.auto and choice.implicit != (leg.settings.method == "radau5"):
             solver = _take_over(leg, choice, solver.t, y1, t_end)
         headway.check(t0, float(solver.t))
+
+
+def _meet(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: dict[int, int]) -> State:
+    """The state right after the event at t at which these indicators left their ranges."""
+    n, contacts = leg.system.n, len(leg.system.contacts)
+    jumps = range(contacts, contacts + len(leg.system.floors))
+    ways = {k - contacts: way for k, way in left.items() if k in jumps}
+    if ways:
+        y0, t0 = leg.reach(t0, y0, t), t
+        levels = passed(leg.system, state.levels, ways)
+        state = replace(
+            state, t=t, q=tuple(y0[:n].tolist()), v=tuple(y0[n:].tolist()), levels=levels
+        )
+        leg = Leg(leg.system, leg.settings, state, leg.u, leg.p, leg.begun)
+    if not (contacts or leg.system.frictions):
+        return state
+    return at_contacts.switched(leg, state, t0, y0, t, [k for k in left if k not in jumps])
 
 
 def _judged(leg: Leg, choice: Choice, solver: Any, t0: float, y0: Vector) -> Choice:

@@ -17,6 +17,7 @@ from . import at_contacts, at_slides
 from .afar import project_from_afar, velocities_from_afar
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
+from .jumps import levels_at, settled
 from .magnitudes import TOUCH, complete, motion_speeds, sizes
 from .motion import EPS, project
 from .precedence import GIVEN, OMITTED
@@ -77,7 +78,9 @@ def start(
     """
     try:
         with np.errstate(all="ignore"):
-            at = Instant(system, t, system.inputs_at(u, 0.0), p)
+            inputs = system.inputs_at(u, 0.0)
+            levels = levels_at(system, t, np.array(q0, float), inputs, p)
+            at = Instant(system, t, [*inputs, *levels], p)
             if system.contacts:
                 at_contacts.check_restitution(system, p)
             ranks = [GIVEN] * (2 * system.n) if rank is None else list(rank)
@@ -106,6 +109,8 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
             break
         q = moved
     _check_angles(system, q)
+    if system.floors:
+        at = settled(at, q)
     size = sizes(system, q, at.p, size)
     q, v, closed = _velocities(at, q, v0, closed, size, rank[n:])
     modes: tuple[bool, ...] = ()
@@ -116,13 +121,13 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
     offset = none
     if system.frictions:
 
-        def settled(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
+        def contacts_at(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
             if not system.contacts:
                 return ()
             return at_contacts.complementary_modes(at, q, v, shut, touching)
 
         at = replace(at, slides=at_slides.begun(at, q, v, size))
-        at, modes = at_slides.settle(at, q, v, modes, settled)
+        at, modes = at_slides.settle(at, q, v, modes, contacts_at)
         limited = [row.friction is not None for row in system.rows]
         offset = np.where(limited, at.residual(q), 0.0)
     q, v = project(at, q, v, system.active(modes), offset, size)
@@ -144,6 +149,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
         departures=(nothing,) * len(system.contacts),
         slides=at.slides,
         slippings=(nothing,) * len(system.frictions),
+        levels=tuple(at.u[len(at.u) - len(system.floors) :]),
     )
     # a start value is its own scale: a start at theta0 = 1e-6 is resolved
     state = complete(at, settings, state, 0.0)

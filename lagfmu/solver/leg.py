@@ -56,7 +56,7 @@ class Leg:
 
     def at(self, t: float) -> Instant:
         u = self.system.inputs_at(self.u, t - self.begun)
-        return Instant(self.system, t, u, self.p, self.state.slides)
+        return Instant(self.system, t, [*u, *self.state.levels], self.p, self.state.slides)
 
     def split(self, y: Vector) -> tuple[Vector, Vector]:
         return y[: self.system.n], y[self.system.n :]

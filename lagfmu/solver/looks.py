@@ -34,7 +34,7 @@ def looks(
         if rows:
             q, v = leg.split(y)
             _, _, G, nu, _ = leg.at(times[-1]).evaluate(q, v)
-            f = np.abs(values[-1][[not c for c in leg.state.closed]])
+            f = np.abs(values[-1][: len(leg.state.closed)][[not c for c in leg.state.closed]])
             speed = np.abs(G[rows]) @ np.abs(v) + np.abs(nu[rows])
             ahead = 0.5 * f / np.where(speed > 0, speed, np.inf)
             near = float(ahead[speed > 0].min(initial=stride))

@@ -21,6 +21,10 @@ class Range:
     slack: float = 0.0
     rises: bool = False
 
+    def way(self, value: float) -> int:
+        """The way on which a value has left the range: 1 upwards, -1 downwards."""
+        return 1 if float(value) > self.high else -1
+
     def inside(self, value: float) -> float:
         """How far inside the range a value lies, negative outside."""
         return min(float(value) - self.low, self.high - float(value))
@@ -32,4 +36,4 @@ class Range:
 
 def first_of_frictions(system: System) -> int:
     """The number of the first indicator of a friction."""
-    return len(system.contacts)
+    return len(system.contacts) + len(system.floors)

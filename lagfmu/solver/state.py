@@ -61,8 +61,9 @@ class State:
     in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
     below which a contact touches; step [s]: the next step to try; span [s]: the communication step that
     led to t (0: none); rate [1/s]: the motion's
-    natural rate at the start; choice: what `auto` remembers; slides, slippings: one entry a friction,
-    how it stands and its latest start of slipping; dissipated [J]: by frictions and impacts so far.
+    natural rate at the start; choice: what `auto` remembers; levels: those of jumps (jumps.py);
+    slides, slippings: one entry a friction, how it stands and its latest start of slipping; dissipated
+    [J]: by frictions and impacts so far.
     """
 
     t: float
@@ -83,6 +84,7 @@ class State:
     slides: tuple[Slide, ...] = ()
     slippings: tuple[Departure, ...] = ()
     dissipated: float = 0.0
+    levels: tuple[float, ...] = ()
 
     def to_json(self) -> str:
         """Text that `from_json` turns into an equal state; floats keep every bit."""

@@ -71,6 +71,9 @@ class System:
     coulomb(t, q, v, u, p) -> (static, kinetic, load, normal) of the `frictions`: coefficients, and
     N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`, one after the other.
 
+    surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
+    is a whole number; `driven`: length of u, the inputs and the levels of jumps behind them.
+
     `outputs` are those of the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
     `restitution` are None too.
@@ -95,6 +98,9 @@ class System:
     outputs: tuple[Own, ...] = ()
     frictions: tuple[Friction, ...] = ()
     coulomb: Callable[..., Any] | None = None
+    surfaces: Callable[..., Any] | None = None
+    floors: tuple[bool, ...] = ()
+    driven: int = 0
 
     @property
     def n(self) -> int:

@@ -58,7 +58,7 @@ MATH = """
     double_t float_t size_t ptrdiff_t wchar_t max_align_t offsetof errno
 """
 OURS = """
-    t q v u p s sdot M F G nu gamma f e energy dt dq dv du ds dsdot dM dF dG dnu dgamma df denergy fill
+    t q v u p s sdot M F G nu gamma f h e energy dt dq dv du ds dsdot dM dF dG dnu dgamma df denergy fill
     shared blocks vdot Q dvdot dlambda dQ w dw other dother
     sign heaviside Kind Formulation Row System Plan Type Role Place Variable near far small interface
     linux unix i386 main Friction coefficients load pressing
@@ -93,6 +93,8 @@ def identifiers(symbols: Sequence[Expr], taken: Sequence[str] = ()) -> dict[Expr
         if text.startswith("der("):
             inner = text[4:-1]
             text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
+        if text.startswith("level("):
+            text = f"level_{text[6:-1]}"
         text = head + text.replace(".", "_")
         if MACROS.match(text):
             text = f"x_{text}"

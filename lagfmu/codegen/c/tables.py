@@ -27,7 +27,9 @@ class Tables:
         constraints: Sequence[Constraint],
         mass: Sequence[Pair],
         entries: Sequence[Pair],
+        floors: Sequence[bool] = (),
     ) -> None:
+        self.floors = floors
         self.eom, self.prefix, self.formulation = eom, prefix, formulation
         self.constraints, self.mass, self.entries = constraints, mass, entries
 
@@ -66,6 +68,8 @@ class Tables:
             parts.append(self._array("const Friction", "frictions", frictions))
             parts.append(self._integers("press", press))
         folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
+        if self.floors:
+            parts.append(self._integers("floors", [int(x) for x in self.floors]))
         if any(folded):
             parts.append(self._array("const double", "folded", [repr(x) for x in folded]))
         p = self.prefix
@@ -82,6 +86,8 @@ class Tables:
             "m": eom.m,
             "contacts": len(contacts),
             "inputs": len(eom.u),
+            "jumps": len(self.floors),
+            "floors": f"{p}floors" if self.floors else "NULL",
             "parameters": len(eom.p),
             "masses": len(self.mass),
             "entries": len(self.entries),
@@ -103,7 +109,9 @@ class Tables:
             "solve": f"{p}solve" if solve else "NULL",
             **{
                 name: p + name if name in functions else "NULL"
-                for name in ("dynamics", "residual", "energies", "restitution", "tangent")
+                for name in (
+                    *("dynamics", "residual", "surfaces", "energies", "restitution", "tangent"),
+                )
             },
             "embed": "embed" if p else "NULL",
             "embed_tangent": "embed_tangent" if p and "tangent" in functions else "NULL",

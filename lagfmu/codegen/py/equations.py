@@ -11,6 +11,7 @@ import sympy as sp
 
 from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.formulations.minimal import Reduction
+from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact, Nonholonomic
 from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
 from .function import function, identifiers
@@ -23,16 +24,19 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
 
     It needs the names System, Row, Own, Friction and Embedding of `lagfmu.solver.system`.
     """
+    eom, reduction, jumps = levelled(eom, reduction)
     if reduction is None:
-        return _imported(_system(eom, "", formulation) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n")
+        return _imported(
+            _system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
+        )
     parts = [_bare_system(eom) if eom.bare else _system(eom, "", "multipliers")]
-    names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.u, *eom.p, TIME])
+    names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.driven, *eom.p, TIME])
     names[TIME] = "t"
     parts.append(
         function(
             "embed",
             "q = phi(s, t) and v = J sdot + dphi/dt.",
-            {"t": (), "s": reduction.s, "sdot": reduction.sdot, "u": eom.u, "p": eom.p},
+            {"t": (), "s": reduction.s, "sdot": reduction.sdot, "u": eom.driven, "p": eom.p},
             {"q": reduction.phi, "v": reduction.vel},
             names,
         )
@@ -45,6 +49,7 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
             "minimal",
             rows,
             "Embedding(embed, SYSTEM_OF_COORDINATES)",
+            jumps,
         )
     )
     return _imported("\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n")
@@ -87,13 +92,14 @@ def _system(
     formulation: str,
     rows: Sequence[int] | None = None,
     embedding: str = "None",
+    jumps: Jumps = NONE,
 ) -> str:
-    names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
+    names = identifiers([*eom.q, *eom.v, *eom.driven, *eom.p])
     names[TIME] = "t"
     lower_triangle = sorted((i, j) for i, j in eom.M.todok() if i >= j)
     jacobian = sorted(eom.G.todok())
-    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.u, "p": eom.p}
-    still = {"t": (), "q": eom.q, "u": eom.u, "p": eom.p}
+    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.driven, "p": eom.p}
+    still = {"t": (), "q": eom.q, "u": eom.driven, "p": eom.p}
     parts = [
         function(
             f"{prefix}dynamics",
@@ -131,6 +137,9 @@ def _system(
     if rows is None:  # the energies of the full system serve the reduced one too
         energies = _energies(eom, names)
     parts += energies
+    if jumps.surfaces:
+        text, found = "h of each jump: where it passes 0, or a whole number.", jumps.surfaces
+        parts.append(function(f"{prefix}surfaces", text, still, {"h": [s.h for s in found]}, names))
     own = _outputs(eom) if rows is None else []
     parts += [text for _, text in own]
     label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
@@ -152,6 +161,7 @@ def _system(
         f"    embedding={embedding},\n"
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
+        f"{_surfaces(prefix, jumps, len(eom.driven))}"
         + (f"    frictions={_frictions(eom)},\n    coulomb=coulomb,\n" if eom.frictions else "")
         + f"{_listed(own)})\n"
     )
@@ -187,9 +197,16 @@ def _frictions(eom: EquationsOfMotion) -> str:
     return f"({' '.join(items)})"
 
 
+def _surfaces(prefix: str, jumps: Jumps, count: int) -> str:
+    if not jumps.surfaces:
+        return ""
+    floors = tuple(s.floor for s in jumps.surfaces)
+    return f"    surfaces={prefix}surfaces,\n    floors={floors!r},\n    driven={count},\n"
+
+
 def _bare_system(eom: EquationsOfMotion) -> str:
     """Coordinates that are only read, and the energies of them if these are."""
-    names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
+    names = identifiers([*eom.q, *eom.v, *eom.driven, *eom.p])
     names[TIME] = "t"
     energies, own = _energies(eom, names), _outputs(eom)
     system = (
@@ -214,7 +231,7 @@ def _energies(eom: EquationsOfMotion, names: dict[Expr, str]) -> list[str]:
     found = {name: e for name, e in group.items() if e is not None}
     if not found:
         return []
-    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.u, "p": eom.p}
+    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.driven, "p": eom.p}
     text = f"{' and '.join(found).capitalize()} energy [J]."
     values = {"energy": [found.get(name, sp.S.Zero) for name in group]}
     return [function("energies", text, state, values, names)]
@@ -222,7 +239,7 @@ def _energies(eom: EquationsOfMotion, names: dict[Expr, str]) -> list[str]:
 
 def _outputs(eom: EquationsOfMotion) -> list[tuple[str, str]]:
     """The model's own outputs: what makes each in the System, and the text of its functions."""
-    groups = (eom.q, eom.v, eom.vdot, eom.u, eom.p, eom.lam, eom.Q)
+    groups = (eom.q, eom.v, eom.vdot, eom.driven, eom.p, eom.lam, eom.Q)
     names = identifiers([s for group in groups for s in group])
     names[TIME] = "t"
     arguments = {

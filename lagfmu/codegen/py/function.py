@@ -18,7 +18,7 @@ from ...errors import DerivationError
 
 Expr = Any
 ARGUMENTS = (
-    *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "e", "energy"),
+    *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "h", "e", "energy"),
     *("vdot", "lam", "Q", "w", "static", "kinetic", "load", "normal"),
 )
 
@@ -61,6 +61,8 @@ def identifiers(symbols: Sequence[Expr]) -> dict[Expr, str]:
         if text.startswith("der("):
             inner = text[4:-1]
             text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
+        if text.startswith("level("):
+            text = f"level_{text[6:-1]}"
         text = text.replace(".", "_")
         while text in taken:
             text += "_"

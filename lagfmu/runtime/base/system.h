@@ -35,7 +35,9 @@ typedef struct System System;
 struct System {
     int n, m;                 /* coordinates, constraint rows */
     int contacts;             /* how many rows are contacts */
-    int inputs, parameters;   /* lengths of u and p */
+    int inputs, parameters;   /* lengths of u, without the levels of jumps behind it, and of p */
+    int jumps;                /* of the forces: how many levels stand behind the inputs in u */
+    const int *floors;        /* (jumps) 1: it jumps wherever h is a whole number; 0: where h = 0 */
     int masses, entries;      /* structural non-zeros of M's lower triangle and of G */
     const char *const *coordinates; /* (n) names */
     const Row *rows;          /* (m) */
@@ -63,6 +65,8 @@ struct System {
                      double *M, double *F, double *G, double *nu, double *gamma);
     /* f (m), 0 for a nonholonomic row */
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
+    /* h (jumps): the surfaces at which the forces jump; NULL where there are none */
+    void (*surfaces)(double t, const double *q, const double *u, const double *p, double *h);
     /* kinetic and potential energy [J]; NULL where they are not read */
     void (*energies)(double t, const double *q, const double *v, const double *u, const double *p,
                      double *energy);

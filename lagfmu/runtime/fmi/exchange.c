@@ -16,6 +16,7 @@
 #include <string.h>
 
 #include "indicators.h"
+#include "jumps.h"
 #include "leg.h"
 #include "parts.h"
 
@@ -102,14 +103,21 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
 Status exchange_indicators(Instance *x, double *indicators) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
-    if (indicators_count(s->system) == 0) return OK;
+    const System *system = s->system;
+    if (indicators_count(system) == 0) return OK;
     if (evaluate(x) != OK) return FAILED;
-    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
-        return FAILED;
-    if (s->system->frictions > 0) {
-        const int first = indicators_first_of_frictions(s->system);
+    const Instant at = leg_instant(s, s->state.now.t);
+    if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
+    if (system->jumps > 0)
+        system->surfaces(at.t, s->state.q, at.u, at.p, indicators + system->contacts);
+    for (int k = 0; k < system->jumps; k++) /* of a floor: how far to the next whole number */
+        if (system->floors[k])
+            indicators[system->contacts + k] =
+                range_inside(jumps_range(s, k), indicators[system->contacts + k]);
+    if (system->frictions > 0) {
+        const int first = indicators_first_of_frictions(system);
         PARTS.slides->indicators(s, indicators + first);
-        for (int i = 0; i < 2 * s->system->frictions; i++)
+        for (int i = 0; i < 2 * system->frictions; i++)
             indicators[first + i] += indicators_range(s, first + i).slack;
     }
     for (int c = 0; c < s->system->contacts; c++) {
@@ -144,7 +152,8 @@ static Status drift(Instance *x, double *worst) {
     return OK;
 }
 
-/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated. */
+/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated and goes
+ * further in, or is pulled back in.  x->pull: the accelerations towards them. */
 static Status find_happened(Instance *x, int *any) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
@@ -154,10 +163,12 @@ static Status find_happened(Instance *x, int *any) {
         return FAILED;
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
+        x->pull[c] = b->gamma[k] - mechanism_row(b, k, b->vdot);
         if (s->state.closed[c])
             x->happened[c] = b->lambda[k] <= 0;
         else
-            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 && mechanism_slip(b, k, s->state.v) < 0;
+            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 &&
+                             (mechanism_slip(b, k, s->state.v) < 0 || x->pull[c] > 0);
         *any |= x->happened[c];
     }
     if (s->system->frictions == 0) return OK;
@@ -174,7 +185,7 @@ Status exchange_step_done(Instance *x, int *event) {
     Solver *s = &x->solver;
     double worst;
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
-    *event = 0;
+    *event = jumps_stale(s, leg_instant(s, s->state.now.t), s->state.q);
     if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
     for (int c = 0; c < s->system->contacts; c++)
@@ -187,22 +198,39 @@ Status exchange_step_done(Instance *x, int *event) {
         memcpy(y + s->system->n, s->state.v, (size_t)s->system->n * sizeof *y);
         if (PARTS.slides->turn(s, s->state.now.t, y) != OK) return FAILED;
     }
-    *event = any || worst > LIMIT;
+    *event = *event || any || worst > LIMIT;
+    return OK;
+}
+
+/* The levels of forces that jump; `changed`: 1 if one is not what it was. */
+static Status settle_jumps(Instance *x, int *changed) {
+    Solver *s = &x->solver;
+    const Instant at = leg_instant(s, s->state.now.t);
+    int again = 0;
+    jumps_settle(s, at, s->state.q, s->state.v, NULL, changed);
+    if (s->system->jumps == 0) return OK;
+    x->evaluated = 0;
+    if (evaluate(x) != OK) return FAILED; /* what rests on a surface may be about to leave it */
+    jumps_settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
+    *changed |= again;
+    x->evaluated = 0;
     return OK;
 }
 
 Status exchange_event(Instance *x, int *moved) {
     Solver *s = &x->solver;
-    int any;
+    int any, jumped;
     double worst;
     *moved = 0;
     if (instance_start(x) != OK) return FAILED;
     if (s->system->contacts > 0 && PARTS.switch_released(s, SHORT / s->state.now.rate) != OK) return FAILED;
     x->observed = x->evaluated = 0;
+    if (settle_jumps(x, &jumped) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
-    if (any) {
+    if (any || (jumped && s->system->contacts + s->system->frictions > 0)) {
         *moved = 1;
         x->evaluated = 0;
+        if (PARTS.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
         return PARTS.switch_modes(s, x->happened);
     }
     if (drift(x, &worst) != OK) return FAILED;

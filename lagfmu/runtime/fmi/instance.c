@@ -33,6 +33,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
         x->happened = arena_ints(&scratch, indicators_count(system));
+        x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
         if (pass == 1) break;
@@ -377,7 +378,7 @@ Status instance_differentiate(Instance *x, Direction d) {
     if (s->system->tangent == NULL)
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
-    const Instant at = {s->state.now.t, s->drive.value, s->p};
+    const Instant at = leg_instant(s, s->state.now.t);
     system_active(s->system, s->state.closed, s->active);
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)

@@ -32,6 +32,7 @@ typedef struct {
     int *set;               /* (inputs) 1: set since the latest step */
     int *closed, *count;    /* (contacts) before a step */
     int *happened;          /* (contacts) */
+    double *pull;            /* (contacts) [of f/s^2] acceleration towards each, of exchange.c */
     char *saved, *backup;   /* what must be saved; a copy from before a step */
     size_t saved_size;
     Tell tell;

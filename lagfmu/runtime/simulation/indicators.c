@@ -2,17 +2,19 @@
  *
  *   contact, closed   lambda >= 0
  *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch
+ *   jump              h on the side of its level
  *   friction          see slides.c */
 #include "indicators.h"
 
 #include <math.h>
 
+#include "jumps.h"
 #include "leg.h"
 #include "parts.h"
 
-int indicators_count(const System *s) { return s->contacts + 2 * s->frictions; }
+int indicators_count(const System *s) { return s->contacts + s->jumps + 2 * s->frictions; }
 
-int indicators_first_of_frictions(const System *s) { return s->contacts; }
+int indicators_first_of_frictions(const System *s) { return s->contacts + s->jumps; }
 
 static Status of_contacts(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
@@ -32,11 +34,18 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
 }
 
 Status indicators_at(Solver *s, double t, const double *y, double *values) {
-    return indicators_count(s->system) == 0 ? OK : of_contacts(s, t, y, values);
+    const System *system = s->system;
+    if (system->contacts + system->frictions > 0 && of_contacts(s, t, y, values) != OK) return FAILED;
+    if (system->jumps == 0) return OK;
+    const Instant at = leg_instant(s, t);
+    system->surfaces(t, y, at.u, at.p, values + system->contacts);
+    return OK;
 }
 
 Range indicators_range(const Solver *s, int indicator) {
-    const int of_friction = indicator - indicators_first_of_frictions(s->system);
+    const System *system = s->system;
+    const int of_friction = indicator - indicators_first_of_frictions(system);
     if (of_friction >= 0) return PARTS.slides->range(s, of_friction);
+    if (indicator >= system->contacts) return jumps_range(s, indicator - system->contacts);
     return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator], 0};
 }

@@ -1,7 +1,8 @@
 /* indicators.h -- the functions that are watched within a step, event indicators: where one of them leaves
  * its range, the equations change.
  *
- *   0 .. contacts - 1   of contact c: lambda while it is closed, f - 0 while it is open
+ *   0 .. contacts - 1   of contact c: lambda while it is closed, f while it is open
+ *   then                of jump k of the forces: h, on the side of its level (jumps.h)
  *   then two a friction (slides.h): the reserve of its cone while it sticks, the slip velocity along its
  *                       direction while it slips; its normal force while it slips on what is no contact
  *

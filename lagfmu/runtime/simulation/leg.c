@@ -19,7 +19,9 @@ static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the st
 void leg_begin(Solver *s) { system_active(s->system, s->state.closed, s->active); }
 
 Instant leg_instant(Solver *s, double t) {
-    if (s->system->inputs > 0) drive_at(s->system, &s->drive, t, s->u);
+    const System *system = s->system;
+    if (system->inputs > 0) drive_at(system, &s->drive, t, s->u);
+    for (int k = 0; k < system->jumps; k++) s->u[system->inputs + k] = s->state.level[k];
     return (Instant){t, s->u, s->p};
 }
 

@@ -11,7 +11,7 @@
 /* The rows that act in the present modes. */
 void leg_begin(Solver *s);
 
-/* Time t with the inputs then (kept in s->u). */
+/* Time t with the inputs then, and the levels of jumps behind them (kept in s->u). */
 Instant leg_instant(Solver *s, double t);
 
 /* One accepted step towards t_bound, none longer than `longest` [s]. */

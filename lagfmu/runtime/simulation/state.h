@@ -54,12 +54,13 @@ typedef struct {
 typedef struct {
     Numbers now;
     double *q, *v;            /* (n) at t, on the constraints */
+    double *level;            /* (jumps) on which side of its surface each jump of the forces is */
     double *offset;           /* (m) the level f = offset that a row keeps which came back with its contact */
     double *scale;            /* (2 n) magnitudes below which errors in q and v are measured absolutely */
     double *size;             /* (n) the coordinates' magnitudes, for rounding */
     double *gap;              /* (contacts) |f| below which a contact touches */
     int *closed, *armed;      /* (contacts) */
-    int *left;                /* (indicators) 1: leaves its range at the event ahead */
+    int *left;                /* (indicators) its range at the event ahead: 1 upwards, -1 downwards */
     int *count;               /* (contacts) departures so far */
     double *departure_time;   /* (contacts) [s] of the latest */
     double *departure_q, *departure_v; /* (contacts * n) state then */
