@@ -19,6 +19,7 @@ from .model.model import (
 )
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
+from .model.spline import Spline
 from .verification.simulate import simulate
 from .verification.verify import Verification, verify
 
@@ -37,6 +38,7 @@ __all__ = [
     "Output",
     "Parameter",
     "Scene",
+    "Spline",
     "Verification",
     "VerificationError",
     "build_fmu",

@@ -187,7 +187,7 @@ def _check_coefficients(
             numbers[kind] = float(value) if value.is_real else math.nan
             if not 0 <= numbers[kind] < math.inf:
                 problems.append(f"{what} is {plain(value)}, expected a number of at least 0")
-    if numbers.get("kinetic", 0.0) > numbers.get("static", math.inf):
+    if "kinetic" in numbers and numbers["kinetic"] > numbers.get("static", math.inf):
         problems.append(
             f"friction {f.name!r}: kinetic = {numbers['kinetic']!r} is above static = "
             f"{numbers['static']!r}, so that it could neither stick nor slip: exchange them"

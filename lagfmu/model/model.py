@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..errors import ModelError
-from .check import declared_units, problems_of
+from .check import declared_units, problems_of, splines_of
 from .frictions import split
 from .kinds import check_containers
 from .parts import (
@@ -32,6 +32,7 @@ from .parts import (
     name_of,
 )
 from .reactions import reaction_units
+from .spline import Spline
 from .units import Unit
 
 __all__ = [
@@ -86,6 +87,11 @@ class Model(ModelFields):
     def units(self) -> dict[Expr, Unit]:
         """Unit of every symbol that may stand in an expression."""
         return declared_units(self, [])
+
+    @cached_property
+    def splines(self) -> tuple[Spline, ...]:
+        """The tables that stand in it, by name."""
+        return tuple(splines_of(self))
 
     @cached_property
     def reactions(self) -> dict[Expr, Unit]:

@@ -57,6 +57,14 @@ class Own:
 
 
 @dataclass(frozen=True)
+class Lookups:
+    """Where tables are looked up: places(t, q, v, u, p) -> x, and (name, first x, last x) of each."""
+
+    places: Callable[..., Any]
+    reach: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True)
 class System:
     """M, F, G, nu, gamma, f and the energies of n coordinates under m constraint rows.
 
@@ -98,6 +106,7 @@ class System:
     outputs: tuple[Own, ...] = ()
     frictions: tuple[Friction, ...] = ()
     coulomb: Callable[..., Any] | None = None
+    lookups: Lookups | None = None
     surfaces: Callable[..., Any] | None = None
     floors: tuple[bool, ...] = ()
     driven: int = 0
