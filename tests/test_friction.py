@@ -102,9 +102,7 @@ def test_each_motion_is_that_of_its_closed_forms(
     """Sticking, slipping, turning round, leaving: in long steps, at several parameters and starts."""
     reached: set[str] = set()
     for values in RUNS[name]:
-        result = simulate(
-            rubbing(name), tolerance=tolerance, start_values=values, step_size=0.0437
-        )
+        result = simulate(rubbing(name), tolerance=tolerance, start_values=values, step_size=0.0437)
         found = misses(name, result, values, max(tolerance, 1e-11))
         assert all(miss < 1 for miss in found.values()), (values, found)
         reached |= found.keys()
@@ -127,9 +125,7 @@ def test_multiplier_stays_within_the_cone(rubbing: Build, name: str) -> None:
         scale = 1e-12 * float(np.abs(N).max())
         assert (np.abs(lam[sticks]) <= mu_s * N[sticks] + scale).all()
         sliding = ~sticks & (np.abs(slip) > 1e-9)
-        assert lam[sliding] == pytest.approx(
-            -mu_k * N[sliding] * np.sign(slip[sliding]), abs=scale
-        )
+        assert lam[sliding] == pytest.approx(-mu_k * N[sliding] * np.sign(slip[sliding]), abs=scale)
         assert (result["power.grip"] <= 0).all()
         assert (np.diff(result["energy.dissipated"]) >= -1e-13).all()
         assert result["margin.grip"] == pytest.approx(mu_s * N - np.abs(lam), abs=scale)
@@ -176,7 +172,7 @@ def test_rollback_across_every_transition_gives_the_same_bits(rubbing: Build, na
             first = [one.get(n) for n in outputs]
             one.fmu.setFMUState(before)
             one.fmu.doStep(count * 0.05, 0.02)
-            one.fmu.setFMUState(one.fmu.deSerializeFMUState(bytes_before))
+            one.fmu.setFMUState(one.fmu.deSerializeFMUstate(bytes_before))
             one.fmu.doStep(count * 0.05, 0.05)
             assert [one.get(n) for n in outputs] == first
             one.fmu.freeFMUState(before)
