@@ -19,7 +19,6 @@ from . import at_slides
 from .instant import Motion
 from .jumps import limits, surfaces
 from .leg import Leg
-from .motion import motion
 from .ranges import Range
 from .system import System, Vector
 
@@ -31,8 +30,8 @@ def is_watched(system: System) -> bool:
 
 def indicators(leg: Leg, t: float, y: Vector) -> Vector:
     """All values at (t, y), in the present modes."""
-    q, _ = leg.split(y)
-    now = motion(leg.at(t), *leg.split(y), leg.rows) if leg.system.frictions else None
+    q, v = leg.split(y)
+    now = leg.near(t, q, v) if leg.system.frictions else None
     parts = [_of_contacts(leg, t, y, now)] if leg.system.contacts else []
     if leg.system.floors:
         at = leg.at(t)
@@ -63,6 +62,6 @@ def _of_contacts(leg: Leg, t: float, y: Vector, now: Motion | None = None) -> Ve
     contacts = list(leg.system.contacts)
     values = at.residual(q)[contacts]
     if any(leg.state.closed):
-        lam = (now or motion(at, q, v, leg.rows)).lam[contacts]
+        lam = (now or leg.near(t, q, v)).lam[contacts]
         values = np.where(leg.state.closed, lam, values)
     return values

@@ -130,7 +130,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
         at, modes = at_slides.settle(at, q, v, modes, contacts_at)
         limited = [row.friction is not None for row in system.rows]
         offset = np.where(limited, at.residual(q), 0.0)
-    q, v = project(at, q, v, system.active(modes), offset, size)
+    q, v = project(at, q, v, system.active(modes), offset, size, dependent=True)
     nothing = Departure(0, 0.0, (0.0,) * system.n, (0.0,) * system.n)
     state = State(
         t=at.t,
@@ -220,7 +220,7 @@ def _velocities(
     ]
     rows = system.active(shut)
     v = velocities_from_afar(at, q, v0, rows, rank, natural)
-    q, v = project(at, q, v, rows, np.zeros(system.m), size)
+    q, v = project(at, q, v, rows, np.zeros(system.m), size, dependent=True)
     M, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
     unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)

@@ -318,7 +318,7 @@ def dissipated(leg: Leg, dense: Any, t0: float, t1: float) -> float:
     for node, weight in zip(NODES, WEIGHTS, strict=True):
         t = t0 + (t1 - t0) * (1 + node) / 2
         q, v = leg.split(dense(t))
-        work += weight * float(power(motion(leg.at(t), q, v, leg.rows)).sum())
+        work += weight * float(power(leg.near(t, q, v)).sum())
     return -work * (t1 - t0) / 2
 
 

@@ -122,6 +122,7 @@ static Status times(Instance *x) {
         {"step count", &now->tiny, 1, MOST},
         {"mode of the step ahead", &now->ahead, 1, 1},
         {"mode of the step ahead", &now->fresh, 1, 1},
+        {"rank of the constraints", &now->dependent, 1, 1},
         {"count of events", &now->event_count, 1, indicators_count(x->solver.system)},
     };
     const Number list[] = {
@@ -202,12 +203,15 @@ static Status arrays(Instance *x) {
         {"parameters", s->p, system->parameters, -DBL_MAX},
     };
     const Ints flags[] = {
+        {"rank of the constraints", a->basis, system->m, 1},
         {"modes", a->closed, contacts, 1}, {"modes", a->armed, contacts, 1},
-        {"events", a->left, watched, 1},   {"counts", a->count, contacts, MOST},
+        {"counts", a->count, contacts, MOST},
         {"inputs", x->set, inputs, 1},     {"counts", a->slip_count, system->frictions, MOST},
     };
     if (doubles(x, list, sizeof list / sizeof *list) != OK) return FAILED;
     if (slides(x) != OK) return FAILED;
+    for (int k = 0; k < watched; k++) /* 1 upwards, -1 downwards */
+        if (a->left[k] < -1 || a->left[k] > 1) return no_state(x, "events", a->left[k]);
     return ints(x, flags, sizeof flags / sizeof *flags);
 }
 

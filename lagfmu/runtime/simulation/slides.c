@@ -496,6 +496,12 @@ static const double NODES[] = {-0.9061798459386640, -0.5384693101056831, 0, 0.53
 static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
                                  0.4786286704993665, 0.2369268850561891};
 
+/* The motion at a state that may lie off the constraints. */
+static Status move_near(Solver *s, double t, const double *y) {
+    return mechanism_motion_near(&s->stepped, leg_instant(s, t), y, y + s->system->n, s->active,
+                                 s->state.offset, s->state.size);
+}
+
 static Status work(Solver *s, double t0, double t1, double *lost) {
     const struct Frictions *f = s->stepped.friction;
     const Integrator *integrator = &s->integrator;
@@ -507,8 +513,7 @@ static Status work(Solver *s, double t0, double t1, double *lost) {
     for (int k = 0; k < 5; k++) {
         const double t = t0 + (t1 - t0) * (1 + NODES[k]) / 2;
         integrator->method->dense(integrator, t, y);
-        if (mechanism_motion(&s->stepped, leg_instant(s, t), y, y + s->system->n, s->active) != OK)
-            return FAILED;
+        if (move_near(s, t, y) != OK) return FAILED;
         for (int i = 0; i < 2 * s->system->frictions; i++)
             if (!f->slide[i / 2].sticks)
                 *lost -= WEIGHTS[k] * (t1 - t0) / 2 * f->tangential[i] * f->slip[i];
@@ -518,8 +523,7 @@ static Status work(Solver *s, double t0, double t1, double *lost) {
 
 static Status rate(Solver *s, double t, const double *y, double *vdot) {
     const size_t bytes = (size_t)s->system->n * sizeof *vdot;
-    if (mechanism_motion(&s->stepped, leg_instant(s, t), y, y + s->system->n, s->active) != OK)
-        return FAILED;
+    if (move_near(s, t, y) != OK) return FAILED;
     memcpy(vdot, s->stepped.vdot, bytes);
     return OK;
 }
