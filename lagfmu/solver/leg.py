@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from .failure import StepFailureError, plain
-from .instant import Instant
+from .instant import Instant, Motion
 from .methods import stepper
-from .motion import Motion, distance, independent, motion, project
+from .motion import distance, independent, motion, project
 from .state import Settings, State
 from .stiffness import Choice
 from .system import Matrix, System, Vector
@@ -69,10 +69,11 @@ class Leg:
         """y' (2 n); not a number where the equations cannot be evaluated: the step is cut there."""
         q, v = self.split(y)
         try:
-            if self.system.frictions:
-                now = self.near(t, q, v)
-            else:
-                now = motion(self.at(t), q, v, self.basis)
+            now = (
+                self.near(t, q, v)
+                if self.system.frictions
+                else motion(self.at(t), q, v, self.basis)
+            )
         except StepFailureError as error:
             self.cause = str(error)
             return np.full_like(y, np.nan)
