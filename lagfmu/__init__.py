@@ -6,7 +6,16 @@ from .mechanics.equations import EquationsOfMotion, derive
 from .mechanics.integrability.classify import classify
 from .model.closed_form import ClosedForm, Conserved, departure, initial, output
 from .model.convert import from_lagranges_method
-from .model.model import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter
+from .model.model import (
+    Contact,
+    Embedding,
+    Holonomic,
+    Input,
+    Model,
+    Nonholonomic,
+    Output,
+    Parameter,
+)
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .verification.simulate import simulate
@@ -23,6 +32,7 @@ __all__ = [
     "LagfmuError",
     "Model",
     "Nonholonomic",
+    "Output",
     "Parameter",
     "Scene",
     "Verification",

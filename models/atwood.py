@@ -7,7 +7,18 @@ the string's force on either mass, positive downward: the tension is -lambda.
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Holonomic, Model, Parameter, Scene, initial, output
+from lagfmu import (
+    ClosedForm,
+    Conserved,
+    Holonomic,
+    Model,
+    Output,
+    Parameter,
+    Scene,
+    initial,
+    multiplier,
+    output,
+)
 
 t = dynamicsymbols._t
 x1, x2 = dynamicsymbols("x1 x2")
@@ -32,6 +43,7 @@ model = Model(
         x1: "first mass, down from the start",
         x2: "second mass, down from the start",
     },
+    outputs=[Output("tension", -multiplier("string"), "N", "pull of the string on either mass")],
 )
 
 scenes = [Scene("Atwood", stop_time=1.0, step_size=0.01)]
@@ -44,6 +56,7 @@ free_fall = (m1 + m2) * (g * t) ** 2 / 2  # kinetic energy without the string
 
 closed_forms = [
     ClosedForm("lambda.string", -tension),
+    ClosedForm("tension", tension),
     ClosedForm("der(x1,2)", acceleration, scale=g),
     ClosedForm("x1", initial(x1) + fall),
     ClosedForm("x2", initial(x2) - fall),

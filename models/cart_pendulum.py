@@ -9,7 +9,18 @@ friction c brakes it.  With f = (x - s)^2 + y^2 - L^2 the rod's force on the bob
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Holonomic, Input, Model, Parameter, Scene, output
+from lagfmu import (
+    ClosedForm,
+    Conserved,
+    Holonomic,
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Scene,
+    multiplier,
+    output,
+)
 
 t = dynamicsymbols._t
 s, x, y, F = dynamicsymbols("s x y F")
@@ -37,6 +48,10 @@ model = Model(
         x: "bob, to the right",
         y: "bob, above the pivot",
     },
+    outputs=[
+        Output("tension", -2 * L * multiplier("rod"), "N", "pull of the rod on the bob"),
+        Output("drive.power", F * s.diff(), "W", "power of the driving force"),
+    ],
 )
 
 scenes = [Scene("CartPendulum", stop_time=10.0, step_size=0.01)]
@@ -47,14 +62,20 @@ scenes = [Scene("CartPendulum", stop_time=10.0, step_size=0.01)]
 d = x - s
 square = d.diff() ** 2 + y.diff() ** 2
 drive = F - c * s.diff()
-multiplier = m * (M * g * y + drive * d - M * square) / (2 * (M * L**2 + m * d**2))
+push = m * (M * g * y + drive * d - M * square) / (2 * (M * L**2 + m * d**2))  # lambda.rod
+
+# The rod does no work: the driving force feeds the energy and the friction.
+power = M * s.diff() * s.diff(t, 2) + m * (x.diff() * x.diff(t, 2) + y.diff() * y.diff(t, 2))
+power += m * g * y.diff() + c * s.diff() ** 2
 
 # The first two add up to  d/dt (M s' + m x' + c s) = F.
 momentum = M * s.diff() + m * x.diff() + c * s - F * t
 
 closed_forms = [
-    ClosedForm("lambda.rod", multiplier),
-    ClosedForm("der(s,2)", (drive - 2 * d * multiplier) / M),
+    ClosedForm("lambda.rod", push),
+    ClosedForm("tension", -2 * L * push),
+    ClosedForm("drive.power", power, scale=output("energy.kinetic") * sqrt(g / L)),
+    ClosedForm("der(s,2)", (drive - 2 * d * push) / M),
     ClosedForm("Q.s", -output("Q.x")),
     # while F is held constant:
     Conserved("momentum and friction's impulse", momentum, scale=m * sqrt(g * L)),

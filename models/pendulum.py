@@ -14,9 +14,11 @@ from lagfmu import (
     Embedding,
     Holonomic,
     Model,
+    Output,
     Parameter,
     Scene,
     initial,
+    multiplier,
     output,
 )
 
@@ -48,6 +50,10 @@ model = Model(
         y: "bob, above the pivot",
         theta: "angle from the downward vertical",
     },
+    outputs=[
+        Output("tension", -2 * L * multiplier("rod"), "N", "pull of the rod on the bob"),
+        Output("bob.height", y + L, "m", "bob, above its lowest place"),
+    ],
 )
 
 scenes = [
@@ -71,6 +77,8 @@ angle = ("PendulumAngle",)
 closed_forms = [
     ClosedForm("lambda.rod", -tension / (2 * L)),
     ClosedForm("lambda.rod from the state", -tension_now / (2 * L), actual=output("lambda.rod")),
+    ClosedForm("tension", tension),
+    ClosedForm("bob.height", L + y),
     ClosedForm("Q.x", -tension * x / L),
     ClosedForm("Q.y", -tension * y / L),
     ClosedForm("rod's length squared", L**2, actual=x**2 + y**2),

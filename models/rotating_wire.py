@@ -5,10 +5,21 @@ wire's angle; phi = omega t is a constraint that depends on time.  lambda [N.m] 
 torque, positive in the sense of a growing phi; its power lambda omega feeds the bead's energy.
 """
 
-from sympy import cosh, sinh, symbols
+from sympy import cosh, sinh, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Holonomic, Model, Parameter, Scene, initial, output
+from lagfmu import (
+    ClosedForm,
+    Conserved,
+    Holonomic,
+    Model,
+    Output,
+    Parameter,
+    Scene,
+    initial,
+    multiplier,
+    output,
+)
 
 t = dynamicsymbols._t
 r, phi = dynamicsymbols("r phi")
@@ -29,6 +40,10 @@ model = Model(
     start={r: 0.1, phi: 0.0, phi.diff(): 2.0},
     description="Bead on a straight wire that is turned at a constant rate",
     descriptions={r: "bead's distance along the wire", phi: "angle of the wire"},
+    outputs=[
+        Output("motor.power", multiplier("drive") * phi.diff(), "W", "power of the motor"),
+        Output("bead.speed", sqrt(r.diff() ** 2 + (r * phi.diff()) ** 2), "m/s"),
+    ],
 )
 
 scenes = [Scene("RotatingWire", stop_time=1.5, step_size=0.01)]
@@ -48,5 +63,7 @@ closed_forms = [
         2 * m * omega * r * r.diff(),
         actual=output("lambda.drive"),
     ),
+    ClosedForm("motor.power", omega * torque),
+    ClosedForm("bead.speed", sqrt(2 * output("energy.kinetic") / m)),
     Conserved("Jacobi's integral", jacobi, scale=T),
 ]

@@ -10,7 +10,7 @@ the crank.  Once the slider has set out, the spring's own motion dies within m c
 from sympy import Piecewise, cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Holonomic, Input, Model, Parameter, Scene, output
+from lagfmu import ClosedForm, Holonomic, Input, Model, Output, Parameter, Scene, multiplier, output
 
 phi, x, y, tau = dynamicsymbols("phi x y tau")
 J, m, M, r, l, s, k, c = symbols("J m M r l s k c", positive=True)  # noqa: E741 - the literature's
@@ -51,6 +51,11 @@ model = Model(
         x: "slider, from the crank's axis",
         y: "load, from the crank's axis",
     },
+    outputs=[
+        Output("rod.thrust", 2 * l * multiplier("rod"), "N", "push of the rod on the slider"),
+        Output("crank.power", tau * phi.diff(), "W", "power of the torque on the crank"),
+        Output("spring.pull", pull, "N", "pull of the spring and its damper on the slider"),
+    ],
 )
 
 scenes = [Scene("SliderCrank", method="radau5", stop_time=1.0, step_size=0.01)]
@@ -67,7 +72,7 @@ f_phi, f_x = 2 * r * x * sin(phi), 2 * (x - r * cos(phi))
 bend = 2 * x.diff() ** 2 + 2 * r * phi.diff() * (
     2 * x.diff() * sin(phi) + x * phi.diff() * cos(phi)
 )
-multiplier = -(bend + f_phi * tau / J + f_x * pull / m) / (f_phi**2 / J + f_x**2 / m)
+push = -(bend + f_phi * tau / J + f_x * pull / m) / (f_phi**2 / J + f_x**2 / m)
 
 # The rod does no work: what the energy changes by is the torque's work less the damper's.
 power = J * phi.diff() * phi.diff().diff() + m * x.diff() * x.diff().diff()
@@ -78,7 +83,8 @@ turnover = output("energy.kinetic") * phi.diff()
 closed_forms = [
     ClosedForm("x", place),
     ClosedForm("der(x)", speed),
-    ClosedForm("lambda.rod", multiplier),
-    ClosedForm("Q.phi", f_phi * multiplier),
+    ClosedForm("lambda.rod", push),
+    ClosedForm("rod.thrust", 2 * l * push),
+    ClosedForm("Q.phi", f_phi * push),
     ClosedForm("power", work, actual=power, scale=turnover),
 ]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from sympy import S, symbols
+from sympy import S, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter
@@ -58,3 +59,26 @@ def rods(name: str, joints: Sequence[tuple[float, float]]) -> Model:
 
 
 FOUR_BAR = ((0.5, 0.75**0.5), (1.9, 1.6), (2.2, 0.0))
+
+
+def pinned_rod(start: Mapping[Any, float]) -> Model:
+    """A uniform rod on a pivot in a vertical plane, in its angle and the place of its middle."""
+    x, y, theta = dynamicsymbols("x y theta")
+    m, g, length = symbols("m g l", positive=True)
+    return Model(
+        name="PinnedRod",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
+        + m * length**2 * theta.diff() ** 2 / 24
+        - m * g * y,
+        coordinates={x: "m", y: "m", theta: "rad"},
+        constraints=[
+            Holonomic("pinx", x - length / 2 * cos(theta)),
+            Holonomic("piny", y - length / 2 * sin(theta)),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(length, 1.5, "m"),
+        ],
+        start=start,
+    )

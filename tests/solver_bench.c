@@ -1,6 +1,7 @@
 /* solver_bench.c -- the solver behind plain functions, for tests through ctypes.  All memory starts
  * as values that are no numbers, so that nothing unset can pass for a result. */
 #include "contacts.h"
+#include "impact.h"
 #include "solver.h"
 
 #include <stdlib.h>
@@ -14,6 +15,7 @@ typedef struct {
     const char *moved_name[64];
     int moved_velocity[64];
     double given[64], used[64];
+    Rank rank[64]; /* of the start values */
 } Bench;
 
 void *bench_open(const System *system);
@@ -25,7 +27,10 @@ int bench_motion(Bench *b, double t, const double *q, const double *v, const int
 int bench_project(Bench *b, double t, double *q, double *v, const int *active);
 int bench_modes(Bench *b, const double *q, const double *v, int *closed, const int *touching,
                 const int *leaving);
-int bench_impact(Bench *b, const double *q, double *v, const int *closed, int landing, int plastic);
+int bench_impact(Bench *b, const double *q, double *v, const int *entering, int plastic,
+                 double *Lambda);
+int bench_impacts(Bench *b, const double *q, double *v, const int *touching, const double *slow,
+                  int *struck);
 int bench_moved(const Bench *b, int i, const char **name, double *given, double *used);
 void bench_drive(const Bench *b, double t, double *u);
 void *bench_array(Bench *b, const char *name);
@@ -50,6 +55,7 @@ void *bench_open(const System *system) {
             *all[i] = (Arena){b->memory[i], 0};
         }
     }
+    for (int i = 0; i < 64; i++) b->rank[i] = GIVEN;
     memset(b->solver.drive.value, 0, (size_t)system->inputs * sizeof(double));
     memset(b->solver.drive.first, 0, (size_t)system->inputs * sizeof(double));
     memset(b->solver.drive.second, 0, (size_t)system->inputs * sizeof(double));
@@ -64,7 +70,8 @@ void bench_close(Bench *b) {
 const char *bench_why(const Bench *b) { return b->solver.why.text; }
 
 static void moved(void *context, const char *coordinate, int is_velocity, double given,
-                  double used) {
+                  double used, Rank rank) {
+    (void)rank;
     Bench *b = context;
     int i = b->moved++;
     if (i >= 64) return;
@@ -86,7 +93,7 @@ int bench_start(Bench *b, double t, const double *q, const double *v, double tol
     b->moved = 0;
     b->solver.settings = (Settings){DOP853, tolerance, 0, 0};
     b->solver.drive.since = t;
-    return solver_start(&b->solver, t, q, v, moved, b);
+    return solver_start(&b->solver, t, q, v, b->rank, moved, b);
 }
 
 int bench_observe(Bench *b) { return solver_observe(&b->solver, &b->seen); }
@@ -111,10 +118,14 @@ int bench_modes(Bench *b, const double *q, const double *v, int *closed, const i
                           leaving);
 }
 
-int bench_impact(Bench *b, const double *q, double *v, const int *closed, int landing,
-                 int plastic) {
-    return contacts_impact(&b->solver, instant(b, b->solver.state.now.t), q, v, closed, landing,
-                           plastic);
+int bench_impact(Bench *b, const double *q, double *v, const int *entering, int plastic,
+                 double *Lambda) {
+    return impact(&b->solver, instant(b, b->solver.state.now.t), q, v, entering, plastic, Lambda);
+}
+
+int bench_impacts(Bench *b, const double *q, double *v, const int *touching, const double *slow,
+                  int *struck) {
+    return impacts(&b->solver, instant(b, b->solver.state.now.t), q, v, touching, slow, struck);
 }
 
 void bench_drive(const Bench *b, double t, double *u) {
@@ -182,7 +193,7 @@ void *bench_array(Bench *b, const char *name) {
         {"state.closed", s->state.closed}, {"state.armed", s->state.armed},
         {"state.count", s->state.count}, {"state.departure_time", s->state.departure_time},
         {"state.departure_q", s->state.departure_q}, {"state.departure_v", s->state.departure_v},
-        {"active", s->active}, {"p", s->p}, {"value", s->drive.value}, {"first", s->drive.first},
+        {"rank", b->rank}, {"active", s->active}, {"p", s->p}, {"value", s->drive.value}, {"first", s->drive.first},
         {"second", s->drive.second}, {"M", s->stepped.M}, {"G", s->stepped.G},
         {"vdot", s->stepped.vdot}, {"lambda", s->stepped.lambda},
         {"seen.q", b->seen.q}, {"seen.v", b->seen.v}, {"seen.vdot", b->seen.vdot},

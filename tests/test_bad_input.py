@@ -742,6 +742,22 @@ def test_a_run_that_stops_early_is_no_success(fmu):
     says(refusal(lambda: verify(fmu("Atwood"), crawl)), "t = 0.0 s", "step")
 
 
+def test_a_step_without_headway_ends(fmu):
+    """100 steps of 1e-9 of the natural time are refused where 50 are allowed, with the setting that allows
+    more; where as many as needed are allowed they are taken, and as a hundred calls they always were."""
+    crawl = {"solver.maximum_step": 1e-9, "solver.maximum_steps": 50}
+    with instance(fmu("PendulumCartesian")) as one:
+        one.start(crawl)
+        with refused(one, DISCARD, "no headway", "solver.maximum_steps", "more than 50"):
+            one.step(1e-7)
+    for setting, steps in ((0, 1), (50, 100)):
+        with instance(fmu("PendulumCartesian")) as one:
+            one.start(crawl | {"solver.maximum_steps": setting})
+            for _ in range(steps):
+                one.step(1e-7 / steps)
+            assert one.get("solver.steps") == pytest.approx(106, abs=8)
+
+
 def test_simulate_refuses_values_that_cannot_be():
     """The same for a model in this process."""
     model = prepare(pendulum())

@@ -151,6 +151,7 @@ def arrays(p: Prepared) -> dict[str, Any]:
         "KINETIC": [seen["energy.kinetic"]],
         "POTENTIAL": [seen.get("energy.potential")],
         "TOTAL": [seen.get("energy.total")],
+        "OUTPUT": [seen[own.name] for own in full.outputs],
         "CONTACT": [seen[f"contact.{c}"] for c in contacts],
         "COUNT": [seen[f"departure.{c}.count"] for c in contacts],
         "DEPARTURE_TIME": [seen[f"departure.{c}.time"] for c in contacts],

@@ -112,7 +112,10 @@ def test_names_are_those_of_the_design(name, xml, prepared):
             expected |= {f"departure.{c}.{s}" for s in q}
             expected |= {f"departure.{c}.velocity.{s}" for s in q}
     expected |= {f"energy.{e}" for e in ("kinetic", "potential", "total")}
-    expected |= {f"solver.{s}" for s in ("method", "tolerance", "step", "maximum_step", "steps")}
+    expected |= {
+        f"solver.{s}"
+        for s in ("method", "tolerance", "step", "maximum_step", "maximum_steps", "steps")
+    }
     constraints = "|".join(c.name for c in model.constraints)
     found = {v for v in variables(xml) if not re.fullmatch(rf"Q\.({constraints})\.\w+", v)}
     assert found == expected

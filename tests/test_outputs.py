@@ -2,15 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import fmpy
+import numpy as np
 import pytest
-from sympy import cos, symbols
+from sympy import Abs, cos, log, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Model, Parameter, force_of_constraint, multiplier
-from lagfmu.errors import ModelError
+from lagfmu import (
+    Contact,
+    Embedding,
+    Holonomic,
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Scene,
+    build_fmu,
+    force_of_constraint,
+    multiplier,
+    simulate,
+)
+from lagfmu.errors import ModelError, SimulationError
+from lagfmu.model.formula import with_outputs
+from lagfmu.page.documentation import page
+from lagfmu.prepare.prepare import prepare
+from lagfmu.study.stress.lagrange import lagrange
+from lagfmu.study.tradeoff.quantities import OWN, quantities
 
-x, y = dynamicsymbols("x y")
-m, g, L = symbols("m g L", positive=True)
+t = dynamicsymbols._t
+x, y, r, theta, F = dynamicsymbols("x y r theta F")
+m, g, L, a = symbols("m g L a", positive=True)
 CONSTANTS = (Parameter(m, 2.0, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1.5, "m"))
 
 
@@ -25,6 +48,24 @@ def pendulum(**changes) -> Model:
         "start": {x: 0.9, y: -1.2},
     }
     return Model(**(fields | changes))
+
+
+TENSION = Output("tension", -2 * L * multiplier("rod"), "N", "pull of the rod on the bob")
+HEIGHT = Output("bob.height", y + L, "m")
+SPEED = Output("bob.speed", sqrt(x.diff() ** 2 + y.diff() ** 2), "m/s")
+
+
+def hemisphere(*outputs: Output) -> Model:
+    """A particle that slides from the top of a hemisphere and leaves it at cos(theta) = 2/3."""
+    return Model(
+        name="Dome",
+        lagrangian=m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2 - m * g * r * cos(theta),
+        coordinates={r: "m", theta: "rad"},
+        constraints=[Contact("surface", r - a)],
+        parameters=(*CONSTANTS[:2], Parameter(a, 1.0, "m")),
+        start={r: 1.0, theta: 0.3},
+        outputs=outputs,
+    )
 
 
 def test_reactions_have_the_unit_that_their_constraint_gives_them():
@@ -47,4 +88,220 @@ def test_what_is_solved_for_cannot_stand_in_the_equations(changes):
     with pytest.raises(ModelError) as refused:
         pendulum(**changes)
     for part in ("solved for", "Friction", "Output"):
+        assert part in str(refused.value)
+
+
+# ---------------------------------------------------------------------------- values
+
+
+@pytest.mark.parametrize("formulation", ["multipliers", "nullspace", "minimal"])
+def test_the_tension_carries_the_weight_and_turns_the_bob(formulation):
+    """T = m v^2/L - m g y/L, whichever way lambda is found; Q and the acceleration are its parts."""
+    outputs = [
+        TENSION,
+        Output("pull", sqrt(force_of_constraint(x) ** 2 + force_of_constraint(y) ** 2), "N"),
+        Output("felt", m * sqrt(x.diff(t, 2) ** 2 + (y.diff(t, 2) + g) ** 2), "N"),
+    ]
+    embedding = Embedding({theta: "rad"}, {x: L * sin(theta), y: -L * cos(theta)}, {theta: 0.6})
+    model = pendulum(outputs=outputs, embedding=embedding)
+    run = simulate(model, 0.5, 0.1, scene=Scene("P", formulation))
+    square = run["der(x)"] ** 2 + run["der(y)"] ** 2
+    expected = 2.0 * (square - 9.81 * run["y"]) / 1.5
+    for name in ("tension", "pull", "felt"):
+        np.testing.assert_allclose(run[name], expected, rtol=1e-12)
+
+
+def test_an_output_alone_is_what_it_is_among_all(native_fmu, tmp_path):
+    """A scene of the tension, or of the height, keeps only what they need, and their values."""
+    whole = simulate(native_fmu("PendulumCartesian"), 1.0)
+    description = fmpy.read_model_description(str(native_fmu("PendulumCartesian")))
+    model = pendulum(
+        outputs=[TENSION, HEIGHT],
+        parameters=[replace(p, value=v) for p, v in zip(CONSTANTS, (1.0, 9.81, 1.0), strict=True)],
+        start={x: np.sin(1.0), y: -np.cos(1.0)},
+    )
+    scene = Scene("Alone", stop_time=1.0, outputs=["tension"])
+    assert [v.name for v in prepare(model, scene).table.outputs] == ["tension"]
+    alone = simulate(build_fmu(model, tmp_path, scene, target="native"), 1.0)
+    assert alone.dtype.names == ("time", "tension")
+    np.testing.assert_allclose(alone["tension"], whole["tension"], rtol=0, atol=0)
+    found = {q.name: q.group for q in quantities(description)}
+    assert found["tension"] == found["bob.height"] == OWN
+
+
+def test_what_needs_no_lambda_needs_no_solution_for_it():
+    """The speed and the height of the bob are read of theta alone: no multiplier is solved for."""
+    embedding = Embedding({theta: "rad"}, {x: L * sin(theta), y: -L * cos(theta)}, {theta: 0.6})
+    model = pendulum(outputs=[TENSION, HEIGHT, SPEED], embedding=embedding)
+    made = prepare(model, Scene("Height", outputs=["bob.height", "bob.speed"]))
+    assert made.formulation == "minimal"
+    assert made.coded.bare
+    run = simulate(made, 0.5, 0.1)
+    energy = 9.81 * run["bob.height"] + run["bob.speed"] ** 2 / 2
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-7)
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_quotient_has_another_value_where_it_has_none(target, tmp_path):
+    """Tangential over normal force, 0 in flight: finite on both sides of the departure."""
+    weight = Output("slope", m * g * sin(theta) / multiplier("surface"), "1", otherwise=-1)
+    model = hemisphere(weight)
+    run = simulate(build_fmu(model, tmp_path, Scene("Dome", step_size=0.05), target=target), 1.0)
+    closed = run["contact.surface"]
+    assert closed[0]
+    assert not closed[-1]
+    tangent = 2.0 * 9.81 * np.sin(run["theta"][closed])
+    np.testing.assert_allclose(run["slope"][closed], tangent / run["lambda.surface"][closed])
+    assert (run["slope"][~closed] == -1).all()
+
+
+HEADING = Output("heading", x.diff() / SPEED.expression, "1")
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_value_that_is_none_is_refused_by_name(target, tmp_path):
+    """The direction of a bob that is brought to rest: 0/0, told with the output and the remedy."""
+    moving = {x: 0.9, y: -1.2, x.diff(): 0.8, y.diff(): 0.6}
+    path = build_fmu(pendulum(outputs=[HEADING], start=moving), tmp_path, target=target)
+    assert simulate(path, 0.1)["heading"][0] == pytest.approx(0.8, rel=1e-12)
+    with pytest.raises(SimulationError) as refused:
+        simulate(path, 0.1, start_values={"der(x)": 0.0, "der(y)": 0.0})
+    for part in ("'heading' has no value at t = 0", "otherwise"):
+        assert part in str(refused.value)
+
+
+def test_a_model_whose_output_has_no_value_at_its_start_is_refused():
+    """Told when the FMU is built, by the same words."""
+    with pytest.raises(ModelError, match="'heading' has no value"):
+        prepare(pendulum(outputs=[HEADING]))
+
+
+def test_what_an_output_depends_on_is_told(prepared):
+    """The power F s' depends on F and s' at an instant; the tension on all that moves, and on F."""
+    table = prepared("CartPendulum").table
+    assert table["drive.power"].depends == ("F", "der(s)")
+    assert {"F", "x", "der(x)"} <= set(table["tension"].depends)
+    assert table["tension"].unit.name == "N"
+    assert "F" in table["drive.power"].depends_initially
+
+
+def test_the_judge_derives_an_output_from_the_model(prepared):
+    """Lagrange's equations of a model also say what each of its own outputs must be."""
+    made = prepared("PendulumCartesian")
+    names = frozenset(v.name for v in made.table.variables)
+    forms = {f.name: f for f in lagrange(made.model, names)}
+    assert forms["tension"].expected == TENSION.expression.xreplace(
+        {L: made.model.parameters[2].symbol}
+    )
+    assert "bob.height" in forms
+
+
+def test_the_page_shows_what_an_output_is_made_of(prepared):
+    """The expression among the equations, the variable with unit and description in the table."""
+    text = page(prepared("PendulumCartesian"))
+    assert "Outputs of the model" in text
+    assert "pull of the rod on the bob" in text
+
+
+# ---------------------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize(
+    ("output", "parts"),
+    [
+        (Output("tension", -2 * multiplier("rod"), "N"), ("'tension'", "N/m", "expected N")),
+        (Output("h", y + m, "m"), ("output 'h'", "'m' (unit kg)", "unit m")),
+        (Output("h", y + L, ""), ("output 'h' has no unit", "give one")),
+        (Output("h", y + L, "mm"), ("output 'h'", "1 mm = 0.001 m")),
+        (Output("tension", multiplier("rope"), "N/m"), ("lambda.rope", "constraint", "rod")),
+        (Output("f", force_of_constraint(r), "N"), ("Q.r", "coordinate", "x, y")),
+        (Output("f", symbols("k") * y, "N"), ("output 'f'", "k is neither", "declare")),
+        (Output("jerk", x.diff(t, 3), "m/s^3"), ("output 'jerk'", "der(x,3)", "at most 2")),
+        (Output("rate", F.diff(), "W"), ("output 'rate'", "der(F)", "prescribed")),
+        (Output("x", y, "m"), ("'x' is used twice", "rename")),
+        (Output("x.high", y, "m"), ("'x' would be a variable", "x.high", "group")),
+        (Output("energy.mine", m * g * y, "J"), ("'energy'", "reserved", "choose")),
+        (Output("bob height", y, "m"), ("'bob height'", "no FMI name", "bob.height")),
+        (Output("h", "y", "m"), ("output 'h'", "no SymPy expression")),
+        (Output("h", y, "m", description=3), ("output 'h'", "expected a text")),
+        (Output("h", y, "m", otherwise=m), ("output 'h', otherwise", "kg", "m")),
+        (y + L, ("outputs hold", "Output")),
+    ],
+)
+def test_an_output_that_cannot_be_is_told(output, parts):
+    """The output, what is wrong with it, what was expected and what to do."""
+    with pytest.raises(ModelError) as refused:
+        pendulum(outputs=[output], inputs=[Input(F, "N")], forces={x: F})
+    for part in parts:
+        assert part in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("tension = -2*L*lambda.rod [N]", TENSION),
+        ("bob.speed = sqrt(der(x)^2 + der( y )**2) [m/s]", SPEED),
+        ("felt = m*abs(der(x,2)) + 0.5*Q.y [N]", None),
+    ],
+)
+def test_an_output_of_the_command_line_is_that_of_the_file(text, expected):
+    """The FMU's names in a formula mean the model's coordinates, rates, lambda and Q."""
+    (found,) = with_outputs(pendulum(), [text]).outputs
+    if expected is None:
+        value = m * Abs(x.diff(t, 2)) + force_of_constraint(y) / 2
+        assert (found.expression - value).evalf() == 0
+    else:
+        assert (found.name, found.expression, found.unit) == (
+            expected.name,
+            expected.expression,
+            expected.unit,
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("tension", ("NAME = EXPRESSION [UNIT]", "lambda.rod [N]")),
+        ("tension = -2*L*lambda.rope [N]", ("'lambda.rope' is unknown", "'lambda.rod'")),
+        ("h = y + [m]", ("'y +' is no expression",)),
+        ("h = exec(1) [m]", ("'exec' is no function",)),
+        ("h = y if x else L [m]", ("'if' is unknown",)),
+        ("h = (y, L) [m]", ("no part of an expression",)),
+        ("h = sqrt() [m]", ("sqrt cannot take 0 arguments",)),
+        ("h = y*y [m]", ("output 'h'", "m2", "expected m")),
+    ],
+)
+def test_a_formula_that_cannot_be_read_is_told(text, parts):
+    """What is wrong in it, and what was expected; nothing of it is executed."""
+    with pytest.raises(ModelError) as refused:
+        with_outputs(pendulum(), [text])
+    for part in parts:
+        assert part in str(refused.value)
+
+
+def test_two_outputs_of_one_name_are_told():
+    """Both are named, and a list is asked for where there is none."""
+    with pytest.raises(ModelError, match=r"'bob\.height' is used twice"):
+        pendulum(outputs=[HEIGHT, HEIGHT])
+    with pytest.raises(ModelError, match=r"outputs = .*expected a list"):
+        pendulum(outputs=TENSION)
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        1 / multiplier("surface"),
+        force_of_constraint(theta) / (2 * force_of_constraint(r)),
+        log(Abs(multiplier("surface"))),
+    ],
+)
+def test_a_quotient_by_what_vanishes_in_the_open_needs_a_value(expression):
+    """lambda of a contact is 0 in the open: the model is refused, and `otherwise` named."""
+    unit = {"1": "1/N", "f": "m", "l": "1"}
+    kind = (
+        "l" if expression.has(log) else "f" if expression.has(force_of_constraint(theta)) else "1"
+    )
+    with pytest.raises(ModelError) as refused:
+        hemisphere(Output("ratio", expression, unit[kind]))
+    for part in ("output 'ratio'", "while the contact 'surface' is open", "otherwise=0"):
         assert part in str(refused.value)

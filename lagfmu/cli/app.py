@@ -8,6 +8,7 @@ import enum
 import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,6 +24,7 @@ from ..fmu.native import takes_long
 from ..interface.variables import VariableTable
 from ..live.command import write_page
 from ..model.file import ModelFile, load
+from ..model.formula import with_outputs
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
@@ -31,6 +33,7 @@ from ..study.tradeoff.page import section
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification, verify
 from .options import (
+    AddOutput,
     Contacts,
     Derivatives,
     Fixed,
@@ -154,6 +157,7 @@ def build(
     formulation: Formulation = None,
     derivatives: Derivatives = None,
     name: Name = None,
+    add_output: AddOutput = None,
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
@@ -168,7 +172,7 @@ def build(
             raise LagfmuError(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
-        file = load(model)
+        file = _load(model, add_output)
         for s in narrowed(_chosen(file, scene), **needs):
             choice = ""
             if s.accuracy is not None:
@@ -229,6 +233,7 @@ def show(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
 
@@ -238,7 +243,7 @@ def show(
     needs |= {"contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
     with _plainly():
-        file = load(model)
+        file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
             show_prepared(prepare(file.model, s), console)
 
@@ -275,16 +280,21 @@ def simulate_command(
         typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
+    add_output: AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest."""
     with _plainly():
         source: Any = target
         if target.suffix == ".py":
-            file = load(target)
+            file = _load(target, add_output)
             source = prepare(file.model, _chosen(file, None if scene is None else [scene])[0])
             name = source.scene.name
             variables = source.table.variables
             units = {v.name: v.unit.name for v in variables if v.unit is not None}
+        elif add_output:
+            raise LagfmuError(
+                "--add-output is for a model file: an FMU has the outputs it was built with"
+            )
         else:
             description = read_description(target)
             name, variables = description.modelName, description.modelVariables
@@ -384,6 +394,12 @@ def stress(
         found = stress_fmus(targets, out, console, target.value, scene or (), quick, limit)
     if any(f.count(WRONG) for f in found):
         raise typer.Exit(1)
+
+
+def _load(path: Path, added: list[str] | None) -> ModelFile:
+    """A model file, with further outputs."""
+    file = load(path)
+    return replace(file, model=with_outputs(file.model, added or []))
 
 
 def _chosen(file: ModelFile, names: list[str] | None) -> list[Scene]:

@@ -46,6 +46,16 @@ Derivatives = Annotated[
         rich_help_panel="What the scene needs",
     ),
 ]
+AddOutput = Annotated[
+    Names,
+    typer.Option(
+        "--add-output",
+        metavar="'NAME = EXPRESSION [UNIT]'",
+        help="An output besides those of the file, of the FMU's names: "
+        "'tension = -2*L*lambda.rod \\[N]'; repeatable.",
+        rich_help_panel="What the scene needs",
+    ),
+]
 Name = Annotated[
     str | None,
     typer.Option(help="Another name for the FMU.", rich_help_panel="What the scene needs"),

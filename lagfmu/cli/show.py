@@ -16,6 +16,7 @@ from ..model.model import Contact, Nonholonomic, name_of
 from ..page.documentation import shown
 from ..page.savings import Savings, savings
 from ..page.typeset import Notation, typeset
+from ..solver.precedence import OMITTED
 
 if TYPE_CHECKING:
     from ..prepare.prepare import Prepared
@@ -137,6 +138,7 @@ def _units(prepared: Prepared) -> Table:
         names += [str(s) for s in prepared.reduction.s if s not in eom.q]
     names += [f"lambda.{c.name}" for c in eom.constraints]
     names += [f"Q.{q}" for q in eom.q if f"Q.{q}" in prepared.table]
+    names += [o.name for o in eom.outputs]
     for name in (n for n in names if n in prepared.table):
         v = prepared.table[name]
         table.add_row(Text(name), Text(shown(v.unit) or "1"), Text(v.description))
@@ -148,7 +150,7 @@ def _starts(prepared: Prepared, console: Console) -> None:
     moved = prepared.structure.start.moved
     if not moved:
         console.print(Text("  as given: they satisfy the constraints"))
-    for name, given, used in moved:
-        unit = shown(prepared.whole[name].unit)
-        text = f"  {name} = {given:.10g} is projected to {used:.10g} {unit}".rstrip()
-        console.print(Text(text))
+    for m in moved:
+        unit = shown(prepared.whole[m.name].unit)
+        said = "is left out: it becomes" if m.rank == OMITTED else f"= {m.given!r} is projected to"
+        console.print(Text(f"  {m.name} {said} {m.used!r} {unit}".rstrip()), soft_wrap=True)

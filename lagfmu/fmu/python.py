@@ -50,10 +50,10 @@ Names are the model's: der_theta is the velocity of theta, lambda stands on the 
 """
 
 from {package}.fmu.slave import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
-from {package}.solver.system import Embedding, Row, System
+from {package}.solver.system import Embedding, Own, Row, System
 {equations}
 
-# name, type, what may set it, start, min, max, positive; the position is the reference
+# name, type, what may set it, start, min, max, positive, given in the model; the position is the reference
 VARIABLES = (
 {variables})
 
@@ -126,7 +126,7 @@ def _script(
     methods: Sequence[str],
 ) -> str:
     rows = "".join(
-        f"    {(v.name, v.kind, v.role, v.start, v.minimum, v.maximum, v.positive)!r},\n"
+        f"    {(v.name, v.kind, v.role, v.start, v.minimum, v.maximum, v.positive, v.given)!r},\n"
         for v in table.variables
     )
     equations = source(eom, reduction, scene.formulation or "multipliers")

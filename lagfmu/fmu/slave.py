@@ -25,6 +25,7 @@ from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import Values, observe
+from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.state import SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
 from .references import end_once, keep, keep_module_of
@@ -60,12 +61,12 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     """A simulation of `system` behind the FMI functions.
 
     The generated subclass gives `system`, `variables` (name, kind, role, start, min, max, must it be
-    positive; the position is the value reference), `default_tolerance`, the `methods` that can be
-    chosen, the default method and fixed step, and `identity`.
+    positive, does the model give the start; the position is the value reference), `default_tolerance`, the
+    `methods` that can be chosen, the default method and fixed step, and `identity`.
     """
 
     system: System
-    variables: Sequence[tuple[str, str, str, Any, float | None, float | None, bool]]
+    variables: Sequence[tuple[str, str, str, Any, float | None, float | None, bool, bool]]
     default_tolerance: float
     methods: Sequence[str]
     default_method: str
@@ -215,7 +216,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set parameters, start values (before the end of initialization) or inputs."""
         for vr, value in zip(vrs, values, strict=True):  # all are checked before one is set
-            name, _, _, _, low, high, positive = self._settable(vr, "Real")
+            name, _, _, _, low, high, positive, _ = self._settable(vr, "Real")
             if not math.isfinite(value):
                 raise Refused(f"{name!r} = {value!r}, expected a finite number")
             if (low is not None and value < low) or (high is not None and value > high):
@@ -305,18 +306,25 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             tolerance=max(tolerance, SMALLEST_TOLERANCE),
             step=value.get("solver.step", self.default_step),
             maximum_step=value["solver.maximum_step"],
+            maximum_steps=value["solver.maximum_steps"],
         )
         self.p = self._values(self.parameters)
-        q = [value[c] for c in self.system.coordinates]
-        v = [value[f"der({c})"] for c in self.system.coordinates]
-        u = self._values(self.inputs)
-        found = start(self.system, self.settings, self.start_time, q, v, u, self.p)
-        for name, given, used in found.moved:
-            self._warn(
-                f"start value {name} = {given!r} misses the constraints: projected to {used!r} "
-                f"(moved by {used - given:.3g})"
-            )
+        states = [*self.system.coordinates, *(f"der({c})" for c in self.system.coordinates)]
+        y, rank = [value[name] for name in states], [self._rank(name) for name in states]
+        n, u = self.system.n, self._values(self.inputs)
+        found = start(self.system, self.settings, self.start_time, y[:n], y[n:], u, self.p, rank)
+        for moved in found.moved:
+            if moved.rank == OMITTED:
+                self.log(str(moved), Fmi2Status.ok, "logEvents")
+            else:
+                self._warn(str(moved))
         self.state, self.observed = found.state, None
+
+    def _rank(self, name: str) -> int:
+        """Who said a start value: the importer if it differs from what is described, the model, nobody."""
+        k = self.reference[name]
+        described, given = self.variables[k][3], self.variables[k][7]
+        return SET if self.values[k] != described else GIVEN if given else OMITTED
 
     def _warn(self, message: str) -> None:
         self.log(message, Fmi2Status.warning, "logStatusWarning")

@@ -13,6 +13,7 @@ from ..errors import BuildError
 from ..model.closed_form import ClosedForm, Conserved
 from ..page.documentation import page
 from ..prepare.prepare import Prepared
+from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
 from .claims import pack_closed_forms
@@ -32,10 +33,14 @@ def write(
 ) -> Path:
     """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
 
-    `choice` is HTML on how the solver settings were chosen.  For the rest see api.build_fmu.
+    `choice` is HTML on how the solver settings were chosen.  For the rest see api.build_fmu.  Warns of
+    each start value that is moved onto the constraints.  Raises ModelError if one in the model's `start`
+    moves by more than 1e-6 of its coordinate's size.
     """
     if target not in TARGETS:
         raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
+    check_given(prepared.model.name, prepared.structure.start.moved)
+    tell(prepared.structure.start.moved)
     prepared = _as_built(prepared, target)
     extra = {
         PAGE: page(prepared, choice=choice).encode(),

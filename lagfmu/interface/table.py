@@ -13,7 +13,7 @@ import sympy as sp
 
 from ..errors import ModelError
 from ..mechanics.coupling import coupled
-from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.equations import EquationsOfMotion, symbols_of
 from ..mechanics.formulations.minimal import Reduction
 from ..methods import FIXED_STEP, described
 from ..model.model import Contact, Nonholonomic, name_of
@@ -26,7 +26,9 @@ from ..model.units import (
     dimension_of,
     generalized_force_unit,
     multiplier_unit,
+    parse_unit,
 )
+from ..solver.state import MAXIMUM_STEPS
 from .variables import Value, Variable, VariableTable
 
 Expr = Any
@@ -81,7 +83,8 @@ class _Builder:
         self.known = {*self.state_names, *self.inputs}
         self.descriptions = {name_of(s): text for s, text in self.model.descriptions.items()}
         self.movable = self._movable()
-        self.starts = self._starts()
+        self.given = self._given()
+        self.starts = {name: self.given.get(name, 0.0) for name in self.state_names}
 
     # ------------------------------------------------------------------ dependencies
 
@@ -96,14 +99,15 @@ class _Builder:
                 moved |= {str(eom.v[j]) for j in coordinates}
         return moved
 
-    def _starts(self) -> dict[str, float]:
+    def _given(self) -> dict[str, float]:
+        """The start values that the model says, by name."""
         model, given = self.model, {}
         for state, value in model.start.items():
             given[str(self.eom.symbols[state])] = float(value)
         if model.embedding is not None:
             for state, value in model.embedding.start.items():
                 given[str(self.eom.symbols[state])] = float(value)
-        return {name: given.get(name, 0.0) for name in self.state_names}
+        return given
 
     def symbols(self, *expressions: Expr) -> set[str]:
         """Names of the symbols that the expressions hold, reduced coordinates put in."""
@@ -196,6 +200,7 @@ class _Builder:
             initial="approx" if approx else "exact",
             description=description,
             start=self.starts[name],
+            given=name in self.given,
             unit=self.units[name],
             derivative_of=derivative_of,
             depends=(name,),
@@ -210,6 +215,7 @@ class _Builder:
             *self.motion(),
             *self.constraint_outputs(),
             *self.energies(),
+            *self.own_outputs(),
             *self.contact_outputs(),
             self.output("solver.steps", "internal steps taken so far", None, (), "Integer"),
         ]
@@ -273,6 +279,13 @@ class _Builder:
             ),
             *([step] if set(FIXED_STEP).intersection(methods) else []),
             setting("maximum_step", 0.0, SECOND, "largest adaptive step; 0: no limit"),
+            setting(
+                "maximum_steps",
+                MAXIMUM_STEPS,
+                ONE,
+                "steps shorter than 1e-6 of the natural time that a communication step may take; "
+                "0: no limit",
+            ),
         ]
 
     def drives(self) -> list[Variable]:
@@ -397,6 +410,22 @@ class _Builder:
         if T is not None and V is not None:
             text = "kinetic plus potential energy"
             variables.append(self.output("energy.total", text, ENERGY, total))
+        return variables
+
+    def own_outputs(self) -> list[Variable]:
+        """The model's own: their dependencies are those of all that stands in them."""
+        variables = []
+        for o in self.eom.outputs:
+            found = symbols_of(o)
+            behind = self.symbols(*found)
+            for j, (a, force) in enumerate(zip(self.eom.vdot, self.eom.Q, strict=True)):
+                if found & {a, force}:
+                    behind |= self.group(coordinate=j)
+            for k, lam in enumerate(self.eom.lam):
+                if lam in found:
+                    behind |= self.group(row=k)
+            text = o.description or f"output {o.name}"
+            variables.append(self.output(o.name, text, parse_unit(o.unit, o.name), behind))
         return variables
 
     def contact_outputs(self) -> list[Variable]:

@@ -22,7 +22,8 @@ class Variable:
     `kind` is Real, Integer, Boolean or String; `role` says what may set it: parameter, start, input,
     solver, or output (nothing).  `depends` are the inputs and states that it is computed from at a
     communication point, `depends_initially` the inputs and exact start values at the start.
-    `positive`: zero, though not below the minimum, makes no sense.
+    `positive`: zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's
+    `start` says it; otherwise it is 0 because nobody did.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     positive: bool = False
+    given: bool = False
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
 

@@ -22,7 +22,8 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
-from ..model.model import Constraint, Model, Nonholonomic, Parameter, name_of
+from ..model.model import Constraint, Model, Nonholonomic, Output, Parameter, name_of
+from ..model.reactions import force_of_constraint, multiplier
 from ..model.units import Unit
 
 Expr = Any
@@ -39,7 +40,8 @@ class EquationsOfMotion:
     G vdot = gamma, f (m) the residual of a position constraint (None for a nonholonomic one).
     `symbols` maps the model's dynamicsymbols to the plain symbols, `rates` a prescribed motion u to
     der(u) and der(u) to der(u,2).  Energies in joule: `kinetic` is the part of L that is quadratic in
-    v, `potential` minus the part without v; their sum is Jacobi's integral.
+    v, `potential` minus the part without v; their sum is Jacobi's integral.  `outputs` are the model's
+    own, in the same symbols and those of accelerations (`vdot`), lambda (`lam`) and Q (`Q`).
 
     A scene may need less than the model (prune.py): then some coordinates and constraints are not
     there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
@@ -62,6 +64,7 @@ class EquationsOfMotion:
     symbols: dict[Expr, Expr]
     rates: dict[Expr, Expr]
     constraints: tuple[Constraint, ...]
+    outputs: tuple[Output, ...] = ()
     numbers: Mapping[Expr, Expr] = field(default_factory=dict)
     bare: bool = False
 
@@ -80,6 +83,21 @@ class EquationsOfMotion:
         """The parameters in the order of p."""
         by_symbol = {p.symbol: p for p in self.model.parameters}
         return tuple(by_symbol[s] for s in self.p)
+
+    @property
+    def vdot(self) -> tuple[Expr, ...]:
+        """The symbols der(q,2) of the accelerations (n)."""
+        return tuple(sp.Symbol(f"der({q},2)", real=True) for q in self.q)
+
+    @property
+    def lam(self) -> tuple[Expr, ...]:
+        """The symbols of the multipliers (m)."""
+        return tuple(multiplier(c.name) for c in self.constraints)
+
+    @property
+    def Q(self) -> tuple[Expr, ...]:
+        """The symbols of the generalized forces of constraint (n)."""
+        return tuple(force_of_constraint(q) for q in self.q)
 
     @cached_property
     def units(self) -> dict[str, Unit]:
@@ -117,11 +135,28 @@ class EquationsOfMotion:
             f=each(self.f),
             kinetic=kinetic,
             potential=potential,
+            outputs=tuple(_changed(o, change) for o in self.outputs),
         )
 
     def plain(self, expression: Expr) -> Expr:
         """An expression of the model's dynamicsymbols in this object's plain symbols and numbers."""
         return sp.sympify(expression).xreplace(self.symbols).xreplace(self.numbers)
+
+
+def _changed(output: Output, change: Callable[[Expr], Expr]) -> Output:
+    """The output with `change` done to its expressions."""
+    other = output.otherwise
+    return replace(
+        output,
+        expression=change(sp.sympify(output.expression)),
+        otherwise=None if other is None else change(sp.sympify(other)),
+    )
+
+
+def symbols_of(o: Output) -> set[Expr]:
+    """The symbols in an output of the model's own, its value where it has none included."""
+    other = sp.S.Zero if o.otherwise is None else sp.sympify(o.otherwise)
+    return set(sp.sympify(o.expression).free_symbols | other.free_symbols)
 
 
 def plain_symbols(model: Model) -> dict[Expr, Expr]:
@@ -194,6 +229,7 @@ def derive(model: Model) -> EquationsOfMotion:
         symbols=table,
         rates=rates,
         constraints=tuple(model.constraints),
+        outputs=tuple(_changed(o, lambda e: e.xreplace(table)) for o in model.outputs),
     )
 
 

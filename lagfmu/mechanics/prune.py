@@ -16,11 +16,11 @@ from typing import Any
 import sympy as sp
 
 from ..errors import ModelError
-from ..model.model import Constraint, Contact, Holonomic
+from ..model.model import Constraint, Contact, Holonomic, Output
 from ..model.scene import Scene
 from ..model.selection import select
 from .coupling import coupled
-from .equations import EquationsOfMotion
+from .equations import EquationsOfMotion, symbols_of
 from .formulations.minimal import Reduction
 
 Expr = Any
@@ -97,6 +97,8 @@ def subjects(
             for name in (f"{c.name}.{q}", f"{c.name}.velocity.{q}"):
                 found[f"departure.{name}"] = frozenset({j}), row
             found[f"Q.{c.name}.{q}"] = frozenset({j}), row
+    for o in eom.outputs:
+        found[o.name] = _of_output(eom, o)
     for name, parts in (
         ("kinetic", [eom.kinetic]),
         ("potential", [eom.potential]),
@@ -111,6 +113,15 @@ def subjects(
         for name in (f"{s}", f"der({s})", f"der({s},2)"):
             found.setdefault(name, (moved, none))
     return found
+
+
+def _of_output(eom: EquationsOfMotion, o: Output) -> tuple[Indices, Indices]:
+    """The coordinates and rows that an output of the model's own is of."""
+    symbols = symbols_of(o)
+    coordinates = {
+        j for group in (eom.q, eom.v, eom.vdot, eom.Q) for j, s in enumerate(group) if s in symbols
+    }
+    return frozenset(coordinates), frozenset(k for k, s in enumerate(eom.lam) if s in symbols)
 
 
 def _behind(eom: EquationsOfMotion, coordinates: Indices, rows: Indices) -> set[Expr]:
@@ -149,7 +160,10 @@ def only(
             {(row[i], column[j]): a for (i, j), a in values if i in row and j in column},
         )
 
-    gone = {s for j in range(eom.n) if j not in js for s in (eom.q[j], eom.v[j])}
+    away = [j for j in range(eom.n) if j not in js]
+    gone = {s for j in away for s in (eom.q[j], eom.v[j])}
+    unsolved = gone | {s for j in away for s in (eom.vdot[j], eom.Q[j])}
+    unsolved |= {s for k, s in enumerate(eom.lam) if k not in ks}
 
     def whole(energy: Expr) -> Expr:
         return None if energy is None or energy.free_symbols & gone else energy
@@ -167,17 +181,19 @@ def only(
         kinetic=whole(eom.kinetic),
         potential=whole(eom.potential),
         constraints=pick(eom.constraints, ks),
+        outputs=tuple(o for o in eom.outputs if not symbols_of(o) & unsolved),
     )
 
 
 def silent(eom: EquationsOfMotion, outputs: Collection[str]) -> EquationsOfMotion:
-    """Without the energies that are not read."""
+    """Without the energies and outputs of the model's own that are not read."""
     kinetic = bool({"energy.kinetic", "energy.total"} & set(outputs))
     potential = bool({"energy.potential", "energy.total"} & set(outputs))
     return replace(
         eom,
         kinetic=eom.kinetic if kinetic else None,
         potential=eom.potential if potential else None,
+        outputs=tuple(o for o in eom.outputs if o.name in outputs),
     )
 
 
@@ -191,6 +207,8 @@ def read_only(
     """
     stepped = {f"der({s},2)" for s in reduction.s}
     solved = {f"der({q},2)" for q in eom.q} - stepped
+    reactions = {*eom.vdot, *eom.lam, *eom.Q}
+    solved |= {o.name for o in eom.outputs if symbols_of(o) & reactions}
     if any(name.startswith(SOLVED) or name in solved for name in outputs):
         return eom, reduction
     of_s = {name for s in reduction.s for name in (f"{s}", f"der({s})", f"der({s},2)")}
@@ -200,9 +218,10 @@ def read_only(
         wanted |= of.get(name, (frozenset(), frozenset()))[0]
     js = sorted(wanted)
     if not js:
-        own = replace(reduction.reduced, constraints=reduction.constraints)
+        own = replace(reduction.reduced, constraints=reduction.constraints, outputs=eom.outputs)
         return silent(own, outputs), None
     rates = [n for n in outputs if n.startswith(("der(", "energy.")) or ".velocity." in n]
+    rates += [o.name for o in eom.outputs if o.name in outputs and symbols_of(o) & set(eom.v)]
     moving = bool(set(rates) - of_s)  # of what is read, velocities are asked for
     nothing = sp.ImmutableSparseMatrix(len(js), len(js), {})
     zeros = (sp.S.Zero,) * len(js)

@@ -14,6 +14,7 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
 from .kinds import check_energy, check_names, check_types
+from .outputs import check_output_units, check_outputs
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
 from .reactions import reactions_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
@@ -31,9 +32,11 @@ def problems_of(model: ModelFields) -> list[str]:
         return problems
     _check_numbers(model, problems)
     _check_symbols(model, problems)
+    check_outputs(model, problems)
     units = declared_units(model, problems)
     if not problems:
         _check_dimensions(model, units, problems)
+        check_output_units(model, units, problems)
     return problems
 
 

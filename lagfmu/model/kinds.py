@@ -23,6 +23,7 @@ from .parts import (
     Input,
     ModelFields,
     Nonholonomic,
+    Output,
     Parameter,
     name_of,
 )
@@ -66,6 +67,7 @@ def check_containers(model: ModelFields) -> list[str]:
             ("constraints", model.constraints, "Holonomic"),
             ("parameters", model.parameters, "Parameter"),
             ("inputs", model.inputs, "Input"),
+            ("outputs", model.outputs, "Output"),
         )
         if isinstance(value, str) or not isinstance(value, Iterable)
     ]
@@ -77,6 +79,7 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
         ("parameters", model.parameters, (Parameter,)),
         ("inputs", model.inputs, (Input,)),
         ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact)),
+        ("outputs", model.outputs, (Output,)),
     )
     for field_name, items, types in kinds:
         expected = ", ".join(t.__name__ for t in types)
@@ -96,6 +99,8 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
     expressions = [("lagrangian", model.lagrangian), ("kinetic_energy", model.kinetic_energy)]
     expressions += [(f"force on {plain(sp.sympify(q))}", f) for q, f in model.forces.items()]
     expressions += [(f"constraint {c.name!r}", c.expression) for c in model.constraints]
+    expressions += [(f"output {o.name!r}", o.expression) for o in model.outputs]
+    expressions += [(f"otherwise of output {o.name!r}", o.otherwise) for o in model.outputs]
     relations = model.embedding.relations if model.embedding else {}
     expressions += [(f"embedding of {plain(sp.sympify(q))}", e) for q, e in relations.items()]
     for what, expression in expressions:
@@ -123,6 +128,7 @@ def _check_texts(model: ModelFields, problems: list[str]) -> None:
     texts += [(f"parameter {name_of(p.symbol)!r}", p.description) for p in model.parameters]
     texts += [(f"input {name_of(i.symbol)!r}", i.description) for i in model.inputs]
     texts += [(f"constraint {c.name!r}", c.description) for c in model.constraints]
+    texts += [(f"output {o.name!r}", o.description) for o in model.outputs]
     texts += [(f"{plain(sp.sympify(q))}", text) for q, text in model.descriptions.items()]
     for what, text in texts:
         if not isinstance(text, str):
@@ -157,7 +163,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
     named += [("input", name_of(i.symbol)) for i in model.inputs]
     seen: dict[str, str] = {}
     for kind, name in named:
-        _check_name(kind, name, problems)
+        check_name(kind, name, problems)
         if kind == "model":
             continue
         if name in seen:
@@ -168,7 +174,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
     contacts = {c.name for c in model.constraints if isinstance(c, Contact)}
     names = set()
     for constraint in model.constraints:
-        _check_name("constraint", constraint.name, problems)
+        check_name("constraint", constraint.name, problems)
         if constraint.name in names:
             problems.append(f"two constraints are called {constraint.name!r}: rename one")
         names.add(constraint.name)
@@ -186,7 +192,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
             )
 
 
-def _check_name(kind: str, name: object, problems: list[str]) -> None:
+def check_name(kind: str, name: object, problems: list[str]) -> None:
     if not isinstance(name, str) or not NAME.match(name):
         problems.append(
             f"{kind} name {name!r} is no FMI name: use letters a-z, A-Z, digits and _, "

@@ -11,9 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import sympy as sp
-from sympy.core.function import AppliedUndef
-
 from ..errors import ModelError
 from .check import declared_units, problems_of
 from .kinds import check_containers
@@ -28,6 +25,7 @@ from .parts import (
     Input,
     ModelFields,
     Nonholonomic,
+    Output,
     Parameter,
     name_of,
 )
@@ -45,6 +43,7 @@ __all__ = [
     "Input",
     "Model",
     "Nonholonomic",
+    "Output",
     "Parameter",
     "name_of",
 ]
@@ -57,7 +56,8 @@ class Model(ModelFields):
     Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is
     given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
-    numbers in SI.  `descriptions` may explain coordinates.
+    numbers in SI.  `descriptions` may explain coordinates.  `outputs` are quantities besides those
+    that every FMU reports.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -70,7 +70,7 @@ class Model(ModelFields):
             raise ModelError(str(self.name), problems)
         for name in ("coordinates", "forces", "start", "descriptions"):
             object.__setattr__(self, name, dict(getattr(self, name)))
-        for name in ("constraints", "parameters", "inputs"):
+        for name in ("constraints", "parameters", "inputs", "outputs"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         problems = problems_of(self)
         if problems:
@@ -85,17 +85,6 @@ class Model(ModelFields):
     def reactions(self) -> dict[Expr, Unit]:
         """The unit of each `multiplier` and `force_of_constraint`."""
         return reaction_units(self, self.units)
-
-    @cached_property
-    def prescribed(self) -> tuple[Input, ...]:
-        """Inputs whose first and second derivative the equations need."""
-        used: set[Expr] = set(self.energy_expression.atoms(AppliedUndef))
-        for constraint in self.constraints:
-            if not isinstance(constraint, Nonholonomic):
-                used |= sp.sympify(constraint.expression).atoms(AppliedUndef)
-        for relation in self.embedding.relations.values() if self.embedding else ():
-            used |= sp.sympify(relation).atoms(AppliedUndef)
-        return tuple(i for i in self.inputs if i.symbol in used)
 
     def constraint(self, name: str) -> Constraint:
         """The constraint called `name`; KeyError if there is none."""

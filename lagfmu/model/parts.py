@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import sympy as sp
@@ -86,6 +87,23 @@ Constraint = Holonomic | Nonholonomic | Contact
 
 
 @dataclass(frozen=True)
+class Output:
+    """A quantity of the model's own that the FMU reports: a tension, a height, a power.
+
+    `expression` may hold coordinates, their first and second derivatives, inputs, parameters, time,
+    `multiplier(constraint)` and `force_of_constraint(coordinate)`; each of its terms has the dimension
+    of `unit`.  The name may be structured, as bob.height.  `otherwise` (a number, or an expression) is
+    its value where the expression has none, as a quotient by a lambda that is 0 in the open.
+    """
+
+    name: str
+    expression: Expr
+    unit: str = "1"
+    description: str = ""
+    otherwise: Expr | None = None
+
+
+@dataclass(frozen=True)
 class Embedding:
     """Dependent coordinates as functions of independent ones, q = phi(s, t).
 
@@ -114,11 +132,23 @@ class ModelFields:
     embedding: Embedding | None = None
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
+    outputs: Sequence[Output] = ()
 
     @property
     def energy_expression(self) -> Expr:
         """The Lagrangian, or the kinetic energy where forces carry the rest [J]."""
         return sp.sympify(self.lagrangian if self.lagrangian is not None else self.kinetic_energy)
+
+    @cached_property
+    def prescribed(self) -> tuple[Input, ...]:
+        """Inputs whose first and second derivative the equations need."""
+        used: set[Expr] = set(self.energy_expression.atoms(AppliedUndef))
+        for constraint in self.constraints:
+            if not isinstance(constraint, Nonholonomic):
+                used |= sp.sympify(constraint.expression).atoms(AppliedUndef)
+        for relation in self.embedding.relations.values() if self.embedding else ():
+            used |= sp.sympify(relation).atoms(AppliedUndef)
+        return tuple(i for i in self.inputs if i.symbol in used)
 
 
 def name_of(symbol: Expr) -> str:

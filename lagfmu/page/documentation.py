@@ -7,7 +7,7 @@ same bytes.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -20,6 +20,7 @@ from markupsafe import Markup
 from ..interface.variables import Variable
 from ..model.model import Contact, Holonomic, Nonholonomic
 from ..model.units import Unit
+from ..solver.precedence import OMITTED
 from .savings import savings
 from .typeset import SUPERSCRIPT, typeset
 
@@ -45,6 +46,7 @@ GROUPS = (
         "Q of a coordinate is the sum of the constraints' shares.",
     ),
     ("Energies", ""),
+    ("Outputs of the model", "What they are made of stands among the equations."),
     ("Contacts and departures", ""),
     ("Solver", "Method, accuracy, and what was done."),
 )
@@ -97,10 +99,15 @@ def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = (), choice: st
         ],
         contacts=[c for c in acting if isinstance(c, Contact)],
         moved=[
-            (n, f"{given:.6g}", f"{used:.6g}", shown(whole[n].unit))
-            for n, given, used in structure.start.moved
+            (
+                m.name,
+                "left out" if m.rank == OMITTED else f"{m.given:.10g}",
+                f"{m.used:.10g}",
+                shown(whole[m.name].unit),
+            )
+            for m in structure.start.moved
         ],
-        groups=_grouped(table.variables),
+        groups=_grouped(table.variables, {o.name for o in model.outputs}),
         inputs=[v.name for v in table.variables if v.causality == "input"],
         prescribed=bool(prepared.system.prescribed),
         tolerance=f"{prepared.scene.tolerance:g}",
@@ -124,12 +131,14 @@ def shown(unit: Unit | None) -> str:
     return name.replace(".", "·")
 
 
-def _grouped(variables: Sequence[Variable]) -> list[tuple[str, str, list[Row]]]:
+def _grouped(
+    variables: Sequence[Variable], own: Collection[str]
+) -> list[tuple[str, str, list[Row]]]:
     rows: dict[str, list[Row]] = {title: [] for title, _ in GROUPS}
     for v in variables:
         start = "" if v.start is None else str(v.start)
         row = Row(v.name, v.causality, v.kind, shown(v.unit), start, v.description)
-        rows[_group(v)].append(row)
+        rows["Outputs of the model" if v.name in own else _group(v)].append(row)
     return [(title, remark, rows[title]) for title, remark in GROUPS if rows[title]]
 
 

@@ -26,6 +26,7 @@ from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.formulations.nullspace import accelerations, lambda_free, largest_group
 from ..model.model import Contact, Nonholonomic
+from ..model.reactions import multiplier
 
 Expr = Any  # SymPy carries no types
 Printed = tuple[str, str]  # LaTeX, text
@@ -70,6 +71,8 @@ def typeset(
         sections.append(page.without_lambda())
     if reduction is not None:
         sections += [page.embedding(reduction), page.reduced(reduction)]
+    if eom.outputs:
+        sections.append(page.outputs())
     return tuple(sections)
 
 
@@ -157,9 +160,11 @@ class Notation:
             written.setdefault(symbol, (name_latex(name, dots), name_text(name, dots)))
         self.multipliers = []
         for c in eom.constraints:
-            symbol = sp.Dummy(f"lambda.{c.name}", real=True)
+            symbol = multiplier(c.name)
             written[symbol] = f"\\lambda_{{{_letter(c.name)}}}", f"λ_{c.name}"
             self.multipliers.append(symbol)
+        for q, force in zip(eom.q, eom.Q, strict=True):
+            written[force] = f"Q_{{{name_latex(str(q))}}}", f"Q_{name_text(str(q))}"
         self.into = {s: sp.Symbol(f"x{k:06d}", **s.assumptions0) for k, s in enumerate(written)}
         names = [self.into[s] for s in written]
         latex = dict(zip(names, (a for a, _ in written.values()), strict=True))
@@ -439,6 +444,15 @@ class _Typesetter:
             "from Lagrange's equations with multipliers."
         )
         return self.section("Reduced equations", remark, equations, eom.n)
+
+    def outputs(self) -> Section:
+        """What the model reports of its own."""
+        equations = []
+        for o in self.eom.outputs[:MOST]:
+            left = ".".join(_letter(part) for part in o.name.split(".")), o.name
+            equations.append((o.name, [left, ("=", "="), self.notation.show(o.expression)]))
+        remark = "Quantities that the model names itself, of values of the same instant."
+        return self.section("Outputs of the model", remark, equations, len(self.eom.outputs))
 
 
 def _energy(E: Expr) -> Expr:

@@ -19,7 +19,7 @@ from ..errors import DerivationError, ModelError
 from ..interface.variables import VariableTable
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
-from ..solver.failure import StepFailureError
+from ..solver.failure import OmittedStartError, StepFailureError
 from ..solver.initial import Start, start
 from ..solver.instant import Instant
 from ..solver.observe import expand, observe
@@ -27,6 +27,7 @@ from ..solver.solution import RANK
 from ..solver.state import Settings
 from ..solver.system import Matrix, System
 from .diagnosis import cause_of_failure, negative_energy
+from .starts import ranks
 
 TRIALS = 5
 
@@ -107,8 +108,10 @@ def _begun(
     q0 = [float(table[c].start or 0.0) for c in system.coordinates]
     v0 = [float(table[f"der({c})"].start or 0.0) for c in system.coordinates]
     try:
-        begun = start(system, Settings(), 0.0, q0, v0, u, p)
+        begun = start(system, Settings(), 0.0, q0, v0, u, p, ranks(system, table, {}))
         observe(system, begun.state, u, p)
+    except OmittedStartError as error:
+        raise ModelError(eom.model.name, [str(error)]) from error
     except StepFailureError as error:
         at = Instant(system, 0.0, system.inputs_at(u, 0.0), p)
         cause = cause_of_failure(at, np.array(q0), np.array(v0)) or str(error)

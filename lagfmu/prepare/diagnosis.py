@@ -9,8 +9,8 @@ import random
 
 import numpy as np
 
+from ..solver.afar import project_from_afar
 from ..solver.failure import StepFailureError
-from ..solver.initial import project_from_afar
 from ..solver.instant import Instant
 from ..solver.solution import RANK
 from ..solver.system import Matrix, System, Vector

@@ -80,6 +80,9 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
         equations = prune.only(equations, coordinates, rows)
         if reduction is not None and equations is not coded:
             reduction = reduce(equations)
+        asked_for = tuple(o for o in equations.outputs if o.name in outputs)
+        if asked_for != equations.outputs:
+            equations = replace(equations, outputs=asked_for)
         coded, coded_reduction = prune.silent(equations, outputs), reduction
         if coded_reduction is not None:
             coded, coded_reduction = prune.read_only(coded, coded_reduction, outputs)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,11 @@ from .system import System, Vector
 
 CHATTER = 200  # contact events in next to no time after which the step is given up
 PATIENCE = 200  # steps after which a communication step is judged by its average step
-STEP_LIMIT = 1e7  # internal steps that a communication step may need
+STEP_LIMIT = (
+    1e7  # internal steps that a communication step may need, unless on average they are no ...
+)
+CRAWL = 1e-3  # ... shorter than this part of the natural time
+TINY = 1e-6  # part of the natural time; a step shorter than this makes no headway
 
 
 def advance(
@@ -33,7 +37,7 @@ def advance(
     t_end: float,
 ) -> State:
     """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was."""
-    begun, first = state.t, state.steps
+    begun = state.t
     events: collections.deque[float] = collections.deque(maxlen=CHATTER)
     if not np.isfinite(t_end) or t_end <= state.t:
         raise StepFailureError(
@@ -45,9 +49,10 @@ def advance(
             state = at_contacts.released(at, state, state.span)
         if is_incomplete(state):
             state = complete(at, settings, state, t_end - state.t)
+        headway = Headway(settings, begun, t_end, state.rate)
         while state.t < t_end:
             leg = Leg(system, settings, state, u, p, begun)
-            state = _travel(leg, state, t_end, begun, first)
+            state = _travel(leg, state, t_end, headway)
             events.append(state.t)
             if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
                 raise StepFailureError(
@@ -57,7 +62,39 @@ def advance(
     return replace(state, span=t_end - begun)
 
 
-def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> State:
+@dataclass
+class Headway:
+    """Do the steps of one communication step, from `begun` to `t_end` [s], get anywhere?"""
+
+    settings: Settings
+    begun: float
+    t_end: float
+    rate: float
+    steps: int = 0
+    tiny: int = 0
+
+    def check(self, t0: float, t: float) -> None:
+        """Counts the step from t0 to t.  Raises StepFailureError if t_end is too far off for its kind."""
+        most, gone, way = self.settings.maximum_steps, t - self.begun, self.t_end - self.begun
+        self.steps += 1
+        self.tiny += (t - t0) * self.rate < TINY
+        if 0 < most < self.tiny:
+            raise StepFailureError(
+                f"the communication step to t = {self.t_end!r} s makes no headway at t = {t!r} s: more "
+                f"than {most:.0f} internal steps (solver.maximum_steps) were shorter than "
+                f"{TINY / self.rate:.2g} s, {TINY:.0e} of the motion's natural time: is there a force "
+                "that jumps to and fro?"
+            )
+        crawls = gone * self.rate < CRAWL * self.steps
+        if self.steps >= PATIENCE and self.steps * way > STEP_LIMIT * gone and crawls:
+            needed = self.steps * way / max(gone, TINY * way)
+            raise StepFailureError(
+                f"the communication step to t = {self.t_end!r} s would need about {needed:.0e} internal "
+                f"steps, more than {STEP_LIMIT:.0e}: take a shorter one"
+            )
+
+
+def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
     """Integrate until t_end or the first event, whichever comes first; at an event, switch modes."""
     y = np.array(state.q + state.v)
     f0 = leg.rate(state.t, y)
@@ -74,7 +111,9 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
         try:
             leg.step(solver)
             y1 = leg.project(solver.t, solver.y)
-            if not (leg.system.prescribed and t0 == begun):  # it may have jumped when it was set
+            if not (
+                leg.system.prescribed and t0 == leg.begun
+            ):  # it may have jumped when it was set
                 leg.check_projection(solver.t, solver.y, y1)
         except StepFailureError:
             if not choice.implicit:
@@ -86,6 +125,7 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
         if watch:
             event, before = at_contacts.first_event(leg, solver, t0, y0, y1, before, armed)
             if event is not None:
+                headway.check(t0, event[0])
                 step = offered
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)
@@ -113,13 +153,7 @@ def _travel(leg: Leg, state: State, t_end: float, begun: float, first: int) -> S
             choice = _judged(leg, choice, solver, t0, y0)
         if leg.auto and choice.implicit != (leg.settings.method == "radau5"):
             solver = _take_over(leg, choice, solver.t, y1, t_end)
-        done = steps - first
-        if done >= PATIENCE and done * (t_end - begun) > STEP_LIMIT * (solver.t - begun):
-            needed = done * (t_end - begun) / (solver.t - begun)
-            raise StepFailureError(
-                f"the communication step to t = {t_end!r} s would need about {needed:.0e} internal "
-                f"steps, more than {STEP_LIMIT:.0e}: take a shorter one"
-            )
+        headway.check(t0, float(solver.t))
 
 
 def _judged(leg: Leg, choice: Choice, solver: Any, t0: float, y0: Vector) -> Choice:

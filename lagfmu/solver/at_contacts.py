@@ -2,6 +2,7 @@
 
 from .contacts import complementary_modes
 from .events import first_event
+from .impact import check_restitution
 from .switch import released, switched
 
-__all__ = ["complementary_modes", "first_event", "released", "switched"]
+__all__ = ["check_restitution", "complementary_modes", "first_event", "released", "switched"]

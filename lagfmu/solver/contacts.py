@@ -1,4 +1,4 @@
-"""Which contacts are closed, and what an impact does.
+"""Which contacts are closed.
 
     f >= 0 ,  lambda >= 0 ,  f lambda = 0        (Signorini's condition; Pfeiffer & Glocker 1996, ch. 4)
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from .failure import StepFailureError
 from .instant import Instant
-from .linear import solve
 from .motion import Motion, motion
 from .system import Vector
 
@@ -90,39 +89,3 @@ def _force_scale(now: Motion) -> Vector:
     square = np.einsum("ij,ij->i", G, G)
     forces = np.abs(now.F) + G.T @ np.abs(now.lam)
     return np.asarray((G @ forces) / np.where(square > 0, square, 1.0))
-
-
-def impact(
-    at: Instant,
-    q: Vector,
-    v: Vector,
-    closed: Sequence[bool],
-    landing: int,
-    plastic: bool = False,
-) -> Vector:
-    """Velocities after the contact `landing` (a position in `system.contacts`) was struck.
-
-    Newton's law of restitution, M (v+ - v-) = G^T Lambda with G v+ - nu = -e (G v- - nu) on the
-    struck row and G v+ = nu on the rows that go on acting; a closed contact that would have to pull
-    is left out.  `plastic`: without rebound.
-    """
-    system = at.system
-    M, _, G, nu, _ = at.evaluate(q, v)
-    struck = system.contacts[landing]
-    assert system.restitution is not None
-    e = 0.0 if plastic else system.restitution(at.p)[struck]
-    modes = list(closed)
-    modes[landing] = True
-    while True:
-        rows = system.active(modes)
-        jump = nu[rows] - G[rows] @ v
-        jump[rows.index(struck)] *= 1 + e
-        found = solve(M, np.zeros(system.n), G[rows], jump)
-        pulling = [
-            c
-            for c, k in enumerate(system.contacts)
-            if modes[c] and c != landing and found.lam[rows.index(k)] < 0
-        ]
-        if not pulling:
-            return v + found.x
-        modes[pulling[0]] = False

@@ -11,6 +11,10 @@ class StartFailureError(StepFailureError):
     """Start values from which no consistent state can be reached."""
 
 
+class OmittedStartError(StartFailureError):
+    """A start value that nobody gave, and whose 0 is singular: what is to be done is known."""
+
+
 def plain(error: Exception) -> str:
     """What Python, NumPy or SciPy could not compute, in words for who does not know them."""
     if isinstance(error, OverflowError):

@@ -1,37 +1,63 @@
 """A consistent start: projection of start values onto the constraints, contact modes, magnitudes.
 
-Order: positions are projected, weighted by M, onto the constraints that always act and onto contacts
-that are penetrated (f < -gap); then velocities onto G v = nu; then the contacts that touch are closed
-if their multiplier is positive.  Every value that was moved is reported.
+Order: positions are projected (afar.py, precedence.py) onto the constraints that always act and onto
+contacts that are penetrated (f < -gap); then velocities onto G v = nu; then the contacts that touch are
+closed if their multiplier is positive.  Every value that was moved is reported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from . import at_contacts
+from .afar import project_from_afar, velocities_from_afar
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
-from .linear import solve
-from .magnitudes import TOUCH, complete, extents, motion_speeds, sizes
+from .magnitudes import TOUCH, complete, motion_speeds, sizes
 from .motion import EPS, project
+from .precedence import GIVEN, OMITTED
 from .state import Departure, Settings, State
-from .system import NONHOLONOMIC, Matrix, System, Vector
+from .system import Matrix, System, Vector
 
-ITERATIONS = 60
 LARGEST_ANGLE = 1e-3 / EPS  # [rad] beyond which neighbouring numbers are more than 1e-3 rad apart
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
 
 
+class Moved(NamedTuple):
+    """A start value that missed the constraints, what it was moved to, and of which rank it is.
+
+    `size`: the magnitude of the coordinate; of a velocity, that magnitude times the motion's natural rate,
+    or the velocity itself if it is larger.
+    """
+
+    name: str
+    given: float
+    used: float
+    rank: int
+    size: float
+
+    def __str__(self) -> str:
+        if self.rank == OMITTED:
+            return (
+                f"{self.name} has no start value: {self.used!r} in place of {self.given!r} satisfies the "
+                "constraints"
+            )
+        return (
+            f"start value {self.name} = {self.given!r} misses the constraints: projected to {self.used!r} "
+            f"(moved by {self.used - self.given:.3g})"
+        )
+
+
 @dataclass(frozen=True)
 class Start:
-    """A consistent state, and (name, given, used) for each value that had to be moved."""
+    """A consistent state, and each value that had to be moved."""
 
     state: State
-    moved: tuple[tuple[str, float, float], ...]
+    moved: tuple[Moved, ...]
 
 
 def start(
@@ -42,23 +68,32 @@ def start(
     v0: Sequence[float],
     u: Sequence[float],
     p: Sequence[float],
+    rank: Sequence[int] | None = None,
 ) -> Start:
-    """The consistent state nearest to the start values.  Raises StartFailureError with the cause."""
+    """The consistent state nearest to the start values.  Raises StartFailureError with the cause.
+
+    `rank` (2 n), of the coordinates and then of the velocities, as in precedence.py: which of them move
+    first; without it they are all alike.
+    """
     try:
         with np.errstate(all="ignore"):
             at = Instant(system, t, system.inputs_at(u, 0.0), p)
-            return _start(at, settings, np.array(q0, float), np.array(v0, float))
+            if system.contacts:
+                at_contacts.check_restitution(system, p)
+            ranks = [GIVEN] * (2 * system.n) if rank is None else list(rank)
+            return _start(at, settings, np.array(q0, float), np.array(v0, float), ranks)
     except StartFailureError:
         raise
     except StepFailureError as error:
         raise StartFailureError(f"the start is refused: {error}") from error
 
 
-def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
+def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[int]) -> Start:
     system = at.system
+    n = system.n
     size = sizes(system, q0, at.p, np.zeros(system.n))
     none = np.zeros(system.m)
-    q = project_from_afar(at, q0, v0, list(system.permanent), size)
+    q = project_from_afar(at, q0, v0, list(system.permanent), size, rank[:n])
     gap = np.array([])
     for _ in range(len(system.contacts) + 1):
         _, _, G, _, _ = at.evaluate(q, v0)
@@ -66,13 +101,13 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
         f = at.residual(q)[list(system.contacts)]
         closed = [bool(a <= g) for a, g in zip(f, gap, strict=True)]
         rows = system.active(closed)
-        moved = project_from_afar(at, q, v0, rows, size)
+        moved = project_from_afar(at, q, v0, rows, size, rank[:n])
         if (np.abs(moved - q) <= 4 * EPS * size).all():
             break
         q = moved
     _check_angles(system, q)
     size = sizes(system, q, at.p, size)
-    q, v, closed = _velocities(at, q, v0, closed, size)
+    q, v, closed = _velocities(at, q, v0, closed, size, rank[n:])
     modes: tuple[bool, ...] = ()
     if system.contacts:
         touching = [c for c, shut in enumerate(closed) if shut]
@@ -97,7 +132,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector) -> Start:
     )
     # a start value is its own scale: a start at theta0 = 1e-6 is resolved
     state = complete(at, settings, state, 0.0)
-    return Start(state, _moved(system, q0, v0, state))
+    return Start(state, _moved(system, q0, v0, state, rank))
 
 
 def _check_angles(system: System, q: Vector) -> None:
@@ -143,74 +178,13 @@ def _check_underflow(at: Instant, q: Vector, v0: Vector, M: Matrix) -> None:
                 )
 
 
-def project_from_afar(
-    at: Instant,
-    q0: Vector,
-    v0: Vector,
-    rows: Sequence[int],
-    size: Vector,
-) -> Vector:
-    """Damped Newton's method for f = 0 on the rows, weighted by M, from anywhere.
-
-    It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
-    since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
-    of at the start (`size`).  While it falls on and on, there is nothing to arrive at.  Raises
-    StartFailureError naming the constraints that remain violated and by how much.
-    """
-    fixed = [k for k in rows if at.system.rows[k].kind != NONHOLONOMIC]
-    q = q0
-    if not fixed:
-        return q
-    least = extents(at.system, at.p)
-    M, _, G, _, _ = at.evaluate(q, v0)
-    f = at.residual(q)[fixed]
-    allowed = np.zeros(len(fixed))
-    for _ in range(ITERATIONS):
-        allowed = 4 * EPS * (np.abs(G[fixed]) @ np.maximum(np.abs(q), least))
-        if (np.abs(f) <= allowed).all():
-            return q
-        unit = np.abs(G[fixed]) @ np.maximum(np.abs(q), size)
-        unit = np.where(unit > 0, unit, np.where(f != 0, np.abs(f), 1.0))
-        allowed = 1e3 * EPS * (np.abs(G[fixed]) @ np.maximum(np.abs(q), size))
-        try:
-            step = solve(M, np.zeros(at.system.n), G[fixed], -f, nearest=True).x
-        except StepFailureError:
-            break
-        for damping in 2.0 ** -np.arange(25):
-            trial = q + damping * step
-            try:
-                f_trial = at.residual(trial)[fixed]
-            except StepFailureError:
-                continue
-            if np.linalg.norm(f_trial / unit) < (1 - 0.1 * damping) * np.linalg.norm(f / unit):
-                break
-        else:
-            break
-        q, f = trial, f_trial
-        M, _, G, _, _ = at.evaluate(q, v0)
-        allowed = 4 * EPS * (np.abs(G[fixed]) @ np.maximum(np.abs(q), least))
-    if (np.abs(f) <= allowed).all():
-        return q
-    missed = ", ".join(
-        f"{at.system.rows[k].name!r} by {a:.3g}"
-        for k, a, b in zip(fixed, f, allowed, strict=True)
-        if not abs(a) <= b
-    )
-    values = ", ".join(
-        f"{n} = {x!r}" for n, x in zip(at.system.coordinates, q0.tolist(), strict=True)
-    )
-    raise StartFailureError(
-        f"the start values {values} cannot be projected onto the constraints (missed: {missed}): "
-        "choose start values near a configuration that satisfies them, or other parameters"
-    )
-
-
 def _velocities(
     at: Instant,
     q: Vector,
     v0: Vector,
     closed: Sequence[bool],
     size: Vector,
+    rank: Sequence[int],
 ) -> tuple[Vector, Vector, list[bool]]:
     """Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open."""
     system = at.system
@@ -224,7 +198,8 @@ def _velocities(
         c and not speed[k] > TOUCH * unit[k] for c, k in zip(closed, system.contacts, strict=True)
     ]
     rows = system.active(shut)
-    q, v = project(at, q, v0, rows, np.zeros(system.m), size)
+    v = velocities_from_afar(at, q, v0, rows, rank, natural)
+    q, v = project(at, q, v, rows, np.zeros(system.m), size)
     M, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
     unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)
@@ -239,13 +214,16 @@ def _velocities(
 
 
 def _moved(
-    system: System, q0: Vector, v0: Vector, state: State
-) -> tuple[tuple[str, float, float], ...]:
+    system: System, q0: Vector, v0: Vector, state: State, rank: Sequence[int]
+) -> tuple[Moved, ...]:
+    n = system.n
     names = [*system.coordinates, *(f"der({c})" for c in system.coordinates)]
     given, used = np.concatenate([q0, v0]), np.array(state.q + state.v)
-    unit = np.maximum(np.array(state.size + state.scale[system.n :]), np.abs(given))
+    unit = np.maximum(np.array(state.size + state.scale[n:]), np.abs(given))
+    size = np.array(state.size)
+    whole = np.maximum(np.concatenate([size, size * state.rate]), np.abs(given))
     return tuple(
-        (name, float(a), float(b))
-        for name, a, b, s in zip(names, given, used, unit, strict=True)
-        if abs(a - b) > 1e-12 * s
+        Moved(names[i], float(given[i]), float(used[i]), rank[i], float(whole[i]))
+        for i in range(2 * n)
+        if abs(given[i] - used[i]) > 1e-12 * unit[i]
     )

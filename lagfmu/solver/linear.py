@@ -24,8 +24,9 @@ from .system import Matrix, Vector
 def solve(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool = False) -> Solution:
     """x (n) and lambda (m) of M x = b + G^T lambda, G x = c.
 
-    `nearest`, for a projection: where dependent rows contradict each other, as those of a c do that is
-    nothing but rounding, c is met as nearly as can be (least squares in rows of comparable units).
+    `nearest`, for a projection: a coordinate with neither mass nor constraint stays; where dependent rows
+    contradict each other, as those of a c do that is nothing but rounding, c is met as nearly as can be
+    (least squares in rows of comparable units).
 
     Raises StepFailureError if a value is not finite, the mass matrix is singular on the constraint
     surface, or dependent constraints contradict each other.

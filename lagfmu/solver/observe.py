@@ -55,6 +55,8 @@ def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float
         values["energy.kinetic"] = float(kinetic)
         values["energy.potential"] = float(potential)
         values["energy.total"] = float(kinetic + potential)
+    if full.outputs:
+        values |= _own(full, state.t, values, q, v, u, p)
     for c, k in enumerate(system.contacts):
         values |= _contact(system, state, c, system.rows[k].name, u, p)
     values["solver.steps"] = state.steps
@@ -92,6 +94,43 @@ def _solved(
     for k, j in zip(*full.jacobian, strict=True):
         values[f"Q.{full.rows[k].name}.{full.coordinates[j]}"] = float(share[k, j])
     return values
+
+
+def _own(
+    full: System,
+    t: float,
+    values: Values,
+    q: Vector,
+    v: Vector,
+    u: Sequence[float],
+    p: Sequence[float],
+) -> Values:
+    """The outputs of the model's own, from what is solved for at this state."""
+    vdot, lam, Q = (
+        [values.get(f"{head}{name}{tail}", 0.0) for name in of]
+        for head, of, tail in (
+            ("der(", full.coordinates, ",2)"),
+            ("lambda.", [row.name for row in full.rows], ""),
+            ("Q.", full.coordinates, ""),
+        )
+    )
+    state = (t, q.tolist(), v.tolist(), vdot, u, p, lam, Q)
+    found: Values = {}
+    for own in full.outputs:
+        value, cause = np.nan, "not finite"
+        try:
+            (value,) = own.value(*state)
+        except (ArithmeticError, ValueError) as error:
+            cause = plain(error)
+        if own.otherwise is not None and not np.isfinite(value):
+            (value,) = own.otherwise(*state)
+        if not np.isfinite(value):
+            raise StepFailureError(
+                f"the output {own.name!r} has no value at t = {t!r} s ({cause}): give the model's "
+                "Output an `otherwise`"
+            )
+        found[own.name] = float(value)
+    return found
 
 
 def expand(

@@ -68,7 +68,7 @@ def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool) -> So
     U, sigma, Vt = np.linalg.svd(K * d * d[:, None])
     keep = sigma > RANK * sigma[0]
     null = Vt[~keep]
-    if len(null) and np.abs(null[:, :n]).max() > 1e-8:
+    if not nearest and len(null) and np.abs(null[:, :n]).max() > 1e-8:
         raise StepFailureError(
             "the mass matrix is singular on the constraint surface: a coordinate has neither mass "
             "nor a constraint that determines its acceleration"

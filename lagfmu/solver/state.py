@@ -12,16 +12,19 @@ from .stiffness import Choice
 
 DEFAULT_TOLERANCE = 1e-8
 SMALLEST_TOLERANCE = 1e-14
+MAXIMUM_STEPS = 5000.0  # that make no headway, in one communication step
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to step: the method, the relative tolerance, the step [s] of rk4, the largest step [s]."""
+    """How to step: the method, the relative tolerance, the step [s] of rk4, the largest step [s], and how
+    many steps shorter than 1e-6 of the natural time a communication step may take (0: no limit)."""
 
     method: str = "auto"
     tolerance: float = DEFAULT_TOLERANCE
     step: float = 0.0
     maximum_step: float = 0.0
+    maximum_steps: float = MAXIMUM_STEPS
 
 
 @dataclass(frozen=True)

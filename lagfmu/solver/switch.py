@@ -1,14 +1,16 @@
-"""What happens at contacts: impacts by Newton's law of restitution, rest, and the modes of all contacts
-together (contacts.py; Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chs. 4, 6)."""
+"""What happens at contacts: impacts (impact.py), rest, and the modes of all contacts together (contacts.py;
+Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chs. 4, 6).  Nothing depends on the
+order in which contacts are declared."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from .contacts import complementary_modes, impact
+from .contacts import complementary_modes
+from .impact import impacts
 from .instant import Instant
 from .leg import Leg
 from .motion import motion, project
@@ -16,7 +18,6 @@ from .state import Departure, State
 from .system import Vector
 
 SLOW = 1e-9  # speed of a gap, relative to the motion's own, that counts as none
-ROUNDS = 50  # in which an impact is passed on between contacts that touch
 
 
 def released(at: Instant, state: State, span: float) -> State:
@@ -67,30 +68,20 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, contacts: 
     """The state right after the event at t: contacts opened or struck, modes settled together."""
     system, at = leg.system, leg.at(t)
     q, v = leg.split(leg.reach(t0, y0, t))
-    closed, armed = list(state.closed), list(state.armed)
-    offset = np.array(state.offset)
-    leaving = [c for c in contacts if closed[c]]
-    landing = [c for c in contacts if not closed[c]]
-    for c in leaving:
-        closed[c] = False
-        armed[c] = False
-    for c in landing:
-        k = system.contacts[c]
-        v = impact(at, q, v, closed, c)
-        closed[c] = _comes_to_rest(at, q, v, closed, c, state.gap[c])
-        armed[c] = False
-        if closed[c]:
-            f = at.residual(q)
-            for j, row in enumerate(system.rows):
-                if row.while_closed == k:
-                    offset[j] = f[j]
+    leaving = {c for c in contacts if state.closed[c]}
+    landing = set(contacts) - leaving
+    closed = [shut and c not in leaving for c, shut in enumerate(state.closed)]
+    f = at.residual(q)[list(system.contacts)]
+    near = {c for c, shut in enumerate(closed) if shut or c in landing or abs(f[c]) <= state.gap[c]}
+    slow = _slow(at, q, v, state)
+    struck: Collection[int] = ()
     if landing:
-        v = _pass_on(at, q, v, closed, state)
-    touching = _touching(at, q, v, state, closed)
-    modes = complementary_modes(at, q, v, closed, touching, leaving)
+        v, struck = impacts(at, q, v, near, slow)
+    modes = _settled(at, q, v, state, closed, near, leaving - set(struck), {*struck, *landing})
+    offset = _levels(at, q, state, modes)
     q, v = project(at, q, v, system.active(modes), offset, leg.size)
     departures = list(state.departures)
-    for c, (old, new) in enumerate(zip(leg.state.closed, modes, strict=True)):
+    for c, (old, new) in enumerate(zip(state.closed, modes, strict=True)):
         if old and not new:
             count = departures[c].count + 1
             departures[c] = Departure(count, t, tuple(q.tolist()), tuple(v.tolist()))
@@ -100,60 +91,65 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, contacts: 
         q=tuple(q.tolist()),
         v=tuple(v.tolist()),
         closed=modes,
-        armed=tuple(armed),
+        armed=tuple(a and c not in contacts and c not in struck for c, a in enumerate(state.armed)),
         offset=tuple(offset.tolist()),
         departures=tuple(departures),
     )
 
 
-def _pass_on(at: Instant, q: Vector, v: Vector, closed: Sequence[bool], state: State) -> Vector:
-    """An impact passed on through contacts that touch: each that is approached is struck in turn.
-
-    After `ROUNDS` rounds the rest is taken as one plastic impact.
-    """
-    system = at.system
-    f = at.residual(q)
-    near = [c for c, k in enumerate(system.contacts) if not closed[c] and abs(f[k]) <= state.gap[c]]
-    for count in range(ROUNDS):
-        _, _, G, nu, _ = at.evaluate(q, v)
-        speed = {c: G[system.contacts[c]] @ v - nu[system.contacts[c]] for c in near}
-        size = np.abs(G) @ (np.array(state.size) * state.rate)
-        struck = [c for c in near if speed[c] < -1e-9 * size[system.contacts[c]]]
-        if not struck:
-            return v
-        plastic = count == ROUNDS - 1
-        for c in struck:
-            v = impact(at, q, v, closed, c, plastic)
-    return v
+def _slow(at: Instant, q: Vector, v: Vector, state: State) -> Vector:
+    """Speeds (m) of the rows that count as none."""
+    G = np.abs(at.evaluate(q, v)[2])
+    natural = np.array(state.size) * state.rate
+    speed = np.maximum(G @ natural, G @ np.array(state.scale[at.system.n :]))
+    return np.asarray(SLOW * speed)
 
 
-def _comes_to_rest(
-    at: Instant, q: Vector, v: Vector, closed: Sequence[bool], contact: int, gap: float
-) -> bool:
-    """True if the rebound would not rise above the gap within which contacts touch, v^2/(2a) <= gap.
-
-    Without it a ball would bounce infinitely often in a finite time.
-    """
-    free = motion(at, q, v, at.system.active(closed))
-    k = at.system.contacts[contact]
-    speed = free.G[k] @ v - free.nu[k]
-    acceleration = free.G[k] @ free.vdot - free.gamma[k]
-    return bool(speed <= 0 or (acceleration < 0 and speed**2 <= -2 * acceleration * gap))
-
-
-def _touching(
+def _settled(
     at: Instant,
     q: Vector,
     v: Vector,
     state: State,
     closed: Sequence[bool],
-) -> list[int]:
-    """Contacts with f and df/dt at zero: those whose mode the accelerations decide."""
+    near: Collection[int],
+    leaving: Collection[int],
+    bounced: Collection[int],
+) -> tuple[bool, ...]:
+    """The modes after the impacts: accelerations decide where df/dt is zero; what parts is open.
+
+    Contacts that were struck rest if the rebound would not rise above the gap within which contacts touch,
+    v^2/(2 a) <= gap: without it a ball would bounce infinitely often in a finite time.
+    """
+    slow = _slow(at, q, v, state)
     _, _, G, nu, _ = at.evaluate(q, v)
-    f = at.residual(q)
-    size = np.abs(G) @ np.array(state.scale[at.system.n :])
-    return [
+    slip = (G @ v - nu)[list(at.system.contacts)]
+    limit = slow[list(at.system.contacts)]
+    touching = {c for c in near if abs(slip[c]) <= limit[c]}
+    guess = [c in touching and (shut or c in bounced) for c, shut in enumerate(closed)]
+    modes = complementary_modes(at, q, v, guess, touching, leaving)
+    now = motion(at, q, v, at.system.active(modes))
+    pull = (now.gamma - now.G @ now.vdot)[list(at.system.contacts)]
+    low = {
         c
-        for c, k in enumerate(at.system.contacts)
-        if closed[c] or (abs(f[k]) <= state.gap[c] and abs(G[k] @ v - nu[k]) <= 1e-9 * size[k])
-    ]
+        for c in near
+        if (closed[c] or c in bounced)
+        and slip[c] > limit[c]
+        and pull[c] > 0
+        and slip[c] ** 2 <= 2 * pull[c] * state.gap[c]
+    }
+    if not low:
+        return modes
+    guess = [shut or c in low for c, shut in enumerate(modes)]
+    return complementary_modes(at, q, v, guess, touching | low, leaving)
+
+
+def _levels(at: Instant, q: Vector, state: State, modes: Sequence[bool]) -> Vector:
+    """The levels f = offset: rows that come back with a contact keep the one at which they do."""
+    system, offset, f = at.system, np.array(state.offset), at.residual(q)
+    come = {
+        k for k, old, new in zip(system.contacts, state.closed, modes, strict=True) if new > old
+    }
+    for j, row in enumerate(system.rows):
+        if row.while_closed in come:
+            offset[j] = f[j]
+    return offset

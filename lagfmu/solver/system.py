@@ -32,6 +32,18 @@ class Row:
 
 
 @dataclass(frozen=True)
+class Own:
+    """An output of the model's own: value(t, q, v, vdot, u, p, lam, Q) -> [value].
+
+    `otherwise`, of the same arguments, gives the value where that is not finite.
+    """
+
+    name: str
+    value: Callable[..., Any]
+    otherwise: Callable[..., Any] | None = None
+
+
+@dataclass(frozen=True)
 class System:
     """M, F, G, nu, gamma, f and the energies of n coordinates under m constraint rows.
 
@@ -43,8 +55,9 @@ class System:
     `extent` (n) the positions in p whose values have it, `folded` (n) the largest magnitude of it among
     the parameters that are numbers in the code; `angles` are those without dimension.
 
-    `energies` is None where they are not read.  The full system of an embedding may hold coordinates
-    that are only read: then `dynamics`, `residual` and `restitution` are None too.
+    `outputs` are those of the model's own.  `energies` is None where they are not read.  The full
+    system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
+    `restitution` are None too.
     """
 
     coordinates: tuple[str, ...]
@@ -63,6 +76,7 @@ class System:
     embedding: Embedding | None = None
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
+    outputs: tuple[Own, ...] = ()
 
     @property
     def n(self) -> int:

@@ -21,12 +21,16 @@ from ..methods import IN_PYTHON, unknown
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import Prepared, prepare
+from ..prepare.starts import ranks, tell
 from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import observe
 from ..solver.state import SMALLEST_TOLERANCE, Settings
 
+STARTS = re.compile(
+    r"start value .* misses the constraints|has no start value"
+)  # a message of a move
 MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
@@ -49,7 +53,8 @@ def simulate(
     What is left out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables
     and inputs to be recorded too.
 
-    Raises ModelError for a model that cannot start, SimulationError if a step fails, and
+    Warns of each start value that is moved onto the constraints (starts.py).  Raises ModelError for a model
+    that cannot start, SimulationError if a step fails, and
     VerificationError for a file that is no FMU.
     """
     values = dict(start_values or {})
@@ -108,6 +113,7 @@ def _simulate_model(
         max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
         known.get("solver.step", scene.step),
         known["solver.maximum_step"],
+        known["solver.maximum_steps"],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
     drives = [v for v in table.variables if v.role == "input"]
@@ -131,7 +137,9 @@ def _simulate_model(
         q = [float(known[c]) for c in system.coordinates]
         v = [float(known[f"der({c})"]) for c in system.coordinates]
         u = drive(0.0)
-        state = start(system, settings, 0.0, q, v, u, p).state
+        begun = start(system, settings, 0.0, q, v, u, p, ranks(system, table, values))
+        tell(begun.moved)
+        state = begun.state
         for k, t in enumerate(times):
             if k:
                 u = drive(state.t)  # held over the step, as an importer of the FMU does
@@ -210,10 +218,13 @@ def _simulate_fmu(
     description = read_description(path)
     experiment = description.defaultExperiment
     messages: list[str] = []
+    moved: list[str] = []
 
     def logger(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
         if status >= 2:  # discard, error, fatal
             messages.append(message.decode(errors="replace").strip())
+        elif STARTS.search(text := message.decode(errors="replace").strip()):
+            moved.append(text)
 
     stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
     step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
@@ -249,6 +260,7 @@ def _simulate_fmu(
         raise SimulationError(_told(path, error, messages)) from None
     except Exception as error:
         raise SimulationError(f"{str(path)!r} cannot be simulated: {error}") from None
+    tell(moved)
     reached = float(result["time"][-1])
     if reached < stop * (1 - 1e-9):  # fmpy ends a run at fmi2Discard without a word
         cause = "; ".join(messages) or "no message was logged"

@@ -170,6 +170,22 @@ def _results(values: Sequence[Expr], places: Sequence[Any]) -> list[Result]:
     return [Result(sp.sympify(e), str(x)) for e, x in zip(values, places, strict=True)]
 
 
+class _Reported:
+    """The words of the outputs of the model's own: those of a state, and what is solved for there."""
+
+    def __init__(self, eom: EquationsOfMotion, words: _Vocabulary) -> None:
+        solved = {"vdot": eom.vdot, "lambda": eom.lam, "Q": eom.Q}
+        flat = [s for group in solved.values() for s in group]
+        self.change = {s: sp.Symbol(f"d({s})", real=True) for s in flat}
+        more = identifiers([*flat, *self.change.values()], list(words.names.values()))
+        self.names = words.names | more
+        self.change |= words.change
+        self.state = {**words.state, **solved}
+        self.along = {**self.state}
+        for a, group in {"t": words.t, "q": eom.q, "v": eom.v, "u": eom.u, **solved}.items():
+            self.along[f"d{a}"] = tuple(self.change[s] for s in group)
+
+
 class _System:
     """One System: its functions, patterns and the table that holds them together."""
 
@@ -268,5 +284,36 @@ class _System:
                 "The change of all of these along the direction (dt, dq, dv, du).",
                 words.along,
                 changes,
+            )
+        if eom.outputs and not self.prefix:
+            found |= self._outputs()
+        return found
+
+    def _outputs(self) -> dict[str, str]:
+        """The model's own outputs, and their changes."""
+        outputs, words = self.eom.outputs, _Reported(self.eom, self.words)
+        d = Differential(words.change)
+        value = [o.expression for o in outputs]
+        other = [sp.S.Zero if o.otherwise is None else o.otherwise for o in outputs]
+        places = [f"{o.name} [{o.unit}]" for o in outputs]
+        found = {
+            "outputs": function(
+                "outputs",
+                "Outputs of the model's own, and their values where these are not finite.",
+                words.state,
+                {"w": _results(value, places), "other": _results(other, places)},
+                words.names,
+            )
+        }
+        if self.tangents:
+            found["outputs_tangent"] = function(
+                "outputs_tangent",
+                "Their changes along a direction, with those of what is solved for.",
+                words.along,
+                {
+                    "dw": _results([d(e) for e in value], places),
+                    "dother": _results([d(sp.sympify(e)) for e in other], places),
+                },
+                words.names,
             )
         return found

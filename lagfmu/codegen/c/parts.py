@@ -9,6 +9,7 @@ from ...solver.system import System
 AT_CONTACTS = {
     "events_find": "events.c",
     "contacts_modes": "contacts.c",
+    "impact_check": "impact.c",
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }
@@ -17,7 +18,7 @@ NO_RUNGS = """
 
 const Dependent *const DEPENDENT = NULL;
 """
-BEHIND_CONTACTS = ("looks.c", "root.c")  # what only those files need
+BEHIND_CONTACTS = ("complementarity.c", "looks.c", "root.c")  # what only those files need
 AT_CONSTRAINTS = (
     "dependent.c",
     "orthogonal.c",

@@ -59,7 +59,7 @@ MATH = """
 """
 OURS = """
     t q v u p s sdot M F G nu gamma f e energy dt dq dv du ds dsdot dM dF dG dnu dgamma df denergy fill
-    shared blocks
+    shared blocks vdot Q dvdot dlambda dQ w dw other dother
     sign heaviside Kind Formulation Row System Plan Type Role Place Variable near far small interface
     linux unix i386 main
 """
@@ -93,7 +93,7 @@ def identifiers(symbols: Sequence[Expr], taken: Sequence[str] = ()) -> dict[Expr
         if text.startswith("der("):
             inner = text[4:-1]
             text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
-        text = head + text
+        text = head + text.replace(".", "_")
         if MACROS.match(text):
             text = f"x_{text}"
         while text in TAKEN or text in used:

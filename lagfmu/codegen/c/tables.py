@@ -34,10 +34,11 @@ class Tables:
     def of_what_is_read(self, functions: Collection[str]) -> str:
         """A System of coordinates that are only read: names, and the energies if they are read."""
         names = self._array("const char *const", "coordinates", [f'"{s}"' for s in self.eom.q])
+        own, more = self._outputs(functions)
         fields = {"n": self.eom.n, "coordinates": f"{self.prefix}coordinates"}
-        fields |= {name: f"{self.prefix}{name}" for name in sorted(functions)}
+        fields |= {name: f"{self.prefix}{name}" for name in sorted(functions)} | more
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
-        return f"{names}static const System {self.prefix}equations = {{\n{lines}}};\n"
+        return f"{names}{own}static const System {self.prefix}equations = {{\n{lines}}};\n"
 
     def text(self, functions: Collection[str]) -> str:
         """The tables, the elimination's plan, and the System with these functions."""
@@ -70,6 +71,8 @@ class Tables:
         if self.formulation != "nullspace":
             solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
             parts.append(f"{solve}\n" if solve else "")
+        own, more = self._outputs(functions)
+        parts.append(own)
         fields = {
             "n": eom.n,
             "m": eom.m,
@@ -101,9 +104,21 @@ class Tables:
             "embed": "embed" if p else "NULL",
             "embed_tangent": "embed_tangent" if p and "tangent" in functions else "NULL",
             "full": "&equations" if p else "NULL",
+            **{name: name for name in ("outputs", "outputs_tangent") if name in functions},
+            **more,
         }
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return "".join(parts) + f"static const System {p}equations = {{\n{lines}}};\n"
+
+    def _outputs(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
+        """Tables of the model's own outputs, and the System's fields that hold them."""
+        if "outputs" not in functions:
+            return "", {}
+        outputs = self.eom.outputs
+        text = self._array("const char *const", "output_names", [f'"{o.name}"' for o in outputs])
+        text += self._integers("guarded", [int(o.otherwise is not None) for o in outputs])
+        names = {"output_names": "output_names", "guarded": "guarded"}
+        return text, {"output_count": len(outputs), **names}
 
     def _array(self, kind: str, name: str, items: Sequence[str]) -> str:
         head = f"static {kind} {self.prefix}{name}[] = {{"

@@ -25,7 +25,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include "state.h"
 #include "variables.h"
 
-/* name, type, role, place, index, contact, state, start, text, min, max, positive */
+/* name, type, role, place, index, contact, state, start, text, min, max, positive, given */
 const Variable VARIABLES[] = {{
 {rows}}};
 
@@ -67,6 +67,7 @@ def places(system: System, inputs: list[str], parameters: list[str]) -> dict[str
         "solver.tolerance": ("TOLERANCE", 0, NONE),
         "solver.step": ("STEP", 0, NONE),
         "solver.maximum_step": ("MAXIMUM_STEP", 0, NONE),
+        "solver.maximum_steps": ("MAXIMUM_STEPS", 0, NONE),
         "solver.steps": ("STEPS", 0, NONE),
         "energy.kinetic": ("KINETIC", 0, NONE),
         "energy.potential": ("POTENTIAL", 0, NONE),
@@ -85,6 +86,7 @@ def places(system: System, inputs: list[str], parameters: list[str]) -> dict[str
         found[f"Q.{q}"] = ("FORCE", j, NONE)
     for e, (k, j) in enumerate(zip(*full.jacobian, strict=True)):
         found[f"Q.{full.rows[k].name}.{full.coordinates[j]}"] = ("SHARE", e, NONE)
+    found |= {own.name: ("OUTPUT", k, NONE) for k, own in enumerate(full.outputs)}
     for c, k in enumerate(system.contacts):
         name = system.rows[k].name
         found[f"contact.{name}"] = ("CONTACT", c, c)
@@ -124,5 +126,6 @@ def _row(v: Variable, place: Place, states: dict[str, int]) -> str:
         low,
         high,
         str(int(v.positive)),
+        str(int(v.given)),
     ]
     return f"{{{', '.join(fields)}}}"

@@ -21,7 +21,7 @@ Expr = Any
 def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations in the given formulation.
 
-    It needs the names System, Row and Embedding of `lagfmu.solver.system`.
+    It needs the names System, Row, Own and Embedding of `lagfmu.solver.system`.
     """
     if reduction is None:
         return _imported(_system(eom, "", formulation) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n")
@@ -64,6 +64,7 @@ def compile_system(text: str) -> System:
 
     scope: dict[str, Any] = {
         "System": vocabulary.System,
+        "Own": vocabulary.Own,
         "Row": vocabulary.Row,
         "Embedding": vocabulary.Embedding,
     }
@@ -127,6 +128,8 @@ def _system(
     if rows is None:  # the energies of the full system serve the reduced one too
         energies = _energies(eom, names)
     parts += energies
+    own = _outputs(eom) if rows is None else []
+    parts += [text for _, text in own]
     label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
     parts.append(
         f"{label} = System(\n"
@@ -146,7 +149,7 @@ def _system(
         f"    embedding={embedding},\n"
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
-        ")\n"
+        f"{_listed(own)})\n"
     )
     return "\n\n".join(parts)
 
@@ -155,7 +158,7 @@ def _bare_system(eom: EquationsOfMotion) -> str:
     """Coordinates that are only read, and the energies of them if these are."""
     names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
     names[TIME] = "t"
-    energies = _energies(eom, names)
+    energies, own = _energies(eom, names), _outputs(eom)
     system = (
         "SYSTEM_OF_COORDINATES = System(\n"
         f"    coordinates={_strings(eom.q)},\n"
@@ -167,9 +170,9 @@ def _bare_system(eom: EquationsOfMotion) -> str:
         f"    energies={'energies' if energies else None},\n"
         "    restitution=None,\n"
         f"    parameters={_strings(eom.p)},\n"
-        ")\n"
+        f"{_listed(own)})\n"
     )
-    return "\n\n".join([*energies, system])
+    return "\n\n".join([*energies, *(text for _, text in own), system])
 
 
 def _energies(eom: EquationsOfMotion, names: dict[Expr, str]) -> list[str]:
@@ -182,6 +185,32 @@ def _energies(eom: EquationsOfMotion, names: dict[Expr, str]) -> list[str]:
     text = f"{' and '.join(found).capitalize()} energy [J]."
     values = {"energy": [found.get(name, sp.S.Zero) for name in group]}
     return [function("energies", text, state, values, names)]
+
+
+def _outputs(eom: EquationsOfMotion) -> list[tuple[str, str]]:
+    """The model's own outputs: what makes each in the System, and the text of its functions."""
+    groups = (eom.q, eom.v, eom.vdot, eom.u, eom.p, eom.lam, eom.Q)
+    names = identifiers([s for group in groups for s in group])
+    names[TIME] = "t"
+    arguments = {
+        "t": (),
+        **dict(zip(("q", "v", "vdot", "u", "p", "lam", "Q"), groups, strict=True)),
+    }
+    found = []
+    for k, o in enumerate(eom.outputs):
+        parts = {f"output_{k}": (f"{o.name} [{o.unit}].", o.expression)}
+        if o.otherwise is not None:
+            parts[f"otherwise_{k}"] = (f"{o.name} where it has no value.", o.otherwise)
+        text = "\n\n".join(
+            function(name, doc, arguments, {"w": [e]}, names) for name, (doc, e) in parts.items()
+        )
+        found.append((f"Own({o.name!r}, {', '.join(parts)})", text))
+    return found
+
+
+def _listed(own: Sequence[tuple[str, str]]) -> str:
+    lines = "".join(f"        {made},\n" for made, _ in own)
+    return f"    outputs=(\n{lines}    ),\n" if own else ""
 
 
 def _constraints(eom: EquationsOfMotion, rows: Sequence[int] | None) -> list[Any]:

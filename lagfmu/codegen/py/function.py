@@ -17,7 +17,10 @@ from sympy.printing.pycode import PythonCodePrinter
 from ...errors import DerivationError
 
 Expr = Any
-ARGUMENTS = ("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "e", "energy")
+ARGUMENTS = (
+    *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "e", "energy"),
+    *("vdot", "lam", "Q", "w"),
+)
 
 
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
@@ -58,6 +61,7 @@ def identifiers(symbols: Sequence[Expr]) -> dict[Expr, str]:
         if text.startswith("der("):
             inner = text[4:-1]
             text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
+        text = text.replace(".", "_")
         while text in taken:
             text += "_"
         taken.add(text)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from ...model.scene import Scene
 from ...solver.system import System
 
-CONTACTS = ("contacts.py", "events.py", "looks.py", "switch.py")
+CONTACTS = ("complementarity.py", "contacts.py", "events.py", "impact.py", "looks.py", "switch.py")
 CONSTRAINTS = ("nullspace.py", "orthogonal.py")
 CLASSES = {
     "dop853": ("from .dop853 import Dop853", "Dop853"),

@@ -101,6 +101,7 @@ def reduce(eom: EquationsOfMotion) -> Reduction:
         f=f,
         kinetic=inside(eom.kinetic),
         potential=None if eom.potential is None else inside(eom.potential),
+        outputs=(),  # those of the full system
     )
     return Reduction(s, sdot, phi, vel, reduced, rows)
 

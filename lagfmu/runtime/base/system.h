@@ -66,6 +66,21 @@ struct System {
                     double *dF, double *dG, double *dnu, double *dgamma, double *df,
                     double *denergy);
 
+    /* The model's own outputs w (output_count), from a state and what is solved for there; `other` is
+     * the value of a guarded one where w is not finite.  NULL without any, outputs_tangent also where
+     * nobody asks for derivatives. */
+    int output_count;
+    const char *const *output_names; /* (output_count) */
+    const int *guarded;              /* (output_count) */
+    void (*outputs)(double t, const double *q, const double *v, const double *u, const double *p,
+                    const double *vdot, const double *lambda, const double *Q, double *w,
+                    double *other);
+    void (*outputs_tangent)(double t, const double *q, const double *v, const double *u,
+                            const double *p, const double *vdot, const double *lambda,
+                            const double *Q, double dt, const double *dq, const double *dv,
+                            const double *du, const double *dvdot, const double *dlambda,
+                            const double *dQ, double *dw, double *dother);
+
     /* An embedding q = phi(s, t), v = J sdot + dphi/dt, from the coordinates that this system steps
      * to those of `full`, from which lambda is recovered; both NULL without one.  If nothing that is
      * solved for is read, `full` has no dynamics, and is nothing but the coordinates that are read. */

@@ -8,6 +8,7 @@
 #include "digits.h"
 #include "leg.h"
 #include "magnitudes.h"
+#include "outputs.h"
 
 static const double SMALLEST_TOLERANCE = 1e-14;
 
@@ -27,6 +28,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->v0 = arena_doubles(&saved, system->n);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
+        x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
         x->happened = arena_ints(&scratch, system->contacts);
@@ -82,6 +84,7 @@ static int ready(const Instance *x, const Variable *v, double *value) {
         case AT_TOLERANCE: *value = x->given.tolerance; return 1;
         case AT_STEP: *value = x->given.step; return 1;
         case AT_MAXIMUM_STEP: *value = x->given.maximum_step; return 1;
+        case AT_MAXIMUM_STEPS: *value = x->given.maximum_steps; return 1;
         case AT_INPUT: *value = s->drive.value[v->index]; return 1;
         default: break;
     }
@@ -132,6 +135,7 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
         case AT_KINETIC: *value = o->energy[0]; break;
         case AT_POTENTIAL: *value = o->energy[1]; break;
         case AT_TOTAL: *value = o->energy[0] + o->energy[1]; break;
+        case AT_OUTPUT: *value = o->own[v->index]; break;
         case AT_DEPARTURE_Q:
             *value = departed(x, v->contact, v->index, o->departure_q, state->departure_q);
             break;
@@ -181,6 +185,7 @@ void instance_set(Instance *x, const Variable *v, double value) {
         case AT_TOLERANCE: x->given.tolerance = value; break;
         case AT_STEP: x->given.step = value; break;
         case AT_MAXIMUM_STEP: x->given.maximum_step = value; break;
+        case AT_MAXIMUM_STEPS: x->given.maximum_steps = value; break;
         default: break;
     }
 }
@@ -213,13 +218,29 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
 /* ------------------------------------------------------------------ start */
 
 static void tell_moved(void *context, const char *coordinate, int is_velocity, double given,
-                       double used) {
+                       double used, Rank rank) {
     Instance *x = context;
-    (void)snprintf(x->note, sizeof x->note,
-                   "start value %s%s%s = %s misses the constraints: projected to %s (moved by %.3g)",
-                   is_velocity ? "der(" : "", coordinate, is_velocity ? ")" : "",
-                   digits(given).text, digits(used).text, used - given);
-    x->tell(x->context, NOTE_WARNING, x->note);
+    const char *head = is_velocity ? "der(" : "", *tail = is_velocity ? ")" : "";
+    if (rank == OMITTED)
+        (void)snprintf(x->note, sizeof x->note,
+                       "%s%s%s has no start value: %s in place of %s satisfies the constraints", head,
+                       coordinate, tail, digits(used).text, digits(given).text);
+    else
+        (void)snprintf(x->note, sizeof x->note,
+                       "start value %s%s%s = %s misses the constraints: projected to %s (moved by "
+                       "%.3g)",
+                       head, coordinate, tail, digits(given).text, digits(used).text, used - given);
+    x->tell(x->context, rank == OMITTED ? NOTE_EVENT : NOTE_WARNING, x->note);
+}
+
+/* A start value that differs from the described one was set, whatever calls set it. */
+static void find_ranks(Instance *x) {
+    for (int k = 0; k < VARIABLE_COUNT; k++) {
+        const Variable *v = &VARIABLES[k];
+        if (v->role != ROLE_START) continue;
+        const int set = instance_setting(x, v) != v->start;
+        x->rank[v->state] = set ? SET : v->given ? GIVEN : OMITTED;
+    }
 }
 
 static void choose_settings(Instance *x) {
@@ -241,7 +262,8 @@ Status instance_start(Instance *x) {
     choose_settings(x);
     s->stop_time = x->stop_time;
     s->drive.since = x->start_time;
-    if (solver_start(s, x->start_time, x->q0, x->v0, tell_moved, x) != OK) return FAILED;
+    find_ranks(x);
+    if (solver_start(s, x->start_time, x->q0, x->v0, x->rank, tell_moved, x) != OK) return FAILED;
     /* model exchange has no communication step: 1 s stands in for it */
     if (x->exchange && magnitudes_incomplete(s) &&
         magnitudes_complete(s, leg_instant(s, x->start_time), 1) != OK)
@@ -350,18 +372,24 @@ Status instance_differentiate(Instance *x, Direction d) {
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
         return FAILED;
-    if (full == NULL) return OK;
+    if (full == NULL) {
+        outputs_change(&s->sensitivity, &s->stepped, s->system, at, &x->seen, d);
+        return OK;
+    }
     Sensitivity *w = &x->along;
     s->system->embed_tangent(at.t, s->state.q, s->state.v, at.u, at.p, d.dt, d.dq, d.dv, d.du,
                              w->dq, w->dv);
     const Direction wide = {d.dt, w->dq, w->dv, d.du};
     if (full->dynamics == NULL) {
         sensitivity_of_energies(w, full, at, x->seen.q, x->seen.v, wide);
+        outputs_change(w, NULL, full, at, &x->seen, wide);
         return OK;
     }
     if (mechanism_motion(&s->full, at, x->seen.q, x->seen.v, s->active_full) != OK)
         return FAILED;
-    return sensitivity_along(w, &s->full, at, x->seen.q, x->seen.v, wide);
+    if (sensitivity_along(w, &s->full, at, x->seen.q, x->seen.v, wide) != OK) return FAILED;
+    outputs_change(w, &s->full, full, at, &x->seen, wide);
+    return OK;
 }
 
 /* Q = G^T lambda: the change of the share that G's value e has in it. */
@@ -396,6 +424,7 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_KINETIC: *change = w->denergy[0]; break;
         case AT_POTENTIAL: *change = w->denergy[1]; break;
         case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;
+        case AT_OUTPUT: *change = w->down[v->index]; break;
         case AT_INPUT: *change = d.du[v->index]; break;
         default: break; /* discrete ones and parameters: none */
     }

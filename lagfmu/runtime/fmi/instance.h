@@ -27,6 +27,7 @@ typedef struct {
     int warned;             /* 1: a jump of a prescribed motion has been told */
     int observed, evaluated;
     double *q0, *v0;        /* (n) start values as they were set */
+    Rank *rank;             /* (2 n) who said them; found anew at each start */
     double *expected;       /* (inputs) values at the end of the latest step */
     int *set;               /* (inputs) 1: set since the latest step */
     int *closed, *count;    /* (contacts) before a step */

@@ -13,7 +13,7 @@ typedef enum { ROLE_PARAMETER, ROLE_START, ROLE_INPUT, ROLE_SOLVER, ROLE_OUTPUT 
 /* where its value lies (`index`, and for departures `contact`) */
 typedef enum {
     AT_PARAMETER,      /* p[index] */
-    AT_METHOD, AT_TOLERANCE, AT_STEP, AT_MAXIMUM_STEP,
+    AT_METHOD, AT_TOLERANCE, AT_STEP, AT_MAXIMUM_STEP, AT_MAXIMUM_STEPS,
     AT_INPUT,          /* u[index] */
     AT_Q, AT_V, AT_VDOT,       /* full coordinates */
     AT_S, AT_SDOT, AT_SDDOT,   /* stepped coordinates of an embedding that are not full ones */
@@ -21,6 +21,7 @@ typedef enum {
     AT_FORCE,          /* Q[index] */
     AT_SHARE,          /* entry index of G */
     AT_KINETIC, AT_POTENTIAL, AT_TOTAL,
+    AT_OUTPUT,         /* own output index */
     AT_CONTACT, AT_COUNT, AT_DEPARTURE_TIME, /* contact index */
     AT_DEPARTURE_Q, AT_DEPARTURE_V,          /* full coordinate index, of `contact` */
     AT_STEPS
@@ -37,6 +38,7 @@ typedef struct {
     const char *text; /* start of a String */
     double min, max; /* -HUGE_VAL, HUGE_VAL where there is none */
     int positive;    /* zero is refused */
+    int given;       /* role START: the model's `start` says it; otherwise nobody did, and it is 0 */
 } Variable;
 
 extern const Variable VARIABLES[];

@@ -83,7 +83,7 @@ Status least_norm_factor(Linear *l) {
     for (int j = w.cod.rank; j < w.cod.columns; j++) {
         for (int i = 0; i < w.cod.columns; i++) w.z[i] = i == j;
         cod_from_rows(&w.cod, w.z, w.spare);
-        if (largest(n, w.z) > VANISHES)
+        if (!l->nearest && largest(n, w.z) > VANISHES)
             return fail(l->why,
                         "the mass matrix is singular on the constraint surface: a coordinate has "
                         "neither mass nor a constraint that determines its acceleration");

@@ -162,3 +162,12 @@ Status linear_nearest(Linear *l, const double *c, double *x) {
     l->nearest = 0;
     return status;
 }
+
+Status linear_project(Linear *l, const double *M, const double *G, const int *active,
+                      const double *c, double *x) {
+    l->nearest = 1;
+    Status status = linear_factor(l, M, G, active);
+    if (status == OK) status = linear_solve(l, NULL, c, x, NULL);
+    l->nearest = 0;
+    return status;
+}

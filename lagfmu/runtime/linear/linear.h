@@ -28,7 +28,7 @@ typedef struct {
     double *sparse;       /* workspace of schur.c */
     double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
     int *pivots;
-    int nearest;          /* 1 within linear_nearest() */
+    int nearest;          /* 1 within linear_nearest() and linear_project() */
 } Linear;
 
 enum { DENSE_MOST = 600 }; /* n + m up to which the dense rungs are there */
@@ -48,5 +48,9 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
  * contradict each other, as those of c do that is nothing but rounding, c is met as nearly as can be
  * (least squares in rows of comparable units). */
 Status linear_nearest(Linear *l, const double *c, double *x);
+
+/* Factors and does that at once; a coordinate that has neither mass nor a constraint stays. */
+Status linear_project(Linear *l, const double *M, const double *G, const int *active,
+                      const double *c, double *x);
 
 #endif

@@ -28,6 +28,9 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dq = arena_doubles(arena, s->n);
     w->dv = arena_doubles(arena, s->n);
     w->du = arena_doubles(arena, s->inputs);
+    w->dforce = arena_doubles(arena, s->output_count > 0 ? s->n : 0);
+    w->down = arena_doubles(arena, s->output_count);
+    w->dother = arena_doubles(arena, s->output_count);
 }
 
 static void right_sides(Sensitivity *w, const Mechanism *b) {

@@ -17,6 +17,8 @@ typedef struct {
     double *dvdot, *dlambda; /* (n), (m) */
     double *b, *c;           /* (n), (m) right sides */
     double *dq, *dv, *du;    /* (n), (n), (inputs): a direction, for whoever asks */
+    double *dforce;          /* (n) change of Q, where there are outputs of the model's own */
+    double *down, *dother;   /* (output_count) changes of these */
 } Sensitivity;
 
 void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);

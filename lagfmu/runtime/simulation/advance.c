@@ -15,7 +15,9 @@
 
 enum { CHATTER = 200 }; /* contact events in next to no time after which the step is given up */
 static const double PATIENCE = 200; /* steps after which one is judged by its average step */
-static const double STEP_LIMIT = 1e7; /* internal steps that a communication step may need */
+static const double STEP_LIMIT = 1e7; /* internal steps that a communication step may need, unless ... */
+static const double CRAWL = 1e-3;     /* ... on average they are no shorter than this part of ... */
+static const double TINY = 1e-6;      /* ... the natural time; a step shorter than this makes no headway */
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
 static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 
@@ -173,6 +175,27 @@ static Status meet(Solver *s) {
     return PARTS.switch_modes(s, s->state.left);
 }
 
+/* FAILED if the step just taken shows that t_end is too far off for steps of its kind. */
+static Status check_headway(Solver *s, double t_end, double begun, int first) {
+    Numbers *now = &s->state.now;
+    const Integrator *i = &s->integrator;
+    const double t = now->event_count > 0 ? now->event_time : i->t;
+    const double done = now->steps - first, gone = t - begun, most = s->settings.maximum_steps;
+    if ((t - i->t_old) * now->rate < TINY) now->tiny += 1;
+    if (most > 0 && now->tiny > most)
+        return fail(&s->why,
+                    "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
+                    "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
+                    "motion's natural time: is there a force that jumps to and fro?",
+                    t_end, t, most, TINY / now->rate, TINY);
+    if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone && gone * now->rate < CRAWL * done)
+        return fail(&s->why,
+                    "the communication step to t = %.17g s would need about %.0e internal "
+                    "steps, more than %.0e: take a shorter one",
+                    t_end, done * (t_end - begun) / gone, STEP_LIMIT);
+    return OK;
+}
+
 /* To t_end, or to the first event before it. */
 static Status travel(Solver *s, double t_end, double begun, int first, int *met) {
     Numbers *now = &s->state.now;
@@ -186,12 +209,7 @@ static Status travel(Solver *s, double t_end, double begun, int first, int *met)
         }
         if (s->integrator.t >= t_end) return arrive(s, t_end);
         if (take_step(s, t_end) != OK) return FAILED;
-        const double done = now->steps - first, gone = s->integrator.t - begun;
-        if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone)
-            return fail(&s->why,
-                        "the communication step to t = %.17g s would need about %.0e internal "
-                        "steps, more than %.0e: take a shorter one",
-                        t_end, done * (t_end - begun) / gone, STEP_LIMIT);
+        if (check_headway(s, t_end, begun, first) != OK) return FAILED;
     }
 }
 
@@ -221,6 +239,7 @@ Status solver_advance(Solver *s, double t_end) {
     if (!(t_end > begun) || !(t_end < HUGE_VAL))
         return fail(&s->why, "a communication step must end after t = %.17g s, got %.17g s", begun,
                     t_end);
+    now->tiny = 0;
     resume(s);
     if (follow_surfaces(s) != OK) return FAILED;
     if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;

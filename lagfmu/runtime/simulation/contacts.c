@@ -1,8 +1,7 @@
-/* contacts.c -- which contacts are closed, and what an impact does.
+/* contacts.c -- which contacts are closed.
  *
  *   f >= 0 ,  lambda >= 0 ,  f lambda = 0     Signorini's condition (Pfeiffer & Glocker, Multibody
  *                                             Dynamics with Unilateral Contacts, 1996, ch. 4)
- *   M (v+ - v-) = G^T Lambda ,  G v+ - nu = -e (G v- - nu)     Newton's law of restitution
  *
  * The modes of all contacts are found together by an active set on the accelerations: a closed
  * contact that would have to pull is opened, an open one that touches and would be penetrated is
@@ -144,31 +143,5 @@ Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, i
         return FAILED;
     if (!settled) return no_modes(s, at, touching);
     memcpy(closed, modes, bytes);
-    return OK;
-}
-
-Status contacts_impact(Solver *s, Instant at, const double *q, double *v, const int *closed,
-                       int landing, int plastic) {
-    const System *system = s->system;
-    const int n = system->n, m = system->m, struck = system->contact[landing];
-    Mechanism *b = &s->stepped;
-    int *active = s->iwork_contacts, *modes = active + m;
-    double *jump = s->work_contacts, *dv = jump + m, *Lambda = dv + n, *e = Lambda + m;
-    system->restitution(s->p, e);
-    memcpy(modes, closed, (size_t)system->contacts * sizeof *modes);
-    modes[landing] = 1;
-    if (mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
-    for (int k = 0; k < m; k++) jump[k] = b->nu[k] - mechanism_row(b, k, v);
-    if (!plastic) jump[struck] *= 1 + e[struck];
-    for (int pulling = 0; pulling != NONE;) { /* a closed contact that would pull is left out */
-        system_active(system, modes, active);
-        if (linear_factor(&b->linear, b->M, b->G, active) == FAILED) return FAILED;
-        if (linear_solve(&b->linear, NULL, jump, dv, Lambda) == FAILED) return FAILED;
-        pulling = NONE;
-        for (int c = 0; c < system->contacts && pulling == NONE; c++)
-            if (modes[c] && c != landing && Lambda[system->contact[c]] < 0) pulling = c;
-        if (pulling != NONE) modes[pulling] = 0;
-    }
-    for (int j = 0; j < n; j++) v[j] += dv[j];
     return OK;
 }

@@ -1,4 +1,4 @@
-/* contacts.h -- which contacts are closed, and what an impact does. */
+/* contacts.h -- which contacts are closed. */
 #ifndef LAGFMU_CONTACTS_H
 #define LAGFMU_CONTACTS_H
 
@@ -11,10 +11,5 @@
  * again. `leaving` may be NULL.  FAILED: no modes fit; `closed` is untouched. */
 Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, int *closed,
                       const int *touching, const int *leaving);
-
-/* Velocities after the contact `landing` (a position among the contacts) was struck: v is replaced.
- * plastic: without rebound.  FAILED leaves v untouched. */
-Status contacts_impact(Solver *s, Instant at, const double *q, double *v, const int *closed,
-                       int landing, int plastic);
 
 #endif

@@ -1,125 +1,19 @@
 /* initial.c -- a consistent start: projection of start values onto the constraints, contact modes,
  * magnitudes.
  *
- *   M dq = G^T mu ,  G dq = -f     damped Newton's method from afar (Deuflhard, Newton Methods for
- *                                  Nonlinear Problems, sect. 3.1), the step halved until |f| falls
- *
- * Positions are projected, weighted by M, onto the constraints that always act and onto contacts
+ * Positions are projected (afar.c, precedence.c) onto the constraints that always act and onto contacts
  * that are penetrated (f < gap); then velocities onto G v = nu; then the contacts that touch are
  * closed if their multiplier is positive. */
 #include <float.h>
 #include <string.h>
 
+#include "afar.h"
 #include "digits.h"
 #include "magnitudes.h"
 #include "parts.h"
 
-enum { ITERATIONS = 60, HALVINGS = 25 };
 static const double EPS = DBL_EPSILON;
 static const double LARGEST_ANGLE = 1e-3 / DBL_EPSILON; /* [rad] neighbouring numbers are 1e-3 apart */
-
-/* The start of a simulation: the state that is being found, and where it began. */
-typedef struct {
-    Solver *s;
-    Instant at;
-    const double *q0, *v0;
-} Start;
-
-static Status refused(Solver *s) {
-    Why cause = s->why;
-    return fail(&s->why, "the start is refused: %s", cause.text);
-}
-
-/* allowed (m): `factor` roundings of each constraint's terms at q, no smaller than those of `least`. */
-static void find_allowed(const Start *x, const double *q, const double *least, double factor,
-                         double *reach, double *allowed) {
-    const System *s = x->s->system;
-    for (int j = 0; j < s->n; j++) reach[j] = fmax(fabs(q[j]), least[j]);
-    for (int k = 0; k < s->m; k++)
-        allowed[k] = factor * EPS * mechanism_row_size(&x->s->stepped, k, reach);
-}
-
-static int arrived(const System *s, const int *rows, const double *f, const double *allowed) {
-    for (int k = 0; k < s->m; k++)
-        if (rows[k] && !(fabs(f[k]) <= allowed[k])) return 0;
-    return 1;
-}
-
-/* |f| on the rows in units of what may be left; of f0 where nothing may. */
-static double norm(const System *s, const int *rows, const double *f, const double *allowed,
-                   const double *f0) {
-    double sum = 0;
-    for (int k = 0; k < s->m; k++) {
-        double unit = allowed[k] > 0 ? allowed[k] : f0[k] != 0 ? fabs(f0[k]) : 1;
-        if (rows[k]) sum += f[k] / unit * (f[k] / unit);
-    }
-    return sqrt(sum);
-}
-
-static Status cannot_be_projected(const Start *x, const int *rows, const double *f,
-                                  const double *allowed) {
-    const System *s = x->s->system;
-    Why *why = &x->s->why;
-    const char *comma = "";
-    fail(why, "the start values ");
-    for (int j = 0; j < s->n; j++) {
-        Digits given = digits(x->q0[j]);
-        why_append(why, "%s%s = %s", j > 0 ? ", " : "", s->coordinates[j], given.text);
-    }
-    why_append(why, " cannot be projected onto the constraints (missed: ");
-    for (int k = 0; k < s->m; k++)
-        if (rows[k] && !(fabs(f[k]) <= allowed[k])) {
-            why_append(why, "%s'%s' by %.3g", comma, s->rows[k].name, f[k]);
-            comma = ", ";
-        }
-    why_append(why, "): choose start values near a configuration that satisfies them, or other "
-                    "parameters");
-    return FAILED;
-}
-
-/* Damped Newton's method for f = 0 on the rows, weighted by M, from anywhere; q is moved.
- *
- * It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
- * since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
- * of at the start (`size`).  While it falls on and on, there is nothing to arrive at. */
-static Status project_from_afar(const Start *x, double *q, int *rows) {
-    const System *s = x->s->system;
-    const size_t bytes = (size_t)s->n * sizeof *q;
-    Mechanism *b = &x->s->stepped;
-    double *step = x->s->work_initial, *trial = step + s->n, *least = trial + s->n;
-    double *f = least + s->n, *f_trial = f + s->m, *allowed = f_trial + s->m;
-    int any = 0;
-    for (int k = 0; k < s->m; k++) {
-        if (s->rows[k].kind == NONHOLONOMIC) rows[k] = 0;
-        any |= rows[k];
-    }
-    if (!any) return OK;
-    magnitudes_extents(s, x->at.p, least);
-    if (mechanism_residual(b, x->at, q, f) == FAILED) return refused(x->s);
-    for (int count = 0;; count++) {
-        if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return refused(x->s);
-        find_allowed(x, q, least, 4, trial, allowed);
-        if (arrived(s, rows, f, allowed)) return OK;
-        if (count == ITERATIONS) return cannot_be_projected(x, rows, f, allowed);
-        find_allowed(x, q, x->s->state.size, 1e3, trial, allowed);
-        for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
-        if (linear_factor(&b->linear, b->M, b->G, rows) == FAILED) break;
-        if (linear_nearest(&b->linear, f_trial, step) == FAILED) break;
-        double damping = 1;
-        int halvings = 0;
-        for (; halvings < HALVINGS; halvings++, damping /= 2) {
-            for (int j = 0; j < s->n; j++) trial[j] = q[j] + damping * step[j];
-            if (mechanism_residual(b, x->at, trial, f_trial) == FAILED) continue;
-            if (norm(s, rows, f_trial, allowed, f) <
-                (1 - 0.1 * damping) * norm(s, rows, f, allowed, f))
-                break;
-        }
-        if (halvings == HALVINGS) break;
-        memcpy(q, trial, bytes);
-        memcpy(f, f_trial, (size_t)s->m * sizeof *f);
-    }
-    return arrived(s, rows, f, allowed) ? OK : cannot_be_projected(x, rows, f, allowed);
-}
 
 /* An angle whose neighbouring numbers are no neighbouring directions is refused. */
 static Status check_angles(const Start *x) {
@@ -160,10 +54,10 @@ static Status find_positions(const Start *x) {
     memcpy(state->q, x->q0, (size_t)s->n * sizeof *state->q);
     memset(state->closed, 0, (size_t)s->contacts * sizeof *state->closed);
     system_active(s, state->closed, rows);
-    if (project_from_afar(x, state->q, rows) == FAILED) return FAILED;
+    if (afar_positions(x, state->q, rows) == FAILED) return FAILED;
     for (int count = 0; count <= s->contacts; count++) {
-        if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return refused(x->s);
-        if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return refused(x->s);
+        if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return afar_refused(x->s);
+        if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return afar_refused(x->s);
         for (int j = 0; j < s->n; j++) unit[j] = fmax(fabs(state->q[j]), state->size[j]);
         for (int c = 0; c < s->contacts; c++) {
             int k = s->contact[c];
@@ -172,7 +66,7 @@ static Status find_positions(const Start *x) {
         }
         system_active(s, state->closed, rows);
         memcpy(moved, state->q, (size_t)s->n * sizeof *moved);
-        if (project_from_afar(x, moved, rows) == FAILED) return FAILED;
+        if (afar_positions(x, moved, rows) == FAILED) return FAILED;
         int still = 1;
         for (int j = 0; j < s->n; j++)
             still &= fabs(moved[j] - state->q[j]) <= 4 * EPS * state->size[j];
@@ -227,7 +121,7 @@ static Status find_velocities(const Start *x) {
     double *natural = x->s->work_initial, *fastest = natural + s->n, *shared = fastest + s->n;
     int *active = x->s->iwork_initial;
     memcpy(state->v, x->v0, (size_t)s->n * sizeof *state->v);
-    if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return refused(x->s);
+    if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return afar_refused(x->s);
     if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
     for (int j = 0; j < s->n; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
@@ -238,10 +132,12 @@ static Status find_velocities(const Start *x) {
         if (speed > TOUCH * mechanism_row_size(b, k, shared)) state->closed[c] = 0;
     }
     system_active(s, state->closed, active);
+    if (afar_velocities(x, state->q, natural, active, state->v) == FAILED)
+        return afar_refused(x->s);
     if (mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->size) ==
         FAILED)
-        return refused(x->s);
-    if (mechanism_evaluate(b, x->at, state->q, state->v) == FAILED) return refused(x->s);
+        return afar_refused(x->s);
+    if (mechanism_evaluate(b, x->at, state->q, state->v) == FAILED) return afar_refused(x->s);
     return check_velocities(x, active, natural, shared);
 }
 
@@ -254,13 +150,13 @@ static Status find_modes(const Start *x) {
     memcpy(touching, state->closed, (size_t)s->contacts * sizeof *touching);
     if (s->contacts > 0 && PARTS.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
                                                 touching, NULL) == FAILED)
-        return refused(x->s);
+        return afar_refused(x->s);
     system_active(s, state->closed, x->s->active);
     if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,
                           state->size) == FAILED)
-        return refused(x->s);
+        return afar_refused(x->s);
     if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
-        return refused(x->s);
+        return afar_refused(x->s);
     return OK;
 }
 
@@ -284,7 +180,8 @@ static void tell_moved(const Start *x, Moved moved, void *context) {
         double used = is_velocity ? state->v[j] : state->q[j];
         double unit = fmax(is_velocity ? state->scale[i] : state->size[j], fabs(given));
         if (fabs(given - used) > 1e-12 * unit)
-            moved(context, x->s->system->coordinates[j], is_velocity, given, used);
+            moved(context, x->s->system->coordinates[j], is_velocity, given, used,
+                  is_velocity ? x->rank_v[j] : x->rank_q[j]);
     }
 }
 
@@ -309,12 +206,13 @@ static void clear(Solver *s, double t) {
     state->now.fresh = 1;
 }
 
-Status solver_start(Solver *s, double t, const double *q0, const double *v0, Moved moved,
-                    void *context) {
+Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
+                    Moved moved, void *context) {
     if (check_finite(s, q0, v0) == FAILED) return FAILED;
     clear(s, t);
     drive_at(s->system, &s->drive, t, s->u);
-    const Start x = {s, {t, s->u, s->p}, q0, v0};
+    if (s->system->contacts > 0 && PARTS.impact_check(s) != OK) return FAILED;
+    const Start x = {s, {t, s->u, s->p}, q0, v0, rank, rank + s->system->n};
     magnitudes_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;
     if (find_velocities(&x) == FAILED) return FAILED;

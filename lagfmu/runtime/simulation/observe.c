@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "outputs.h"
 #include "solver.h"
 
 static int same_row(const System *a, int i, const System *b, int k) {
@@ -177,5 +178,6 @@ Status solver_observe(Solver *s, Observed *o) {
     if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;
     if (full->energies != NULL) full->energies(at.t, o->q, o->v, at.u, at.p, o->energy);
     observe_departures(s, o);
-    return check_finite(s, full, o);
+    if (check_finite(s, full, o) != OK) return FAILED;
+    return outputs_observe(full, at, o, &s->why);
 }

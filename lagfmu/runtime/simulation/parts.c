@@ -11,6 +11,7 @@ const Parts PARTS = {
     .rattle_step = rattle_step,
     .events_find = events_find,
     .contacts_modes = contacts_modes,
+    .impact_check = impact_check,
     .switch_modes = switch_modes,
     .switch_released = switch_released,
 };

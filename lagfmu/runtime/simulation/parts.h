@@ -7,6 +7,7 @@
 
 #include "contacts.h"
 #include "events.h"
+#include "impact.h"
 #include "rattle.h"
 #include "switch.h"
 
@@ -21,6 +22,7 @@ typedef struct {
     Status (*events_find)(Solver *s, const double *y1);
     Status (*contacts_modes)(Solver *s, Instant at, const double *q, const double *v, int *closed,
                              const int *touching, const int *leaving);
+    Status (*impact_check)(Solver *s);
     Status (*switch_modes)(Solver *s, const int *happened);
     Status (*switch_released)(Solver *s, double span);
 } Parts;

@@ -1,6 +1,7 @@
 /* solver.c -- the memory of a simulation, taken in two passes (arena.h). */
 #include "solver.h"
 
+#include "impact.h"
 #include "indicators.h"
 #include "looks.h"
 #include "parts.h"
@@ -51,14 +52,17 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     }
     s->active = arena_ints(scratch, m);
     s->u = arena_doubles(scratch, system->inputs);
-    s->work_initial = arena_doubles(scratch, 5 * n + 3 * m);
-    s->iwork_initial = arena_ints(scratch, m + contacts);
+    s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);
+    s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
     s->work_contacts = arena_doubles(scratch, 2 * n + 3 * m);
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
     s->work_advance = arena_doubles(scratch, 4 * n);
     s->work_events =
         arena_doubles(scratch, indicators == 0 ? 0 : 2 * n + indicators + looks_doubles(indicators));
-    s->iwork_events = arena_ints(scratch, 5 * contacts);
+    s->iwork_events = arena_ints(scratch, 6 * contacts);
+    s->work_switch = arena_doubles(scratch, contacts == 0 ? 0 : m);
+    s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(n, m, contacts));
+    s->iwork_impact = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));
 }
 
 void solver_inputs_changed(Solver *s) {
@@ -79,6 +83,8 @@ void observed_layout(Observed *o, Arena *arena, const System *system) {
     o->unique = arena_ints(arena, m);
     o->force = arena_doubles(arena, n);
     o->share = arena_doubles(arena, full->entries);
+    o->own = arena_doubles(arena, full->output_count);
+    o->other = arena_doubles(arena, full->output_count);
     o->s = arena_doubles(arena, stepped);
     o->sdot = arena_doubles(arena, stepped);
     o->sddot = arena_doubles(arena, stepped);

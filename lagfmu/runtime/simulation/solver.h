@@ -3,6 +3,7 @@
 #define LAGFMU_SOLVER_H
 
 #include "mechanism.h"
+#include "precedence.h"
 #include "sensitivity.h"
 #include "state.h"
 
@@ -20,13 +21,16 @@ typedef struct {
     Sensitivity sensitivity;   /* of `stepped` */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
-    double *work_initial;      /* (5 n + 3 m) of initial.c and magnitudes.c */
-    int *iwork_initial;        /* (m + contacts) */
+    double *work_initial;      /* (6 n + 3 m) of initial.c, afar.c and magnitudes.c */
+    int *iwork_initial;        /* (2 m + contacts) */
     double *work_contacts;     /* (2 n + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */
     double *work_advance;      /* (4 n) of advance.c */
     double *work_events;       /* (2 n + indicators and all looks) of events.c */
-    int *iwork_events;         /* (5 contacts) of events.c and switch.c */
+    int *iwork_events;         /* (6 contacts) of events.c and switch.c */
+    double *work_switch;       /* (m) of switch.c */
+    double *work_impact;       /* of impact.c, see there */
+    int *iwork_impact;
     Why why;
 } Solver;
 
@@ -37,13 +41,14 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
 
 /* One start value that had to be moved onto the constraints. */
 typedef void (*Moved)(void *context, const char *coordinate, int is_velocity, double given,
-                      double used);
+                      double used, Rank rank);
 
-/* initial.c -- the consistent state at t nearest to the start values q0, v0 (n, not in s->state),
- * for the drive and p that the caller has set; `moved` (may be NULL) is called for each value that
+/* initial.c -- the consistent state at t nearest to the start values q0, v0 (n, not in s->state) of
+ * rank (2 n, of the coordinates and then of the velocities: which of them move first), for the drive and
+ * p that the caller has set; `moved` (may be NULL) is called for each value that
  * was moved.  FAILED: the start is refused, the cause is in s->why; the state is in disorder. */
-Status solver_start(Solver *s, double t, const double *q0, const double *v0, Moved moved,
-                    void *context);
+Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
+                    Moved moved, void *context);
 
 /* advance.c -- from state.now.t to t_end [s].  FAILED leaves the state in disorder: the caller
  * puts the saved one back (it keeps a copy). */
@@ -59,6 +64,7 @@ typedef struct {
     int *unique;                   /* (m) */
     double *force, *share;         /* Q (n); one constraint's part of it (entries) */
     double energy[2];              /* kinetic, potential */
+    double *own, *other;           /* (output_count) the model's own; where these are not finite */
     double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
     double *departure_q, *departure_v; /* (contacts * n) in full coordinates */
 } Observed;

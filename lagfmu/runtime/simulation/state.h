@@ -14,10 +14,11 @@ enum { METHOD_COUNT = 6 };
 extern const char *const METHOD_NAMES[METHOD_COUNT];
 
 /* How to step.  tolerance: relative, a step; step [s]: largest step of rk4 and rattle, 0: chosen;
- * maximum_step [s]: largest adaptive step, 0: no limit. */
+ * maximum_step [s]: largest adaptive step, 0: no limit.  maximum_steps: how many steps shorter than 1e-6
+ * of the natural time a communication step may take, 0: no limit. */
 typedef struct {
     MethodName method;
-    double tolerance, step, maximum_step;
+    double tolerance, step, maximum_step, maximum_steps;
 } Settings;
 
 /* Inputs as polynomials in the time since they were set: u_k(elapsed) = value + elapsed * first +
@@ -37,6 +38,7 @@ typedef struct {
     double step;         /* [s] the step to try next */
     double span;         /* [s] the communication step that led to t; 0: none */
     int steps;           /* internal steps taken so far */
+    int tiny;            /* those of the present communication step that make no headway */
     int ahead;           /* 1: the integrator stands at integrator->t >= t, and dense output answers */
     double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */
     int event_count;     /* indicators that leave their ranges then */

@@ -1,84 +1,115 @@
-/* switch.c -- impacts by Newton's law of restitution, rest, and the modes of all contacts together
- * (contacts.c; Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chs. 4 and 6). */
+/* switch.c -- what happens at contacts: impacts (impact.c), rest, and the modes of all contacts together
+ * (contacts.c; Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chs. 4 and 6).  Nothing
+ * depends on the order in which contacts are declared. */
 #include "switch.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "contacts.h"
+#include "impact.h"
 #include "leg.h"
 
-enum { ROUNDS = 50 }; /* in which an impact is passed on between contacts that touch */
 static const double SLOW = 1e-9; /* speed of a gap, relative to the motion's own, that counts as none */
 
-/* True if the rebound would not rise above the gap within which contacts touch, v^2 / (2 a) <= gap:
- * without it a ball would bounce infinitely often in a finite time. */
-static Status comes_to_rest(Solver *s, Instant at, const int *closed, int c, int *rests) {
+/* What is said of each contact while an event is met: flags (contacts). */
+typedef struct {
+    int *closed;   /* before the event, without those that are leaving; then the modes after it */
+    int *leaving;  /* opened because the multiplier passed through zero */
+    int *near;     /* an impact can reach it */
+    int *struck;   /* it landed, or took an impulse */
+    int *touching; /* f and df/dt are zero: the accelerations decide */
+} Flags;
+
+/* Speeds (m) of the rows that count as none, of the G that was evaluated last. */
+static void find_slow(const Solver *s, double *slow) {
     const System *system = s->system;
-    Mechanism *b = &s->stepped;
-    const int k = system->contact[c];
-    system_active(system, closed, s->active);
-    if (mechanism_motion(b, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
-    const double speed = mechanism_slip(b, k, s->state.v);
-    const double acceleration = mechanism_row(b, k, b->vdot) - b->gamma[k];
-    *rests = speed <= 0 ||
-             (acceleration < 0 && speed * speed <= -2 * acceleration * s->state.gap[c]);
-    return OK;
+    for (int k = 0; k < system->m; k++)
+        slow[k] = SLOW * fmax(s->state.now.rate * mechanism_row_size(&s->stepped, k, s->state.size),
+                              mechanism_row_size(&s->stepped, k, s->state.scale + system->n));
 }
 
-/* An impact passed on through contacts that touch: each that is approached is struck in turn; after
- * ROUNDS rounds the rest is taken as one plastic impact. */
-static Status pass_on(Solver *s, Instant at, const int *closed) {
+static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
     const System *system = s->system;
-    Mechanism *b = &s->stepped;
-    int *near = s->iwork_events, *struck = near + system->contacts;
-    if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
-    for (int c = 0; c < system->contacts; c++)
-        near[c] = !closed[c] && fabs(b->f[system->contact[c]]) <= s->state.gap[c];
-    for (int round = 0; round < ROUNDS; round++) {
-        int any = 0;
-        if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
-        for (int c = 0; c < system->contacts; c++) {
-            const int k = system->contact[c];
-            const double size = s->state.now.rate * mechanism_row_size(b, k, s->state.size);
-            struck[c] = near[c] && mechanism_slip(b, k, s->state.v) < -SLOW * size;
-            any |= struck[c];
-        }
-        if (!any) return OK;
-        for (int c = 0; c < system->contacts; c++)
-            if (struck[c] && contacts_impact(s, at, s->state.q, s->state.v, closed, c,
-                                             round == ROUNDS - 1) != OK)
-                return FAILED;
+    const double *f = s->stepped.f;
+    if (mechanism_residual(&s->stepped, at, s->state.q, s->stepped.f) != OK) return FAILED;
+    for (int c = 0; c < system->contacts; c++) {
+        const int shut = s->state.closed[c];
+        x->leaving[c] = happened[c] && shut;
+        x->closed[c] = shut && !happened[c];
+        x->struck[c] = 0;
+        x->near[c] = x->closed[c] || (happened[c] && !shut) ||
+                     fabs(f[system->contact[c]]) <= s->state.gap[c];
     }
     return OK;
 }
 
-/* Contacts with f and df/dt at zero: those whose mode the accelerations decide. */
-static Status find_touching(Solver *s, Instant at, const int *closed, int *touching) {
+/* Impacts, if a contact has landed. */
+static Status strike(Solver *s, Instant at, const int *happened, Flags *x) {
+    int landed = 0;
+    const int contacts = s->system->contacts;
+    double *slow = s->work_switch;
+    for (int c = 0; c < contacts; c++) landed |= happened[c] && !x->leaving[c];
+    if (!landed) return OK;
+    if (mechanism_evaluate(&s->stepped, at, s->state.q, s->state.v) != OK) return FAILED;
+    find_slow(s, slow);
+    if (impacts(s, at, s->state.q, s->state.v, x->near, slow, x->struck) != OK) return FAILED;
+    for (int c = 0; c < contacts; c++) {
+        if (x->struck[c]) x->leaving[c] = 0;
+        if (happened[c] && !s->state.closed[c]) x->struck[c] = 1;
+    }
+    return OK;
+}
+
+/* Contacts that were struck, or were closed, and part so slowly that they would not rise above the gap within
+ * which contacts touch, v^2 / (2 a) <= gap, are added to those that touch: without it a ball would bounce
+ * infinitely often in a finite time.  `shut`: closed before.  Returns whether there are any. */
+static int find_low(Solver *s, const double *slow, const int *shut, Flags *x) {
     const System *system = s->system;
-    Mechanism *b = &s->stepped;
-    if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
-    if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
+    const Mechanism *b = &s->stepped;
+    int any = 0;
     for (int c = 0; c < system->contacts; c++) {
         const int k = system->contact[c];
-        const double size = mechanism_row_size(b, k, s->state.scale + system->n);
-        touching[c] = closed[c] || (fabs(b->f[k]) <= s->state.gap[c] &&
-                                    fabs(mechanism_slip(b, k, s->state.v)) <= SLOW * size);
+        const double speed = mechanism_slip(b, k, s->state.v);
+        const double pull = b->gamma[k] - mechanism_row(b, k, b->vdot);
+        if (!x->near[c] || !(shut[c] || x->struck[c]) || !(speed > slow[k])) continue;
+        if (!(pull > 0 && speed * speed <= 2 * pull * s->state.gap[c])) continue;
+        x->closed[c] = x->touching[c] = any = 1;
     }
-    return OK;
+    return any;
 }
 
-/* The contact c is struck: velocities after the impact; if it stays closed, the rows that act with it
- * keep the level at which they come back. */
-static Status land(Solver *s, Instant at, int *closed, int c) {
+/* The modes after the impacts: accelerations decide where df/dt is zero; what parts is open. */
+static Status settle(Solver *s, Instant at, Flags *x) {
     const System *system = s->system;
-    Mechanism *b = &s->stepped;
-    if (contacts_impact(s, at, s->state.q, s->state.v, closed, c, 0) != OK) return FAILED;
-    if (comes_to_rest(s, at, closed, c, &closed[c]) != OK) return FAILED;
-    if (!closed[c]) return OK;
-    if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
-    for (int k = 0; k < system->m; k++)
-        if (system->rows[k].while_closed == system->contact[c]) s->state.offset[k] = b->f[k];
+    const double *q = s->state.q, *v = s->state.v;
+    double *slow = s->work_switch;
+    int *shut = s->iwork_events + 5 * system->contacts;
+    memcpy(shut, x->closed, (size_t)system->contacts * sizeof *shut);
+    if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
+    find_slow(s, slow);
+    for (int c = 0; c < system->contacts; c++) {
+        const int k = system->contact[c];
+        x->touching[c] = x->near[c] && fabs(mechanism_slip(&s->stepped, k, v)) <= slow[k];
+        x->closed[c] = x->touching[c] && (shut[c] || x->struck[c]);
+    }
+    if (contacts_modes(s, at, q, v, x->closed, x->touching, x->leaving) != OK) return FAILED;
+    system_active(system, x->closed, s->active);
+    if (mechanism_motion(&s->stepped, at, q, v, s->active) != OK) return FAILED;
+    if (!find_low(s, slow, shut, x)) return OK;
+    return contacts_modes(s, at, q, v, x->closed, x->touching, x->leaving);
+}
+
+/* Rows that come back with a contact keep the level f = offset at which they do. */
+static Status set_levels(Solver *s, Instant at, const int *closed) {
+    const System *system = s->system;
+    if (mechanism_residual(&s->stepped, at, s->state.q, s->stepped.f) != OK) return FAILED;
+    for (int c = 0; c < system->contacts; c++) {
+        if (!closed[c] || s->state.closed[c]) continue;
+        for (int k = 0; k < system->m; k++)
+            if (system->rows[k].while_closed == system->contact[c])
+                s->state.offset[k] = s->stepped.f[k];
+    }
     return OK;
 }
 
@@ -94,30 +125,19 @@ Status switch_modes(Solver *s, const int *happened) {
     const System *system = s->system;
     const int contacts = system->contacts;
     const Instant at = leg_instant(s, s->state.now.t);
-    int *closed = s->iwork_events + 2 * contacts, *touching = closed + contacts;
-    int *leaving = touching + contacts, landed = 0;
-    for (int c = 0; c < contacts; c++) {
-        closed[c] = s->state.closed[c];
-        leaving[c] = happened[c] && closed[c];
-        if (leaving[c]) closed[c] = 0;
-        if (happened[c]) s->state.armed[c] = 0;
-    }
-    for (int c = 0; c < contacts; c++) {
-        if (!happened[c] || leaving[c]) continue;
-        if (land(s, at, closed, c) != OK) return FAILED;
-        landed = 1;
-    }
-    if (landed && pass_on(s, at, closed) != OK) return FAILED;
-    if (find_touching(s, at, closed, touching) != OK) return FAILED;
-    if (contacts_modes(s, at, s->state.q, s->state.v, closed, touching, leaving) != OK)
-        return FAILED;
-    system_active(system, closed, s->active);
+    int *flags = s->iwork_events;
+    Flags x = {flags, flags + contacts, flags + 2 * contacts, flags + 3 * contacts,
+               flags + 4 * contacts};
+    if (find_near(s, at, happened, &x) != OK || strike(s, at, happened, &x) != OK) return FAILED;
+    if (settle(s, at, &x) != OK || set_levels(s, at, x.closed) != OK) return FAILED;
+    system_active(system, x.closed, s->active);
     if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
                           s->state.size) != OK)
         return FAILED;
     for (int c = 0; c < contacts; c++) {
-        if (s->state.closed[c] && !closed[c]) note_departure(s, c);
-        s->state.closed[c] = closed[c];
+        if (s->state.closed[c] && !x.closed[c]) note_departure(s, c);
+        if (happened[c] || x.struck[c]) s->state.armed[c] = 0;
+        s->state.closed[c] = x.closed[c];
     }
     return OK;
 }

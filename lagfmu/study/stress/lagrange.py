@@ -3,6 +3,7 @@
     d/dt dL/dv_j - dL/dq_j = Q_nc,j + Q_j                  for each coordinate
     d^2 f/dt^2 = 0   or   d/dt (sum a_j v_j + a_0) = 0     for each constraint, while it acts
     Q_cj = lambda_c a_cj ,   residual_c = f   or   sum a_j v_j + a_0
+    an Output of the model = its expression, of the values that are reported beside it
 
 They hold at each instant, whatever the parameters, the inputs and the tolerance, and together they
 determine the accelerations, lambda and Q: nothing of the FMU's own derivation, code and linear algebra stands
@@ -56,6 +57,7 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
     total = sp.Add(*(terms[q] / sp.sqrt(masses[q]) for q in heavy))
     forms += _of_constraints(model, {q: total / sp.sqrt(masses[q]) for q in heavy})
     forms += _of_shares(model, variables)
+    forms += [ClosedForm(o.name, o.expression, rounding=ROUNDING) for o in model.outputs]
     return [form for form in forms if _names(form) <= variables]
 
 
@@ -97,5 +99,6 @@ def _form(
 
 
 def _names(form: ClosedForm) -> set[str]:
-    used = in_variables(form.actual).free_symbols | in_variables(form.expected).free_symbols
+    actual = output(form.name) if form.actual is None else form.actual
+    used = in_variables(actual).free_symbols | in_variables(form.expected).free_symbols
     return {str(s) for s in used} - {"time"}

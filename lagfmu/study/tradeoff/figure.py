@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import BuildError
 from .measure import Tradeoff
-from .quantities import EVENT, FORCE, MULTIPLIER
+from .quantities import EVENT, FORCE, MULTIPLIER, OWN
 
 COLOURS = {
     "dop853": "#0b6e99",
@@ -236,6 +236,7 @@ def _error_label(found: Tradeoff, group: str) -> str:
         EVENT: "largest error of an event time, relative to the time",
         MULTIPLIER: "largest error of a λ, relative to its largest magnitude",
         FORCE: "largest error of a Q, relative to its largest magnitude",
+        OWN: "largest error of an output of the model, relative to its largest magnitude",
     }.get(group, "largest error of a coordinate, relative to its largest magnitude")
 
 

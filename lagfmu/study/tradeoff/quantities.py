@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...errors import SimulationError
+from ...model.parts import RESERVED
 from ...verification.simulate import Trajectory
 
 MULTIPLIER, FORCE, MOTION, EVENT = "lambda", "Q", "coordinates", "event time"
-GROUPS = (MULTIPLIER, FORCE, MOTION, EVENT)
+OWN = "outputs"
+GROUPS = (MULTIPLIER, FORCE, MOTION, OWN, EVENT)
 ZERO = 1e-9  # part of its group's magnitude below which a quantity counts as zero
 
 
@@ -33,19 +35,33 @@ class Quantity:
 
 
 def quantities(description: Any) -> tuple[Quantity, ...]:
-    """Every output of an FMU (fmpy's ModelDescription) that is a lambda, Q, coordinate or departure
-    time."""
+    """Every output of an FMU (fmpy's ModelDescription) that is a lambda, Q, coordinate, departure time
+    or output of the model's own."""
     reals = [v for v in description.modelVariables if v.type == "Real"]
     units = {v.name: v.unit or "1" for v in reals if v.causality == "output"}
-    coordinates = [n for n in units if re.fullmatch(r"[A-Za-z_]\w*", n)]
+    known = {v.name for v in description.modelVariables}
+    own = [n for n in units if _is_own(n, known)]
+    coordinates = [n for n in units if re.fullmatch(r"[A-Za-z_]\w*", n) and n not in own]
     found = [Quantity(n, MULTIPLIER, units[n]) for n in units if n.startswith("lambda.")]
     found += [Quantity(n, FORCE, units[n]) for n in units if re.fullmatch(r"Q\.\w+", n)]
     found += [Quantity(c, MOTION, units[c]) for c in coordinates]
+    found += [Quantity(n, OWN, units[n]) for n in own]
     for n in units:
         parts = n.split(".")
         if len(parts) == 3 and parts[0] == "departure" and parts[2] == "time":
             found.append(Quantity(n, EVENT, units[n], parts[1]))
     return tuple(found)
+
+
+def _is_own(name: str, known: Collection[str]) -> bool:
+    """True for an output that the model names itself: neither the FMU's own, nor one that moves.
+
+    A full FMU reports the velocity of each of its coordinates.
+    """
+    full = any(n.startswith("der(") for n in known)
+    if "." in name or "(" in name:
+        return "(" not in name and name.split(".")[0] not in RESERVED
+    return full and f"der({name})" not in known
 
 
 def residual(run: Trajectory) -> float:

@@ -14,9 +14,9 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from .measure import Row, Tradeoff
-from .quantities import EVENT, FORCE, MOTION, MULTIPLIER
+from .quantities import EVENT, FORCE, MOTION, MULTIPLIER, OWN
 
-SYMBOLS = {MULTIPLIER: "λ", FORCE: "Q", MOTION: "motion", EVENT: "event"}
+SYMBOLS = {MULTIPLIER: "λ", FORCE: "Q", MOTION: "motion", OWN: "outputs", EVENT: "event"}
 FORMAT = 1
 BUSY = 1.3  # ratio of quartiles from which the times come with a warning
 GOALS = (1e-4, 1e-7, 1e-10)

@@ -1,0 +1,152 @@
+"""What is wrong with the outputs of a model's own, in words: names, symbols, units, missing values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+from sympy.physics.vector import dynamicsymbols
+
+from ..errors import UnitError
+from .parts import NAME, RESERVED, Contact, Expr, ModelFields, Nonholonomic, name_of
+from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
+from .units import Unit, check_dimension, parse_unit, plain
+
+HIGHEST = 2  # order of a derivative
+
+
+def check_outputs(model: ModelFields, problems: list[str]) -> None:
+    """Names that cannot be, symbols that are none of the model's, quotients without a value."""
+    _check_names(model, problems)
+    for o in model.outputs:
+        what = f"output {o.name!r}"
+        for expression in (o.expression, 0 if o.otherwise is None else o.otherwise):
+            problems += _unknown(model, what, sp.sympify(expression))
+        if o.otherwise is None:
+            problems += _undefined(model, what, sp.sympify(o.expression))
+
+
+def check_output_units(model: ModelFields, units: Mapping[Expr, Unit], problems: list[str]) -> None:
+    """Each term has the dimension of the output's unit; `otherwise` may be a plain number."""
+    known = {**units, **(reaction_units(model, units) if model.outputs else {})}
+    for o in model.outputs:
+        what = f"output {o.name!r}"
+        if not isinstance(o.unit, str) or not o.unit.strip():
+            problems.append(f"{what} has no unit: give one, e.g. 'N', 'rad', or '1' for a number")
+            continue
+        try:
+            unit = parse_unit(o.unit, what)
+        except UnitError as error:
+            problems.append(str(error))
+            continue
+        problems += check_dimension(sp.sympify(o.expression), unit, known, what)
+        if o.otherwise is not None and not sp.sympify(o.otherwise).is_number:
+            problems += check_dimension(sp.sympify(o.otherwise), unit, known, f"{what}, otherwise")
+
+
+def _check_names(model: ModelFields, problems: list[str]) -> None:
+    extra = model.embedding.coordinates if model.embedding else {}
+    taken = {name_of(q): "a coordinate" for q in (*model.coordinates, *extra)}
+    taken |= {name_of(p.symbol): "a parameter" for p in model.parameters}
+    taken |= {name_of(i.symbol): "an input" for i in model.inputs}
+    for o in model.outputs:
+        parts = o.name.split(".") if isinstance(o.name, str) else [""]
+        if not all(NAME.match(part) for part in parts):
+            problems.append(
+                f"output name {o.name!r} is no FMI name: use letters a-z, A-Z, digits and _, not "
+                "beginning with a digit, in parts with a dot between them, as 'bob.height'"
+            )
+            continue
+        if parts[0] in RESERVED:
+            problems.append(
+                f"output name {o.name!r} begins with {parts[0]!r}, which is reserved for the FMU's own "
+                f"variables ({', '.join(RESERVED)}): choose another"
+            )
+            continue
+        for name, other in taken.items():
+            if name == o.name:
+                problems.append(
+                    f"the name {name!r} is used twice, by {other} and an output: rename one"
+                )
+            elif o.name.startswith(f"{name}.") or name.startswith(f"{o.name}."):
+                short, long = sorted((name, o.name), key=len)
+                problems.append(
+                    f"{short!r} would be a variable and, with {long!r}, a group of variables: rename one"
+                )
+        taken[o.name] = "an output"
+
+
+def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
+    t = dynamicsymbols._t
+    known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t}
+    known |= set(model.coordinates)
+    embedded = set(model.embedding.coordinates) if model.embedding else set()
+    names = {name_of(s) for s in known}
+    found = expression.free_symbols | expression.atoms(AppliedUndef)
+    for symbol in sorted(found - known - set(reactions_in(expression)), key=str):
+        name = plain(symbol)
+        remedy = "declare it, e.g. as a Parameter with value and unit"
+        if symbol in embedded:
+            remedy = "it is one of the embedding: write it by the model's own coordinates"
+        elif name in names:
+            remedy = (
+                "one of that name is declared, but as another symbol (other assumptions, or no "
+                "function of time): use the same"
+            )
+        yield f"{what}: {name} is neither coordinate, parameter nor input: {remedy}"
+    constraints = [c.name for c in model.constraints]
+    reactions = {multiplier(c) for c in constraints}
+    reactions |= {force_of_constraint(q) for q in model.coordinates}
+    for symbol in reactions_in(expression):
+        if symbol not in reactions:
+            kind = "constraint" if str(symbol).startswith("lambda.") else "coordinate"
+            known_names = constraints if kind == "constraint" else map(name_of, model.coordinates)
+            yield (
+                f"{what}: {symbol} is of no {kind} of this model, expected one of "
+                f"{', '.join(known_names) or 'none: there are no constraints'}"
+            )
+    yield from _derivatives(model, what, expression)
+
+
+def _derivatives(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
+    prescribed = {i.symbol for i in model.prescribed}
+    for d in sorted(expression.atoms(sp.Derivative), key=str):
+        if d.derivative_count > HIGHEST:
+            yield (
+                f"{what}: holds {plain(d)}, a derivative of order {d.derivative_count}, expected at "
+                f"most {HIGHEST}"
+            )
+        elif d.expr in {i.symbol for i in model.inputs} - prescribed:
+            yield (
+                f"{what}: holds {plain(d)}, but only an input that stands in a constraint (a "
+                "prescribed motion) has derivatives: make the rate an Input of its own"
+            )
+
+
+def _undefined(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
+    """Quotients and logarithms without a value while a contact is open."""
+    below = [e.base for e in expression.atoms(sp.Pow) if e.exp.could_extract_minus_sign()]
+    below += [e.args[0] for e in expression.atoms(sp.log)]
+    for contact in (c.name for c in model.constraints if isinstance(c, Contact)):
+        nothing = _nothing_in_the_open(model, contact)
+        for e in sorted(below, key=str):
+            if reactions_in(e) and sp.sympify(e).xreplace(nothing).expand() == 0:
+                yield (
+                    f"{what}: divides by {plain(e)}, which is 0 while the contact {contact!r} is open, "
+                    "so that it has no value there: say which with otherwise=..., e.g. otherwise=0"
+                )
+
+
+def _nothing_in_the_open(model: ModelFields, contact: str) -> dict[Expr, Expr]:
+    """The multipliers and forces of constraint that are 0 while a contact is open."""
+    t = dynamicsymbols._t
+    gone, left = {}, set()
+    for c in model.constraints:
+        if c.name == contact or getattr(c, "while_closed", None) == contact:
+            gone[multiplier(c.name)] = sp.S.Zero
+        elif hasattr(c, "expression"):
+            f = sp.sympify(c.expression)
+            rate = isinstance(c, Nonholonomic)
+            left |= {q for q in model.coordinates if f.has(q.diff(t) if rate else q)}
+    return gone | {force_of_constraint(q): sp.S.Zero for q in model.coordinates if q not in left}

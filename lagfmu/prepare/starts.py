@@ -1,0 +1,52 @@
+"""Start values that miss the constraints: who said them, what they are moved to, and how that is told."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ..errors import ModelError
+from ..interface.variables import VariableTable
+from ..solver.initial import Moved
+from ..solver.precedence import GIVEN, OMITTED, SET
+from ..solver.system import System
+
+ALLOWED = 1e-6  # part of its coordinate's size by which a value in `start` may miss the constraints
+
+
+class StartMovedWarning(UserWarning):
+    """A start value is not the one that the simulation begins with."""
+
+
+def ranks(system: System, table: VariableTable, values: Mapping[str, Any]) -> list[int]:
+    """Of each coordinate and then each velocity (2 n): who said its start value, as in precedence.py.
+
+    `values`: what is set, by name; a value that is the described one is not.
+    """
+    names = [*system.coordinates, *(f"der({c})" for c in system.coordinates)]
+    said = [GIVEN if table[name].given else OMITTED for name in names]
+    return [
+        SET if name in values and float(values[name]) != table[name].start else rank
+        for name, rank in zip(names, said, strict=True)
+    ]
+
+
+def tell(moved: Iterable[Moved | str]) -> None:
+    """One warning for each value that is moved."""
+    for m in moved:
+        warnings.warn(str(m), StartMovedWarning, stacklevel=3)
+
+
+def check_given(model: str, moved: Iterable[Moved]) -> None:
+    """Raises ModelError naming the values in the model's `start` that miss the constraints, all at once."""
+    wrong = [m for m in moved if m.rank == GIVEN and abs(m.used - m.given) > ALLOWED * m.size]
+    if wrong:
+        raise ModelError(
+            model,
+            [
+                f"start gives {m.name} = {m.given!r}, which misses the constraints; with the other values "
+                f"given it would have to be {m.used!r}: correct it, or leave it out of start"
+                for m in wrong
+            ],
+        )

@@ -1,0 +1,23 @@
+/* precedence.h -- which start values move first onto the constraints: omitted ones, then those given in
+ * the model, then those that the importer set.  A rank moves only if the lower ones cannot reach the
+ * constraints alone. */
+#ifndef LAGFMU_PRECEDENCE_H
+#define LAGFMU_PRECEDENCE_H
+
+#include "mechanism.h"
+
+/* Nobody said it; the model's `start` does; the importer did. */
+typedef enum { OMITTED, GIVEN, SET } Rank;
+enum { RANKS = 3 };
+
+/* The first rank from `stage` on that a coordinate has, of `rank` (n); RANKS if there is none. */
+int precedence_stage(const System *s, const Rank *rank, int stage);
+
+/* own (m): of `rows` those that hold a coordinate that is free in this stage; returns whether all do. */
+int precedence_rows(const System *s, const Rank *rank, int stage, const int *rows, int *own);
+
+/* b->dq (n), zero where nothing is free, with G dq = c (m) as nearly as can be on the rows `own`.  M and G
+ * of the mechanism are lost: they are to be evaluated again. */
+Status precedence_nearest(Mechanism *b, const Rank *rank, int stage, const int *own, const double *c);
+
+#endif

@@ -1,0 +1,207 @@
+/* afar.c -- start values onto the constraints, from anywhere, by precedence.
+ *
+ *   M dq = G^T mu ,  G dq = -f     damped Newton's method from afar (Deuflhard, Newton Methods for
+ *                                  Nonlinear Problems, sect. 3.1), the step halved until |f| falls
+ *   M dv = G^T mu ,  G dv = nu - G v
+ *
+ * of the coordinates that are free in a stage; each stage begins at the start values as they were given. */
+#include "afar.h"
+
+#include <float.h>
+#include <string.h>
+
+#include "digits.h"
+#include "magnitudes.h"
+
+enum { ITERATIONS = 60, HALVINGS = 25 };
+enum { SWEEPS = 3 }; /* of the velocities: the second removes what the first left by rounding */
+static const double EPS = DBL_EPSILON;
+static const double ARRIVED = 1e3 * DBL_EPSILON; /* slip, relative to its terms, that rounding may leave */
+
+Status afar_refused(Solver *s) {
+    Why cause = s->why;
+    return fail(&s->why, "the start is refused: %s", cause.text);
+}
+
+/* allowed (m): `factor` roundings of each constraint's terms at q, no smaller than those of `least`. */
+static void find_allowed(const Start *x, const double *q, const double *least, double factor,
+                         double *reach, double *allowed) {
+    const System *s = x->s->system;
+    for (int j = 0; j < s->n; j++) reach[j] = fmax(fabs(q[j]), least[j]);
+    for (int k = 0; k < s->m; k++)
+        allowed[k] = factor * EPS * mechanism_row_size(&x->s->stepped, k, reach);
+}
+
+static int arrived(const System *s, const int *rows, const double *f, const double *allowed) {
+    for (int k = 0; k < s->m; k++)
+        if (rows[k] && !(fabs(f[k]) <= allowed[k])) return 0;
+    return 1;
+}
+
+/* |f| on the rows in units of what may be left; of f0 where nothing may. */
+static double norm(const System *s, const int *rows, const double *f, const double *allowed,
+                   const double *f0) {
+    double sum = 0;
+    for (int k = 0; k < s->m; k++) {
+        double unit = allowed[k] > 0 ? allowed[k] : f0[k] != 0 ? fabs(f0[k]) : 1;
+        if (rows[k]) sum += f[k] / unit * (f[k] / unit);
+    }
+    return sqrt(sum);
+}
+
+static Status cannot_be_projected(const Start *x, const int *rows, const double *f,
+                                  const double *allowed) {
+    const System *s = x->s->system;
+    Why *why = &x->s->why;
+    const char *comma = "";
+    fail(why, "the start values ");
+    for (int j = 0; j < s->n; j++) {
+        Digits given = digits(x->q0[j]);
+        why_append(why, "%s%s = %s", j > 0 ? ", " : "", s->coordinates[j], given.text);
+    }
+    why_append(why, " cannot be projected onto the constraints (missed: ");
+    for (int k = 0; k < s->m; k++)
+        if (rows[k] && !(fabs(f[k]) <= allowed[k])) {
+            why_append(why, "%s'%s' by %.3g", comma, s->rows[k].name, f[k]);
+            comma = ", ";
+        }
+    why_append(why, "): choose start values near a configuration that satisfies them, or other "
+                    "parameters");
+    return FAILED;
+}
+
+/* One stage: q is moved.
+ *
+ * It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
+ * since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
+ * of at the start (`size`).  While it falls on and on, there is nothing to arrive at. */
+static Status newton(const Start *x, int stage, double *q, const int *rows) {
+    const System *s = x->s->system;
+    Mechanism *b = &x->s->stepped;
+    double *trial = x->s->work_initial, *least = trial + s->n, *f = least + s->n;
+    double *f_trial = f + s->m, *allowed = f_trial + s->m;
+    int *own = x->s->iwork_initial + s->m;
+    const int all = precedence_rows(s, x->rank_q, stage, rows, own);
+    magnitudes_extents(s, x->at.p, least);
+    if (mechanism_residual(b, x->at, q, f) == FAILED) return afar_refused(x->s);
+    for (int count = 0;; count++) {
+        if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return afar_refused(x->s);
+        find_allowed(x, q, least, 4, trial, allowed);
+        if (arrived(s, rows, f, allowed)) return OK;
+        if (count == ITERATIONS) return cannot_be_projected(x, rows, f, allowed);
+        find_allowed(x, q, x->s->state.size, 1e3, trial, allowed);
+        if (!all && arrived(s, own, f, allowed)) break; /* what is left is not for these coordinates */
+        for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
+        if (precedence_nearest(b, x->rank_q, stage, own, f_trial) == FAILED) break;
+        double damping = 1;
+        int halvings = 0;
+        for (; halvings < HALVINGS; halvings++, damping /= 2) {
+            for (int j = 0; j < s->n; j++) trial[j] = q[j] + damping * b->dq[j];
+            if (mechanism_residual(b, x->at, trial, f_trial) == FAILED) continue;
+            if (norm(s, own, f_trial, allowed, f) <
+                (1 - 0.1 * damping) * norm(s, own, f, allowed, f))
+                break;
+        }
+        if (halvings == HALVINGS) break;
+        memcpy(q, trial, (size_t)s->n * sizeof *q);
+        memcpy(f, f_trial, (size_t)s->m * sizeof *f);
+    }
+    return arrived(s, rows, f, allowed) ? OK : cannot_be_projected(x, rows, f, allowed);
+}
+
+/* Whether G_kj is not 0 where the coordinate j is put aside. */
+static int depends_elsewhere(const Start *x, const double *q, int entry, double aside) {
+    const System *s = x->s->system;
+    Mechanism *b = &x->s->stepped;
+    double *elsewhere = x->s->work_initial;
+    memcpy(elsewhere, q, (size_t)s->n * sizeof *q);
+    elsewhere[s->entry_column[entry]] += aside;
+    return mechanism_evaluate(b, x->at, elsewhere, x->v0) == OK && b->G[entry] != 0;
+}
+
+/* Refuses, naming the coordinate, where an omitted value's 0 is singular: the row k is missed by f, none
+ * of the omitted coordinates in it has a derivative there, and one has elsewhere. */
+static Status check_omissions(const Start *x, const double *q, int k, double f) {
+    const System *s = x->s->system;
+    Mechanism *b = &x->s->stepped;
+    double aside = 0;
+    if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return afar_refused(x->s);
+    for (int j = 0; j < s->n; j++) aside = fmax(aside, fabs(q[j]));
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
+        if (x->rank_q[s->entry_column[e]] == OMITTED && b->G[e] != 0) return OK;
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
+        const char *name = s->coordinates[s->entry_column[e]];
+        if (x->rank_q[s->entry_column[e]] != OMITTED) continue;
+        if (!depends_elsewhere(x, q, e, aside > 0 ? aside : 1)) continue;
+        return fail(&x->s->why,
+                    "the start is refused: %s has no start value, and at 0 constraint '%s', missed by "
+                    "%.3g, does not depend on it to first order: give %s a start value",
+                    name, s->rows[k].name, f, name);
+    }
+    return OK;
+}
+
+static Status check_all_omissions(const Start *x, const double *q, const int *rows) {
+    const System *s = x->s->system;
+    double *f = x->s->work_initial + 2 * s->n;
+    if (mechanism_residual(&x->s->stepped, x->at, q, f) == FAILED) return afar_refused(x->s);
+    for (int k = 0; k < s->m; k++)
+        if (rows[k] && f[k] != 0 && check_omissions(x, q, k, f[k]) == FAILED) return FAILED;
+    return OK;
+}
+
+Status afar_positions(const Start *x, double *q, int *rows) {
+    const System *s = x->s->system;
+    const size_t bytes = (size_t)s->n * sizeof *q;
+    double *given = x->s->work_initial + 5 * s->n + 3 * s->m;
+    int any = 0;
+    for (int k = 0; k < s->m; k++) {
+        if (s->rows[k].kind == NONHOLONOMIC) rows[k] = 0;
+        any |= rows[k];
+    }
+    if (!any) return OK;
+    memcpy(given, q, bytes);
+    for (int stage = 0; (stage = precedence_stage(s, x->rank_q, stage)) < RANKS; stage++) {
+        memcpy(q, given, bytes);
+        if (newton(x, stage, q, rows) == OK) return OK;
+        if (stage == OMITTED && check_all_omissions(x, given, rows) == FAILED) return FAILED;
+    }
+    return FAILED;
+}
+
+/* slip (m) = nu - G v; whether it is rounding on the rows `own`. */
+static int on_velocities(const Start *x, const double *least, const double *v, const int *own,
+                         double *speed, double *slip) {
+    const System *s = x->s->system;
+    const Mechanism *b = &x->s->stepped;
+    double *shared = speed + s->n;
+    int on = 1;
+    for (int j = 0; j < s->n; j++) speed[j] = fmax(fmax(fabs(v[j]), fabs(x->v0[j])), least[j]);
+    magnitudes_motion_speeds(b, speed, shared);
+    for (int k = 0; k < s->m; k++) {
+        slip[k] = -mechanism_slip(b, k, v);
+        const double terms = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);
+        on &= !own[k] || fabs(slip[k]) <= ARRIVED * terms;
+    }
+    return on;
+}
+
+Status afar_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v) {
+    const System *s = x->s->system;
+    Mechanism *b = &x->s->stepped;
+    double *slip = x->s->work_initial + 3 * s->n, *speed = slip + s->m;
+    int *own = x->s->iwork_initial + s->m;
+    memcpy(v, x->v0, (size_t)s->n * sizeof *v);
+    for (int stage = 0; (stage = precedence_stage(s, x->rank_v, stage)) < RANKS; stage++) {
+        memcpy(v, x->v0, (size_t)s->n * sizeof *v);
+        precedence_rows(s, x->rank_v, stage, rows, own);
+        for (int sweep = 0; sweep < SWEEPS; sweep++) {
+            if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return FAILED;
+            if (on_velocities(x, least, v, rows, speed, slip)) return OK;
+            if (on_velocities(x, least, v, own, speed, slip)) break;
+            if (precedence_nearest(b, x->rank_v, stage, own, slip) == FAILED) break;
+            for (int j = 0; j < s->n; j++) v[j] += b->dq[j];
+        }
+    }
+    return OK;
+}

@@ -1,0 +1,275 @@
+/* impact.c -- impacts: all contacts that are struck at one instant are solved together (docs/impacts.md).
+ *
+ *   M (v+ - v-) = G^T Lambda ,   s = G v - nu
+ *   0 <= Lambda_k  _|_  s_k+ + e_k s_k- >= 0    contacts that touch with s_k- <= 0
+ *   s_k+ = 0                                    rows that always act, or act with such a contact
+ *
+ * Newton's law of restitution with complementarity (Moreau 1988; Pfeiffer & Glocker, Multibody Dynamics with
+ * Unilateral Contacts, 1996, ch. 8; Glocker, Set-Valued Force Laws, 2001).  With 0 <= e <= 1 and s- <= 0 the
+ * energy in the contacts' own frame does not rise,
+ * Lambda^T (s+ + s-) / 2 = sum (1 - e_k) Lambda_k s_k- / 2 <= 0. */
+#include "impact.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "digits.h"
+
+enum { ROUNDS = 1000 }; /* of impacts at one instant, after which the rest is one plastic impact */
+static const double PULL = 1e-9; /* of the largest impulse: a negative one that is rounding */
+
+/* What an impact starts from, and its workspace.  Rows are numbered as in the system, contacts by their
+ * position among the contacts, `k` of them entering. */
+typedef struct {
+    Solver *s;
+    Mechanism *b;
+    double *slip, *e, *zero, *right; /* (m) s-, e; 0; right-hand sides */
+    double *x;                       /* (n) */
+    double *A, *c, *z, *w, *work;    /* of complementarity.h */
+    int k, *contact, *holding;       /* (contacts) those that enter; 1: rows that act with it do */
+    int *active;                     /* (m) */
+    int *iwork;
+} Struck;
+
+/* The velocities' change and the impulses. */
+typedef struct {
+    double *dv, *Lambda; /* (n), (m) */
+} Impulse;
+
+static int row_of(const Struck *x, int i) { return x->s->system->contact[x->contact[i]]; }
+
+/* Rows that act with both signs: those that always do, and those of the contacts in `holding`. */
+static void set_base(Struck *x) {
+    const System *system = x->s->system;
+    system_active(system, x->holding, x->active);
+    for (int c = 0; c < system->contacts; c++) x->active[system->contact[c]] = 0;
+}
+
+static int acts_with(const System *system, int contact) {
+    for (int j = 0; j < system->m; j++)
+        if (system->rows[j].while_closed == system->contact[contact]) return 1;
+    return 0;
+}
+
+/* Rows of one impact may miss each other by rounding: they are met as nearly as can be. */
+static Status solve(Struck *x, const double *right, double *dv, double *Lambda) {
+    Linear *l = &x->b->linear;
+    l->nearest = 1;
+    const Status status = linear_solve(l, NULL, right, dv, Lambda);
+    l->nearest = 0;
+    return status;
+}
+
+/* A (k, k) and c (k): s+ + e s- = A Lambda + c on the contacts, the base rows taken care of. */
+static Status reduce(Struck *x, const Impulse *scratch) {
+    const System *system = x->s->system;
+    Mechanism *b = x->b;
+    if (linear_factor(&b->linear, b->M, b->G, x->active) != OK) return FAILED;
+    for (int j = 0; j < system->m; j++) x->right[j] = -x->slip[j];
+    if (solve(x, x->right, scratch->dv, scratch->Lambda) != OK) return FAILED;
+    for (int i = 0; i < x->k; i++) {
+        const int row = row_of(x, i);
+        x->c[i] = (1 + x->e[row]) * x->slip[row] + mechanism_row(b, row, scratch->dv);
+    }
+    for (int i = 0; i < x->k; i++) {
+        const int row = row_of(x, i);
+        memset(x->x, 0, (size_t)system->n * sizeof *x->x);
+        for (int e = system->row_start[row]; e < system->row_start[row + 1]; e++)
+            x->x[system->entry_column[e]] = b->G[e];
+        if (linear_solve(&b->linear, x->x, x->zero, scratch->dv, scratch->Lambda) != OK)
+            return FAILED;
+        for (int j = 0; j < x->k; j++)
+            x->A[j * x->k + i] = mechanism_row(b, row_of(x, j), scratch->dv);
+    }
+    for (int i = 0; i < x->k; i++)
+        for (int j = 0; j < i; j++)
+            x->A[i * x->k + j] = x->A[j * x->k + i] = (x->A[i * x->k + j] + x->A[j * x->k + i]) / 2;
+    return OK;
+}
+
+static int rebounds(const Struck *x) {
+    for (int j = 0; j < x->s->system->m; j++)
+        if (x->e[j] > 0) return 1;
+    return 0;
+}
+
+static Status no_velocities(Struck *x, double time) {
+    const char *comma = "";
+    Digits t = digits(time);
+    fail(&x->s->why, "no velocities after the impact at t = %s s satisfy the contacts ", t.text);
+    for (int i = 0; i < x->k; i++) {
+        why_append(&x->s->why, "%s'%s'", comma, x->s->system->rows[row_of(x, i)].name);
+        comma = ", ";
+    }
+    why_append(&x->s->why, " together: they are driven against each other");
+    return FAILED;
+}
+
+/* Velocities from the rows that were found, solved once more together.  Lambda of dependent rows is that
+ * of least norm, if that pushes; else the one that was found. */
+static Status finish(Struck *x, const Impulse *found) {
+    const System *system = x->s->system;
+    Mechanism *b = x->b;
+    for (int j = 0; j < system->m; j++) x->right[j] = -x->slip[j];
+    for (int pass = 0; pass < 2; pass++) {
+        double most = 0, least = 0;
+        set_base(x);
+        for (int i = 0; i < x->k; i++) {
+            const int row = row_of(x, i);
+            x->active[row] = pass == 0 ? x->w[i] == 0 : x->z[i] > 0;
+            x->right[row] = -(1 + x->e[row]) * x->slip[row];
+        }
+        if (linear_factor(&b->linear, b->M, b->G, x->active) != OK) return FAILED;
+        if (solve(x, x->right, found->dv, found->Lambda) != OK) return FAILED;
+        for (int j = 0; j < system->m; j++) most = fmax(most, fabs(found->Lambda[j]));
+        for (int i = 0; i < x->k; i++) least = fmin(least, found->Lambda[row_of(x, i)]);
+        if (least >= -PULL * most) break;
+    }
+    return OK;
+}
+
+/* The law.  A row that acts with a contact does so unless the others lift the contact off. */
+static Status newton(Struck *x, double time, const Impulse *found) {
+    const System *system = x->s->system;
+    memset(x->holding, 0, (size_t)system->contacts * sizeof *x->holding);
+    for (int i = 0; i < x->k; i++) x->holding[x->contact[i]] = 1;
+    for (int lifted = 1; lifted;) {
+        set_base(x);
+        if (reduce(x, found) != OK) return FAILED;
+        if (!complementarity_solve(x->k, x->A, x->c, x->z, x->w, x->work, x->iwork)) {
+            if (!rebounds(x)) return no_velocities(x, time);
+            memset(x->e, 0, (size_t)system->m * sizeof *x->e);
+            continue; /* rows that act with a contact leave no room to rebound */
+        }
+        lifted = 0;
+        for (int i = 0; i < x->k; i++) {
+            const int c = x->contact[i];
+            if (!(x->w[i] > 0) || !x->holding[c]) continue;
+            x->holding[c] = 0;
+            lifted |= acts_with(system, c);
+        }
+    }
+    return finish(x, found);
+}
+
+/* Energy gained in the contacts' own frame [J], Lambda^T (s+ + s-) / 2, on the way from the plastic
+ * impact (part = 0) to Newton's (part = 1). */
+static double gain(const Struck *x, const Impulse *plastic, const Impulse *newton, double part) {
+    double sum = 0;
+    for (int j = 0; j < x->s->system->m; j++) {
+        const double from = mechanism_row(x->b, j, plastic->dv);
+        const double to = mechanism_row(x->b, j, newton->dv);
+        const double Lambda = plastic->Lambda[j] + part * (newton->Lambda[j] - plastic->Lambda[j]);
+        if (Lambda != 0) sum += Lambda * (2 * x->slip[j] + from + part * (to - from)) / 2;
+    }
+    return sum;
+}
+
+/* Where rows that act with a contact make Newton's law raise the energy: between the plastic impact, which
+ * never does, and Newton's, the one that keeps it.  The energy is quadratic on the way. */
+static Status bound(Struck *x, double time, const Impulse *found, const Impulse *plastic) {
+    const System *system = x->s->system;
+    const double gained = gain(x, found, found, 1);
+    int any = 0;
+    for (int i = 0; i < x->k; i++) any |= acts_with(system, x->contact[i]);
+    if (!any || !(gained > 0)) return OK;
+    memset(x->e, 0, (size_t)system->m * sizeof *x->e);
+    if (newton(x, time, plastic) != OK) return FAILED;
+    const double lost = -gain(x, plastic, found, 0);
+    double part = 0;
+    if (lost > 0) {
+        const double slope = 4 * gain(x, plastic, found, 0.5) + 3 * lost - gained;
+        const double bend = gained + lost - slope;
+        const double root = sqrt(fmax(slope * slope + 4 * lost * bend, 0));
+        part = slope < 0 ? (root - slope) / (2 * bend) : 2 * lost / (slope + root);
+        part = fmin(fmax(part, 0), 1);
+    }
+    for (int j = 0; j < system->n; j++)
+        found->dv[j] = plastic->dv[j] + part * (found->dv[j] - plastic->dv[j]);
+    for (int j = 0; j < system->m; j++)
+        found->Lambda[j] = plastic->Lambda[j] + part * (found->Lambda[j] - plastic->Lambda[j]);
+    return OK;
+}
+
+Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
+              double *Lambda) {
+    const System *system = s->system;
+    const int n = system->n, m = system->m, contacts = system->contacts;
+    Struck x = {.s = s, .b = &s->stepped, .slip = s->work_impact, .contact = s->iwork_impact};
+    x.e = x.slip + m;
+    x.zero = x.e + m;
+    x.right = x.zero + m;
+    x.x = x.right + m;
+    const Impulse found = {x.x + n, Lambda}, soft = {found.dv + n, found.dv + 2 * n};
+    x.A = soft.Lambda + m;
+    x.c = x.A + contacts * contacts;
+    x.z = x.c + contacts;
+    x.w = x.z + contacts;
+    x.work = x.w + contacts;
+    x.holding = x.contact + contacts;
+    x.active = x.holding + contacts;
+    x.iwork = x.active + m;
+    if (mechanism_evaluate(x.b, at, q, v) != OK) return FAILED;
+    for (int c = 0; c < contacts; c++)
+        if (entering[c]) x.contact[x.k++] = c;
+    for (int j = 0; j < m; j++) {
+        x.slip[j] = mechanism_slip(x.b, j, v);
+        x.zero[j] = 0;
+    }
+    system->restitution(s->p, x.e);
+    if (plastic) memset(x.e, 0, (size_t)m * sizeof *x.e);
+    if (newton(&x, at.t, &found) != OK || bound(&x, at.t, &found, &soft) != OK) return FAILED;
+    for (int j = 0; j < n; j++) v[j] += found.dv[j];
+    return OK;
+}
+
+/* Contacts that take part: approached or at rest; one that separates does not, and if it is driven back,
+ * that is the next impact.  Returns whether any is approached. */
+static int find_entering(const Solver *s, const double *v, const int *touching, const double *slow,
+                         int plastic, int *entering) {
+    const System *system = s->system;
+    int any = 0;
+    for (int c = 0; c < system->contacts; c++) {
+        const int k = system->contact[c];
+        const double speed = mechanism_slip(&s->stepped, k, v);
+        entering[c] = touching[c] && (speed <= slow[k] || plastic);
+        any |= touching[c] && speed < -slow[k];
+    }
+    return any;
+}
+
+Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching,
+               const double *slow, int *struck) {
+    const System *system = s->system;
+    const int contacts = system->contacts;
+    int *entering = s->iwork_impact + impact_ints(system->m, contacts) - contacts;
+    double *Lambda = s->work_impact + impact_doubles(system->n, system->m, contacts) - system->m;
+    memset(struck, 0, (size_t)contacts * sizeof *struck);
+    for (int round = 1; round <= ROUNDS; round++) {
+        if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
+        if (!find_entering(s, v, touching, slow, round == ROUNDS, entering)) return OK;
+        if (impact(s, at, q, v, entering, round == ROUNDS, Lambda) != OK) return FAILED;
+        for (int c = 0; c < contacts; c++)
+            struck[c] |= entering[c] && Lambda[system->contact[c]] > 0;
+    }
+    return OK;
+}
+
+Status impact_check(Solver *s) {
+    const System *system = s->system;
+    double *e = s->work_impact;
+    const char *and = "the start is refused: ";
+    s->why.text[0] = 0;
+    system->restitution(s->p, e);
+    for (int c = 0; c < system->contacts; c++) {
+        const int k = system->contact[c];
+        if (e[k] >= 0 && e[k] <= 1) continue;
+        Digits value = digits(e[k]);
+        why_append(&s->why,
+                   "%sthe coefficient of restitution of '%s' is %s, expected 0 (no rebound) to 1 (no "
+                   "loss)",
+                   and, system->rows[k].name, value.text);
+        and = "; ";
+    }
+    return s->why.text[0] == 0 ? OK : FAILED;
+}

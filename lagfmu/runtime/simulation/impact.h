@@ -1,0 +1,30 @@
+/* impact.h -- impacts: all contacts that are struck at one instant are solved together. */
+#ifndef LAGFMU_IMPACT_H
+#define LAGFMU_IMPACT_H
+
+#include "complementarity.h"
+#include "solver.h"
+
+/* Doubles and ints of workspace for n coordinates, m rows and so many contacts. */
+static inline int impact_doubles(int n, int m, int contacts) {
+    return 3 * n + 6 * m + contacts * contacts + 3 * contacts + complementarity_doubles(contacts);
+}
+static inline int impact_ints(int m, int contacts) {
+    return m + 3 * contacts + complementarity_ints(contacts);
+}
+
+/* All impacts of an instant; v (n) is replaced by the velocities after them.  `touching`: flags, the
+ * contacts that an impact can reach; `slow` (m): speeds that count as none; `struck`: flags, set for the
+ * contacts that took an impulse.  FAILED: no velocities satisfy the contacts. */
+Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching,
+               const double *slow, int *struck);
+
+/* One impact on the contacts flagged in `entering`, approached or at rest, together; `plastic`: e = 0.
+ * Lambda (m): the impulses, 0 where a row did not act. */
+Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
+              double *Lambda);
+
+/* FAILED if a coefficient of restitution is not between 0 and 1. */
+Status impact_check(Solver *s);
+
+#endif

@@ -1,0 +1,319 @@
+"""Impacts of several contacts at once: solved together, whatever the order in which they are declared."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from impact_models import G, corner, cradle, e, m, restitution, rod, table, wedge
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Model, Parameter, Scene, simulate
+from lagfmu.errors import LagfmuError
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.prepare.prepare import prepare
+from lagfmu.solver.complementarity import complementary
+from lagfmu.solver.failure import StepFailureError
+from lagfmu.solver.impact import impact, impacts
+from lagfmu.solver.instant import Instant
+from lagfmu.solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Row, System
+
+Run = Callable[..., Any]
+pytestmark = pytest.mark.filterwarnings("ignore:.*follows? from the others")
+
+
+@pytest.fixture(params=["python", "native"])
+def run(request: pytest.FixtureRequest, tmp_path: Path) -> Run:
+    """run(model, stop, step, ...): the model in this process, or its native FMU."""
+    if request.param == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+
+    def simulated(model: Model, stop: float, step: float, values: Any = None) -> Any:
+        one: Any = prepare(model, Scene(model.name, stop_time=stop))
+        if request.param == "native":
+            one = write(one, tmp_path, [], target="native")
+        return simulate(one, stop, step, 1e-10, values)
+
+    return simulated
+
+
+def top(result: Any) -> Any:
+    """Top of the parabola [m] that each communication point lies on."""
+    return result["z"] + result["der(z)"] ** 2 / (2 * G)
+
+
+# --------------------------------------------------------------------------- systems
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_rod_dropped_flat_rebounds_flat(run, order):
+    """With J = 2 m l^2 and e = 1/2 both feet strike at sqrt(2 h/g), and the rod rises flat to e^2 h, then
+    to e^4 h, ..., until it lies: no foot knows which was declared first."""
+    result = run(rod(order), 2.0, 0.02)
+    assert np.abs(result["theta"]).max() < 1e-14
+    t, first = result["time"], np.sqrt(2 / G)
+    for n, ends in enumerate(first * (1 + 2 * np.array([0, 0.5, 0.75]))):
+        after = t > ends + 1e-6
+        assert top(result)[after].max() == pytest.approx(0.25 ** (n + 1), rel=1e-9)
+    assert result["contact.left"][-1]
+    assert result["contact.right"][-1]
+    assert result["lambda.left"][-1] == pytest.approx(G / 2, rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 1, 0, 2)])
+def test_a_table_dropped_flat_on_four_legs_stays_level(run, order):
+    """Four legs on three degrees of freedom strike together: the table rises level to e^2 h."""
+    result = run(table(order), 1.0, 0.02)
+    assert np.abs(result["theta"]).max() < 1e-14
+    assert np.abs(result["phi"]).max() < 1e-14
+    after = result["time"] > np.sqrt(2 / G) + 1e-6
+    assert top(result)[after].max() == pytest.approx(0.25, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_plastic_particle_stays_at_the_bottom_of_a_v(run, order):
+    """e = 0: it falls to the bottom of a symmetric V and climbs neither side; each wall then carries
+    m g/(2 sin(angle))."""
+    result = run(wedge(order), 1.0, 0.05)
+    assert np.abs(result["x"]).max() < 1e-15
+    rests = result["time"] > np.sqrt(2 / G)
+    assert np.abs(result["z"][rests]).max() < 1e-15
+    for wall in ("left", "right"):
+        assert result[f"lambda.{wall}"][-1] == pytest.approx(G / 2 / np.sin(1.0), rel=1e-13)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_particle_bounces_straight_up_in_a_v(run, order):
+    """With e = 1/2 on both walls it rises on the axis of the V to e^2 h."""
+    result = run(wedge(order, 0.5), 0.8, 0.05)
+    assert np.abs(result["x"]).max() < 1e-14
+    assert top(result)[-1] == pytest.approx(0.25, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+def test_a_ball_flies_out_of_a_corner_the_way_it_came(run, order, tilt):
+    """In a right-angled corner struck at its vertex both components of the velocity turn to -e v."""
+    model = corner(order, 0.8, tilt)
+    values = {"x": np.cos(np.pi / 4 + tilt), "z": np.sin(np.pi / 4 + tilt)}
+    values |= {f"der({q})": -x for q, x in values.items()}
+    result = run(model, 2.0, 0.5, values)
+    for q in ("x", "z"):
+        assert result[f"der({q})"][-1] == pytest.approx(-0.8 * values[f"der({q})"], rel=1e-12)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
+def test_a_cradle_whose_balls_touch_is_the_same_from_both_sides(run, value):
+    """n equal balls: by Newton's law and complementarity those at rest move on together with
+    (1 + e)/n, whatever their order and whether the first or the last is struck."""
+    count, ways = 4, [(0, 1, 2), (2, 1, 0), (1, 2, 0)]
+    for order, mirrored in itertools.product(ways, (False, True)):
+        last = run(cradle(count, order, value, mirrored), 1.0, 0.25)[-1]
+        v = np.array([last[f"der(x{k})"] for k in range(count)])
+        if mirrored:
+            v = -v[::-1]
+        expected = [(1 + value) / count - value, *[(1 + value) / count] * (count - 1)]
+        np.testing.assert_allclose(v, expected, atol=1e-14)
+
+
+def test_a_cradle_with_gaps_passes_the_motion_on(run):
+    """Balls a micrometre apart strike one after another: with e = 1 the last flies off alone."""
+    model = cradle(4)
+    gaps = {f"x{k}": 0.1 * k + 1e-6 * k for k in range(1, 4)}
+    last = run(model, 1.0, 0.25, gaps)[-1]
+    v = [last[f"der(x{k})"] for k in range(4)]
+    np.testing.assert_allclose(v, [0, 0, 0, 1], atol=1e-12)
+
+
+def test_a_ball_rebounds_from_a_block_that_lies(run):
+    """A ball falls on a block that rests on the floor: the block stays, the impulse passes through it,
+    the ball rises to e^2 h."""
+    low, z = dynamicsymbols("low z")
+    d, g = symbols("d g", positive=True)
+    model = Model(
+        name="Anvil",
+        lagrangian=m * (low.diff() ** 2 + z.diff() ** 2) / 2 - m * g * (low + z),
+        coordinates={low: "m", z: "m"},
+        constraints=[
+            Contact("between", z - low - d, restitution=e),
+            Contact("floor", low, restitution=e),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, G, "m/s^2"),
+            Parameter(d, 0.1, "m"),
+            restitution(0.6),
+        ],
+        start={low: 0.0, z: 1.1},
+    )
+    result = run(model, 0.8, 0.05)
+    assert np.abs(result["low"]).max() < 1e-15
+    assert result["contact.floor"].all()
+    assert top(result)[-1] == pytest.approx(0.1 + 0.36, rel=1e-9)
+
+
+# --------------------------------------------------------------------------- the law
+
+
+def linear_system(M: Any, A: Any, values: Any, kinds: Any = None) -> System:
+    """Contacts A q >= 0 with constant M and coefficients of restitution `values`; or rows of `kinds`."""
+    m, n = A.shape
+    rows = tuple(kinds or (Row(f"c{k}", CONTACT) for k in range(m)))
+    i, j = np.tril_indices(n)
+    zeros = [0.0] * m
+    return System(
+        coordinates=tuple(f"q{k}" for k in range(n)),
+        rows=rows,
+        mass=(i, j),
+        jacobian=tuple(np.indices(A.shape).reshape(2, -1)),
+        dynamics=lambda *_: (M[i, j].tolist(), [0.0] * n, A.ravel().tolist(), zeros, zeros),
+        residual=lambda *_: zeros,
+        energies=None,
+        restitution=lambda _: list(values),
+    )
+
+
+def random_mass(rng: Any, n: int) -> Any:
+    B = rng.standard_normal((n, n))
+    return B @ B.T + 0.1 * np.eye(n)
+
+
+def approached(rng: Any, A: Any) -> Any:
+    """A velocity that approaches every contact: A v < 0 for rows that point one way."""
+    v = -np.abs(rng.standard_normal(A.shape[1]))
+    return v * (np.abs(A) @ np.abs(v)).max()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_newtons_law_with_complementarity(seed):
+    """For each struck contact 0 <= Lambda, 0 <= s+ + e s-, one of them zero; M (v+ - v-) = G^T Lambda;
+    1/2 Lambda^T (s+ + s-) <= 0 is the change of the kinetic energy; and the order does not matter."""
+    rng = np.random.default_rng(seed)
+    n, count = int(rng.integers(1, 5)), int(rng.integers(1, 7))
+    M, A, values = random_mass(rng, n), rng.standard_normal((count, n)), rng.uniform(0, 1, count)
+    v = rng.standard_normal(n)
+    A *= -np.sign(A @ v)[:, None]  # every contact is approached
+    found = impact(Instant(linear_system(M, A, values), 0.0, [], []), v, v, range(count))
+    before, after = A @ v, A @ found.v
+    size = np.abs(found.Lambda).max(), np.abs(before).max()
+    w = after + values * before
+    assert (found.Lambda >= -1e-9 * size[0]).all()
+    assert (w >= -1e-9 * size[1]).all()
+    assert np.abs(found.Lambda * w).max() < 1e-9 * size[0] * size[1]
+    np.testing.assert_allclose(M @ (found.v - v), A.T @ found.Lambda, atol=1e-9 * size[0])
+    gained = (found.v @ M @ found.v - v @ M @ v) / 2
+    assert gained == pytest.approx(found.Lambda @ (before + after) / 2, abs=1e-9 * (v @ M @ v))
+    assert gained <= 1e-12 * (v @ M @ v)
+    order = rng.permutation(count)
+    other = linear_system(M, A[order], values[order])
+    again = impact(Instant(other, 0.0, [], []), v, v, range(count))
+    np.testing.assert_allclose(again.v, found.v, atol=1e-9 * np.abs(found.v).max())
+
+
+def balls(v: Any, value: float) -> tuple[Instant, Any]:
+    """Three equal balls on a line that touch."""
+    A = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
+    system = linear_system(np.eye(3), A, [value, value])
+    return Instant(system, 0.0, [], []), np.array(v, float)
+
+
+def test_a_contact_that_separates_takes_no_part_and_is_driven_back():
+    """Ball 1 comes with 1, ball 3 goes with 1/4: first 1 strikes 2, which goes with 1 and then strikes 3
+    at the same instant: (0, 1/4, 1)."""
+    at, v = balls([1.0, 0.0, 0.25], 1.0)
+    after, struck = impacts(at, v, v, {0, 1}, np.full(2, 1e-9))
+    np.testing.assert_allclose(after, [0, 0.25, 1], atol=1e-15)
+    assert struck == {0, 1}
+
+
+def test_impacts_without_end_come_to_an_end():
+    """A light ball between two heavy ones, both of which it keeps striking: with e = 1/2 the three go on
+    together, with the momentum that there was."""
+    A = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
+    M = np.diag([1.0, 1e-3, 1.0])
+    at = Instant(linear_system(M, A, [0.5, 0.5]), 0.0, [], [])
+    after, _ = impacts(at, np.zeros(3), np.array([1.0, 0.5, 0.6]), {0, 1}, np.full(2, 1e-12))
+    assert (A @ after >= -1e-12).all()
+    assert np.ones(3) @ M @ after == pytest.approx(1.6005, rel=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_rows_that_act_with_a_contact_never_raise_the_energy(seed):
+    """A rough contact (no slip while it is closed) beside a smooth one: whatever the masses and e near 1,
+    the impact takes energy or keeps it, and it leaves no contact approached."""
+    rng = np.random.default_rng(seed)
+    n = 3
+    M, A = random_mass(rng, n), rng.standard_normal((4, n))
+    v = rng.standard_normal(n)
+    A[[0, 2]] *= -np.sign(A[[0, 2]] @ v)[:, None]
+    kinds = [
+        Row("c0", CONTACT),
+        Row("grip", NONHOLONOMIC, 0),
+        Row("c1", CONTACT),
+        Row("rod", HOLONOMIC),
+    ]
+    A[3] -= (A[3] @ v) / (v @ v) * v  # the bilateral row is satisfied before
+    at = Instant(linear_system(M, A, [0.99, 0.0, 0.95, 0.0], kinds), 0.0, [], [])
+    found = impact(at, v, v, [0, 1])
+    after = A @ found.v
+    assert found.v @ M @ found.v <= v @ M @ v * (1 + 1e-12)
+    assert after[[0, 2]].min() > -1e-9
+    assert abs(after[3]) < 1e-9
+    assert found.Lambda[[0, 2]].min() >= -1e-9
+
+
+def test_contacts_driven_against_each_other_are_refused_by_name():
+    """Between two walls that close in with 1 m/s each there is no velocity for a particle."""
+    system = linear_system(np.eye(1), np.array([[1.0], [-1.0]]), [0.0, 0.0])
+    closing = lambda *_: ([1.0], [0.0], [1.0, -1.0], [1.0, 1.0], [0.0, 0.0])  # noqa: E731
+    object.__setattr__(system, "dynamics", closing)
+    zero = np.zeros(1)
+    with pytest.raises(StepFailureError, match="'c0', 'c1' together: they are driven against"):
+        impact(Instant(system, 0.5, [], []), zero, zero, [0, 1])
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_complementarity_is_met_with_dependent_rows(seed):
+    """z >= 0, w = A z + b >= 0, z w = 0 for A of less than full rank; w does not depend on the order."""
+    rng = np.random.default_rng(seed)
+    k, rank = int(rng.integers(1, 9)), int(rng.integers(1, 5))
+    W = rng.standard_normal((k, rank))
+    A, b = W @ W.T, W @ rng.standard_normal(rank)
+    found = complementary(A, b)
+    assert found is not None
+    z, w = found
+    assert z.min() >= 0
+    assert w.min() >= 0
+    assert np.abs(z * w).max() == 0
+    np.testing.assert_allclose(A @ z + b, w, atol=1e-9)
+    order = rng.permutation(k)
+    again = complementary(A[np.ix_(order, order)], b[order])
+    assert again is not None
+    np.testing.assert_allclose(again[1], w[order], atol=1e-9)
+
+
+# --------------------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize("value", [1.5, -0.1, 1 + 1e-9])
+def test_a_restitution_outside_0_to_1_is_refused(run, value):
+    """e = 1.5 would make energy, e < 0 pass through the floor: refused by name and value, also where
+    the parameter has no bounds of its own."""
+    free = symbols("e_free")
+    x = dynamicsymbols("x")
+    model = Model(
+        name="Free",
+        lagrangian=m * x.diff() ** 2 / 2,
+        coordinates={x: "m"},
+        constraints=[Contact("floor", x, restitution=free)],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(free, 0.5, "1")],
+        start={x: 1.0},
+    )
+    with pytest.raises(LagfmuError, match=r"restitution of 'floor' is .*expected 0 .* to 1"):
+        run(model, 1.0, 0.5, {"e_free": value})

@@ -1,0 +1,122 @@
+"""Start values that miss the constraints: which of them move, and how that is told."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linkages import pinned_rod
+from sympy.physics.mechanics import dynamicsymbols
+from typer.testing import CliRunner
+
+from lagfmu import simulate
+from lagfmu.cli.app import app
+from lagfmu.errors import ModelError
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.prepare.prepare import prepare
+from lagfmu.prepare.starts import StartMovedWarning
+
+x, y, theta = dynamicsymbols("x y theta")
+HALF = 0.75  # m, from the pivot to the middle of the rod
+FILE = """
+import sys
+sys.path.insert(0, {folder!r})
+from linkages import pinned_rod
+from lagfmu import Scene
+from sympy.physics.mechanics import dynamicsymbols
+x, theta = dynamicsymbols("x theta")
+model = pinned_rod({start})
+scenes = [Scene("PinnedRod", stop_time=0.01, step_size=0.01)]
+closed_forms = []
+"""
+
+
+@pytest.fixture(scope="module", params=["python", "native"])
+def rod(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pinned rod with theta and theta' in the model's start, and nothing said of x and y."""
+    if request.param == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    model = pinned_rod({theta: 0.3, theta.diff(): 1.86})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StartMovedWarning)
+        return write(prepare(model), tmp_path_factory.mktemp("rod"), target=request.param)
+
+
+def begun(fmu: Path, **values: float) -> tuple[dict[str, float], list[str]]:
+    """The values at t = 0, and what was said of those that moved."""
+    given = {k.replace("_dot", ""): v for k, v in values.items() if not k.endswith("_dot")}
+    given |= {f"der({k[:-4]})": v for k, v in values.items() if k.endswith("_dot")}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run = simulate(fmu, stop_time=1e-3, step_size=1e-3, start_values=given)
+    told = [str(w.message) for w in caught if issubclass(w.category, StartMovedWarning)]
+    return {name: float(run[name][0]) for name in run.dtype.names}, told
+
+
+def test_given_start_values_stay_and_the_omitted_ones_follow(rod):
+    """theta' = 1.86 rad/s is given: the middle moves at l/2 theta', and theta' stays what it was."""
+    at, told = begun(rod)
+    assert (at["theta"], at["der(theta)"]) == (0.3, 1.86)
+    assert at["x"] == pytest.approx(HALF * np.cos(0.3), rel=1e-14)
+    assert at["der(y)"] == pytest.approx(HALF * 1.86 * np.cos(0.3), rel=1e-14)
+    assert len(told) == 4
+    assert all("has no start value" in text for text in told)
+
+
+def test_what_the_importer_sets_stays_and_the_given_values_follow(rod):
+    """x = 0.6 set by the importer turns the rod to arccos(0.8), though the model gives theta = 0.3; that
+    theta' = 1.86 stays is no question of positions."""
+    at, told = begun(rod, x=0.6)
+    assert (at["x"], at["der(theta)"]) == (0.6, 1.86)
+    assert at["theta"] == pytest.approx(np.arccos(0.8), rel=1e-14)
+    assert any("start value theta = 0.3 misses" in t and repr(at["theta"])[:12] in t for t in told)
+
+
+def test_a_value_that_is_the_described_one_is_not_set(rod):
+    """Importers write all start values back: theta = 0.3 set to what is described stays a given value."""
+    at, _ = begun(rod, theta=0.3, x=0.6)
+    assert at["x"] == 0.6
+    at, told = begun(rod, theta=0.5, x=0.0)
+    assert at["theta"] == 0.5
+    assert not any("start value" in t.replace("no start value", "") for t in told)
+
+
+def test_changed_parameters_move_omitted_values_first(rod):
+    """With another length the middle lies elsewhere on the same ray: theta stays."""
+    at, _ = begun(rod, l=3.0)
+    assert at["theta"] == 0.3
+    assert np.hypot(at["x"], at["y"]) == pytest.approx(1.5, rel=1e-14)
+
+
+def test_a_model_whose_own_start_contradicts_itself_is_not_built(tmp_path):
+    """x = 0.5 with theta = 0.3 misses x = l/2 cos(theta) by 0.2 m: both are named with both numbers."""
+    prepared = prepare(pinned_rod({theta: 0.3, x: 0.5}))
+    with pytest.raises(ModelError) as refused:
+        write(prepared, tmp_path)
+    text = str(refused.value)
+    assert "start gives theta = 0.3" in text
+    assert "start gives x = 0.5" in text
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_move_is_said_by_show_simulate_and_build(tmp_path):
+    """A start given to 8 digits is moved onto the constraint by 1e-9 m, and each command says so."""
+    near = float(HALF * np.cos(0.3) + 1e-9)
+    path = tmp_path / "rod.py"
+    here = str(Path(__file__).parent)
+    path.write_text(FILE.format(folder=here, start=f"{{theta: 0.3, x: {near!r}}}"))
+    run = CliRunner()
+    for command in (
+        ["show", str(path)],
+        ["simulate", str(path)],
+        ["build", str(path), "--out", str(tmp_path), "--no-check"],
+    ):
+        result = run.invoke(app, command)
+        assert result.exit_code == 0, result.output
+        said = " ".join((result.output + result.stderr).split())
+        assert repr(near) in said, command
+        assert "x = " in said, command
+        assert "y has no start value" in said or "y is left out" in said, command
