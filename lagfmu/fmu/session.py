@@ -94,7 +94,8 @@ class Plan:
 
     `vary` are set before initialization, to another row of values in each run; `drive` are inputs, set at
     the communication points to the rows of `drives` (points, inputs).  `keep` are (variable, LAST ...
-    TIME_OF_MAX); `events` are (count, time) of departures.  With `whole`, the values at all points are returned too.
+    TIME_OF_MAX); `events` are (count, time) of departures.  With `whole`, the values at all points are
+    returned too.
     """
 
     vary: tuple[str, ...]
@@ -246,8 +247,8 @@ class Session:
         )
         for field, array in arrays.items():
             setattr(batch, field, None if array is None else array.ctypes.data)
-        listener = _Listener(batch, found.reasons)
-        with listener:
+        self.used = True
+        with _Listener(batch, found.reasons):
             while batch.current < batch.runs:
                 status = function(self.slave.component, ctypes.byref(batch))
                 if status <= 1:

@@ -23,6 +23,7 @@ from ...errors import SimulationError
 from ...methods import NUMBERS
 
 Values = NDArray[np.float64]
+MOST = 10**8  # values of one quantity
 PLANS = ("latin-hypercube", "sobol")
 DISTRIBUTIONS = {  # name -> parameters
     "uniform": ("low", "high"),
@@ -85,6 +86,10 @@ def axis(text: str) -> tuple[str, Values]:
     if not parts[2].strip().isdigit() or int(parts[2]) < 1:
         raise SimulationError(f"{what}: {parts[2]!r} values, expected a whole number from 1")
     count = int(parts[2])
+    if count > MOST:
+        raise SimulationError(
+            f"{what}: {count} values, {8e-9 * count:.3g} GB, expected at most {MOST:.0e}"
+        )
     if low == high and count > 1:
         raise SimulationError(f"{what}: {count} values from {low!r} to {high!r}: the step is zero")
     if len(parts) == 4:
@@ -186,9 +191,10 @@ def design(
     if empty:
         raise SimulationError(f"nothing is given for {', '.join(n[0] for n in empty)}")
     if sample:
-        if runs is None or runs < 1:
+        if runs is None or not 1 <= runs <= MOST:
+            size = f" ({8e-9 * runs * len(sample):.3g} GB)" if runs and runs > MOST else ""
             raise SimulationError(
-                f"runs = {runs!r}, expected a whole number from 1 for the samples"
+                f"runs = {runs!r}{size}, expected a whole number from 1 to {MOST:.0e} for the samples"
             )
     elif runs is not None:
         raise SimulationError("runs is for samples, and nothing is sampled")

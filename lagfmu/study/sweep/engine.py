@@ -114,7 +114,7 @@ def distributed(
         return future
 
     first = [submit(n) for n, _ in _taken(waiting, AHEAD * cores)]
-    queue: Any = dask.as_completed(first)
+    queue: Any = dask.as_completed(first, loop=client.loop)
     for future in queue:
         number = known.pop(future)
         try:

@@ -60,7 +60,10 @@ def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
     return Kept(tuple(numbers), tuple(trajectories))
 
 
-def missing(name: str, known: Iterable[str]) -> str:
+def missing(name: str, known: Iterable[str], what: str = "is not in the FMU") -> str:
     """What to say of a name that the FMU does not have."""
-    near = difflib.get_close_matches(name, list(known), 1)
-    return f"there is no {name!r}" + (f"; did you mean {near[0]!r}?" if near else "")
+    known = list(known)
+    near = difflib.get_close_matches(name, known, 1)
+    if near:
+        return f"{name!r} {what}; did you mean {near[0]!r}?"
+    return f"{name!r} {what}, expected one of {', '.join(known) or 'none'}"

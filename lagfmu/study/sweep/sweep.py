@@ -26,7 +26,7 @@ from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
 from ...verification.simulate import Trajectory, communication_points, read_description
-from .design import Design, design
+from .design import Design, Values, design
 from .engine import connected, distributed, local
 from .keep import kept as parsed
 from .keep import missing
@@ -34,7 +34,7 @@ from .table import Layout, Parts, dataset, write_parquet
 
 MOST = 2000  # runs in a chunk
 FEWEST = 100  # chunks, of a large sweep
-MEMORY = 0.5  # of this machine's, for one table
+MEMORY = 0.1  # of this machine's, for one table: it is held a few times over
 SUFFIXES = (".parquet", ".nc", ".zarr")
 
 Progress = Callable[[int, int, int], None]  # runs done, of how many, of those refused
@@ -42,7 +42,7 @@ Progress = Callable[[int, int, int], None]  # runs done, of how many, of those r
 
 def sweep(
     target: str | os.PathLike[str] | Model,
-    vary: Mapping[str, Sequence[float]] | None = None,
+    vary: Mapping[str, Sequence[float] | Values] | None = None,
     *,
     sample: Mapping[str, Any] | None = None,
     runs: int | None = None,
@@ -261,7 +261,7 @@ def _fmu(target: Any, scene: Scene | str | None) -> Iterator[Path]:
 
 
 def _design(
-    vary: Mapping[str, Sequence[float]] | None,
+    vary: Mapping[str, Sequence[float] | Values] | None,
     sample: Mapping[str, Any] | None,
     runs: int | None,
     seed: int,
@@ -293,9 +293,7 @@ def _check(varied: Design, variables: Mapping[str, Any], driven: Sequence[str]) 
         if v.type in TYPES
         and (v.causality in ("parameter", "input") or v.initial in ("exact", "approx"))
     ]
-    problems = [
-        missing(n, settable) + " that can be set" for n in varied.names if n not in settable
-    ]
+    problems = [missing(n, settable, "cannot be set") for n in varied.names if n not in settable]
     problems += [
         f"{n} varies and comes from the file of inputs" for n in varied.names if n in driven
     ]
