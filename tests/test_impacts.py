@@ -7,10 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
 from impact_models import G, corner, cradle, e, m, restitution, rod, table, wedge
-from sympy import symbols
+from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Model, Parameter, Scene, simulate
@@ -317,3 +318,109 @@ def test_a_restitution_outside_0_to_1_is_refused(run, value):
     )
     with pytest.raises(LagfmuError, match=r"restitution of 'floor' is .*expected 0 .* to 1"):
         run(model, 1.0, 0.5, {"e_free": value})
+
+
+# --------------------------------------------------------------------------- model exchange
+
+TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
+
+
+def exchanged(path: Path, stop: float, interval: float = 0.02, **more: Any) -> Any:
+    """A run of fmpy's integrator on the FMU's model exchange."""
+    return fmpy.simulate_fmu(
+        str(path), stop_time=stop, output_interval=interval, fmi_type="ModelExchange", **more
+    )
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3, 0.5, 0.7, 0.9])
+def test_an_importers_integrator_leaves_the_ball_above_the_floor(native_fmu, value):
+    """Under CVODE at every tolerance the ball bounces, comes to rest on the floor and stays there:
+    y >= -1e-5 m, and after sqrt(2 h/g) (1 + e)/(1 - e) lambda = m g."""
+    rest = np.sqrt(2 / G) * (1 + value) / (1 - value)
+    for tolerance in TOLERANCES:
+        result = exchanged(
+            native_fmu("BouncingBall"),
+            max(6.0, 1.1 * rest),
+            relative_tolerance=tolerance,
+            start_values={"e": value},
+        )
+        assert result["y"].min() >= -1e-8
+        assert result["contact.floor"][-1]
+        assert abs(result["y"][-1]) < 1e-15
+        assert result["lambda.floor"][-1] == pytest.approx(G, rel=1e-12)
+        assert (result["departure.floor.count"] == 0).all()
+
+
+@pytest.mark.parametrize("step", [0.05, 0.01])
+def test_a_fixed_step_carries_no_ball_through_the_floor(native_fmu, step):
+    """Euler's method sees a landing up to a step late, so that the ball is inside by v h at most; it is
+    brought back each time, and does not sink."""
+    for value in (0.0, 0.3, 0.7):
+        result = exchanged(
+            native_fmu("BouncingBall"),
+            8.0,
+            step,
+            solver="Euler",
+            step_size=step,
+            start_values={"e": value},
+        )
+        assert result["y"].min() >= -5 * step
+        assert result["y"][-1] >= 0
+
+
+@pytest.fixture(scope="module")
+def lander(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A particle that slides down a hemisphere and lands on the floor around it."""
+    if find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    r, theta = dynamicsymbols("r theta")
+    a, g = symbols("a g", positive=True)
+    model = Model(
+        name="Lander",
+        lagrangian=m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2 - m * g * r * cos(theta),
+        coordinates={r: "m", theta: "rad"},
+        constraints=[Contact("surface", r - a), Contact("floor", r * cos(theta), restitution=e)],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, G, "m/s^2"),
+            Parameter(a, 1.0, "m"),
+            restitution(0.5),
+        ],
+        start={r: 1.0, theta: 0.1},
+    )
+    folder = tmp_path_factory.mktemp("lander")
+    return write(prepare(model, Scene("Lander", stop_time=6.0)), folder, [], target="native")
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5, 0.9])
+def test_a_particle_that_left_a_hemisphere_lands_in_model_exchange(lander, value):
+    """It leaves at cos theta = (2/3) cos theta0, lands on the floor and stays above it for 6 s, whatever
+    tolerance CVODE has; x'' = 0 and energy only falls after the departure, within the tolerance."""
+    for tolerance in TOLERANCES:
+        values = {"e": value}
+        result = exchanged(lander, 6.0, relative_tolerance=tolerance, start_values=values)
+        height = result["r"] * np.cos(result["theta"])
+        assert height.min() >= -1e-5
+        assert result["r"].min() >= 1 - 1e-3
+        assert result["departure.surface.count"][-1] == 1
+        assert result["departure.floor.count"][-1] == 0
+        if value < 0.9:
+            assert result["contact.floor"][-1]
+        angle = result["departure.surface.theta"][-1]
+        assert np.cos(angle) == pytest.approx(2 / 3 * np.cos(0.1), abs=100 * tolerance)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_rod_dropped_flat_lies_flat_in_model_exchange(tmp_path, order):
+    """Both feet are struck together under an importer's integrator too."""
+    if find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    path = write(
+        prepare(rod(order, 0.7), Scene("Rod", stop_time=6.0)), tmp_path, [], target="native"
+    )
+    for tolerance in TOLERANCES:
+        result = exchanged(path, 6.0, relative_tolerance=tolerance)
+        assert np.abs(result["theta"]).max() < 1e-8
+        assert result["contact.left"][-1]
+        assert result["contact.right"][-1]
+        assert min(result["residual.left"].min(), result["residual.right"].min()) > -1e-8

@@ -117,7 +117,7 @@ def sources_of(
         },
         b"".join(name.encode() + text for name, text in {**runtime, **generated}.items()),
         sources=sources,
-        event_indicators=len(system.contacts),
+        event_indicators=len(system.contacts) + len(system.floors),
         reinitialized=table.states if system.rows else (),
     )
     generated["identity.h"] = IDENTITY.format(guid=guid_of(description)).encode()

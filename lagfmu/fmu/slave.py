@@ -26,6 +26,7 @@ from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
+from ..solver.restored import restored, restored_settings
 from ..solver.state import SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
 from .references import end_once, keep, keep_module_of
@@ -90,6 +91,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         self.observed: list[Any] | None = None
         self.expected: list[float] = []
         self.warned = False
+        self.outside: set[str] = set()  # tables that were looked up beyond their ends
 
     # -------------------------------------------------------------- life cycle
 
@@ -150,6 +152,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             self.state, self.values, self.observed = before, values, None
             self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
             return False
+        self._warn_of_tables()
         self._report_events(before, self.state)
         if self.state.choice.product and not before.choice.product:
             self.log(self.state.choice.message(), Fmi2Status.ok, "logEvents")
@@ -189,6 +192,21 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                     "communication point; connect its derivatives as well"
                 )
                 self.warned = True
+
+    def _warn_of_tables(self) -> None:
+        """Once for each: a table is looked up beyond its ends."""
+        lookups, state = self.system.lookups, self.state
+        if lookups is None or state is None:
+            return
+        u = [*self._values(self.inputs), *state.levels]
+        places = lookups.places(state.t, state.q, state.v, u, self.p)
+        for (name, first, last), x in zip(lookups.reach, places, strict=True):
+            if not first <= x <= last and name not in self.outside:
+                self.outside.add(name)
+                self._warn(
+                    f"table {name} is looked up at {x!r}, outside of its points from {first!r} to "
+                    f"{last!r}: it goes on as a straight line"
+                )
 
     # -------------------------------------------------------------- values
 
@@ -359,14 +377,46 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             raise Refused(state["refused"])
         if state.get("identity") != self.identity:
             raise Refused("the saved state belongs to another FMU, or to another version of this")
-        self.values = list(state["values"])
-        self.running = state["running"]
-        self.start_time, self.stop_time, self.tolerance = state["experiment"]
-        if state["settings"] is not None:
-            self.settings = Settings(**state["settings"])
-        self.state = None if state["state"] is None else State.from_json(state["state"])
+        try:
+            kept = self._checked_state(state)
+        except (ValueError, TypeError, KeyError) as error:
+            raise Refused(f"the saved state is none of this FMU's: {error}") from None
+        self.values, self.running, experiment, settings, self.state = kept
+        self.start_time, self.stop_time, self.tolerance = experiment
+        if settings is not None:
+            self.settings = settings
         self.p = self._values(self.parameters)
         self.observed = None
+
+    def _checked_state(self, state: dict[str, Any]) -> tuple[Any, ...]:
+        """Everything that was read is what this FMU can have saved.  Raises ValueError."""
+        values, running = state["values"], state["running"]
+        if not isinstance(values, list) or len(values) != len(self.variables):
+            raise ValueError("it has other variables")
+        for variable, value in zip(self.variables, values, strict=True):
+            if variable[2] != "output":
+                self._check_saved(variable, value)
+        start, stop, tolerance = (float(x) for x in state["experiment"])
+        if not (math.isfinite(start) and stop > start and 0 <= tolerance < math.inf):
+            raise ValueError(f"its experiment is {state['experiment']!r}")
+        settings, kept = state["settings"], state["state"]
+        settings = None if settings is None else restored_settings(settings, self.methods)
+        kept = None if kept is None else restored(self.system, kept)
+        if not isinstance(running, bool) or (running and None in (settings, kept)):
+            raise ValueError(f"its mode is {running!r}")
+        return list(values), running, (start, stop, tolerance), settings, kept
+
+    def _check_saved(self, variable: Any, value: Any) -> None:
+        name, kind, _, _, low, high, positive = variable[:7]
+        if kind == "Real":
+            number = float(value)
+            good = isinstance(value, (int, float)) and math.isfinite(number)
+            good = good and (low is None or number >= low) and (high is None or number <= high)
+            good = good and (not positive or number > 0)
+        else:
+            good = value in self.methods if name == "solver.method" else True
+        if not good:
+            raise ValueError(f"its {name} is {value!r}")
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
@@ -380,5 +430,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             if int(check, 16) != zlib.crc32(text):
                 raise ValueError("their check sum is wrong")
             return dict(json.loads(text.decode("ascii")))
-        except (TypeError, ValueError) as error:  # raised here, it would crash pythonfmu's binary
+        except (
+            TypeError,
+            ValueError,
+            RecursionError,
+        ) as error:  # raised here, it would crash pythonfmu's binary
             return {"refused": f"the bytes are no saved state of an FMU ({error})"}

@@ -22,6 +22,7 @@ from ..mechanics.formulations.minimal import Reduction
 from ..solver.failure import OmittedStartError, StepFailureError
 from ..solver.initial import Start, start
 from ..solver.instant import Instant
+from ..solver.jumps import levels_at
 from ..solver.observe import expand, observe
 from ..solver.solution import RANK
 from ..solver.state import Settings
@@ -79,8 +80,9 @@ def examine(
             except StepFailureError:
                 continue
             q, v = np.array(moved.state.q), np.array(moved.state.v)
-        full, q, v = expand(system, 0.0, q, v, u, p)
-        M, _, G, _, _ = Instant(full, 0.0, u, p).evaluate(q, v)
+        levelled = [*u, *levels_at(system, 0.0, q, u, p)]
+        full, q, v = expand(system, 0.0, q, v, levelled, p)
+        M, _, G, _, _ = Instant(full, 0.0, levelled, p).evaluate(q, v)
         ranks.append(_rank(full, G))
         masses.append(M)
     size = np.abs([M.diagonal() for M in masses]).max(axis=0)
@@ -113,7 +115,8 @@ def _begun(
     except OmittedStartError as error:
         raise ModelError(eom.model.name, [str(error)]) from error
     except StepFailureError as error:
-        at = Instant(system, 0.0, system.inputs_at(u, 0.0), p)
+        levels = levels_at(system, 0.0, np.array(q0), u, p)
+        at = Instant(system, 0.0, [*system.inputs_at(u, 0.0), *levels], p)
         cause = cause_of_failure(at, np.array(q0), np.array(v0)) or str(error)
         raise ModelError(eom.model.name, [cause]) from error
     return begun, u, p

@@ -12,6 +12,7 @@ from ..interface.variables import VariableTable
 from ..mechanics import fold, prune
 from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.formulations.minimal import Reduction, reduce
+from ..mechanics.jumps import with_jumps
 from ..model.model import Contact, Model
 from ..model.scene import Scene
 from ..model.selection import select
@@ -64,7 +65,7 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
     """Derive, prune, reduce, lower and examine.  Raises ModelError or DerivationError."""
     asked = scene = scene or Scene(model.name)
     problems: list[str] = []
-    derived = derive(model)
+    derived = with_jumps(derive(model))
     equations = prune.held(derived, scene, problems)
     numbers = fold.numbers_of(derived, scene, problems)
     scene, reduction, outputs = _asked(equations, scene, problems)

@@ -1,4 +1,4 @@
-"""From one communication point to the next: leg after leg, each up to an event at a contact."""
+"""From one communication point to the next: leg after leg, each up to an event."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from . import at_contacts
+from . import at_contacts, at_events
 from .failure import StepFailureError
 from .indicators import indicators, is_watched
 from .instant import Instant
+from .jumps import levels_at, passed
 from .leg import Leg
 from .magnitudes import complete, is_incomplete
 from .state import Settings, State
@@ -44,7 +45,11 @@ def advance(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
         )
     with np.errstate(all="ignore"):
-        at = Instant(system, state.t, system.inputs_at(u, 0.0), p)
+        inputs = system.inputs_at(u, 0.0)
+        if system.floors:  # the inputs may have been set
+            levels = levels_at(system, state.t, np.array(state.q), inputs, p)
+            state = replace(state, levels=levels)
+        at = Instant(system, state.t, [*inputs, *state.levels], p)
         if system.contacts and system.prescribed:
             state = at_contacts.released(at, state, state.span)
         if is_incomplete(state):
@@ -56,8 +61,8 @@ def advance(
             events.append(state.t)
             if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
                 raise StepFailureError(
-                    f"{CHATTER} contacts open or close in {events[-1] - events[0]:.1g} s at "
-                    f"t = {state.t!r} s: the contacts chatter without end"
+                    f"{CHATTER} events in {events[-1] - events[0]:.1g} s at t = {state.t!r} s: contacts "
+                    "chatter without end, or a force jumps to and fro"
                 )
     return replace(state, span=t_end - begun)
 
@@ -97,7 +102,7 @@ class Headway:
 def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
     """Integrate until t_end or the first event, whichever comes first; at an event, switch modes."""
     y = np.array(state.q + state.v)
-    f0 = leg.rate(state.t, y)
+    f0 = leg.accept(state.t, y)
     if not np.isfinite(f0).all():
         raise StepFailureError(leg.cause)
     solver = leg.stepper(state.t, y, t_end, state.step or None)
@@ -123,14 +128,14 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
             continue
         steps += 1
         if watch:
-            event, before = at_contacts.first_event(leg, solver, t0, y0, y1, before, armed)
+            event, before = at_events.first_event(leg, solver, t0, y0, y1, before, armed)
             if event is not None:
                 headway.check(t0, event[0])
                 step = offered
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)
                 here = replace(state, step=step, steps=steps, armed=tuple(armed), choice=choice)
-                return at_contacts.switched(leg, here, t0, y0, *event)
+                return _meet(leg, here, t0, y0, *event)
         if choice.implicit:
             choice = implicit_step(choice, float(solver.t - t0))
         if solver.t == t_end:
@@ -148,12 +153,28 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
                 steps=steps,
                 choice=choice,
             )
-        solver.y, solver.f = y1, leg.rate(solver.t, y1)
+        solver.y, solver.f = y1, leg.accept(solver.t, y1)
         if leg.auto and leg.settings.method == "dop853":
             choice = _judged(leg, choice, solver, t0, y0)
         if leg.auto and choice.implicit != (leg.settings.method == "radau5"):
             solver = _take_over(leg, choice, solver.t, y1, t_end)
         headway.check(t0, float(solver.t))
+
+
+def _meet(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: dict[int, int]) -> State:
+    """The state right after the event at t at which these indicators left their ranges."""
+    n, contacts = leg.system.n, len(leg.system.contacts)
+    ways = {k - contacts: way for k, way in left.items() if k >= contacts}
+    if ways:
+        y0, t0 = leg.reach(t0, y0, t), t
+        levels = passed(leg.system, state.levels, ways)
+        state = replace(
+            state, t=t, q=tuple(y0[:n].tolist()), v=tuple(y0[n:].tolist()), levels=levels
+        )
+        leg = Leg(leg.system, leg.settings, state, leg.u, leg.p, leg.begun)
+    if not contacts:
+        return state
+    return at_contacts.switched(leg, state, t0, y0, t, [k for k in left if k < contacts])
 
 
 def _judged(leg: Leg, choice: Choice, solver: Any, t0: float, y0: Vector) -> Choice:

@@ -7,6 +7,7 @@ Wanner I, sect. II.6, with exact trials).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from scipy.optimize import brentq
@@ -17,7 +18,9 @@ from .looks import look_into_dips, looks
 from .motion import EPS
 from .system import Vector
 
-Event = tuple[float, list[int]]  # its time [s], and the indicators that leave their ranges then
+Event = tuple[
+    float, dict[int, int]
+]  # its time [s], the indicators that leave their ranges: 1 up, -1 down
 
 
 def first_event(
@@ -36,7 +39,7 @@ def first_event(
     for c, closed in enumerate(leg.state.closed):
         if closed:
             look_into_dips(leg, solver, times, values, c)
-    found: list[tuple[float, int]] = []
+    found: list[tuple[float, int, int]] = []
     for k, r in enumerate(ranges(leg)):
         risen = k >= len(armed) or leg.state.closed[k] or armed[k]
         for i in range(1, len(times)):
@@ -46,15 +49,23 @@ def first_event(
                 inside = max((j for j in range(i) if limit.inside(values[j][k]) > 0), default=0)
                 t = _locate(leg, t0, y0, times[inside], times[i], k, limit)
                 if t is not None:
-                    found.append((t, k))
+                    found.append((t, k, r.way(values[i][k])))
                     break
     if not found:
         gap = leg.state.gap
         for c, closed in enumerate(leg.state.closed):
             armed[c] = bool(armed[c] or (not closed and any(v[c] > gap[c] for v in values)))
         return None, values[-1]
-    earliest = min(t for t, _ in found)
-    return (earliest, [k for t, k in found if t == earliest]), values[-1]
+    earliest = min(t for t, _, _ in found)
+    return (earliest, {k: way for t, k, way in found if t == earliest}), values[-1]
+
+
+def _past(height: Callable[[float], float], root: float, b: float) -> float:
+    """The root, or the next time after it at which the limit has been passed, rounding included."""
+    step, elapsed = EPS * b, root
+    while elapsed < b and height(elapsed) > 0:
+        elapsed, step = min(root + step, b), 2 * step
+    return elapsed
 
 
 def _locate(
@@ -71,6 +82,6 @@ def _locate(
         if height(b) >= 0:
             return None  # it only grazed: within the tolerance there is no event
         if height(a) > 0:
-            found = brentq(height, a, b, xtol=EPS * b, rtol=4 * EPS, maxiter=200)
-            return float(t0 + found)
+            root = float(brentq(height, a, b, xtol=EPS * b, rtol=4 * EPS, maxiter=200))
+            return t0 + (root if indicator < len(leg.state.closed) else _past(height, root, b))
     return float(t0)

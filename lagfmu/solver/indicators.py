@@ -3,6 +3,7 @@ equations change.
 
     0 .. contacts - 1   of a contact: lambda >= 0 while it is closed; while it is open f >= 0, left only at
                         f < -gap, within which contacts touch
+    then                of a jump of the forces: h on the side of its level (jumps.py)
 
 A further kind takes the numbers after these: its values stand in `indicators`, its ranges in `ranges`, what
 it does at an event in advance.py.
@@ -14,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .jumps import limits, surfaces
 from .leg import Leg
-from .motion import motion
 from .system import System, Vector
 
 
@@ -31,6 +32,10 @@ class Range:
     high: float = float("inf")
     slack: float = 0.0
 
+    def way(self, value: float) -> int:
+        """The way on which a value has left the range: 1 upwards, -1 downwards."""
+        return 1 if float(value) > self.high else -1
+
     def inside(self, value: float) -> float:
         """How far inside the range a value lies, negative outside."""
         return min(float(value) - self.low, self.high - float(value))
@@ -42,21 +47,31 @@ class Range:
 
 def is_watched(system: System) -> bool:
     """True if there is anything to watch."""
-    return bool(system.contacts)
+    return bool(system.contacts or system.floors)
 
 
 def indicators(leg: Leg, t: float, y: Vector) -> Vector:
     """All values at (t, y), in the present modes."""
-    return _of_contacts(leg, t, y)
+    q, _ = leg.split(y)
+    values = _of_contacts(leg, t, y) if leg.system.contacts else np.zeros(0)
+    if not leg.system.floors:
+        return values
+    at = leg.at(t)
+    return np.concatenate([values, surfaces(leg.system, t, q, at.u, at.p)])
 
 
 def ranges(leg: Leg) -> list[Range]:
     """The range of each, in the present modes."""
     state = leg.state
-    return [
+    contacts = [
         Range(0.0, slack=0.0 if shut else gap)
         for shut, gap in zip(state.closed, state.gap, strict=True)
     ]
+    jumps = [
+        Range(*limits(level, floor))
+        for level, floor in zip(state.levels, leg.system.floors, strict=True)
+    ]
+    return contacts + jumps
 
 
 def _of_contacts(leg: Leg, t: float, y: Vector) -> Vector:
@@ -65,6 +80,6 @@ def _of_contacts(leg: Leg, t: float, y: Vector) -> Vector:
     contacts = list(leg.system.contacts)
     values = at.residual(q)[contacts]
     if any(leg.state.closed):
-        lam = motion(at, q, v, leg.rows).lam[contacts]
+        lam = leg.near(t, q, v).lam[contacts]
         values = np.where(leg.state.closed, lam, values)
     return values

@@ -17,6 +17,7 @@ from . import at_contacts
 from .afar import project_from_afar, velocities_from_afar
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
+from .jumps import levels_at, settled
 from .magnitudes import TOUCH, complete, motion_speeds, sizes
 from .motion import EPS, project
 from .precedence import GIVEN, OMITTED
@@ -77,7 +78,9 @@ def start(
     """
     try:
         with np.errstate(all="ignore"):
-            at = Instant(system, t, system.inputs_at(u, 0.0), p)
+            inputs = system.inputs_at(u, 0.0)
+            levels = levels_at(system, t, np.array(q0, float), inputs, p)
+            at = Instant(system, t, [*inputs, *levels], p)
             if system.contacts:
                 at_contacts.check_restitution(system, p)
             ranks = [GIVEN] * (2 * system.n) if rank is None else list(rank)
@@ -106,13 +109,15 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
             break
         q = moved
     _check_angles(system, q)
+    if system.floors:
+        at = settled(at, q)
     size = sizes(system, q, at.p, size)
     q, v, closed = _velocities(at, q, v0, closed, size, rank[n:])
     modes: tuple[bool, ...] = ()
     if system.contacts:
         touching = [c for c, shut in enumerate(closed) if shut]
         modes = at_contacts.complementary_modes(at, q, v, closed, touching)
-    q, v = project(at, q, v, system.active(modes), none, size)
+    q, v = project(at, q, v, system.active(modes), none, size, dependent=True)
     nothing = Departure(0, 0.0, (0.0,) * system.n, (0.0,) * system.n)
     state = State(
         t=at.t,
@@ -129,6 +134,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
         span=0.0,
         steps=0,
         departures=(nothing,) * len(system.contacts),
+        levels=tuple(at.u[len(at.u) - len(system.floors) :]),
     )
     # a start value is its own scale: a start at theta0 = 1e-6 is resolved
     state = complete(at, settings, state, 0.0)
@@ -199,7 +205,7 @@ def _velocities(
     ]
     rows = system.active(shut)
     v = velocities_from_afar(at, q, v0, rows, rank, natural)
-    q, v = project(at, q, v, rows, np.zeros(system.m), size)
+    q, v = project(at, q, v, rows, np.zeros(system.m), size, dependent=True)
     M, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
     unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)

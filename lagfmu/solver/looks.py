@@ -14,7 +14,6 @@ import numpy as np
 
 from .indicators import indicators
 from .leg import Leg
-from .motion import motion
 from .system import Vector
 
 LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
@@ -34,7 +33,7 @@ def looks(
         if rows:
             q, v = leg.split(y)
             _, _, G, nu, _ = leg.at(times[-1]).evaluate(q, v)
-            f = np.abs(values[-1][[not c for c in leg.state.closed]])
+            f = np.abs(values[-1][: len(leg.state.closed)][[not c for c in leg.state.closed]])
             speed = np.abs(G[rows]) @ np.abs(v) + np.abs(nu[rows])
             ahead = 0.5 * f / np.where(speed > 0, speed, np.inf)
             near = float(ahead[speed > 0].min(initial=stride))
@@ -59,7 +58,7 @@ def _top_of_rebound(leg: Leg, t: float, y: Vector, values: Vector) -> float:
     if not left:
         return float("inf")
     q, v = leg.split(y)
-    now = motion(leg.at(t), q, v, leg.rows)
+    now = leg.near(t, q, v)
     speed, pull = now.G @ v - now.nu, now.gamma - now.G @ now.vdot
     return min(
         (

@@ -36,6 +36,7 @@ def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]
 
 def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float]) -> Values:
     values: Values = {}
+    u = [*u, *state.levels]
     full, q, v = expand(system, state.t, np.array(state.q), np.array(state.v), u, p)
     for j, name in enumerate(full.coordinates):
         values[name] = float(q[j])

@@ -46,7 +46,7 @@ class State:
     in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
     below which a contact touches; step [s]: the next step to try; span [s]: the communication step that
     led to t (0: none); rate [1/s]: the motion's
-    natural rate at the start; choice: what `auto` remembers.
+    natural rate at the start; choice: what `auto` remembers; levels: those of jumps (jumps.py).
     """
 
     t: float
@@ -64,6 +64,7 @@ class State:
     steps: int
     departures: tuple[Departure, ...]
     choice: Choice = field(default_factory=Choice)
+    levels: tuple[float, ...] = ()
 
     def to_json(self) -> str:
         """Text that `from_json` turns into an equal state; floats keep every bit."""

@@ -44,6 +44,14 @@ class Own:
 
 
 @dataclass(frozen=True)
+class Lookups:
+    """Where tables are looked up: places(t, q, v, u, p) -> x, and (name, first x, last x) of each."""
+
+    places: Callable[..., Any]
+    reach: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True)
 class System:
     """M, F, G, nu, gamma, f and the energies of n coordinates under m constraint rows.
 
@@ -54,6 +62,9 @@ class System:
     and its two derivatives begin.  `like` (n) lists for each coordinate those of its dimension,
     `extent` (n) the positions in p whose values have it, `folded` (n) the largest magnitude of it among
     the parameters that are numbers in the code; `angles` are those without dimension.
+
+    surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
+    is a whole number; `driven`: length of u, the inputs and the levels of jumps behind them.
 
     `outputs` are those of the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
@@ -77,6 +88,10 @@ class System:
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
     outputs: tuple[Own, ...] = ()
+    lookups: Lookups | None = None
+    surfaces: Callable[..., Any] | None = None
+    floors: tuple[bool, ...] = ()
+    driven: int = 0
 
     @property
     def n(self) -> int:

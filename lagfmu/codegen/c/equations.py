@@ -16,9 +16,10 @@ import sympy as sp
 from ...mechanics.differential import Differential
 from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.formulations.minimal import Reduction
+from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
 from .function import FILL, Result, function
-from .printer import HELPERS, identifiers
+from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
 
 Expr = Any
@@ -51,10 +52,11 @@ def model_source(
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
+    eom, reduction, jumps = levelled(eom, reduction)
     eom = _in_reals(eom)
     index = _index("coordinates", eom.q) + _index("constraints", [c.name for c in eom.constraints])
     if reduction is None:
-        text = _System(eom, "", formulation, tangents).text() + _pointer("equations")
+        text = _System(eom, "", formulation, tangents, jumps=jumps).text() + _pointer("equations")
     else:
         reduced = _in_reals(reduction.reduced)
         index += _index("coordinates that are stepped", reduced.q)
@@ -62,10 +64,11 @@ def model_source(
             [
                 _System(eom, "", "multipliers", tangents).text(),
                 *_embedding(eom, reduction, reduced, tangents),
-                _System(reduced, "reduced_", "minimal", tangents, reduction.rows).text(),
+                _System(reduced, "reduced_", "minimal", tangents, reduction.rows, jumps).text(),
             ]
         ) + _pointer("reduced_equations")
     helpers = [code for name, code in {**HELPERS, "fill": FILL}.items() if f"{name}(" in text]
+    helpers += [table_text(s) for s in eom.model.splines if f"&{table_name(s)}," in text]
     model = eom.model
     description = f": {model.description}" if model.description else ""
     head = HEAD.format(name=model.name, description=_comment(description), index=index)
@@ -122,17 +125,21 @@ class _Vocabulary:
 
     def __init__(self, eom: EquationsOfMotion, q: str = "q", v: str = "v") -> None:
         t = _real([TIME]).get(TIME, TIME)
-        self.t, self.q, self.v, self.u, self.p = (t,), eom.q, eom.v, eom.u, eom.p
+        self.t, self.q, self.v, self.u, self.p = (t,), eom.q, eom.v, eom.driven, eom.p
         moving = [*eom.q, *eom.v, *eom.u]
         self.change = {s: sp.Symbol(f"d({s})", real=True) for s in moving}
         self.change[t] = sp.Symbol("d(t)", real=True)
-        self.names = identifiers([*moving, *eom.p, *(self.change[s] for s in moving)])
+        fixed = [*eom.p, *eom.levels]
+        self.names = identifiers([*moving, *fixed, *(self.change[s] for s in moving)])
         self.names |= {t: "t", self.change[t]: "dt"}
         self.state = {"t": self.t, q: self.q, v: self.v, "u": self.u, "p": self.p}
         self.still = {"t": self.t, q: self.q, "u": self.u, "p": self.p}
         self.along = {
             **self.state,
-            **{f"d{a}": tuple(self.change[s] for s in self.state[a]) for a in ("t", q, v, "u")},
+            **{
+                f"d{a}": tuple(self.change[s] for s in self.state[a] if s in self.change)
+                for a in ("t", q, v, "u")
+            },
         }
 
 
@@ -196,9 +203,10 @@ class _System:
         formulation: str,
         tangents: bool,
         rows: Sequence[int] | None = None,
+        jumps: Jumps = NONE,
     ) -> None:
         self.eom, self.prefix, self.formulation = eom, prefix, formulation
-        self.tangents = tangents
+        self.tangents, self.jumps = tangents, jumps
         chosen = range(len(eom.constraints)) if rows is None else rows
         self.constraints = [eom.constraints[k] for k in chosen]
         mass, jacobian = eom.M.todok(), eom.G.todok()
@@ -212,7 +220,13 @@ class _System:
         """Functions, then tables."""
         functions = self._functions()
         tables = Tables(
-            self.eom, self.prefix, self.formulation, self.constraints, self.mass, self.entries
+            self.eom,
+            self.prefix,
+            self.formulation,
+            self.constraints,
+            self.mass,
+            self.entries,
+            [s.floor for s in self.jumps.surfaces],
         )
         text = tables.of_what_is_read if self.eom.bare else tables.text
         return "\n".join([*functions.values(), text(set(functions))])
@@ -284,6 +298,22 @@ class _System:
                 "The change of all of these along the direction (dt, dq, dv, du).",
                 words.along,
                 changes,
+            )
+        if eom.lookups:
+            found["lookups"] = define(
+                "lookups",
+                "Where tables are looked up.",
+                words.state,
+                {"places": _results([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])},
+            )
+        if self.jumps.surfaces:
+            table = _real([*eom.q, *eom.v, *eom.u, *eom.p, TIME])
+            h = [s.h.xreplace(table) for s in self.jumps.surfaces]
+            found["surfaces"] = define(
+                "surfaces",
+                "h of each jump of the forces: where it passes 0, or a whole number.",
+                words.still,
+                {"h": _results(h, [str(s) for s in eom.levels])},
             )
         if eom.outputs and not self.prefix:
             found |= self._outputs()

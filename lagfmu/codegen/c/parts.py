@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from ...methods import INTEGRATORS, METHODS
 from ...model.scene import Scene
+from ...solver.indicators import is_watched
 from ...solver.system import System
 
+AT_EVENTS = {"events_find": "events.c"}
 AT_CONTACTS = {
-    "events_find": "events.c",
     "contacts_modes": "contacts.c",
     "impact_check": "impact.c",
+    "landing_lift": "landing.c",
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }
@@ -18,7 +20,10 @@ NO_RUNGS = """
 
 const Dependent *const DEPENDENT = NULL;
 """
-BEHIND_CONTACTS = ("complementarity.c", "looks.c", "root.c")  # what only those files need
+BEHIND_EVENTS, BEHIND_CONTACTS = (
+    ("looks.c", "root.c"),
+    ("complementarity.c",),
+)  # what only those need
 AT_CONSTRAINTS = (
     "dependent.c",
     "orthogonal.c",
@@ -48,6 +53,7 @@ def parts_source(scene: Scene, system: System) -> str | None:
         f"    .methods[{place.upper()}] = &{menu[place]},\n" for place in METHODS if place in menu
     ]
     rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
+    rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     what = ", ".join(found) + (", contacts" if contacts else "")
     rungs = "" if system.is_constrained else NO_RUNGS
@@ -62,6 +68,8 @@ def needs_tangents(scene: Scene) -> bool:
 def files_left_out(scene: Scene, system: System) -> frozenset[str]:
     """The runtime's files that the FMU does without."""
     gone = {f"{m}.c" for m in INTEGRATORS if m not in scene.integrators}
+    if not is_watched(system):
+        gone |= {*AT_EVENTS.values(), *BEHIND_EVENTS}
     if not system.contacts:
         gone |= {*AT_CONTACTS.values(), *BEHIND_CONTACTS}
     if not system.is_constrained:

@@ -27,7 +27,9 @@ class Tables:
         constraints: Sequence[Constraint],
         mass: Sequence[Pair],
         entries: Sequence[Pair],
+        floors: Sequence[bool] = (),
     ) -> None:
+        self.floors = floors
         self.eom, self.prefix, self.formulation = eom, prefix, formulation
         self.constraints, self.mass, self.entries = constraints, mass, entries
 
@@ -62,6 +64,8 @@ class Tables:
             self._integers("extent_dimension", extent),
         ]
         folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
+        if self.floors:
+            parts.append(self._integers("floors", [int(x) for x in self.floors]))
         if any(folded):
             parts.append(self._array("const double", "folded", [repr(x) for x in folded]))
         p = self.prefix
@@ -72,12 +76,16 @@ class Tables:
             solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
             parts.append(f"{solve}\n" if solve else "")
         own, more = self._outputs(functions)
-        parts.append(own)
+        reach, ends = self._lookups(functions)
+        parts += [own, reach]
+        more |= ends
         fields = {
             "n": eom.n,
             "m": eom.m,
             "contacts": len(contacts),
             "inputs": len(eom.u),
+            "jumps": len(self.floors),
+            "floors": f"{p}floors" if self.floors else "NULL",
             "parameters": len(eom.p),
             "masses": len(self.mass),
             "entries": len(self.entries),
@@ -99,7 +107,9 @@ class Tables:
             "solve": f"{p}solve" if solve else "NULL",
             **{
                 name: p + name if name in functions else "NULL"
-                for name in ("dynamics", "residual", "energies", "restitution", "tangent")
+                for name in (
+                    *("dynamics", "residual", "surfaces", "energies", "restitution", "tangent"),
+                )
             },
             "embed": "embed" if p else "NULL",
             "embed_tangent": "embed_tangent" if p and "tangent" in functions else "NULL",
@@ -119,6 +129,17 @@ class Tables:
         text += self._integers("guarded", [int(o.otherwise is not None) for o in outputs])
         names = {"output_names": "output_names", "guarded": "guarded"}
         return text, {"output_count": len(outputs), **names}
+
+    def _lookups(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
+        """The names and ends of the tables that are looked up, and the System's fields for them."""
+        if "lookups" not in functions:
+            return "", {}
+        tables, p = [s for s, _ in self.eom.lookups], self.prefix
+        text = self._array("const char *const", "lookup_names", [f'"{s.name}"' for s in tables])
+        text += self._array("const double", "lookup_first", [repr(s.x[0]) for s in tables])
+        text += self._array("const double", "lookup_last", [repr(s.x[-1]) for s in tables])
+        names = ("lookup_names", "lookup_first", "lookup_last", "lookups")
+        return text, {"lookup_count": len(tables), **{name: p + name for name in names}}
 
     def _array(self, kind: str, name: str, items: Sequence[str]) -> str:
         head = f"static {kind} {self.prefix}{name}[] = {{"

@@ -11,9 +11,11 @@ import sympy as sp
 
 from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.formulations.minimal import Reduction
+from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact, Nonholonomic
+from ...solver.cubic import Cubic
 from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
-from .function import function, identifiers
+from .function import function, identifiers, table_name
 
 Expr = Any
 
@@ -21,18 +23,21 @@ Expr = Any
 def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations in the given formulation.
 
-    It needs the names System, Row, Own and Embedding of `lagfmu.solver.system`.
+    It needs the names System, Row, Own, Lookups and Embedding of `lagfmu.solver.system`, and Cubic where
+    there are tables.
     """
+    eom, reduction, jumps = levelled(eom, reduction)
     if reduction is None:
-        return _imported(_system(eom, "", formulation) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n")
+        text = _system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
+        return _imported(_tables(eom, text) + text)
     parts = [_bare_system(eom) if eom.bare else _system(eom, "", "multipliers")]
-    names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.u, *eom.p, TIME])
+    names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.driven, *eom.p, TIME])
     names[TIME] = "t"
     parts.append(
         function(
             "embed",
             "q = phi(s, t) and v = J sdot + dphi/dt.",
-            {"t": (), "s": reduction.s, "sdot": reduction.sdot, "u": eom.u, "p": eom.p},
+            {"t": (), "s": reduction.s, "sdot": reduction.sdot, "u": eom.driven, "p": eom.p},
             {"q": reduction.phi, "v": reduction.vel},
             names,
         )
@@ -45,9 +50,25 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
             "minimal",
             rows,
             "Embedding(embed, SYSTEM_OF_COORDINATES)",
+            jumps,
         )
     )
-    return _imported("\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n")
+    text = "\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n"
+    return _imported(_tables(eom, text) + text)
+
+
+def _tables(eom: EquationsOfMotion, text: str) -> str:
+    """The tables that the text looks up."""
+    lines = []
+    for s in eom.model.splines:
+        name, table = table_name(s), s.table
+        if f"{name}(" in text:
+            rows = "".join(f"        {row!r},\n" for row in table.coefficients)
+            lines.append(
+                f"{name} = Cubic(\n    {table.knots!r},\n    (\n{rows}    ),\n"
+                f"    {table.periodic!r},\n)\n\n\n"
+            )
+    return "".join(lines)
 
 
 def _imported(text: str) -> str:
@@ -65,6 +86,8 @@ def compile_system(text: str) -> System:
     scope: dict[str, Any] = {
         "System": vocabulary.System,
         "Own": vocabulary.Own,
+        "Lookups": vocabulary.Lookups,
+        "Cubic": Cubic,
         "Row": vocabulary.Row,
         "Embedding": vocabulary.Embedding,
     }
@@ -86,13 +109,14 @@ def _system(
     formulation: str,
     rows: Sequence[int] | None = None,
     embedding: str = "None",
+    jumps: Jumps = NONE,
 ) -> str:
-    names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
+    names = identifiers([*eom.q, *eom.v, *eom.driven, *eom.p])
     names[TIME] = "t"
     lower_triangle = sorted((i, j) for i, j in eom.M.todok() if i >= j)
     jacobian = sorted(eom.G.todok())
-    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.u, "p": eom.p}
-    still = {"t": (), "q": eom.q, "u": eom.u, "p": eom.p}
+    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.driven, "p": eom.p}
+    still = {"t": (), "q": eom.q, "u": eom.driven, "p": eom.p}
     parts = [
         function(
             f"{prefix}dynamics",
@@ -128,8 +152,18 @@ def _system(
     if rows is None:  # the energies of the full system serve the reduced one too
         energies = _energies(eom, names)
     parts += energies
+    if jumps.surfaces:
+        text, found = "h of each jump: where it passes 0, or a whole number.", jumps.surfaces
+        parts.append(function(f"{prefix}surfaces", text, still, {"h": [s.h for s in found]}, names))
     own = _outputs(eom) if rows is None else []
     parts += [text for _, text in own]
+    looked_up = ""
+    if eom.lookups:
+        text = "Where tables are looked up."
+        places = {"w": [x for _, x in eom.lookups]}
+        parts.append(function(f"{prefix}lookups", text, state, places, names))
+        reach = [(s.name, s.x[0], s.x[-1]) for s, _ in eom.lookups]
+        looked_up = f"    lookups=Lookups({prefix}lookups, {tuple(reach)!r}),\n"
     label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
     parts.append(
         f"{label} = System(\n"
@@ -149,14 +183,22 @@ def _system(
         f"    embedding={embedding},\n"
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
-        f"{_listed(own)})\n"
+        f"{_surfaces(prefix, jumps, len(eom.driven))}"
+        f"{_listed(own)}{looked_up})\n"
     )
     return "\n\n".join(parts)
 
 
+def _surfaces(prefix: str, jumps: Jumps, count: int) -> str:
+    if not jumps.surfaces:
+        return ""
+    floors = tuple(s.floor for s in jumps.surfaces)
+    return f"    surfaces={prefix}surfaces,\n    floors={floors!r},\n    driven={count},\n"
+
+
 def _bare_system(eom: EquationsOfMotion) -> str:
     """Coordinates that are only read, and the energies of them if these are."""
-    names = identifiers([*eom.q, *eom.v, *eom.u, *eom.p])
+    names = identifiers([*eom.q, *eom.v, *eom.driven, *eom.p])
     names[TIME] = "t"
     energies, own = _energies(eom, names), _outputs(eom)
     system = (
@@ -181,7 +223,7 @@ def _energies(eom: EquationsOfMotion, names: dict[Expr, str]) -> list[str]:
     found = {name: e for name, e in group.items() if e is not None}
     if not found:
         return []
-    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.u, "p": eom.p}
+    state = {"t": (), "q": eom.q, "v": eom.v, "u": eom.driven, "p": eom.p}
     text = f"{' and '.join(found).capitalize()} energy [J]."
     values = {"energy": [found.get(name, sp.S.Zero) for name in group]}
     return [function("energies", text, state, values, names)]
@@ -189,7 +231,7 @@ def _energies(eom: EquationsOfMotion, names: dict[Expr, str]) -> list[str]:
 
 def _outputs(eom: EquationsOfMotion) -> list[tuple[str, str]]:
     """The model's own outputs: what makes each in the System, and the text of its functions."""
-    groups = (eom.q, eom.v, eom.vdot, eom.u, eom.p, eom.lam, eom.Q)
+    groups = (eom.q, eom.v, eom.vdot, eom.driven, eom.p, eom.lam, eom.Q)
     names = identifiers([s for group in groups for s in group])
     names[TIME] = "t"
     arguments = {

@@ -25,7 +25,9 @@ typedef struct System System;
 struct System {
     int n, m;                 /* coordinates, constraint rows */
     int contacts;             /* how many rows are contacts */
-    int inputs, parameters;   /* lengths of u and p */
+    int inputs, parameters;   /* lengths of u, without the levels of jumps behind it, and of p */
+    int jumps;                /* of the forces: how many levels stand behind the inputs in u */
+    const int *floors;        /* (jumps) 1: it jumps wherever h is a whole number; 0: where h = 0 */
     int masses, entries;      /* structural non-zeros of M's lower triangle and of G */
     const char *const *coordinates; /* (n) names */
     const Row *rows;          /* (m) */
@@ -53,6 +55,8 @@ struct System {
                      double *M, double *F, double *G, double *nu, double *gamma);
     /* f (m), 0 for a nonholonomic row */
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
+    /* h (jumps): the surfaces at which the forces jump; NULL where there are none */
+    void (*surfaces)(double t, const double *q, const double *u, const double *p, double *h);
     /* kinetic and potential energy [J]; NULL where they are not read */
     void (*energies)(double t, const double *q, const double *v, const double *u, const double *p,
                      double *energy);
@@ -80,6 +84,13 @@ struct System {
                             const double *Q, double dt, const double *dq, const double *dv,
                             const double *du, const double *dvdot, const double *dlambda,
                             const double *dQ, double *dw, double *dother);
+
+    /* Where tables are looked up (lookup_count), and where these begin and end.  NULL without any. */
+    int lookup_count;
+    const char *const *lookup_names;
+    const double *lookup_first, *lookup_last;
+    void (*lookups)(double t, const double *q, const double *v, const double *u, const double *p,
+                    double *places);
 
     /* An embedding q = phi(s, t), v = J sdot + dphi/dt, from the coordinates that this system steps
      * to those of `full`, from which lambda is recovered; both NULL without one.  If nothing that is

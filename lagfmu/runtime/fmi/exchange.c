@@ -15,6 +15,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "jumps.h"
 #include "leg.h"
 #include "parts.h"
 
@@ -64,9 +65,33 @@ static Status evaluate(Instance *x) {
     if (instance_start(x) != OK) return FAILED;
     leg_begin(s);
     if (mechanism_motion(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
-                         s->active) != OK)
+                         leg_rows(s)) != OK)
         return FAILED;
     x->evaluated = 1;
+    return OK;
+}
+
+/* The multipliers of all rows, those too that depend on others. */
+static Status find_multipliers(Instance *x) {
+    Solver *s = &x->solver;
+    if (!s->state.now.dependent) return evaluate(x);
+    if (instance_start(x) != OK) return FAILED;
+    leg_begin(s);
+    x->evaluated = 0;
+    return mechanism_motion_near(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+                                 s->active, s->state.offset, s->state.size);
+}
+
+/* Which rows stand for all from here on. */
+static Status choose_rows(Instance *x) {
+    Solver *s = &x->solver;
+    if (s->system->m < 2) return OK;
+    leg_begin(s);
+    x->evaluated = 0;
+    if (mechanism_motion_near(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+                              s->active, s->state.offset, s->state.size) != OK)
+        return FAILED;
+    leg_choose_rows(s);
     return OK;
 }
 
@@ -101,10 +126,17 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
 Status exchange_indicators(Instance *x, double *indicators) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
-    if (s->system->contacts == 0) return OK;
-    if (evaluate(x) != OK) return FAILED;
-    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
-        return FAILED;
+    const System *system = s->system;
+    if (indicators_count(system) == 0) return OK;
+    if (find_multipliers(x) != OK) return FAILED;
+    const Instant at = leg_instant(s, s->state.now.t);
+    if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
+    if (system->jumps > 0)
+        system->surfaces(at.t, s->state.q, at.u, at.p, indicators + system->contacts);
+    for (int k = 0; k < system->jumps; k++) /* of a floor: how far to the next whole number */
+        if (system->floors[k])
+            indicators[system->contacts + k] =
+                range_inside(jumps_range(s, k), indicators[system->contacts + k]);
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
         indicators[c] = s->state.closed[c] ? b->lambda[k] : b->f[k] + s->state.gap[c];
@@ -136,20 +168,23 @@ static Status drift(Instance *x, double *worst) {
     return OK;
 }
 
-/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated. */
+/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated and goes
+ * further in, or is pulled back in.  x->pull: the accelerations towards them. */
 static Status find_happened(Instance *x, int *any) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
     *any = 0;
-    if (evaluate(x) != OK) return FAILED;
+    if (find_multipliers(x) != OK) return FAILED;
     if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
+        x->pull[c] = b->gamma[k] - mechanism_row(b, k, b->vdot);
         if (s->state.closed[c])
             x->happened[c] = b->lambda[k] <= 0;
         else
-            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 && mechanism_slip(b, k, s->state.v) < 0;
+            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 &&
+                             (mechanism_slip(b, k, s->state.v) < 0 || x->pull[c] > 0);
         *any |= x->happened[c];
     }
     return OK;
@@ -159,35 +194,57 @@ Status exchange_step_done(Instance *x, int *event) {
     Solver *s = &x->solver;
     double worst;
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
-    *event = 0;
+    *event = jumps_stale(s, leg_instant(s, s->state.now.t), s->state.q);
     if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
+    if (s->state.now.dependent && s->stepped.linear.rung != RUNG_SCHUR && choose_rows(x) != OK)
+        return FAILED; /* the rows that stood for all are about to depend on each other */
     for (int c = 0; c < s->system->contacts; c++)
         if (!s->state.closed[c] && s->stepped.f[s->system->contact[c]] > s->state.gap[c])
             s->state.armed[c] = 1;
     if (find_happened(x, &any) != OK) return FAILED;
-    *event = any || worst > LIMIT;
+    *event = *event || any || worst > LIMIT;
+    return OK;
+}
+
+/* The levels of forces that jump; `changed`: 1 if one is not what it was. */
+static Status settle_jumps(Instance *x, int *changed) {
+    Solver *s = &x->solver;
+    const Instant at = leg_instant(s, s->state.now.t);
+    int again = 0;
+    jumps_settle(s, at, s->state.q, s->state.v, NULL, changed);
+    if (s->system->jumps == 0) return OK;
+    x->evaluated = 0;
+    if (evaluate(x) != OK) return FAILED; /* what rests on a surface may be about to leave it */
+    jumps_settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
+    *changed |= again;
+    x->evaluated = 0;
     return OK;
 }
 
 Status exchange_event(Instance *x, int *moved) {
     Solver *s = &x->solver;
-    int any;
+    int any, jumped;
     double worst;
     *moved = 0;
     if (instance_start(x) != OK) return FAILED;
     if (s->system->contacts > 0 && PARTS.switch_released(s, SHORT / s->state.now.rate) != OK) return FAILED;
     x->observed = x->evaluated = 0;
+    if (settle_jumps(x, &jumped) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
-    if (any) {
+    if (any || (jumped && s->system->contacts > 0)) {
         *moved = 1;
         x->evaluated = 0;
-        return PARTS.switch_modes(s, x->happened);
+        if (PARTS.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
+        if (PARTS.switch_modes(s, x->happened) != OK) return FAILED;
+        return choose_rows(x);
     }
     if (drift(x, &worst) != OK) return FAILED;
     if (!(worst > LIMIT)) return OK;
     *moved = 1;
     x->evaluated = 0;
-    return mechanism_project(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
-                             s->active, s->state.offset, s->state.size);
+    if (mechanism_project(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+                          s->active, s->state.offset, s->state.size) != OK)
+        return FAILED;
+    return choose_rows(x);
 }

@@ -21,8 +21,10 @@
 
 #include "digits.h"
 #include "exchange.h"
+#include "indicators.h"
 #include "instance.h"
 #include "parts.h"
+#include "restored.h"
 
 enum {
     INSTANTIATED = 1,
@@ -550,6 +552,15 @@ fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *FMUstate) {
     return fmi2OK;
 }
 
+/* Is the phase that was restored one that this instance can be in?  The cause is in why if not. */
+static int in_phase(Instance *x) {
+    const int live = x->exchange ? EXCHANGE : STEPPING, all = INSTANTIATED | INITIALIZATION | live | TERMINATED;
+    const int one = x->phase > 0 && (x->phase & (x->phase - 1)) == 0 && (x->phase & all) != 0;
+    if (one && x->running == ((x->phase & (live | TERMINATED)) != 0)) return 1;
+    (void)fail(&x->solver.why, "the saved state is none of this FMU's: its mode is %d", x->phase);
+    return 0;
+}
+
 fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate) {
     Component *c = component;
     if (!allowed(c, ANY_MODE)) return forbidden(c, "fmi2SetFMUstate");
@@ -559,9 +570,12 @@ fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate) {
     instance_save(&c->instance, c->instance.backup);
     const int exchange = c->instance.exchange;
     instance_restore(&c->instance, (const char *)FMUstate + sizeof(Head));
-    if (c->instance.exchange == exchange) return fmi2OK;
+    const int other = c->instance.exchange != exchange;
+    if (!other && instance_restored(&c->instance) == OK && in_phase(&c->instance)) return fmi2OK;
     instance_restore(&c->instance, c->instance.backup);
-    return refuse(c, "fmi2SetFMUstate: the state was saved by an instance of the other type");
+    if (other)
+        return refuse(c, "fmi2SetFMUstate: the state was saved by an instance of the other type");
+    return failed(c, fmi2Error);
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *FMUstate) {
@@ -921,7 +935,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component component, fmi2Real derivatives[], s
 fmi2Status fmi2GetEventIndicators(fmi2Component component, fmi2Real eventIndicators[],
                                   size_t ni) {
     return read_array(component, "fmi2GetEventIndicators", READABLE, exchange_indicators,
-                      eventIndicators, ni, MODEL_SYSTEM->contacts);
+                      eventIndicators, ni, indicators_count(MODEL_SYSTEM));
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component component, fmi2Real x[], size_t nx) {

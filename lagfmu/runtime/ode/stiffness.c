@@ -33,9 +33,7 @@ enum {
     STIFF = 15, /* steps that decide, ... */
     OTHER = 6,  /* ... and others in a row after which they are counted anew */
     BRIEF = 6,  /* steps of radau5 in a row that do not pay, after which dop853 comes back */
-    MOST = 8,   /* times that the stiff steps asked for are made four times as many */
-    RETRY = 128,  /* steps of radau5 before dop853 is tried again; twice as many each time, ... */
-    LATEST = 20   /* ... so often at most */
+    RETRY = 128 /* steps of radau5 before dop853 is tried again; twice as many each time */
 };
 
 /* Cost of a step of radau5 in steps of dop853: as measured for 4 to 64 states; the matrices are dense. */
@@ -105,15 +103,15 @@ void stiffness_implicit_step(Choice *c, const Integrator *i) {
         c->failures = c->span >= enough * c->taken ? 0 : c->failures + 1;
     } else if (c->taken >= RETRY << c->retries) {
         c->turn = 1;
-        c->retries += c->retries < LATEST;
+        c->retries += c->retries < STIFFNESS_MOST_RETRIES;
         c->failures = 0;
     }
-    if (c->failures > MOST) c->failures = MOST;
+    if (c->failures > STIFFNESS_MOST_FAILURES) c->failures = STIFFNESS_MOST_FAILURES;
 }
 
 void stiffness_explicit(Choice *c, int paid) {
     c->implicit = c->turn = c->stiff = c->other = 0;
-    c->failures = paid ? 0 : c->failures < MOST ? c->failures + 1 : MOST;
+    c->failures = paid ? 0 : c->failures < STIFFNESS_MOST_FAILURES ? c->failures + 1 : STIFFNESS_MOST_FAILURES;
 }
 
 int stiffness_turn(Choice *c) {

@@ -4,6 +4,11 @@
 
 #include "integrator.h"
 
+enum {
+    STIFFNESS_MOST_FAILURES = 8, /* times that the stiff steps asked for are made four times as many */
+    STIFFNESS_MOST_RETRIES = 20  /* times that the steps before a retry are made twice as many */
+};
+
 /* What the choice remembers; all zero at the start. */
 typedef struct {
     int implicit;     /* 1: radau5 is at work */

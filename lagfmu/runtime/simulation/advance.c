@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "indicators.h"
+#include "jumps.h"
 #include "leg.h"
 #include "parts.h"
 #include "magnitudes.h"
@@ -172,7 +173,8 @@ static Status meet(Solver *s) {
     }
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
-    return PARTS.switch_modes(s, s->state.left);
+    jumps_pass(s, s->state.left + s->system->contacts);
+    return s->system->contacts == 0 ? OK : PARTS.switch_modes(s, s->state.left);
 }
 
 /* FAILED if the step just taken shows that t_end is too far off for steps of its kind. */
@@ -220,9 +222,11 @@ static Status complete_magnitudes(Solver *s, double span) {
     return magnitudes_complete(s, at, span);
 }
 
-/* The inputs may have been set: contacts whose surface went away open, the others go with it. */
-static Status follow_surfaces(Solver *s) {
+/* The inputs may have been set: levels of jumps are those of now, contacts whose surface went away open, the others go with it. */
+static Status follow_inputs(Solver *s) {
     const System *system = s->system;
+    if (!s->state.now.ahead)
+        jumps_settle(s, leg_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (system->contacts == 0 || system->prescribed_count == 0) return OK;
     if (PARTS.switch_released(s, s->state.now.span) != OK) return FAILED;
     const Instant at = leg_instant(s, s->state.now.t);
@@ -241,7 +245,7 @@ Status solver_advance(Solver *s, double t_end) {
                     t_end);
     now->tiny = 0;
     resume(s);
-    if (follow_surfaces(s) != OK) return FAILED;
+    if (follow_inputs(s) != OK) return FAILED;
     if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
     while (now->t < t_end) {
         int met;
@@ -254,8 +258,8 @@ Status solver_advance(Solver *s, double t_end) {
         events += 1;
         if (events == CHATTER)
             return fail(&s->why,
-                        "%d contacts open or close in %.1g s at t = %.17g s: the contacts chatter "
-                        "without end",
+                        "%d events in %.1g s at t = %.17g s: contacts chatter without end, or a "
+                        "force jumps to and fro",
                         CHATTER, now->t - since, now->t);
     }
     now->span = t_end - begun;

@@ -6,6 +6,7 @@
 #include "events.h"
 
 #include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "indicators.h"
@@ -32,6 +33,16 @@ static Status height(void *context, double elapsed, double *value) {
     return OK;
 }
 
+/* From a root to the next time at which the limit has been passed, rounding included. */
+static Status get_past(Sought *x, double b, double *elapsed) {
+    double value, step = DBL_EPSILON * b;
+    for (;; step *= 2) {
+        if (height(x, *elapsed, &value) != OK) return FAILED;
+        if (!(value > 0) || *elapsed >= b) return OK;
+        *elapsed = fmin(*elapsed + step, b);
+    }
+}
+
 /* The time in [lo, hi] at which the indicator leaves the range; found = 0 if it only grazed, so that
  * within the tolerance there is no event. */
 static Status locate(Sought *x, double lo, double hi, double *time, int *found) {
@@ -48,6 +59,7 @@ static Status locate(Sought *x, double lo, double hi, double *time, int *found) 
         if (!(at_a > 0)) continue;
         if (root_find(height, x, starts[k], at_a, b, at_b, DBL_EPSILON * b, &elapsed) != OK)
             return FAILED;
+        if (x->indicator >= x->s->system->contacts && get_past(x, b, &elapsed) != OK) return FAILED;
         *time = x->t0 + elapsed;
         return OK;
     }
@@ -60,7 +72,8 @@ static int is_armed(const Solver *s, int i) {
 }
 
 /* The first time among the looks at which indicator i leaves its range, if it does. */
-static Status first_of(Solver *s, Sought *x, const Looks *looks, int i, double *time, int *found) {
+static Status first_of(Solver *s, Sought *x, const Looks *looks, int i, double *time, int *found,
+                       int *way) {
     const int width = indicators_count(s->system);
     const Range range = indicators_range(s, i);
     const double *value = looks->values + i;
@@ -69,6 +82,7 @@ static Status first_of(Solver *s, Sought *x, const Looks *looks, int i, double *
     for (int k = 1; k < looks->count && !*found; k++) {
         if (range_inside(range, value[(k - 1) * width]) > range.slack) armed = 1;
         if (!(range_inside(range, value[k * width]) < -range.slack)) continue;
+        *way = value[k * width] > range.high ? 1 : -1;
         x->indicator = i;
         x->range = range;
         if (!armed) {
@@ -82,7 +96,7 @@ static Status first_of(Solver *s, Sought *x, const Looks *looks, int i, double *
     return OK;
 }
 
-static void note(State *x, int width, int i, double time) {
+static void note(State *x, int width, int i, double time, int way) {
     Numbers *now = &x->now;
     if (now->event_count > 0 && time > now->event_time) return;
     if (now->event_count == 0 || time < now->event_time) {
@@ -91,7 +105,7 @@ static void note(State *x, int width, int i, double time) {
         memset(x->left, 0, (size_t)width * sizeof *x->left);
     }
     now->event_count += 1;
-    x->left[i] = 1;
+    x->left[i] = way;
 }
 
 /* Contacts that have risen above their gap are armed. */
@@ -114,9 +128,9 @@ Status events_find(Solver *s, const double *y1) {
     if (looks_take(s, y1, y, &looks) != OK) return FAILED;
     for (int k = 0; k < width; k++) {
         double time;
-        int found;
-        if (first_of(s, &x, &looks, k, &time, &found) != OK) return FAILED;
-        if (found) note(&s->state, width, k, time);
+        int found, way;
+        if (first_of(s, &x, &looks, k, &time, &found, &way) != OK) return FAILED;
+        if (found) note(&s->state, width, k, time, way);
     }
     if (s->state.now.event_count > 0) return OK;
     arm(s, &looks);

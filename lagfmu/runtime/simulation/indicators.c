@@ -1,14 +1,16 @@
 /* indicators.c -- the functions that are watched within a step, and the ranges that they leave at events:
  *
  *   contact, closed   lambda >= 0
- *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch */
+ *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch
+ *   jump              h on the side of its level */
 #include "indicators.h"
 
 #include <math.h>
 
+#include "jumps.h"
 #include "leg.h"
 
-int indicators_count(const System *s) { return s->contacts; }
+int indicators_count(const System *s) { return s->contacts + s->jumps; }
 
 static Status of_contacts(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
@@ -19,16 +21,23 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
     if (mechanism_residual(b, at, y, b->f) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++) values[c] = b->f[system->contact[c]];
     if (!any) return OK;
-    if (mechanism_motion(b, at, y, y + system->n, s->active) != OK) return FAILED;
+    if (mechanism_motion_near(b, at, y, y + system->n, s->active, s->state.offset, s->state.size) != OK)
+        return FAILED;
     for (int c = 0; c < system->contacts; c++)
         if (s->state.closed[c]) values[c] = b->lambda[system->contact[c]];
     return OK;
 }
 
 Status indicators_at(Solver *s, double t, const double *y, double *values) {
-    return s->system->contacts == 0 ? OK : of_contacts(s, t, y, values);
+    const System *system = s->system;
+    if (system->contacts > 0 && of_contacts(s, t, y, values) != OK) return FAILED;
+    if (system->jumps == 0) return OK;
+    const Instant at = leg_instant(s, t);
+    system->surfaces(t, y, at.u, at.p, values + system->contacts);
+    return OK;
 }
 
 Range indicators_range(const Solver *s, int indicator) {
+    if (indicator >= s->system->contacts) return jumps_range(s, indicator - s->system->contacts);
     return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator]};
 }

@@ -1,7 +1,8 @@
 /* indicators.h -- the functions that are watched within a step, event indicators: where one of them leaves
  * its range, the equations change.
  *
- *   0 .. contacts - 1   of contact c: lambda while it is closed, f - 0 while it is open
+ *   0 .. contacts - 1   of contact c: lambda while it is closed, f while it is open
+ *   then                of jump k of the forces: h, on the side of its level (jumps.h)
  *
  * A further kind takes the numbers after these: its count, its values and its range stand in indicators.c,
  * what it does at an event in advance.c (meet). */

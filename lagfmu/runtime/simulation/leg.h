@@ -11,7 +11,14 @@
 /* The rows that act in the present modes. */
 void leg_begin(Solver *s);
 
-/* Time t with the inputs then (kept in s->u). */
+/* Where `stepped` was solved for all rows that act, on the constraints: which of them depend on others is
+ * remembered; factors are lost. */
+void leg_choose_rows(Solver *s);
+
+/* (m) The rows for states off the constraints: those that act, as many of them as are independent. */
+const int *leg_rows(const Solver *s);
+
+/* Time t with the inputs then, and the levels of jumps behind them (kept in s->u). */
 Instant leg_instant(Solver *s, double t);
 
 /* One accepted step towards t_bound, none longer than `longest` [s]. */

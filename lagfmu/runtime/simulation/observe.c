@@ -9,7 +9,7 @@
 
 #include "digits.h"
 #include "outputs.h"
-#include "solver.h"
+#include "leg.h"
 
 static int same_row(const System *a, int i, const System *b, int k) {
     return strcmp(a->rows[i].name, b->rows[k].name) == 0;
@@ -94,7 +94,10 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
         full_active(s);
         active = s->active_full;
     }
-    if (mechanism_motion(b, at, o->q, o->v, active) == FAILED) return FAILED;
+    const Status status = b->dependent ? mechanism_motion_near(b, at, o->q, o->v, active, s->state.offset,
+                                                               s->state.size)
+                                       : mechanism_motion(b, at, o->q, o->v, active);
+    if (status == FAILED) return FAILED;
     observe_forces(b, o);
     return observe_residuals(s, at, b, o);
 }
@@ -170,9 +173,9 @@ static Status check_finite(Solver *s, const System *full, const Observed *o) {
 Status solver_observe(Solver *s, Observed *o) {
     const System *full = s->system->embed != NULL ? s->system->full : s->system;
     Mechanism *b = s->system->embed != NULL ? &s->full : &s->stepped;
-    drive_at(s->system, &s->drive, s->state.now.t, s->u);
-    const Instant at = {s->state.now.t, s->u, s->p};
+    const Instant at = leg_instant(s, s->state.now.t);
     system_active(s->system, s->state.closed, s->active);
+    s->stepped.dependent = s->state.now.dependent;
     if (s->system->embed != NULL && observe_stepped(s, at, o) == FAILED) return FAILED;
     expand(s, at.t, s->state.q, s->state.v, o->q, o->v);
     if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;

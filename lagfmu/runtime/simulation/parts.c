@@ -12,6 +12,7 @@ const Parts PARTS = {
     .events_find = events_find,
     .contacts_modes = contacts_modes,
     .impact_check = impact_check,
+    .landing_lift = landing_lift,
     .switch_modes = switch_modes,
     .switch_released = switch_released,
 };

@@ -8,6 +8,7 @@
 #include "contacts.h"
 #include "events.h"
 #include "impact.h"
+#include "landing.h"
 #include "rattle.h"
 #include "switch.h"
 
@@ -18,11 +19,13 @@ typedef struct {
     Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *level,
                           const double *u, const double *p, const Control *control,
                           double t_bound);
-    /* What happens at contacts; NULL where there are none. */
+    /* Finds events; NULL where there is nothing to watch. */
     Status (*events_find)(Solver *s, const double *y1);
+    /* What happens at contacts; NULL where there are none. */
     Status (*contacts_modes)(Solver *s, Instant at, const double *q, const double *v, int *closed,
                              const int *touching, const int *leaving);
     Status (*impact_check)(Solver *s);
+    Status (*landing_lift)(Solver *s, const int *happened, const double *pull);
     Status (*switch_modes)(Solver *s, const int *happened);
     Status (*switch_released)(Solver *s, double span);
 } Parts;

@@ -12,10 +12,12 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->block = saved->base == NULL ? NULL : saved->base + begin;
     x->q = arena_doubles(saved, n);
     x->v = arena_doubles(saved, n);
+    x->level = arena_doubles(saved, s->jumps);
     x->offset = arena_doubles(saved, s->m);
     x->scale = arena_doubles(saved, 2 * n);
     x->size = arena_doubles(saved, n);
     x->gap = arena_doubles(saved, contacts);
+    x->basis = arena_ints(saved, s->m);
     x->closed = arena_ints(saved, contacts);
     x->armed = arena_ints(saved, contacts);
     x->left = arena_ints(saved, indicators);
@@ -51,7 +53,8 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
         s->active_full = arena_ints(scratch, system->full->m);
     }
     s->active = arena_ints(scratch, m);
-    s->u = arena_doubles(scratch, system->inputs);
+    s->u = arena_doubles(scratch, system->inputs + system->jumps);
+    s->work_jumps = arena_doubles(scratch, system->jumps > 0 ? 2 * system->jumps + n : 0);
     s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);
     s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
     s->work_contacts = arena_doubles(scratch, 2 * n + 3 * m);

@@ -17,7 +17,7 @@ typedef struct {
     Mechanism stepped, full;   /* full: of an embedding; otherwise unused */
     Integrator integrator, probe; /* probe: integrates again from the last accepted point */
     int *active;               /* (m) rows that act in the present modes */
-    double *u;                 /* (inputs) at the time of the latest evaluation */
+    double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
@@ -25,6 +25,7 @@ typedef struct {
     int *iwork_initial;        /* (2 m + contacts) */
     double *work_contacts;     /* (2 n + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */
+    double *work_jumps;        /* (2 jumps + n) of jumps.c */
     double *work_advance;      /* (4 n) of advance.c */
     double *work_events;       /* (2 n + indicators and all looks) of events.c */
     int *iwork_events;         /* (6 contacts) of events.c and switch.c */

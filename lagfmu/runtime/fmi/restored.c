@@ -1,0 +1,215 @@
+/* restored.c -- is what was read from a saved state a state that this FMU can be in?
+ *
+ * Bytes come from a file, or from anyone.  A checksum tells altered bytes, not forged ones: an index, a
+ * count, a mode or a time that no simulation has would be followed blindly.  So each number has a range,
+ * and numbers that belong together are held against each other.  Whoever adds to State, Settings, Drive
+ * or Instance what is saved adds a line here. */
+#include "restored.h"
+
+#include <float.h>
+#include <limits.h>
+#include <math.h>
+#include <stddef.h>
+
+#include "digits.h"
+#include "indicators.h"
+#include "parts.h"
+
+enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased */
+
+typedef struct {
+    const char *name;
+    double value, low, high;
+} Number;
+
+typedef struct {
+    const char *name;
+    const double *values;
+    int count;
+    double low;
+} Doubles;
+
+typedef struct {
+    const char *name;
+    const int *values;
+    int count, high; /* from 0 */
+} Ints;
+
+static Status no_state(Instance *x, const char *name, double value) {
+    return fail(&x->solver.why, "the saved state is none of this FMU's: its %s is %s", name,
+                digits(value).text);
+}
+
+static Status numbers(Instance *x, const Number *list, size_t count) {
+    for (size_t k = 0; k < count; k++)
+        if (!(list[k].value >= list[k].low && list[k].value <= list[k].high))
+            return no_state(x, list[k].name, list[k].value);
+    return OK;
+}
+
+static Status doubles(Instance *x, const Doubles *list, size_t count) {
+    for (size_t k = 0; k < count; k++)
+        for (int j = 0; j < list[k].count; j++)
+            if (!(list[k].values[j] >= list[k].low && list[k].values[j] <= DBL_MAX))
+                return no_state(x, list[k].name, list[k].values[j]);
+    return OK;
+}
+
+static Status ints(Instance *x, const Ints *list, size_t count) {
+    for (size_t k = 0; k < count; k++)
+        for (int j = 0; j < list[k].count; j++)
+            if (list[k].values[j] < 0 || list[k].values[j] > list[k].high)
+                return no_state(x, list[k].name, list[k].values[j]);
+    return OK;
+}
+
+/* The methods that this FMU holds; before the start none may be chosen yet. */
+static int offered(MethodName method) {
+    return (int)method > 0 && (int)method < METHOD_COUNT && PARTS.methods[method] != NULL;
+}
+
+static Status settings(Instance *x) {
+    const Settings *s = &x->solver.settings, *given = &x->given;
+    const Number list[] = {
+        {"solver.tolerance", s->tolerance, x->started ? DBL_MIN : 0, DBL_MAX},
+        {"solver.step", s->step, 0, DBL_MAX},
+        {"solver.maximum_step", s->maximum_step, 0, DBL_MAX},
+        {"solver.maximum_steps", s->maximum_steps, 0, DBL_MAX},
+        {"given tolerance", given->tolerance, 0, DBL_MAX},
+        {"given step", given->step, 0, DBL_MAX},
+        {"given maximum step", given->maximum_step, 0, DBL_MAX},
+        {"given maximum steps", given->maximum_steps, 0, DBL_MAX},
+        {"tolerance", x->tolerance, 0, DBL_MAX},
+        {"start time", x->start_time, -DBL_MAX, DBL_MAX},
+        {"stop time", x->stop_time, x->start_time, HUGE_VAL},
+        {"time of the inputs", x->solver.drive.since, -DBL_MAX, DBL_MAX},
+    };
+    if (!offered(given->method)) return no_state(x, "given method", (double)given->method);
+    if (x->started && !offered(s->method)) return no_state(x, "method", (double)s->method);
+    if (x->started && !(x->solver.stop_time >= x->start_time))
+        return no_state(x, "stop time", x->solver.stop_time);
+    return numbers(x, list, sizeof list / sizeof *list);
+}
+
+/* What the method `auto` remembers. */
+static Status choice(Instance *x) {
+    const Choice *c = &x->solver.state.now.choice;
+    const Ints list[] = {
+        {"stiffness mode", &c->implicit, 1, 1},  {"stiffness turn", &c->turn, 1, 1},
+        {"stiffness memory", &c->unseen, 1, MOST}, {"stiffness memory", &c->stiff, 1, MOST},
+        {"stiffness memory", &c->other, 1, MOST},  {"stiffness memory", &c->taken, 1, MOST},
+        {"stiffness memory", &c->brief, 1, MOST},
+        {"stiffness memory", &c->failures, 1, STIFFNESS_MOST_FAILURES},
+        {"stiffness memory", &c->retries, 1, STIFFNESS_MOST_RETRIES},
+    };
+    const Number sizes[] = {
+        {"stiffness memory", c->longest, 0, HUGE_VAL}, {"stiffness memory", c->span, 0, HUGE_VAL},
+        {"time of stiffness", c->time, -DBL_MAX, DBL_MAX}, {"h rho", c->product, 0, HUGE_VAL},
+        {"rho / sigma", c->ratio, 0, HUGE_VAL},
+    };
+    if ((c->implicit || c->turn) &&
+        (x->solver.settings.method != AUTO || PARTS.methods[RADAU5] == NULL))
+        return no_state(x, "stiffness mode", c->implicit);
+    if (ints(x, list, sizeof list / sizeof *list) != OK) return FAILED;
+    return numbers(x, sizes, sizeof sizes / sizeof *sizes);
+}
+
+/* Time, and the step ahead. */
+static Status times(Instance *x) {
+    const Numbers *now = &x->solver.state.now;
+    const Ints flags[] = {
+        {"step count", &now->steps, 1, MOST},
+        {"step count", &now->tiny, 1, MOST},
+        {"mode of the step ahead", &now->ahead, 1, 1},
+        {"mode of the step ahead", &now->fresh, 1, 1},
+        {"rank of the constraints", &now->dependent, 1, 1},
+        {"count of events", &now->event_count, 1, indicators_count(x->solver.system)},
+    };
+    const Number list[] = {
+        {"time", now->t, -DBL_MAX, DBL_MAX},
+        {"natural rate", now->rate, 0, HUGE_VAL},
+        {"step", now->step, 0, HUGE_VAL},
+        {"communication step", now->span, 0, DBL_MAX},
+        {"next step", now->h_next, 0, HUGE_VAL},
+        {"error of the step", now->error_old, 0, HUGE_VAL},
+        {"integrator's time", now->t_integrator, -DBL_MAX, DBL_MAX},
+        {"integrator's time", now->t_old, -DBL_MAX, now->t_integrator},
+        {"time of the event", now->event_time, -DBL_MAX, DBL_MAX},
+    };
+    if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
+    if (numbers(x, list, sizeof list / sizeof *list) != OK) return FAILED;
+    if (now->ahead && !(now->t <= now->t_integrator && now->t <= x->solver.stop_time))
+        return no_state(x, "integrator's time", now->t_integrator);
+    if (now->ahead && now->event_count > 0 &&
+        !(now->event_time >= now->t_old && now->event_time <= now->t_integrator))
+        return no_state(x, "time of the event", now->event_time);
+    return OK;
+}
+
+static Status arrays(Instance *x) {
+    const Solver *s = &x->solver;
+    const State *a = &s->state;
+    const System *system = s->system;
+    const int n = system->n, contacts = system->contacts, inputs = system->inputs, ny = 2 * n;
+    const int watched = indicators_count(system);
+    const Integrator *i = &s->integrator;
+    const Method *now =
+        x->started ? PARTS.methods[a->now.choice.implicit ? RADAU5 : s->settings.method] : NULL;
+    const Doubles list[] = {
+        {"coordinates", a->q, n, -DBL_MAX},
+        {"velocities", a->v, n, -DBL_MAX},
+        {"levels", a->offset, system->m, -DBL_MAX},
+        {"scales", a->scale, ny, 0},
+        {"sizes", a->size, n, 0},
+        {"gaps", a->gap, contacts, 0},
+        {"departures", a->departure_time, contacts, -DBL_MAX},
+        {"departures", a->departure_q, contacts * n, -DBL_MAX},
+        {"departures", a->departure_v, contacts * n, -DBL_MAX},
+        {"indicators", a->indicator, watched, -DBL_MAX},
+        {"step ahead", i->y, ny, -DBL_MAX},
+        {"step ahead", i->y_old, ny, -DBL_MAX},
+        {"step ahead", i->f, ny, -DBL_MAX},
+        {"step ahead", i->f_old, ny, -DBL_MAX},
+        {"step ahead", i->dense, now == NULL ? 0 : now->dense_arrays * ny, -DBL_MAX},
+        {"inputs", s->drive.value, inputs, -DBL_MAX},
+        {"inputs", s->drive.first, inputs, -DBL_MAX},
+        {"inputs", s->drive.second, inputs, -DBL_MAX},
+        {"inputs", x->expected, inputs, -DBL_MAX},
+        {"start values", x->q0, n, -DBL_MAX},
+        {"start values", x->v0, n, -DBL_MAX},
+        {"parameters", s->p, system->parameters, -DBL_MAX},
+    };
+    const Ints flags[] = {
+        {"rank of the constraints", a->basis, system->m, 1},
+        {"modes", a->closed, contacts, 1}, {"modes", a->armed, contacts, 1},
+        {"events", a->left, watched, 1},   {"counts", a->count, contacts, MOST},
+        {"inputs", x->set, inputs, 1},
+    };
+    if (doubles(x, list, sizeof list / sizeof *list) != OK) return FAILED;
+    return ints(x, flags, sizeof flags / sizeof *flags);
+}
+
+/* What the importer has set is inside of the bounds that the description states. */
+static Status bounds(Instance *x) {
+    for (int k = 0; k < VARIABLE_COUNT; k++) {
+        const Variable *v = &VARIABLES[k];
+        if (v->type != TYPE_REAL || (v->role != ROLE_PARAMETER && v->role != ROLE_SOLVER)) continue;
+        const double value = instance_setting(x, v);
+        if (!(value >= v->min && value <= v->max) || (v->positive && !(value > 0)))
+            return no_state(x, v->name, value);
+    }
+    return OK;
+}
+
+Status instance_restored(Instance *x) {
+    const Ints flags[] = {
+        {"type", &x->exchange, 1, 1},
+        {"mode", &x->started, 1, 1},
+        {"mode", &x->running, 1, 1},
+        {"mode", &x->warned, 1, INT_MAX}, /* bits of what has been told */
+    };
+    if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
+    if (x->running && !x->started) return no_state(x, "mode", x->running);
+    if (settings(x) != OK || choice(x) != OK || times(x) != OK) return FAILED;
+    return arrays(x) == OK ? bounds(x) : FAILED;
+}

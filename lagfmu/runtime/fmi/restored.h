@@ -1,0 +1,11 @@
+/* restored.h -- is what was read from a saved state a state that this FMU can be in? */
+#ifndef LAGFMU_RESTORED_H
+#define LAGFMU_RESTORED_H
+
+#include "instance.h"
+
+/* Looks at everything that instance_restore() has just put into the instance.  FAILED: it is no state
+ * of this FMU, the cause is in x->solver.why; nothing of it must be used. */
+Status instance_restored(Instance *x);
+
+#endif

@@ -1,0 +1,31 @@
+/* jumps.h -- forces that jump at surfaces h(q, t, u) = 0, or, with floor, wherever h is a whole number.
+ *
+ * Between two events the forces are evaluated on one side of each surface: they read not h but its level,
+ * which stands behind the inputs in u,
+ *
+ *   sign, Heaviside, conditions   -1, 0 or 1, the sign of h      floor   n + 1/2 for n <= h < n + 1
+ *
+ * so that they are smooth.  h is an indicator (indicators.h): where it leaves the range of its level, the
+ * level changes.  At 0 a motion rests on the surface, or has just been set there. */
+#ifndef LAGFMU_JUMPS_H
+#define LAGFMU_JUMPS_H
+
+#include "indicators.h"
+#include "solver.h"
+
+/* The levels that belong to h at (at, q), state.level and those behind the inputs in s->u alike; on a surface
+ * that of the side to which the motion goes with v and vdot (may be NULL).  `changed` (may be NULL): 1 if one
+ * is not what it was. */
+void jumps_settle(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
+                  int *changed);
+
+/* 1 if a level is not the one that belongs to h at (at, q), which is on no surface. */
+int jumps_stale(Solver *s, Instant at, const double *q);
+
+/* The levels after surfaces were passed; way (jumps): 1 upwards, -1 downwards, 0 not passed. */
+void jumps_pass(Solver *s, const int *way);
+
+/* The range of h in which the level of jump k holds. */
+Range jumps_range(const Solver *s, int k);
+
+#endif

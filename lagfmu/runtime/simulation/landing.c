@@ -1,0 +1,56 @@
+/* landing.c -- a state that an importer's solver (Model Exchange) has carried through a contact, brought
+ * back onto it.
+ *
+ * A solver stops where it sees that f has changed its sign, a little inside, f = -d; a slow rebound from
+ * there would never come out.  So q goes back onto f = 0, and what the way inside has added to the speed
+ * is taken off, s^2 <- s^2 - 2 a d with the acceleration a towards the contact: without it bounces with e
+ * near 1 would not die out, e^2 (h + d) = h.  A contact that is inside and already parts, though it is
+ * pulled back, has been in a flight too short for the solver's steps: it is at rest, s = 0. */
+#include "landing.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "leg.h"
+
+/* The speeds' change (m) on the rows `active`. */
+static void set_changes(Solver *s, const int *happened, const double *pull, const double *depth,
+                        double *change) {
+    const System *system = s->system;
+    memset(change, 0, (size_t)system->m * sizeof *change);
+    for (int c = 0; c < system->contacts; c++) {
+        const int k = system->contact[c];
+        const double speed = mechanism_slip(&s->stepped, k, s->state.v);
+        if (s->state.closed[c] || !(depth[k] > 0) || !(pull[c] > 0)) continue;
+        if (!happened[c] && !(speed < 0)) continue;
+        const double square = speed * speed - 2 * pull[c] * depth[k];
+        change[k] = (speed < 0 && square > 0 ? -sqrt(square) : 0) - speed;
+    }
+}
+
+Status landing_lift(Solver *s, const int *happened, const double *pull) {
+    const System *system = s->system;
+    const Instant at = leg_instant(s, s->state.now.t);
+    Mechanism *b = &s->stepped;
+    int *acting = s->iwork_initial, any = 0;
+    double *v = s->work_initial, *dv = v + system->n, *depth = dv + system->n;
+    double *change = depth + system->m;
+    system_active(system, s->state.closed, acting);
+    if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
+    for (int k = 0; k < system->m; k++) depth[k] = -b->f[k];
+    for (int c = 0; c < system->contacts; c++) {
+        const int k = system->contact[c];
+        if (happened[c] || !s->state.closed[c]) acting[k] = depth[k] > 0;
+        any |= acting[k] && (happened[c] || !s->state.closed[c]);
+    }
+    if (!any) return OK;
+    memcpy(v, s->state.v, (size_t)system->n * sizeof *v);
+    if (mechanism_project(b, at, s->state.q, v, acting, s->state.offset, s->state.size) != OK)
+        return FAILED; /* the positions; velocities may change only in an impact */
+    if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
+    set_changes(s, happened, pull, depth, change);
+    if (linear_factor(&b->linear, b->M, b->G, acting) != OK) return FAILED;
+    if (linear_nearest(&b->linear, change, dv) != OK) return FAILED;
+    for (int j = 0; j < system->n; j++) s->state.v[j] += dv[j];
+    return OK;
+}

@@ -1,0 +1,191 @@
+"""Saved states come back from files, and anyone can write a file with the right checksum."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import struct
+import subprocess
+import sys
+import zlib
+from ctypes import c_double
+from pathlib import Path
+
+import pytest
+from fmi2 import EXCHANGE, OK, Library, Single
+from fmpy.fmi1 import FMICallException
+from instance import instance
+
+HEAD = 80  # bytes before the record: magic, layout, byte order, size, checksum, GUID
+SUM = 24  # where the checksum stands
+INTS = (-1, 2, 7, 2**31 - 1, -(2**31), 0x3FFFFFFF)
+DOUBLES = (math.nan, math.inf, -math.inf, -1.0, 0.0, 5e-324, 1e300, -1e300, 1e9, 3.5)
+
+
+def forged(saved: bytes, offset: int, word: bytes) -> bytes:
+    """Other bytes at a place of the record, and the checksum that belongs to them (FNV-1a)."""
+    record = saved[HEAD:offset] + word + saved[offset + len(word) :]
+    total = 14695981039346656037
+    for byte in record:
+        total = (total ^ byte) * 1099511628211 % 2**64
+    return saved[:SUM] + struct.pack("=Q", total) + saved[SUM + 8 : HEAD] + record
+
+
+def use(one: Single, exchange: bool) -> None:
+    """What an importer does next; each call may be refused, none may take the process down."""
+    one.call("GetFMUstate", one.spare)
+    names = [n for n, v in one.library.variables.items() if v.type == "Real"]
+    for _ in range(2):
+        if exchange:
+            one.call("EnterEventMode")
+            one.call("EnterContinuousTimeMode")
+            values = (c_double * 20)()
+            one.call("GetDerivatives", values, len(one.library.states))
+        else:
+            one.call("DoStep", c_double(one.time), c_double(0.02), 1)
+            one.time += 0.02
+        found = (c_double * len(names))()
+        if one.call("GetReal", one.references(names), len(names), found) == OK:
+            assert all(map(math.isfinite, found)), "not finite, with fmi2OK"
+    one.call("SetFMUstate", one.good)
+
+
+def attack(path: str, folder: str, kind: str, seed: int) -> None:
+    """In a process of its own: hostile words at every place of states of each phase of a life."""
+    import ctypes
+
+    library = Library(Path(path), Path(folder))
+    library.states = [v for v in library.variables.values() if v.derivative is not None]
+    exchange = kind == "exchange"
+    options = {"kind": EXCHANGE} if exchange else {}
+    one = library(**options)
+    one.spare = ctypes.byref(ctypes.c_void_p())
+    lives = [(0.0, one.bytes_of(one.saved()))]
+    one.start({}, tolerance=1e-8, stop=50.0)
+    lives.append((0.0, one.bytes_of(one.saved())))
+    if not exchange:
+        for _ in range(3):
+            one.step(0.05)
+        lives.append((one.time, one.bytes_of(one.saved())))
+    one.good = one.saved()
+    good = one.outputs()
+    chance, accepted, refused = random.Random(seed), 0, 0
+    for moment, saved in lives:
+        attacks = [(k, struct.pack("=i", i)) for k in range(HEAD, len(saved), 4) for i in INTS]
+        attacks += [(k, struct.pack("=d", x)) for k in range(HEAD, len(saved), 8) for x in DOUBLES]
+        for offset, word in chance.sample(attacks, 500):
+            state = ctypes.c_void_p()
+            data = forged(saved, offset, word)
+            if one.call("DeSerializeFMUstate", data, len(data), ctypes.byref(state)) != OK:
+                continue
+            one.time = moment
+            if one.call("SetFMUstate", state) == OK:
+                accepted += 1
+                use(one, exchange)
+            else:
+                refused += 1
+                assert "state" in one.log[-1][2], one.log[-1]
+            one.does("FreeFMUstate", ctypes.byref(state))
+            assert one.outputs() == good
+    print(accepted, refused)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("Hemisphere", "steps"),
+        ("CartPendulum", "steps"),
+        ("BouncingBall", "steps"),
+        ("Hemisphere", "exchange"),
+    ],
+)
+def test_a_forged_state_is_refused_or_harmless(native_fmu, tmp_path, name, kind):
+    """Modes, counts, times and indices that no simulation has, with the right checksum: the process
+    lives, nothing that is not finite comes with fmi2OK, and the instance is as it was before."""
+    done = subprocess.run(
+        [sys.executable, __file__, str(native_fmu(name)), str(tmp_path), kind, "1"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, (done.returncode, done.stderr[-2000:])
+    accepted, refused = map(int, done.stdout.split())
+    assert refused > 200
+    assert accepted > 100  # most doubles can be anything finite
+
+
+def forged_text(saved: bytes, change) -> bytes:
+    """The same for a python FMU, whose states are JSON behind a CRC-32."""
+    whole = json.loads(saved.rstrip(b"\0").partition(b" ")[2])
+    inner = json.loads(whole["state"])
+    change(whole, inner)
+    whole["state"] = whole["state"] if whole["state"] is None else json.dumps(inner)
+    text = json.dumps(whole).encode()
+    return b"%08x %s" % (zlib.crc32(text), text)
+
+
+CHANGES = {
+    "method": lambda whole, inner: whole["settings"].update(method="euler"),
+    "another field": lambda whole, inner: whole["settings"].update(more=1),
+    "tolerance": lambda whole, inner: whole["settings"].update(tolerance=0.0),
+    "not a number": lambda whole, inner: inner.update(t=math.nan),
+    "one coordinate too few": lambda whole, inner: inner["q"].pop(),
+    "one contact too many": lambda whole, inner: inner["closed"].append(True),
+    "a text as a velocity": lambda whole, inner: inner["v"].__setitem__(0, "1"),
+    "a number as a mode": lambda whole, inner: inner["closed"].__setitem__(0, 2),
+    "a negative count": lambda whole, inner: inner["departures"][0].update(count=-1),
+    "an endless number": lambda whole, inner: inner.update(steps=10**400),
+    "a negative rate": lambda whole, inner: inner.update(rate=-1.0),
+    "failures": lambda whole, inner: inner["choice"].update(failures=10**6),
+    "no choice": lambda whole, inner: inner.update(choice=None),
+    "a parameter out of bounds": lambda whole, inner: whole["values"].__setitem__(0, -1.0),
+    "a parameter that is none": lambda whole, inner: whole["values"].__setitem__(0, None),
+    "too few values": lambda whole, inner: whole["values"].pop(),
+    "no state of a running FMU": lambda whole, inner: whole.update(state=None),
+    "a mode": lambda whole, inner: whole.update(running="yes"),
+    "an experiment": lambda whole, inner: whole.update(experiment=[0.0, -1.0, 0.0]),
+    "half an experiment": lambda whole, inner: whole.update(experiment=[0.0]),
+    "a field left out": lambda whole, inner: whole.pop("values"),
+}
+
+
+def test_a_forged_state_of_a_python_fmu_is_refused_in_words(python_fmu):
+    """Other types, lengths and ranges than the FMU saves, with the right check sum: refused without an
+    internal error, and the instance goes on as if nothing had been."""
+    with (
+        instance(python_fmu("Hemisphere")) as one,
+        instance(python_fmu("Hemisphere"), "b") as other,
+    ):
+        for x in (one, other):
+            x.start()
+            x.step(0.05)
+        saved = one.fmu.serializeFMUState(one.fmu.getFMUState())
+        for name, change in CHANGES.items():
+            count = len(one.log)
+            with pytest.raises(FMICallException):
+                one.fmu.setFMUState(one.fmu.deSerializeFMUstate(forged_text(saved, change)))
+            told = " ".join(text for _, _, text in one.log[count:])
+            assert "none of this FMU's" in told, (name, told)
+            assert "internal error" not in told, (name, told)
+        one.fmu.setFMUState(
+            one.fmu.deSerializeFMUstate(forged_text(saved, lambda whole, inner: None))
+        )
+        one.step(0.05)
+        other.step(0.05)
+        assert one.outputs() == other.outputs()
+
+
+def test_bytes_nested_without_end_are_refused(python_fmu):
+    """JSON of 100,000 brackets: its reader gives up, the FMU says so and lives on."""
+    text = b"[" * 100_000
+    with instance(python_fmu("Hemisphere")) as one:
+        one.start()
+        with pytest.raises(FMICallException):
+            one.fmu.setFMUState(one.fmu.deSerializeFMUstate(b"%08x %s" % (zlib.crc32(text), text)))
+        one.step(0.05)
+
+
+if __name__ == "__main__":
+    attack(*sys.argv[1:4], int(sys.argv[4]))
