@@ -18,6 +18,7 @@ from .model.model import (
 )
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
+from .model.spline import Spline
 from .verification.simulate import simulate
 from .verification.verify import Verification, verify
 
@@ -35,6 +36,7 @@ __all__ = [
     "Output",
     "Parameter",
     "Scene",
+    "Spline",
     "Verification",
     "VerificationError",
     "build_fmu",

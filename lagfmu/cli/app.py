@@ -25,10 +25,10 @@ from ..interface.variables import VariableTable
 from ..live.command import write_page
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
+from ..model.goal import parse
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
-from ..study.tradeoff.goal import parse
 from ..study.tradeoff.page import section
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification, verify
@@ -348,7 +348,12 @@ def tradeoff(
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path(
         "dist/tradeoff"
     ),
-    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    target: Annotated[
+        Target | None,
+        typer.Option(
+            help="What is built of model files: native where there is a compiler, else python."
+        ),
+    ] = None,
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
     ] = None,
@@ -360,6 +365,10 @@ def tradeoff(
     ] = None,
     method: Annotated[list[str] | None, typer.Option(help="Solver method; repeatable.")] = None,
     repeats: Annotated[int | None, typer.Option(help="Timed runs of each setting.")] = None,
+    full: Annotated[
+        bool,
+        typer.Option("--full", help="The whole grid: minutes instead of half a minute an FMU."),
+    ] = False,
 ) -> None:
     """Measure error against wall time over methods, tolerances and communication steps."""
     with _plainly():
@@ -367,12 +376,13 @@ def tradeoff(
             targets,
             out,
             console,
-            target.value,
+            None if target is None else target.value,
             step_size or (),
             tolerance or (),
             method or (),
             repeats,
             scene or (),
+            full,
         )
 
 

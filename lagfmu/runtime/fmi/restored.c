@@ -204,7 +204,7 @@ Status instance_restored(Instance *x) {
         {"type", &x->exchange, 1, 1},
         {"mode", &x->started, 1, 1},
         {"mode", &x->running, 1, 1},
-        {"mode", &x->warned, 1, 1},
+        {"mode", &x->warned, 1, INT_MAX}, /* bits of what has been told */
     };
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (x->running && !x->started) return no_state(x, "mode", x->running);
