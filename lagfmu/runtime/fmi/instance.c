@@ -391,8 +391,10 @@ Status instance_differentiate(Instance *x, Direction d) {
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
     const Instant at = leg_instant(s, s->state.now.t);
-    system_active(s->system, s->state.closed, s->active);
-    if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
+    leg_begin(s);
+    if (mechanism_motion_near(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                              s->state.size) != OK)
+        return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
         return FAILED;
     if (full == NULL) {
