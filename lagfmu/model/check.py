@@ -16,6 +16,7 @@ from ..errors import UnitError
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
+from .picture import check_picture
 from .reactions import reactions_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
@@ -33,6 +34,7 @@ def problems_of(model: ModelFields) -> list[str]:
     _check_numbers(model, problems)
     _check_symbols(model, problems)
     check_outputs(model, problems)
+    check_picture(model, problems)
     units = declared_units(model, problems)
     if not problems:
         _check_dimensions(model, units, problems)

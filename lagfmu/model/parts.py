@@ -133,6 +133,7 @@ class ModelFields:
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
     outputs: Sequence[Output] = ()
+    picture: Sequence[Any] = ()  # of the shapes in picture.py
 
     @property
     def energy_expression(self) -> Expr:
