@@ -19,6 +19,7 @@ from .model.model import (
 from .model.picture import Arrow, Disk, Ground, Line, Path, Rod, Spring
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
+from .model.spline import Spline
 from .verification.simulate import simulate
 from .verification.verify import Verification, verify
 
@@ -42,6 +43,7 @@ __all__ = [
     "Path",
     "Rod",
     "Scene",
+    "Spline",
     "Spring",
     "Verification",
     "VerificationError",

@@ -46,7 +46,12 @@ def write(
     extra = {
         PAGE: page(prepared, choice=choice).encode(),
         "resources/lagfmu.json": pack_closed_forms(
-            prepared.scene, closed_forms, prepared.table, prepared.numbers, prepared.held
+            prepared.scene,
+            closed_forms,
+            prepared.table,
+            prepared.numbers,
+            prepared.held,
+            prepared.model.splines,
         ),
     }
     picture = picture_of(prepared)

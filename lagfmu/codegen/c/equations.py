@@ -19,7 +19,7 @@ from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
 from .function import FILL, Result, function
-from .printer import HELPERS, identifiers
+from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
 
 Expr = Any
@@ -68,6 +68,7 @@ def model_source(
             ]
         ) + _pointer("reduced_equations")
     helpers = [code for name, code in {**HELPERS, "fill": FILL}.items() if f"{name}(" in text]
+    helpers += [table_text(s) for s in eom.model.splines if f"&{table_name(s)}," in text]
     model = eom.model
     description = f": {model.description}" if model.description else ""
     head = HEAD.format(name=model.name, description=_comment(description), index=index)
@@ -297,6 +298,13 @@ class _System:
                 "The change of all of these along the direction (dt, dq, dv, du).",
                 words.along,
                 changes,
+            )
+        if eom.lookups:
+            found["lookups"] = define(
+                "lookups",
+                "Where tables are looked up.",
+                words.state,
+                {"places": _results([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])},
             )
         if self.jumps.surfaces:
             table = _real([*eom.q, *eom.v, *eom.u, *eom.p, TIME])

@@ -122,6 +122,7 @@ static Status times(Instance *x) {
         {"step count", &now->tiny, 1, MOST},
         {"mode of the step ahead", &now->ahead, 1, 1},
         {"mode of the step ahead", &now->fresh, 1, 1},
+        {"rank of the constraints", &now->dependent, 1, 1},
         {"count of events", &now->event_count, 1, indicators_count(x->solver.system)},
     };
     const Number list[] = {
@@ -179,6 +180,7 @@ static Status arrays(Instance *x) {
         {"parameters", s->p, system->parameters, -DBL_MAX},
     };
     const Ints flags[] = {
+        {"rank of the constraints", a->basis, system->m, 1},
         {"modes", a->closed, contacts, 1}, {"modes", a->armed, contacts, 1},
         {"events", a->left, watched, 1},   {"counts", a->count, contacts, MOST},
         {"inputs", x->set, inputs, 1},
@@ -204,7 +206,7 @@ Status instance_restored(Instance *x) {
         {"type", &x->exchange, 1, 1},
         {"mode", &x->started, 1, 1},
         {"mode", &x->running, 1, 1},
-        {"mode", &x->warned, 1, 1},
+        {"mode", &x->warned, 1, INT_MAX}, /* bits of what has been told */
     };
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (x->running && !x->started) return no_state(x, "mode", x->running);
