@@ -70,6 +70,12 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
             )
     for i in model.inputs:
         _finite(f"start of input {name_of(i.symbol)!r}", i.start, problems)
+        _finite(f"rate of input {name_of(i.symbol)!r}", i.rate, problems)
+        if _number(i.rate) and i.rate != 0 and i not in model.prescribed:
+            problems.append(
+                f"rate of input {name_of(i.symbol)!r} is {i.rate!r}, but only an input that stands in a "
+                "constraint (a prescribed motion) has one: leave it out"
+            )
     states = {s for q in model.coordinates for s in (q, q.diff(t))}
     _check_start("start", model.start, states, problems)
     if model.embedding is not None:
