@@ -41,13 +41,14 @@ class Input:
 
     A dynamicsymbol that stands in a holonomic constraint or a contact is a prescribed motion: the
     FMU then has the inputs `u`, `der(u)` and `der(u,2)`, because the constraint's second derivative
-    needs them.
+    needs them.  `start` and `rate` [unit/s] are its value and its velocity until the importer sets them.
     """
 
     symbol: Expr
     unit: str = "1"
     start: float = 0.0
     description: str = ""
+    rate: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,7 @@ class ModelFields:
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
     outputs: Sequence[Output] = ()
+    picture: Sequence[Any] = ()  # of the shapes in picture.py
 
     @property
     def energy_expression(self) -> Expr:

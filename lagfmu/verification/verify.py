@@ -119,8 +119,8 @@ def verify(
     _check_texts(description, start_values or {})
     problems = validate_fmu(str(path))
     begun = time.perf_counter()
-    local = {v.name for v in description.modelVariables if v.causality == "local"}
-    besides = sorted(local & set().union(*(claim.variables for claim in claims)))
+    read = {v.name for v in description.modelVariables if v.causality in ("local", "input")}
+    besides = sorted(read & set().union(*(claim.variables for claim in claims)))
     result = simulate(path, stop_time, step_size, tolerance, start_values, besides=besides)
     seconds = time.perf_counter() - begun
     experiment = description.defaultExperiment
