@@ -17,6 +17,7 @@ from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
+from .picture import check_picture
 from .reactions import reaction_units, reactions_in
 from .spline import Spline, splines_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
@@ -35,6 +36,7 @@ def problems_of(model: ModelFields) -> list[str]:
     _check_numbers(model, problems)
     _check_symbols(model, problems)
     check_outputs(model, problems)
+    check_picture(model, problems)
     _check_splines(model, problems)
     units = declared_units(model, problems)
     if not problems:

@@ -70,6 +70,7 @@ def check_containers(model: ModelFields) -> list[str]:
             ("parameters", model.parameters, "Parameter"),
             ("inputs", model.inputs, "Input"),
             ("outputs", model.outputs, "Output"),
+            ("picture", model.picture, "Line"),
         )
         if isinstance(value, str) or not isinstance(value, Iterable)
     ]

@@ -61,7 +61,8 @@ class Model(ModelFields):
     given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
     numbers in SI.  `descriptions` may explain coordinates.  `outputs` are quantities besides those
-    that every FMU reports.  A `Friction` is written among `constraints` and kept in `frictions`.
+    that every FMU reports, `picture` how it looks.  A `Friction` is written among `constraints` and kept in
+    `frictions`.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -74,7 +75,7 @@ class Model(ModelFields):
             raise ModelError(str(self.name), problems)
         for name in ("coordinates", "forces", "start", "descriptions"):
             object.__setattr__(self, name, dict(getattr(self, name)))
-        for name in ("constraints", "parameters", "inputs", "outputs"):
+        for name in ("constraints", "parameters", "inputs", "outputs", "picture"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         constraints, frictions = split(self.constraints)
         object.__setattr__(self, "constraints", constraints)

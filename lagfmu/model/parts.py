@@ -157,6 +157,7 @@ class ModelFields:
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
     frictions: Sequence[Friction] = ()
     outputs: Sequence[Output] = ()
+    picture: Sequence[Any] = ()  # of the shapes in picture.py
 
     @property
     def energy_expression(self) -> Expr:
