@@ -36,6 +36,8 @@ FILES = {
     "SliderCrank": "slider_crank",
     "DoublePendulum": "double_pendulum",
     "BouncingBall": "bouncing_ball",
+    "Crane": "crane",
+    "HalfCar": "half_car",
 }
 
 
