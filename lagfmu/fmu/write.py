@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -75,10 +75,14 @@ def put_figures(
     choice: str = "",
 ) -> None:
     """Put verification results into the page of an FMU that stands at `path`; nothing else changes."""
+    put(path, {PAGE: page(_as_built(prepared, target), figures, choice).encode()})
+
+
+def put(path: Path, more: Mapping[str, bytes]) -> None:
+    """Put files into an FMU that stands at `path`, or replace them."""
     with zipfile.ZipFile(path) as archive:
         contents = {name: archive.read(name) for name in archive.namelist()}
-    contents[PAGE] = page(_as_built(prepared, target), figures, choice).encode()
-    write_whole(path, pack(contents))
+    write_whole(path, pack(contents | dict(more)))
 
 
 def _as_built(prepared: Prepared, target: str) -> Prepared:

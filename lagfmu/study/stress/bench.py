@@ -254,6 +254,8 @@ class Bench:
         grown = np.maximum(1.0, self.elapsed(run, span)[:common]) * (1 + growth[:common])
         allowed = SAFETY * max(tolerance, 1e-13) * grown
         worst = Check(what, 0.0, 1.0)
+        if common == 0:
+            return []
         for name, error in self.differences(run, other, common).items():
             k = int(np.argmax(error / allowed))
             one = Check(f"{what}: {name}", float(error[k]), float(allowed[k]))
