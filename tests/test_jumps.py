@@ -1,4 +1,4 @@
-"""Forces that jump in position, time or inputs: events, found to rounding; those in a velocity are refused."""
+"""Forces that jump in position, time or inputs are events, found to rounding; in a velocity, refused."""
 
 from __future__ import annotations
 

@@ -50,6 +50,7 @@ Names are the model's: der_theta is the velocity of theta, lambda stands on the 
 """
 
 from {package}.fmu.slave import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
+from {package}.solver import interval
 from {package}.solver.system import Embedding, Own, Row, System
 {equations}
 

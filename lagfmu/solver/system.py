@@ -56,7 +56,9 @@ class System:
     the parameters that are numbers in the code; `angles` are those without dimension.
 
     surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
-    is a whole number; `driven`: length of u, the inputs and the levels of jumps behind them.
+    is a whole number; bounds(t, q, v, u, p) -> how fast f of the contacts and h of the jumps can change in
+    boxes of t, q, v and u (interval.py); `driven`: length of u, the inputs and the
+    levels of jumps behind them.
 
     `outputs` are those of the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
@@ -82,6 +84,7 @@ class System:
     outputs: tuple[Own, ...] = ()
     surfaces: Callable[..., Any] | None = None
     floors: tuple[bool, ...] = ()
+    bounds: Callable[..., Any] | None = None
     driven: int = 0
 
     @property

@@ -14,6 +14,7 @@ from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact, Nonholonomic
 from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
+from .. import bounds
 from .function import function, identifiers
 
 Expr = Any
@@ -58,16 +59,18 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
 def _imported(text: str) -> str:
     """The text under an import of the functions of `math` that it calls."""
     called = sorted(
-        name for name in set(re.findall(r"\b([a-z]\w*)\(", text)) if hasattr(math, name)
+        name for name in set(re.findall(r"(?<!\.)\b([a-z]\w*)\(", text)) if hasattr(math, name)
     )
     return (f"from math import {', '.join(called)}\n\n\n" if called else "") + text
 
 
 def compile_system(text: str) -> System:
     """Run generated source in memory and take its SYSTEM."""
+    from ...solver import interval
     from ...solver import system as vocabulary
 
     scope: dict[str, Any] = {
+        "interval": interval,
         "System": vocabulary.System,
         "Own": vocabulary.Own,
         "Row": vocabulary.Row,
@@ -137,6 +140,9 @@ def _system(
     if jumps.surfaces:
         text, found = "h of each jump: where it passes 0, or a whole number.", jumps.surfaces
         parts.append(function(f"{prefix}surfaces", text, still, {"h": [s.h for s in found]}, names))
+    changing = bounds.rates(eom, _constraints(eom, rows), jumps)
+    if changing:
+        parts.append(_bounds(prefix, eom, changing))
     own = _outputs(eom) if rows is None else []
     parts += [text for _, text in own]
     label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
@@ -159,9 +165,25 @@ def _system(
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
         f"{_surfaces(prefix, jumps, len(eom.driven))}"
+        f"{f'    bounds={prefix}bounds,' + chr(10) if changing else ''}"
         f"{_listed(own)})\n"
     )
     return "\n\n".join(parts)
+
+
+def _bounds(prefix: str, eom: EquationsOfMotion, changing: Sequence[Expr]) -> str:
+    """Bounds on the rates of the indicators, in interval arithmetic."""
+    groups = {"q": eom.q, "v": eom.v, "u": eom.u}
+    places = {s: f"{a}[{j}]" for a, group in groups.items() for j, s in enumerate(group)}
+    places |= {p: f"interval.of(p[{k}])" for k, p in enumerate(eom.p)}
+    places[TIME] = "t"
+    lines, values = bounds.body(changing, places, bounds.PYTHON)
+    text = "".join(f"    {line}\n" for line in lines)
+    return (
+        f"def {prefix}bounds(t, q, v, u, p):\n"
+        '    """How fast the indicators of events can change: f of contacts, h of jumps."""\n'
+        f"{text}    return [{', '.join(values)}]\n"
+    )
 
 
 def _surfaces(prefix: str, jumps: Jumps, count: int) -> str:

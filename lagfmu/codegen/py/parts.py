@@ -11,7 +11,7 @@ from ...solver.indicators import is_watched
 from ...solver.system import System
 
 CONTACTS = ("complementarity.py", "contacts.py", "impact.py", "switch.py")
-EVENTS = ("events.py", "looks.py")
+EVENTS = ("clearance.py", "events.py", "looks.py")
 CONSTRAINTS = ("nullspace.py", "orthogonal.py")
 CLASSES = {
     "dop853": ("from .dop853 import Dop853", "Dop853"),
