@@ -20,8 +20,8 @@ from rich.table import Table
 
 from lagfmu.errors import LagfmuError
 from lagfmu.model.file import load
+from lagfmu.model.goal import Goal
 from lagfmu.study.tradeoff.choose import Choice, pick
-from lagfmu.study.tradeoff.goal import Goal
 from lagfmu.study.tradeoff.survey import survey
 
 GOALS = (1e-4, 1e-7, 1e-10)

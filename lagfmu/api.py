@@ -11,11 +11,11 @@ from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
 from .fmu.write import put_figures, write
 from .model.closed_form import ClosedForm, Conserved
+from .model.goal import parse
 from .model.model import Model
 from .model.scene import Scene
 from .prepare.prepare import Prepared, prepare
 from .study.tradeoff.choose import choose
-from .study.tradeoff.goal import parse
 from .study.tradeoff.page import section
 from .verification.verify import Verification, verify
 

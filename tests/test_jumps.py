@@ -1,4 +1,4 @@
-"""Forces that jump in position, time or inputs are events, found to rounding; in a velocity, refused."""
+"""Forces that jump in position, time or inputs are events; jumps in a velocity are refused."""
 
 from __future__ import annotations
 

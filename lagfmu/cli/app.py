@@ -25,10 +25,10 @@ from ..interface.variables import VariableTable
 from ..live.command import write_page
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
+from ..model.goal import parse
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
-from ..study.tradeoff.goal import parse
 from ..study.tradeoff.page import section
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification, verify
@@ -348,7 +348,12 @@ def tradeoff(
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path(
         "dist/tradeoff"
     ),
-    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    target: Annotated[
+        Target | None,
+        typer.Option(
+            help="What is built of model files: native where there is a compiler, else python."
+        ),
+    ] = None,
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
     ] = None,
@@ -360,6 +365,10 @@ def tradeoff(
     ] = None,
     method: Annotated[list[str] | None, typer.Option(help="Solver method; repeatable.")] = None,
     repeats: Annotated[int | None, typer.Option(help="Timed runs of each setting.")] = None,
+    full: Annotated[
+        bool,
+        typer.Option("--full", help="The whole grid: minutes instead of half a minute an FMU."),
+    ] = False,
 ) -> None:
     """Measure error against wall time over methods, tolerances and communication steps."""
     with _plainly():
@@ -367,12 +376,13 @@ def tradeoff(
             targets,
             out,
             console,
-            target.value,
+            None if target is None else target.value,
             step_size or (),
             tolerance or (),
             method or (),
             repeats,
             scene or (),
+            full,
         )
 
 
@@ -400,6 +410,90 @@ def _load(path: Path, added: list[str] | None) -> ModelFile:
     """A model file, with further outputs."""
     file = load(path)
     return replace(file, model=with_outputs(file.model, added or []))
+
+
+@app.command()
+def sweep(
+    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FROM:TO:COUNT[:log]|NAME=V,V,...",
+            help="A parameter, start value or solver setting; several are crossed.",
+        ),
+    ] = None,
+    sample: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="'NAME ~ KIND(...)'",
+            help="uniform(low, high), loguniform(low, high), normal(mean, sd) or truncnormal(mean, sd, "
+            "low, high); with --runs.",
+        ),
+    ] = None,
+    runs: Annotated[int | None, typer.Option(help="How many samples.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
+    sampling: Annotated[str, typer.Option(help="latin-hypercube or sobol.")] = "latin-hypercube",
+    rows: Annotated[
+        Path | None,
+        typer.Option("--from", help="A .csv or .parquet file, a row a run under the names."),
+    ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME:last|max|min|mean|time-of-max|trajectory",
+            help="What to keep of each run (default: largest multipliers, departures); repeatable.",
+        ),
+    ] = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Tolerance = None,
+    inputs: Annotated[
+        Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
+    ] = None,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="runs.parquet, or .nc or .zarr with trajectories."),
+    ] = None,
+    on: Annotated[
+        str | None,
+        typer.Option(metavar="tcp://HOST:PORT", help="A Dask scheduler; else this machine."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes of this machine (default: its cores).")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where an interrupted sweep stopped.")
+    ] = False,
+    plot_: Annotated[
+        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
+    ] = None,
+) -> None:
+    """Run an FMU many times: parameters and start values crossed, sampled, or from a file."""
+    from .sweep import run_sweep
+
+    with _plainly():
+        run_sweep(
+            target,
+            console,
+            vary or (),
+            sample or (),
+            runs,
+            seed,
+            sampling,
+            rows,
+            keep or (),
+            stop_time,
+            step_size,
+            tolerance,
+            inputs,
+            scene,
+            out,
+            on,
+            workers,
+            resume,
+            plot_,
+        )
 
 
 def _chosen(file: ModelFile, names: list[str] | None) -> list[Scene]:

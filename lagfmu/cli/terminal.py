@@ -8,8 +8,9 @@ import unicodedata
 from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table
+from rich.text import Text
 
 PLAIN = {"≤": "<=", "≥": ">=", "−": "-", "–": "-", "→": "->", "●": "*", "µ": "u", "√": "sqrt"}
 ACCENTS = {"\u0307": "'", "\u0308": "''"}  # combining dots: derivatives
@@ -64,12 +65,20 @@ def new_table(title: str, *columns: str, text: Sequence[str] = ()) -> Table:
     return drawn
 
 
+def _width(cell: RenderableType) -> int:
+    return Text.from_markup(cell).cell_len if isinstance(cell, str) else 0
+
+
 def print_whole(console: Console, drawn: Table) -> None:
     """Print a table without cutting anything: row by row in words where the console is too narrow."""
-    if console.measure(drawn).minimum <= console.width:
+    for column in drawn.columns:
+        if column.no_wrap:
+            column.min_width = max(map(_width, (column.header, *column.cells)))
+    unbounded = console.options.update(width=10_000)
+    if console.measure(drawn, options=unbounded).minimum <= console.width:
         console.print(drawn)
         return
-    console.print(drawn.title, style="bold", highlight=False, soft_wrap=True)
+    console.print(drawn.title or "", style="bold", highlight=False)
     headings = [str(c.header) for c in drawn.columns]
     for cells in zip(*(c.cells for c in drawn.columns), strict=True):
         parts = [

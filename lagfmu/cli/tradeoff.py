@@ -13,20 +13,20 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
 from ..errors import BuildError, LagfmuError
+from ..fmu.compiler import find_compiler
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile, load
+from ..model.goal import Goal
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.tradeoff.choose import Choice, choose
 from ..study.tradeoff.figure import draw
-from ..study.tradeoff.goal import Goal
 from ..study.tradeoff.importer import Importer
-from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure
+from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure, quick_plan
 from ..study.tradeoff.report import as_csv, as_json, digits, remarks, summary, table
-
-WIDTH = 110  # of tables that go into a file
+from .terminal import print_whole
 
 
 @contextlib.contextmanager
@@ -39,7 +39,11 @@ def progress(console: Console, title: str) -> Iterator[Tick]:
         MofNCompleteColumn(),
         TextColumn("{task.fields[what]}"),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
+    if not console.is_terminal:
+        console.print(f"{escape(title)} ...", highlight=False)
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
         task = bar.add_task("", total=None, what="")
 
         def tick(what: str, done: int, total: int) -> None:
@@ -52,14 +56,17 @@ def compare(
     paths: Sequence[Path],
     out: Path,
     console: Console,
-    target: str = "python",
+    target: str | None = None,
     communications: Sequence[float] = (),
     tolerances: Sequence[float] = (),
     methods: Sequence[str] = (),
     repeats: int | None = None,
     scenes: Sequence[str] = (),
+    full: bool = False,
 ) -> list[Tradeoff]:
     """Measure model files and FMUs, print tables, write OUT/TARGET/NAME.json, .csv, .svg and .png.
+
+    Without a `target` native FMUs where there is a compiler, else python ones; `full`: the whole grid.
 
     Raises LagfmuError with the causes for what cannot be built or run, when the rest is done.
     """
@@ -69,16 +76,15 @@ def compare(
     numbers = [*communications, *tolerances, *([] if repeats is None else [repeats])]
     if not all(0 < x < float("inf") for x in numbers):
         raise BuildError("communication steps, tolerances and repeats must be positive numbers")
+    kind = target or ("python" if find_compiler() is None else "native")
     found: list[Tradeoff] = []
     problems: list[str] = []
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         for item in _work(paths, scenes):
             try:
-                fmu = _fmu(item, Path(folder), target, console)
+                fmu = _fmu(item, Path(folder), kind, console)
                 with Importer(fmu) as importer:
-                    plan = default_plan(importer)
+                    plan = default_plan(importer) if full else quick_plan(importer)
                 if communications:
                     plan = replace(plan, communications=tuple(sorted(set(communications))))
                 if tolerances:
@@ -89,7 +95,7 @@ def compare(
             except LagfmuError as error:
                 problems.append(str(error))  # the others are measured all the same
     if len(found) > 1:
-        console.print(summary(found))
+        print_whole(console, summary(found))
     if problems:
         raise BuildError("\n".join(problems))
     return found
@@ -99,7 +105,7 @@ def _one(fmu: Path, plan: Plan, repeats: int | None, out: Path, console: Console
     with progress(console, fmu.stem) as tick:
         one = measure(fmu, plan, tick, repeats)
     for h in one.floor:
-        console.print(table(one, h))
+        print_whole(console, table(one, h))
     for line in remarks(one):
         console.print(f"  {escape(line)}", highlight=False, soft_wrap=True)
     stem = out / one.target / one.name

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import difflib
 import json
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
 
-from ..errors import ModelError, VerificationError
+from ..errors import ModelError, TableError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
+from ..model.goal import parse
 from ..model.scene import Scene
-from .formula import read_formula, text_of
+from ..model.spline import Spline
+from .formula import functions_of, read_formula, text_of
 
 Expr = Any
 FORMAT = 1
@@ -27,7 +30,8 @@ CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 class Claim:
     """One statement to verify, in symbols named as the FMU's variables.
 
-    `expected` is None for a conserved quantity.
+    `expected` is None for a conserved quantity; `accuracy` is the relative error that the FMU was built
+    to hold, as long as it runs with the settings that it was built with.
     """
 
     name: str
@@ -41,6 +45,13 @@ class Claim:
     within: float
     rounding: float
     when: Expr | None = None
+    accuracy: float | None = None
+
+    def allowed(self, tolerance: float, as_built: bool) -> float:
+        """The relative error that the statement may have; `as_built`: with the FMU's own settings."""
+        if as_built and self.accuracy is not None:
+            return max(self.accuracy, self.rounding)
+        return max(self.within * tolerance, self.rounding)
 
     @property
     def variables(self) -> set[str]:
@@ -120,12 +131,13 @@ def pack_closed_forms(
     table: VariableTable,
     numbers: Mapping[str, Expr] | None = None,
     held: Collection[str] = (),
+    tables: Sequence[Spline] = (),
 ) -> bytes:
     """JSON with the claims; expressions are indexed symbols, so that any name can be read back.
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
-    closed.  Claims that need a variable which the scene leaves out are left out too.  Raises ModelError
-    if a claim uses what no FMU of the model has.
+    closed, `tables` those that the model looks up.  Claims that need a variable which the scene leaves
+    out are left out too.  Raises ModelError if a claim uses what no FMU of the model has.
     """
     claims = [
         claim
@@ -146,7 +158,8 @@ def pack_closed_forms(
                     f"closed form {claim.name!r} uses {name!r}, which is no variable of the FMU"
                     + (f"; did you mean {near[0]!r}?" if near else "")
                 )
-    packed = []
+    goal = None if scene.accuracy is None else parse(scene.accuracy)
+    packed, functions = [], functions_of(tables)
     for claim in kept:
         entry: dict[str, Any] = {
             key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
@@ -155,15 +168,25 @@ def pack_closed_forms(
         for key in EXPRESSIONS:
             e = getattr(claim, key)
             entry[key] = None if e is None else _text(sp.sympify(e), names)
+        if goal is not None:
+            symbols = {str(s) for s in sp.sympify(claim.actual).free_symbols}
+            entry["accuracy"] = goal.allowed(symbols, claim.within)
         entry["symbols"] = {short: str(symbol) for symbol, short in names.items()}
         packed.append(entry)
         try:
-            _claim(entry)  # it has to come back
+            _claim(entry, functions)  # it has to come back
         except ValueError as error:
             problems.append(f"closed form {claim.name!r} cannot be carried by an FMU: {error}")
     if problems:
         raise ModelError(scene.name, problems)
-    return json.dumps({"format": FORMAT, "closed_forms": packed}, indent=1).encode()
+    record: dict[str, Any] = {"format": FORMAT, "closed_forms": packed}
+    if tables:
+        record["tables"] = [
+            {"name": s.name, "x": s.x, "y": s.y, "ends": s.ends}
+            | {"x_unit": s.x_unit.name, "y_unit": s.y_unit.name}
+            for s in tables
+        ]
+    return json.dumps(record, indent=1).encode()
 
 
 def unpack_closed_forms(content: bytes, name: str) -> list[Claim]:
@@ -171,15 +194,27 @@ def unpack_closed_forms(content: bytes, name: str) -> list[Claim]:
 
     Raises VerificationError if the file is not lagfmu's.
     """
+    return _unpacked(content, name)[0]
+
+
+def tables_in(content: bytes, name: str) -> list[Spline]:
+    """The tables that an FMU's equations look up.  Raises VerificationError."""
+    return _unpacked(content, name)[1]
+
+
+def _unpacked(content: bytes, name: str) -> tuple[list[Claim], list[Spline]]:
     try:
         if len(content) > LARGEST_RECORD:
             raise ValueError(f"{len(content)} bytes, expected at most {LARGEST_RECORD}")
         data = json.loads(content)
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise ValueError(f"expected format {FORMAT}")
-        if not isinstance(data.get("closed_forms"), list):
-            raise ValueError("expected a list of closed forms")
-        return [_claim(entry) for entry in data["closed_forms"]]
+        for what, field in (("closed forms", "closed_forms"), ("tables", "tables")):
+            if not isinstance(data.get(field, []), list) or "closed_forms" not in data:
+                raise ValueError(f"expected a list of {what}")
+        tables = [_spline(entry) for entry in data.get("tables", [])]
+        functions = functions_of(tables)
+        return [_claim(entry, functions) for entry in data["closed_forms"]], tables
     except (ValueError, RecursionError) as error:
         raise VerificationError(
             f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "
@@ -193,18 +228,38 @@ def _text(e: Expr, names: dict[Expr, str]) -> str:
     return text_of(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}))
 
 
-def _claim(entry: Any) -> Claim:
+def _spline(entry: Any) -> Spline:
+    """A table of the record.  Raises ValueError with what is wrong in it."""
+    fields = ("name", "x", "y", "x_unit", "y_unit", "ends")
+    if not isinstance(entry, dict) or set(entry) != set(fields):
+        raise ValueError("a table with other fields than this version of lagfmu knows")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # told when the FMU was built
+            return Spline(*(entry[f] for f in fields))
+    except TableError as error:
+        raise ValueError(str(error)) from None
+
+
+def _claim(entry: Any, tables: Mapping[str, Any]) -> Claim:
     """One entry of the record.  Raises ValueError with what is wrong in it."""
     texts = {"name", *CONDITIONS, *EXPRESSIONS}
     numbers = {"within", "rounding"}
-    if not isinstance(entry, dict) or set(entry) != texts | numbers | {"symbols"}:
+    if not isinstance(entry, dict) or {*entry, "accuracy"} != {
+        *texts,
+        *numbers,
+        "symbols",
+        "accuracy",
+    }:
         raise ValueError("a closed form with other fields than this version of lagfmu knows")
     for key in texts:
         optional = key not in ("name", "actual")
         if not isinstance(entry[key], str) and not (optional and entry[key] is None):
             raise ValueError(f"{key!r} of a closed form is {entry[key]!r}, expected text")
-    for key in numbers:
-        number = entry[key]
+    for key in ("within", "rounding", "accuracy"):
+        number = entry.get(key)
+        if key == "accuracy" and number is None:
+            continue
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not number >= 0:
             raise ValueError(f"{key!r} of {entry['name']!r} is {number!r}, expected a number >= 0")
     names = entry["symbols"]
@@ -213,7 +268,9 @@ def _claim(entry: Any) -> Claim:
     symbols = {short: output(name) for short, name in names.items()}
     fields: dict[str, Any] = {key: entry[key] for key in ("name", *CONDITIONS)}
     fields |= {key: float(entry[key]) for key in numbers}
+    if entry.get("accuracy") is not None:
+        fields["accuracy"] = float(entry["accuracy"])
     for key in EXPRESSIONS:
         text = entry[key]
-        fields[key] = None if text is None else read_formula(text, symbols)
+        fields[key] = None if text is None else read_formula(text, symbols, tables)
     return Claim(**fields)

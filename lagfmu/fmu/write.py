@@ -45,7 +45,12 @@ def write(
     extra = {
         PAGE: page(prepared, choice=choice).encode(),
         "resources/lagfmu.json": pack_closed_forms(
-            prepared.scene, closed_forms, prepared.table, prepared.numbers, prepared.held
+            prepared.scene,
+            closed_forms,
+            prepared.table,
+            prepared.numbers,
+            prepared.held,
+            prepared.model.splines,
         ),
     }
     equations = (prepared.coded, prepared.coded_reduction)

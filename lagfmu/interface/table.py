@@ -310,7 +310,7 @@ class _Builder:
                         description=(text, f"rate of: {text}", f"second derivative of: {text}")[
                             order
                         ],
-                        start=float(i.start) if order == 0 else 0.0,
+                        start=(float(i.start), float(i.rate), 0.0)[order],
                         unit=self.units[full],
                         derivative_of=names[order - 1] if order else None,
                     )

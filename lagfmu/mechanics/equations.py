@@ -24,6 +24,7 @@ from sympy.physics.vector import dynamicsymbols
 from ..errors import ModelError
 from ..model.model import Constraint, Model, Nonholonomic, Output, Parameter, name_of
 from ..model.reactions import force_of_constraint, multiplier
+from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
 
 Expr = Any
@@ -90,6 +91,19 @@ class EquationsOfMotion:
         """The parameters in the order of p."""
         by_symbol = {p.symbol: p for p in self.model.parameters}
         return tuple(by_symbol[s] for s in self.p)
+
+    @cached_property
+    def lookups(self) -> list[tuple[Spline, Expr]]:
+        """The tables that end somewhere, each with an argument of the state by which it is looked up."""
+        if not any(s.ends != "periodic" for s in self.model.splines):
+            return []
+        known = {*self.q, *self.v, *self.u, *self.p, TIME}
+        flat = [*self.M.todok().values(), *self.F, *self.G.todok().values(), *self.nu, *self.gamma]
+        flat += [*self.f, *(o.expression for o in self.outputs)]
+        calls = {c for e in flat if e is not None for c in sp.sympify(e).atoms(SplineBase)}
+        found = {(c.spline, c.args[0]) for c in calls if c.spline.ends != "periodic"}
+        state = [pair for pair in found if pair[1].free_symbols <= known]
+        return sorted(state, key=lambda pair: (pair[0].name, str(pair[1])))
 
     @property
     def vdot(self) -> tuple[Expr, ...]:

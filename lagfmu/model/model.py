@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..errors import ModelError
-from .check import declared_units, problems_of
+from .check import declared_units, problems_of, splines_of
 from .kinds import check_containers
 from .parts import (
     NAME,
@@ -30,6 +30,7 @@ from .parts import (
     name_of,
 )
 from .reactions import reaction_units
+from .spline import Spline
 from .units import Unit
 
 __all__ = [
@@ -80,6 +81,11 @@ class Model(ModelFields):
     def units(self) -> dict[Expr, Unit]:
         """Unit of every symbol that may stand in an expression."""
         return declared_units(self, [])
+
+    @cached_property
+    def splines(self) -> tuple[Spline, ...]:
+        """The tables that stand in it, by name."""
+        return tuple(splines_of(self))
 
     @cached_property
     def reactions(self) -> dict[Expr, Unit]:

@@ -41,13 +41,14 @@ class Input:
 
     A dynamicsymbol that stands in a holonomic constraint or a contact is a prescribed motion: the
     FMU then has the inputs `u`, `der(u)` and `der(u,2)`, because the constraint's second derivative
-    needs them.
+    needs them.  `start` and `rate` [unit/s] are its value and its velocity until the importer sets them.
     """
 
     symbol: Expr
     unit: str = "1"
     start: float = 0.0
     description: str = ""
+    rate: float = 0.0
 
 
 @dataclass(frozen=True)

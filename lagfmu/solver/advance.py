@@ -102,7 +102,7 @@ class Headway:
 def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
     """Integrate until t_end or the first event, whichever comes first; at an event, switch modes."""
     y = np.array(state.q + state.v)
-    f0 = leg.rate(state.t, y)
+    f0 = leg.accept(state.t, y)
     if not np.isfinite(f0).all():
         raise StepFailureError(leg.cause)
     solver = leg.stepper(state.t, y, t_end, state.step or None)
@@ -153,7 +153,7 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
                 steps=steps,
                 choice=choice,
             )
-        solver.y, solver.f = y1, leg.rate(solver.t, y1)
+        solver.y, solver.f = y1, leg.accept(solver.t, y1)
         if leg.auto and leg.settings.method == "dop853":
             choice = _judged(leg, choice, solver, t0, y0)
         if leg.auto and choice.implicit != (leg.settings.method == "radau5"):

@@ -17,7 +17,6 @@ import numpy as np
 
 from .jumps import limits, surfaces
 from .leg import Leg
-from .motion import motion
 from .system import System, Vector
 
 
@@ -81,6 +80,6 @@ def _of_contacts(leg: Leg, t: float, y: Vector) -> Vector:
     contacts = list(leg.system.contacts)
     values = at.residual(q)[contacts]
     if any(leg.state.closed):
-        lam = motion(at, q, v, leg.rows).lam[contacts]
+        lam = leg.near(t, q, v).lam[contacts]
         values = np.where(leg.state.closed, lam, values)
     return values

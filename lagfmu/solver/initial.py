@@ -117,7 +117,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
     if system.contacts:
         touching = [c for c, shut in enumerate(closed) if shut]
         modes = at_contacts.complementary_modes(at, q, v, closed, touching)
-    q, v = project(at, q, v, system.active(modes), none, size)
+    q, v = project(at, q, v, system.active(modes), none, size, dependent=True)
     nothing = Departure(0, 0.0, (0.0,) * system.n, (0.0,) * system.n)
     state = State(
         t=at.t,
@@ -205,7 +205,7 @@ def _velocities(
     ]
     rows = system.active(shut)
     v = velocities_from_afar(at, q, v0, rows, rank, natural)
-    q, v = project(at, q, v, rows, np.zeros(system.m), size)
+    q, v = project(at, q, v, rows, np.zeros(system.m), size, dependent=True)
     M, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
     unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)

@@ -13,7 +13,6 @@ from typing import Any
 from .clearance import BRACKETS, CLEAR, between
 from .indicators import indicators
 from .leg import Leg
-from .motion import motion
 from .system import Vector
 
 QUARTERS, SMALLEST_LOOK, MOST_LOOKS = (
@@ -64,7 +63,7 @@ def _top_of_rebound(leg: Leg, t: float, y: Vector, values: Vector) -> float:
     if not left:
         return float("inf")
     q, v = leg.split(y)
-    now = motion(leg.at(t), q, v, leg.rows)
+    now = leg.near(t, q, v)
     speed, pull = now.G @ v - now.nu, now.gamma - now.G @ now.vdot
     return min(
         (

@@ -44,6 +44,14 @@ class Own:
 
 
 @dataclass(frozen=True)
+class Lookups:
+    """Where tables are looked up: places(t, q, v, u, p) -> x, and (name, first x, last x) of each."""
+
+    places: Callable[..., Any]
+    reach: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True)
 class System:
     """M, F, G, nu, gamma, f and the energies of n coordinates under m constraint rows.
 
@@ -82,6 +90,7 @@ class System:
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
     outputs: tuple[Own, ...] = ()
+    lookups: Lookups | None = None
     surfaces: Callable[..., Any] | None = None
     floors: tuple[bool, ...] = ()
     bounds: Callable[..., Any] | None = None

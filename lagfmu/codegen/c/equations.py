@@ -21,7 +21,7 @@ from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
 from .. import bounds
 from .function import FILL, Result, function
-from .printer import HELPERS, identifiers
+from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
 
 Expr = Any
@@ -70,6 +70,7 @@ def model_source(
             ]
         ) + _pointer("reduced_equations")
     helpers = [code for name, code in {**HELPERS, "fill": FILL}.items() if f"{name}(" in text]
+    helpers += [table_text(s) for s in eom.model.splines if f"&{table_name(s)}," in text]
     model = eom.model
     description = f": {model.description}" if model.description else ""
     head = HEAD.format(name=model.name, description=_comment(description), index=index)
@@ -299,6 +300,13 @@ class _System:
                 "The change of all of these along the direction (dt, dq, dv, du).",
                 words.along,
                 changes,
+            )
+        if eom.lookups:
+            found["lookups"] = define(
+                "lookups",
+                "Where tables are looked up.",
+                words.state,
+                {"places": _results([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])},
             )
         jumps = self.jumps.mapped(_real([*eom.q, *eom.v, *eom.u, *eom.p, TIME]))
         if jumps.surfaces:

@@ -76,7 +76,9 @@ class Tables:
             solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
             parts.append(f"{solve}\n" if solve else "")
         own, more = self._outputs(functions)
-        parts.append(own)
+        reach, ends = self._lookups(functions)
+        parts += [own, reach]
+        more |= ends
         fields = {
             "n": eom.n,
             "m": eom.m,
@@ -128,6 +130,17 @@ class Tables:
         text += self._integers("guarded", [int(o.otherwise is not None) for o in outputs])
         names = {"output_names": "output_names", "guarded": "guarded"}
         return text, {"output_count": len(outputs), **names}
+
+    def _lookups(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
+        """The names and ends of the tables that are looked up, and the System's fields for them."""
+        if "lookups" not in functions:
+            return "", {}
+        tables, p = [s for s, _ in self.eom.lookups], self.prefix
+        text = self._array("const char *const", "lookup_names", [f'"{s.name}"' for s in tables])
+        text += self._array("const double", "lookup_first", [repr(s.x[0]) for s in tables])
+        text += self._array("const double", "lookup_last", [repr(s.x[-1]) for s in tables])
+        names = ("lookup_names", "lookup_first", "lookup_last", "lookups")
+        return text, {"lookup_count": len(tables), **{name: p + name for name in names}}
 
     def _array(self, kind: str, name: str, items: Sequence[str]) -> str:
         head = f"static {kind} {self.prefix}{name}[] = {{"

@@ -13,9 +13,10 @@ from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact, Nonholonomic
+from ...solver.cubic import Cubic
 from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
 from .. import bounds
-from .function import function, identifiers
+from .function import function, identifiers, table_name
 
 Expr = Any
 
@@ -23,13 +24,13 @@ Expr = Any
 def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations in the given formulation.
 
-    It needs the names System, Row, Own and Embedding of `lagfmu.solver.system`.
+    It needs the names System, Row, Own, Lookups and Embedding of `lagfmu.solver.system`, and Cubic where
+    there are tables.
     """
     eom, reduction, jumps = levelled(eom, reduction)
     if reduction is None:
-        return _imported(
-            _system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
-        )
+        text = _system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
+        return _imported(_tables(eom, text) + text)
     parts = [_bare_system(eom) if eom.bare else _system(eom, "", "multipliers")]
     names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.driven, *eom.p, TIME])
     names[TIME] = "t"
@@ -53,7 +54,22 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
             jumps,
         )
     )
-    return _imported("\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n")
+    text = "\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n"
+    return _imported(_tables(eom, text) + text)
+
+
+def _tables(eom: EquationsOfMotion, text: str) -> str:
+    """The tables that the text looks up."""
+    lines = []
+    for s in eom.model.splines:
+        name, table = table_name(s), s.table
+        if f"{name}(" in text:
+            rows = "".join(f"        {row!r},\n" for row in table.coefficients)
+            lines.append(
+                f"{name} = Cubic(\n    {table.knots!r},\n    (\n{rows}    ),\n"
+                f"    {table.periodic!r},\n)\n\n\n"
+            )
+    return "".join(lines)
 
 
 def _imported(text: str) -> str:
@@ -73,6 +89,8 @@ def compile_system(text: str) -> System:
         "interval": interval,
         "System": vocabulary.System,
         "Own": vocabulary.Own,
+        "Lookups": vocabulary.Lookups,
+        "Cubic": Cubic,
         "Row": vocabulary.Row,
         "Embedding": vocabulary.Embedding,
     }
@@ -145,6 +163,13 @@ def _system(
         parts.append(_bounds(prefix, eom, changing))
     own = _outputs(eom) if rows is None else []
     parts += [text for _, text in own]
+    looked_up = ""
+    if eom.lookups:
+        text = "Where tables are looked up."
+        places = {"w": [x for _, x in eom.lookups]}
+        parts.append(function(f"{prefix}lookups", text, state, places, names))
+        reach = [(s.name, s.x[0], s.x[-1]) for s, _ in eom.lookups]
+        looked_up = f"    lookups=Lookups({prefix}lookups, {tuple(reach)!r}),\n"
     label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
     parts.append(
         f"{label} = System(\n"
@@ -166,7 +191,7 @@ def _system(
         f"    parameters={_strings(eom.p)},\n"
         f"{_surfaces(prefix, jumps, len(eom.driven))}"
         f"{f'    bounds={prefix}bounds,' + chr(10) if changing else ''}"
-        f"{_listed(own)})\n"
+        f"{_listed(own)}{looked_up})\n"
     )
     return "\n\n".join(parts)
 

@@ -20,8 +20,8 @@ CLASSES = {
 }
 
 
-def files_left_out(scene: Scene, system: System) -> frozenset[str]:
-    """The solver's files that the FMU does without."""
+def files_left_out(scene: Scene, system: System, tables: bool) -> frozenset[str]:
+    """The solver's files that the FMU does without; `tables`: its equations look some up."""
     gone = {f"{m}.py" for m in CLASSES if m not in scene.integrators}
     if not system.contacts:
         gone |= {*CONTACTS}
@@ -29,6 +29,8 @@ def files_left_out(scene: Scene, system: System) -> frozenset[str]:
         gone |= {*EVENTS}
     if not system.is_constrained:
         gone |= {*CONSTRAINTS}
+    if not tables:
+        gone |= {"cubic.py"}
     return frozenset(gone)
 
 

@@ -90,6 +90,13 @@ struct System {
                             const double *du, const double *dvdot, const double *dlambda,
                             const double *dQ, double *dw, double *dother);
 
+    /* Where tables are looked up (lookup_count), and where these begin and end.  NULL without any. */
+    int lookup_count;
+    const char *const *lookup_names;
+    const double *lookup_first, *lookup_last;
+    void (*lookups)(double t, const double *q, const double *v, const double *u, const double *p,
+                    double *places);
+
     /* An embedding q = phi(s, t), v = J sdot + dphi/dt, from the coordinates that this system steps
      * to those of `full`, from which lambda is recovered; both NULL without one.  If nothing that is
      * solved for is read, `full` has no dynamics, and is nothing but the coordinates that are read. */

@@ -65,9 +65,33 @@ static Status evaluate(Instance *x) {
     if (instance_start(x) != OK) return FAILED;
     leg_begin(s);
     if (mechanism_motion(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
-                         s->active) != OK)
+                         leg_rows(s)) != OK)
         return FAILED;
     x->evaluated = 1;
+    return OK;
+}
+
+/* The multipliers of all rows, those too that depend on others. */
+static Status find_multipliers(Instance *x) {
+    Solver *s = &x->solver;
+    if (!s->state.now.dependent) return evaluate(x);
+    if (instance_start(x) != OK) return FAILED;
+    leg_begin(s);
+    x->evaluated = 0;
+    return mechanism_motion_near(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+                                 s->active, s->state.offset, s->state.size);
+}
+
+/* Which rows stand for all from here on. */
+static Status choose_rows(Instance *x) {
+    Solver *s = &x->solver;
+    if (s->system->m < 2) return OK;
+    leg_begin(s);
+    x->evaluated = 0;
+    if (mechanism_motion_near(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+                              s->active, s->state.offset, s->state.size) != OK)
+        return FAILED;
+    leg_choose_rows(s);
     return OK;
 }
 
@@ -104,7 +128,7 @@ Status exchange_indicators(Instance *x, double *indicators) {
     Mechanism *b = &s->stepped;
     const System *system = s->system;
     if (indicators_count(system) == 0) return OK;
-    if (evaluate(x) != OK) return FAILED;
+    if (find_multipliers(x) != OK) return FAILED;
     const Instant at = leg_instant(s, s->state.now.t);
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     if (system->jumps > 0)
@@ -150,7 +174,7 @@ static Status find_happened(Instance *x, int *any) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
     *any = 0;
-    if (evaluate(x) != OK) return FAILED;
+    if (find_multipliers(x) != OK) return FAILED;
     if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int c = 0; c < s->system->contacts; c++) {
@@ -173,6 +197,8 @@ Status exchange_step_done(Instance *x, int *event) {
     *event = jumps_stale(s, leg_instant(s, s->state.now.t), s->state.q);
     if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
+    if (s->state.now.dependent && s->stepped.linear.rung != RUNG_SCHUR && choose_rows(x) != OK)
+        return FAILED; /* the rows that stood for all are about to depend on each other */
     for (int c = 0; c < s->system->contacts; c++)
         if (!s->state.closed[c] && s->stepped.f[s->system->contact[c]] > s->state.gap[c])
             s->state.armed[c] = 1;
@@ -210,12 +236,15 @@ Status exchange_event(Instance *x, int *moved) {
         *moved = 1;
         x->evaluated = 0;
         if (PARTS.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
-        return PARTS.switch_modes(s, x->happened);
+        if (PARTS.switch_modes(s, x->happened) != OK) return FAILED;
+        return choose_rows(x);
     }
     if (drift(x, &worst) != OK) return FAILED;
     if (!(worst > LIMIT)) return OK;
     *moved = 1;
     x->evaluated = 0;
-    return mechanism_project(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
-                             s->active, s->state.offset, s->state.size);
+    if (mechanism_project(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+                          s->active, s->state.offset, s->state.size) != OK)
+        return FAILED;
+    return choose_rows(x);
 }

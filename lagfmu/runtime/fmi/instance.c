@@ -34,6 +34,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->happened = arena_ints(&scratch, system->contacts);
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
+        x->places = arena_doubles(&scratch, system->lookup_count);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
         if (pass == 1) break;
         x->saved_size = saved.used;
@@ -290,7 +291,7 @@ Status instance_observe(Instance *x) {
 static void warn_of_jumps(Instance *x) {
     const System *s = x->solver.system;
     const double *u = x->solver.drive.value;
-    for (int i = 0; i < s->prescribed_count && !x->warned; i++) {
+    for (int i = 0; i < s->prescribed_count && !(x->warned & 1); i++) {
         const int k = s->prescribed[i];
         if (u[k] == x->expected[k] || u[k + 1] != 0 || u[k + 2] != 0) continue;
         const char *name = "";
@@ -301,7 +302,27 @@ static void warn_of_jumps(Instance *x) {
                        "communication point; connect its derivatives as well",
                        name, name, name);
         x->tell(x->context, NOTE_WARNING, x->note);
-        x->warned = 1;
+        x->warned |= 1;
+    }
+}
+
+/* Once for each: a table is looked up beyond its ends. */
+static void warn_of_tables(Instance *x) {
+    Solver *s = &x->solver;
+    const System *system = s->system;
+    const Instant at = leg_instant(s, s->state.now.t);
+    system->lookups(at.t, s->state.q, s->state.v, at.u, at.p, x->places);
+    for (int i = 0; i < system->lookup_count && i < 30; i++) {
+        const double first = system->lookup_first[i], last = system->lookup_last[i];
+        const int told = 2 << i;
+        if ((x->warned & told) || (x->places[i] >= first && x->places[i] <= last)) continue;
+        x->warned |= told;
+        (void)snprintf(x->note, sizeof x->note,
+                       "table %s is looked up at %s, outside of its points from %s to %s: it goes on "
+                       "as a straight line",
+                       system->lookup_names[i], digits(x->places[i]).text, digits(first).text,
+                       digits(last).text);
+        x->tell(x->context, NOTE_WARNING, x->note);
     }
 }
 
@@ -352,6 +373,7 @@ Status instance_step(Instance *x, double t_end) {
         return FAILED;
     }
     move_inputs(x, t_end);
+    if (s->system->lookup_count > 0) warn_of_tables(x);
     if (s->system->contacts > 0) report_events(x);
     if (product == 0 && s->state.now.choice.product > 0) {
         stiffness_message(&s->state.now.choice, x->note, sizeof x->note);
@@ -369,8 +391,10 @@ Status instance_differentiate(Instance *x, Direction d) {
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
     const Instant at = leg_instant(s, s->state.now.t);
-    system_active(s->system, s->state.closed, s->active);
-    if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
+    leg_begin(s);
+    if (mechanism_motion_near(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                              s->state.size) != OK)
+        return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
         return FAILED;
     if (full == NULL) {

@@ -122,6 +122,7 @@ static Status times(Instance *x) {
         {"step count", &now->tiny, 1, MOST},
         {"mode of the step ahead", &now->ahead, 1, 1},
         {"mode of the step ahead", &now->fresh, 1, 1},
+        {"rank of the constraints", &now->dependent, 1, 1},
         {"count of events", &now->event_count, 1, indicators_count(x->solver.system)},
     };
     const Number list[] = {
@@ -161,6 +162,7 @@ static Status arrays(Instance *x) {
         {"scales", a->scale, ny, 0},
         {"sizes", a->size, n, 0},
         {"gaps", a->gap, contacts, 0},
+        {"levels of jumps", a->level, system->jumps, -DBL_MAX},
         {"departures", a->departure_time, contacts, -DBL_MAX},
         {"departures", a->departure_q, contacts * n, -DBL_MAX},
         {"departures", a->departure_v, contacts * n, -DBL_MAX},
@@ -179,10 +181,17 @@ static Status arrays(Instance *x) {
         {"parameters", s->p, system->parameters, -DBL_MAX},
     };
     const Ints flags[] = {
+        {"rank of the constraints", a->basis, system->m, 1},
         {"modes", a->closed, contacts, 1}, {"modes", a->armed, contacts, 1},
-        {"events", a->left, watched, 1},   {"counts", a->count, contacts, MOST},
+        {"counts", a->count, contacts, MOST},
         {"inputs", x->set, inputs, 1},
     };
+    for (int k = 0; k < watched; k++)
+        if (a->left[k] < -1 || a->left[k] > 1) return no_state(x, "events", a->left[k]);
+    for (int k = 0; x->started && k < system->jumps; k++)
+        if (!(system->floors[k] ? a->level[k] - 0.5 == floor(a->level[k])
+                                : fabs(a->level[k]) == 1 || a->level[k] == 0))
+            return no_state(x, "levels of jumps", a->level[k]);
     if (doubles(x, list, sizeof list / sizeof *list) != OK) return FAILED;
     return ints(x, flags, sizeof flags / sizeof *flags);
 }
@@ -204,7 +213,7 @@ Status instance_restored(Instance *x) {
         {"type", &x->exchange, 1, 1},
         {"mode", &x->started, 1, 1},
         {"mode", &x->running, 1, 1},
-        {"mode", &x->warned, 1, 1},
+        {"mode", &x->warned, 1, INT_MAX}, /* bits of what has been told */
     };
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (x->running && !x->started) return no_state(x, "mode", x->running);

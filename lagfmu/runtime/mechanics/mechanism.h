@@ -19,6 +19,7 @@ typedef struct {
     double *f;                      /* (m) scratch for residuals */
     double *dq, *trial;             /* (n) scratch of project() */
     int *fixed;                     /* (m) scratch of project(): position constraints that act */
+    int dependent;                  /* 1: rows that act depend on each other, on the constraints */
     Why *why;
 } Mechanism;
 
@@ -62,6 +63,11 @@ Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
 /* evaluate, factor, solve: b->vdot (n) and b->lambda (m), 0 where a row does not act. */
 Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                         const int *active);
+
+/* The same for a state off the constraints: what depends on each other on them does so here, and is not
+ * asked to agree.  `offset` (m), `size` (n) as below. */
+Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
+                             const int *active, const double *offset, const double *size);
 
 /* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
  * v are moved in place.  For states that are nearly consistent; initial.c deals with the others.

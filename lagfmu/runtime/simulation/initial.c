@@ -159,6 +159,7 @@ static Status find_modes(const Start *x) {
         return afar_refused(x->s);
     if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
         return afar_refused(x->s);
+    leg_choose_rows(x->s);
     return OK;
 }
 
@@ -215,6 +216,7 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
     jumps_settle(s, leg_instant(s, t), q0, v0, NULL, NULL);
     if (s->system->contacts > 0 && PARTS.impact_check(s) != OK) return FAILED;
     const Start x = {s, {t, s->u, s->p}, q0, v0, rank, rank + s->system->n};
+    s->stepped.dependent = 1; /* it is not known yet */
     magnitudes_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;
     jumps_settle(s, x.at, s->state.q, v0, NULL, NULL);

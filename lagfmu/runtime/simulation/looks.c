@@ -27,7 +27,9 @@ static Status top_of_rebound(Solver *s, double t, const double *y, const double 
     for (int c = 0; c < system->contacts; c++)
         left |= !s->state.closed[c] && values[c] <= s->state.gap[c];
     if (!left) return OK;
-    if (mechanism_motion(b, leg_instant(s, t), y, y + system->n, s->active) != OK) return FAILED;
+    if (mechanism_motion_near(b, leg_instant(s, t), y, y + system->n, s->active, s->state.offset,
+                              s->state.size) != OK)
+        return FAILED;
     for (int c = 0; c < system->contacts; c++) {
         const int k = system->contact[c];
         if (s->state.closed[c] || !(values[c] <= s->state.gap[c])) continue;

@@ -94,7 +94,10 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
         full_active(s);
         active = s->active_full;
     }
-    if (mechanism_motion(b, at, o->q, o->v, active) == FAILED) return FAILED;
+    const Status status = b->dependent ? mechanism_motion_near(b, at, o->q, o->v, active, s->state.offset,
+                                                               s->state.size)
+                                       : mechanism_motion(b, at, o->q, o->v, active);
+    if (status == FAILED) return FAILED;
     observe_forces(b, o);
     return observe_residuals(s, at, b, o);
 }
@@ -172,6 +175,7 @@ Status solver_observe(Solver *s, Observed *o) {
     Mechanism *b = s->system->embed != NULL ? &s->full : &s->stepped;
     const Instant at = leg_instant(s, s->state.now.t);
     system_active(s->system, s->state.closed, s->active);
+    s->stepped.dependent = s->state.now.dependent;
     if (s->system->embed != NULL && observe_stepped(s, at, o) == FAILED) return FAILED;
     expand(s, at.t, s->state.q, s->state.v, o->q, o->v);
     if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;

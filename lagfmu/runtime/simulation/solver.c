@@ -18,6 +18,7 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->scale = arena_doubles(saved, 2 * n);
     x->size = arena_doubles(saved, n);
     x->gap = arena_doubles(saved, contacts);
+    x->basis = arena_ints(saved, s->m);
     x->closed = arena_ints(saved, contacts);
     x->armed = arena_ints(saved, contacts);
     x->left = arena_ints(saved, indicators);

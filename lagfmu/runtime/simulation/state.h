@@ -35,6 +35,7 @@ void drive_at(const System *s, const Drive *drive, double t, double *u);
 typedef struct {
     double t;            /* [s] the communication point */
     double rate;         /* [1/s] the motion's natural rate at the start */
+    int dependent;       /* 1: at the latest state on the constraints, rows that act depended on each other */
     double step;         /* [s] the step to try next */
     double span;         /* [s] the communication step that led to t; 0: none */
     int steps;           /* internal steps taken so far */
@@ -56,6 +57,7 @@ typedef struct {
     double *scale;            /* (2 n) magnitudes below which errors in q and v are measured absolutely */
     double *size;             /* (n) the coordinates' magnitudes, for rounding */
     double *gap;              /* (contacts) |f| below which a contact touches */
+    int *basis;               /* (m) rows that act, as many of them as were independent there */
     int *closed, *armed;      /* (contacts) */
     int *left;                /* (indicators) its range at the event ahead: 1 upwards, -1 downwards */
     int *count;               /* (contacts) departures so far */

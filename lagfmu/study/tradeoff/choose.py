@@ -14,11 +14,11 @@ from ...errors import BuildError, LagfmuError
 from ...fmu.write import write
 from ...methods import METHODS
 from ...model.closed_form import ClosedForm, Conserved
+from ...model.goal import Goal
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
 from ...verification.verify import claims_in
-from .goal import Goal
 from .held_out import Case, held_out
 from .importer import Importer
 from .measure import Tick

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import itertools
+import math
 import re
 import shutil
 import time
@@ -45,6 +46,10 @@ MESSAGES: list[str] = []  # of one call: fmpy's proxy of the logger knows one lo
 def _log(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
     if status >= 2:  # discard, error, fatal
         MESSAGES.append(message.decode(errors="replace").strip())
+
+
+class TooSlowError(SimulationError):
+    """A run that was broken off at the time that it was given."""
 
 
 class Importer:
@@ -113,9 +118,17 @@ class Importer:
         self.slave = None
 
     def observe(
-        self, setting: Setting, values: Mapping[str, Any] | None = None, stop: float | None = None
+        self,
+        setting: Setting,
+        values: Mapping[str, Any] | None = None,
+        stop: float | None = None,
+        limit: float = math.inf,
     ) -> Trajectory:
-        """All outputs at every communication point.  Raises SimulationError with the FMU's reason."""
+        """All outputs at every communication point.
+
+        Raises SimulationError with the FMU's reason, TooSlowError if it takes longer than `limit` [s].
+        """
+        begun = time.perf_counter()
         times = communication_points(stop or self.stop_time, setting.communication)
         columns: list[tuple[str, Any]] = [("time", np.float64)]
         columns += [(v.name, KINDS[v.type]) for v in self.outputs]
@@ -132,6 +145,8 @@ class Importer:
         try:
             self._begin(setting, values or {}, float(times[-1]))
             for k, t in enumerate(times.tolist()):
+                if time.perf_counter() - begun > limit:
+                    raise TooSlowError(f"{setting}: a run takes longer than {limit:.3g} s")
                 if k:
                     before = float(times[k - 1])
                     self.slave.doStep(before, t - before)

@@ -3,6 +3,7 @@ falls on all of them alike; the median and the quartiles are kept."""
 
 from __future__ import annotations
 
+import math
 import random
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,6 +28,7 @@ REPEATS = 7  # timed runs a setting, if the budget allows
 QUICK_REPEATS = 31
 FEWEST = 3
 WIDER = (10, 5, 2)
+COARSE_GRID = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)  # tolerances
 SHORTEST, MOST = 1e-3, 20  # a timed piece of work [s], and how many runs it may be made of
 PAUSE = 2e-4  # [s] before each, so that it starts on a time slice of its own
 Tick = Callable[[str, int, int], None]  # what is done, how far, of how many
@@ -38,7 +40,8 @@ class Plan:
 
     A fixed step is halved `halvings` times.
     A run longer than `limit` [s] ends its method's refinement; after `budget` [s] of timing no
-    setting is run again that was run `FEWEST` times.
+    setting is run again that was run `FEWEST` times.  Without `warm_up` the first run is a time like
+    any other: right where a run takes long.
     """
 
     communications: tuple[float, ...]
@@ -48,6 +51,7 @@ class Plan:
     repeats: int = REPEATS
     limit: float = 3.0
     budget: float = 60.0
+    warm_up: bool = True
 
 
 @dataclass(frozen=True)
@@ -149,6 +153,14 @@ def default_plan(importer: Importer) -> Plan:
     return Plan(steps)
 
 
+def quick_plan(importer: Importer) -> Plan:
+    """The same communication steps with fewer points between: an answer within half a minute an FMU."""
+    plan = replace(default_plan(importer), tolerances=COARSE_GRID, budget=5.0)
+    if importer.target == "native":
+        return plan
+    return replace(plan, halvings=2, repeats=1, limit=1.5, warm_up=False)
+
+
 def measure(
     fmu: Path, plan: Plan | None = None, tick: Tick | None = None, repeats: int | None = None
 ) -> Tradeoff:
@@ -244,10 +256,17 @@ def accepts(importer: Importer, method: str) -> bool:
 
 
 def weigh(
-    importer: Importer, setting: Setting, reference: Reference, claims: Sequence[Claim] = ()
+    importer: Importer,
+    setting: Setting,
+    reference: Reference,
+    claims: Sequence[Claim] = (),
+    limit: float = math.inf,
 ) -> Row:
-    """The errors of one setting.  Raises SimulationError if the FMU refuses it."""
-    run = importer.observe(setting)
+    """The errors of one setting.
+
+    Raises SimulationError if the FMU refuses it, TooSlowError if it takes longer than `limit` [s].
+    """
+    run = importer.observe(setting, limit=limit)
     errors = reference.errors(run)
     parameters = {
         v.name: float(v.start)
@@ -273,7 +292,10 @@ def take_turns(
     What takes less than `SHORTEST` is done several times in a row, and the mean is one time.
     """
     seconds: list[list[float]] = [[] for _ in work]
-    often = [max(1, min(MOST, int(SHORTEST / max(once(), 1e-9)))) for once in work]  # warm as well
+    warm = [work[j]() for j in say_each(range(len(work)), "timing", say)]
+    often = [max(1, min(MOST, int(SHORTEST / max(s, 1e-9)))) for s in warm]
+    if not plan.warm_up:
+        seconds = [[s] for s in warm]
     order = list(range(len(work)))
     shuffle = random.Random(0).shuffle
     begun = time.perf_counter()

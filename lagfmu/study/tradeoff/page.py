@@ -8,9 +8,9 @@ from importlib.resources import files
 import jinja2
 from markupsafe import Markup
 
+from ...model.goal import HELD_OUT_MARGIN, MARGIN
 from .choose import Choice
 from .curve import curve
-from .goal import HELD_OUT_MARGIN, MARGIN
 from .report import digits
 from .survey import Option
 

@@ -25,7 +25,6 @@ GOALS = (1e-4, 1e-7, 1e-10)
 def table(found: Tradeoff, communication: float) -> Table:
     """One line a setting at one communication step: errors, time, spread; the front is marked."""
     chosen = found.front(communication)
-    fastest = min(r.median for r in found.rows)
     points = round(found.simulated / communication)
     drawn = Table(
         title=f"{found.name} ({found.target}), {points} communication steps of "
@@ -33,18 +32,13 @@ def table(found: Tradeoff, communication: float) -> Table:
         title_justify="left",
         box=SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
-        caption="dial: tolerance, or step; errors relative to the largest magnitude of each quantity; "
-        "≤: not above the reference's own; residual in SI units; ms/s: wall time per simulated "
-        "second, median and quartiles; ● nothing is both faster and more accurate in "
-        + SYMBOLS[found.headline],
-        caption_justify="left",
     )
     drawn.add_column("", no_wrap=True)
     drawn.add_column("method", no_wrap=True)
     drawn.add_column("dial", justify="right", no_wrap=True)
     for group in found.groups:
         drawn.add_column(SYMBOLS[group], justify="right", no_wrap=True)
-    for column in ("residual", "steps", "ms/s", "quartiles", "cost"):
+    for column in ("steps", "ms/s"):
         drawn.add_column(column, justify="right", no_wrap=True)
     method = ""
     for row in (r for r in found.rows if r.setting.communication == communication):
@@ -52,17 +46,13 @@ def table(found: Tradeoff, communication: float) -> Table:
             drawn.add_section()
         method = row.setting.method
         scale = 1e3 / found.simulated
-        low, high = row.quartiles
         drawn.add_row(
             "●" if row in chosen else "",
             method,
             row.setting.dial,
             *(_error(found, row, g) for g in found.groups),
-            f"{row.residual:.0e}",
             str(row.steps),
             digits(scale * row.median),
-            f"{digits(scale * low)}–{digits(scale * high)}",
-            f"{row.median / fastest:.1f}",
             style="bold" if row in chosen else None,
         )
     return drawn
@@ -82,7 +72,11 @@ def digits(value: float) -> str:
 def remarks(found: Tradeoff) -> list[str]:
     """What the reference is and how right it is, what was refused or cut, and fmpy's own share."""
     reference = found.reference
-    lines = []
+    lines = [
+        "dial: tolerance, or step; errors relative to the largest magnitude of each quantity; ≤: not "
+        "above the reference's own; ms/s: wall time per simulated second, median; ● nothing is both "
+        f"faster and more accurate in {SYMBOLS[found.headline]}; quartiles and residuals: in the files"
+    ]
     for source in dict.fromkeys(reference.source.values()):
         names = [n for n, s in reference.source.items() if s == source]
         own = max(reference.own[n] for n in names)
@@ -127,26 +121,19 @@ def summary(all_found: Sequence[Tradeoff]) -> Table:
         box=SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
     )
-    drawn.add_column("FMU")
-    drawn.add_column("every", justify="right")
-    for goal in GOALS:
-        drawn.add_column(f"{goal:.0e}")
-        drawn.add_column("ms/s", justify="right")
+    drawn.add_column("FMU", overflow="fold")
+    for column in ("every", "error", "setting", "ms/s"):
+        drawn.add_column(column, justify="right", no_wrap=True)
     for found in all_found:
         head = f"{found.name} ({found.target})"
         for h in dict.fromkeys(r.setting.communication for r in found.rows):
-            cells = []
+            every = f"{h:.3g} s"
             for goal in GOALS:
                 row = cheapest(found, goal, h)
-                if row is None:
-                    cells += ["none", ""]
-                else:
-                    cells += [
-                        f"{row.setting.method} {row.setting.dial}",
-                        digits(1e3 * row.median / found.simulated),
-                    ]
-            drawn.add_row(head, f"{h:.3g} s", *cells)
-            head = ""
+                setting = "none" if row is None else f"{row.setting.method} {row.setting.dial}"
+                spent = "" if row is None else digits(1e3 * row.median / found.simulated)
+                drawn.add_row(head, every, f"{goal:.0e}", setting, spent)
+                head = every = ""
         drawn.add_section()
     return drawn
 

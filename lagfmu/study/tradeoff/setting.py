@@ -8,6 +8,8 @@ from typing import Any
 
 from ...methods import FIXED_STEP
 
+ORDERS = {"rk4": 4, "rattle": 6}  # of convergence
+
 
 @dataclass(frozen=True)
 class Setting:

@@ -7,31 +7,31 @@ times that, so that what is chosen does not lean on an importer that cuts the so
 from __future__ import annotations
 
 import contextlib
+import math
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from ...errors import LagfmuError, SimulationError
+from ...errors import LagfmuError
 from ...fmu.write import write
 from ...methods import EVALUATIONS, METHODS
 from ...model.closed_form import ClosedForm, Conserved
+from ...model.goal import Goal
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
 from ...verification.verify import claims_in
-from .goal import Goal
 from .importer import Importer
 from .measure import Plan, Row, Tick, accepts, default_plan, take_turns, weigh, wider
 from .quantities import selected
 from .reference import Reference, refer
-from .setting import dials
+from .search import SLOW, Clock, Walk, coarsest, start
+from .setting import Setting, dials
 
-BUDGET = 20.0  # [s] of timing
-ENOUGH = 3  # settings of a method that hold the accuracy, before no finer one is measured
-SLOW = 5.0  # times the fastest that holds it: what takes longer is not timed
+BUDGET = 5.0  # [s] of timing
+SPREAD = 3  # times from which on quartiles say something
 ALIKE = 1.25  # times within this factor, with quartiles that overlap, cannot be told apart
 
 
@@ -82,7 +82,7 @@ def survey(
     target: str = "python",
     plan: Plan | None = None,
 ) -> Survey:
-    """Measure the options of a scene, up to those that hold the goal with its margin.
+    """Measure the options of a scene about those that hold the goal with its margin (search.py).
 
     Raises LagfmuError if the scene cannot be built as it stands.
     """
@@ -103,14 +103,20 @@ def survey(
                     raise
                 dropped.append(f"{formulation}: {error}")
         first = importers[tried[0]]
-        plan = plan or replace(default_plan(first), budget=BUDGET)
+        if plan is None:
+            plan = replace(default_plan(first), budget=BUDGET)
+            if first.target == "python":  # each run takes long: one is a time
+                plan = replace(plan, repeats=0, warm_up=False)
         say("reference", 0, 1)
-        reference = refer(first, claims_in(first.path), communication=scene.step_size)
+        claims = claims_in(first.path)
+        reference = refer(first, claims, communication=scene.step_size, second_opinion=False)
         names = tuple(q.name for q in selected(reference.known, goal.names))
         found: list[tuple[str, Row, float]] = []
+        clock, near = Clock(), dict[str, int]()
         for formulation, importer in importers.items():
-            found += _weighed(formulation, importer, reference, names, goal, plan, dropped, say)
-        kept = _worth_timing(found, names, reference, goal)
+            task = _Task(formulation, importer, reference, names, goal.on_the_scene, clock, near)
+            found += _weighed(task, plan, dropped, say)
+        kept = _worth_timing(found, names, reference, goal, plan)
         work = [partial(importers[f].seconds, r.setting, names) for f, r, _ in kept]
         timed = take_turns([*work, partial(first.floor, scene.step_size, names)], plan, say)
         options = tuple(
@@ -127,38 +133,56 @@ def _error(row: Row, names: Sequence[str], reference: Reference) -> float:
     return max(max(row.errors[n], reference.own[n]) for n in names)
 
 
+@dataclass(frozen=True)
+class _Task:
+    """What to measure a formulation for; `near`: by method, the dial that held it in another one."""
+
+    formulation: str
+    importer: Importer
+    reference: Reference
+    names: Sequence[str]
+    goal: float
+    clock: Clock
+    near: dict[str, int]
+    wide: dict[Setting, Mapping[str, float]] = field(default_factory=dict)
+
+    def coarse(self, setting: Setting, limit: float) -> float:
+        """The error at the wider communication step."""
+        errors = self._wide(setting, limit)
+        return max(max(errors[n], self.reference.own[n]) for n in self.names)
+
+    def full(self, setting: Setting, limit: float) -> tuple[Row, float]:
+        """The row, with the larger errors of both communication steps, and the largest of them."""
+        row = _worse(
+            weigh(self.importer, setting, self.reference, limit=limit), self._wide(setting, limit)
+        )
+        return row, _error(row, self.names, self.reference)
+
+    def _wide(self, setting: Setting, limit: float) -> Mapping[str, float]:
+        if setting not in self.wide:
+            coarse = replace(setting, communication=wider(self.importer))
+            run = self.importer.observe(coarse, limit=limit)
+            self.wide[setting] = self.reference.errors(run)
+        return self.wide[setting]
+
+
 def _weighed(
-    formulation: str,
-    importer: Importer,
-    reference: Reference,
-    names: Sequence[str],
-    goal: Goal,
-    plan: Plan,
-    dropped: list[str],
-    say: Tick,
+    task: _Task, plan: Plan, dropped: list[str], say: Tick
 ) -> list[tuple[str, Row, float]]:
-    """(formulation, row, seconds of that first run), from coarse to fine, method by method."""
+    """(formulation, row, seconds of that first run), method by method, from coarse to fine."""
     found: list[tuple[str, Row, float]] = []
-    for k, method in enumerate(plan.methods):
-        say(f"errors of {formulation}, {method}", k, len(plan.methods))
-        if not accepts(importer, method):
+    for j, method in enumerate(plan.methods):
+        say(f"errors of {task.formulation}, {method}", j, len(plan.methods))
+        if not accepts(task.importer, method):
             if method not in dropped:
                 dropped.append(method)
             continue
-        enough = 0
-        for setting in dials(method, importer.step_size, plan.tolerances, plan.halvings):
-            begun = time.perf_counter()
-            try:
-                row = weigh(importer, setting, reference)
-                seconds = time.perf_counter() - begun
-                wide = replace(setting, communication=wider(importer))
-                row = _worse(row, reference.errors(importer.observe(wide)))
-            except SimulationError:
-                continue
-            found.append((formulation, row, seconds))
-            enough += _error(row, names, reference) <= goal.on_the_scene
-            if enough == ENOUGH or seconds > plan.limit:
-                break
+        grid = dials(method, task.importer.step_size, plan.tolerances, plan.halvings)
+        walk = Walk(grid, task, task.goal, task.clock)
+        held = coarsest(walk, task.near.get(method, start(grid, task.goal)), plan.warm_up)
+        if held is not None:
+            task.near.setdefault(method, held)
+        found += [(task.formulation, row, s) for _, (row, _, s) in sorted(walk.found.items())]
     return found
 
 
@@ -171,10 +195,16 @@ def _worth_timing(
     names: Sequence[str],
     reference: Reference,
     goal: Goal,
+    plan: Plan,
 ) -> list[tuple[str, Row, float]]:
-    good = [s for _, r, s in found if _error(r, names, reference) <= goal.on_the_scene]
-    longest = SLOW * min(good, default=float("inf"))
-    return [(f, r, s) for f, r, s in found if s <= longest]
+    """What takes no longer than SLOW times the fastest that holds the goal.
+
+    Where runs take long (no `warm_up`) only what holds it, unless nothing does.
+    """
+    good = [x for x in found if _error(x[1], names, reference) <= goal.on_the_scene]
+    longest = SLOW * min((s for _, _, s in good), default=math.inf)
+    among = found if plan.warm_up or not good else good
+    return [x for x in among if x[2] <= longest]
 
 
 def ranked(options: Sequence[Option], error: float) -> list[Option]:
@@ -189,11 +219,12 @@ def ranked(options: Sequence[Option], error: float) -> list[Option]:
     order = []
     while left:
         fastest = min(left, key=lambda o: o.row.median)
+        few = len(fastest.row.seconds) < SPREAD
         alike = [
             o
             for o in left
-            if o.row.quartiles[0] <= fastest.row.quartiles[1]
-            and o.row.median <= factor * fastest.row.median
+            if o.row.median <= factor * fastest.row.median
+            and (few or o.row.quartiles[0] <= fastest.row.quartiles[1])
         ]
         best = min(alike, key=lambda o: (o.evaluations, o.error))
         order.append(best)

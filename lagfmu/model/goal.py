@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
+import fnmatch
+import re
+from collections.abc import Collection
 from dataclasses import dataclass
 
-from ...errors import BuildError
+from ..errors import BuildError
 
 MARGIN = 5.0  # the choice is this much better on the scene than what was asked
 HELD_OUT_MARGIN = 2.0  # and still this much on other start values and parameters
 LOOSEST, FINEST = 0.1, 1e-12
+GROUPS = {  # of quantities that an accuracy is asked of
+    "lambda": r"lambda\.\w+",
+    "Q": r"Q\.\w+",
+    "coordinates": r"[A-Za-z_]\w*",
+    "event time": r"departure\.\w+\.time",
+}
+USUAL = 10.0  # times the tolerance that a closed form may miss, unless it says otherwise
+
+
+def _is(variable: str, name: str) -> bool:
+    """Whether a variable is meant by a name, a pattern (Q.*) or a group."""
+    group = GROUPS.get(name)
+    if group is not None and re.fullmatch(group, variable):
+        return True
+    return fnmatch.fnmatchcase(variable, name)
 
 
 @dataclass(frozen=True)
@@ -27,6 +45,17 @@ class Goal:
     def held_out(self) -> float:
         """The error that it may have elsewhere."""
         return self.accuracy / HELD_OUT_MARGIN
+
+    def allowed(self, symbols: Collection[str], within: float) -> float | None:
+        """What a statement about these variables may miss, relative to its scale; None: not asked.
+
+        A measured quantity is held to the accuracy itself.  An expression of such, which loosens them
+        by its terms, is when it is allowed `within` / USUAL of what is usual.
+        """
+        if self.names and not all(any(_is(s, n) for n in self.names) for s in symbols):
+            return None
+        measured = len(symbols) == 1 and any(_is(s, group) for s in symbols for group in GROUPS)
+        return self.accuracy if measured else self.accuracy * max(1.0, within / USUAL)
 
     def __str__(self) -> str:
         return f"{self.accuracy:g}" + (f" of {', '.join(self.names)}" if self.names else "")
