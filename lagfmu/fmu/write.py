@@ -12,6 +12,7 @@ from pathlib import Path
 from ..errors import BuildError
 from ..model.closed_form import ClosedForm, Conserved
 from ..page.documentation import page
+from ..page.picture import IN_FMU, as_bytes, picture_of
 from ..prepare.prepare import Prepared
 from ..prepare.starts import check_given, tell
 from . import native, python
@@ -53,6 +54,9 @@ def write(
             prepared.model.splines,
         ),
     }
+    picture = picture_of(prepared)
+    if picture is not None:
+        extra[IN_FMU] = as_bytes(picture)
     equations = (prepared.coded, prepared.coded_reduction)
     made = (*equations, prepared.scene, prepared.table, prepared.system, extra)
     content = native.build(*made, platforms) if target == "native" else python.build(*made)

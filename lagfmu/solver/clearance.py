@@ -33,12 +33,12 @@ def between(
     found, rates, bounded = CLEAR, None, len(leg.system.contacts) + len(leg.system.floors)
     limits = ranges(leg)
     for r, f_a, f_b in zip(limits, at_a.tolist(), at_b.tolist(), strict=True):
-        if r.inside(f_a) < -r.slack:
-            return BRACKETS
-        if r.inside(f_b) < -r.slack:
+        if r.inside(f_a) >= -r.slack > r.inside(f_b):
             found = BRACKETS
     for k, r in enumerate(limits[:bounded]):
         if k < len(leg.state.closed) and leg.state.closed[k]:
+            continue
+        if r.inside(float(at_a[k])) < -r.slack:
             continue
         if rates is None:
             rates = _rates(leg, dense, a, b)

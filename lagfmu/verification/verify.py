@@ -171,7 +171,9 @@ def claims_in(path: Path) -> list[Claim]:
             v = variables.get(name)
             if v is None:
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
-            elif (v.type == "Boolean") != name.startswith("contact.") or v.type == "String":
+            elif (v.type == "Boolean") != name.startswith(
+                ("contact.", "sticks.")
+            ) or v.type == "String":
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
@@ -214,7 +216,7 @@ def check_claim(
 
     `as_built`: held to the accuracy that the FMU was built for, if it was built for one.
     """
-    chosen = applies(claim, result)
+    chosen = applies(claim, result, values)
     allowed = claim.allowed(tolerance, as_built)
     count = int(chosen.sum())
     if count == 0:
@@ -235,8 +237,8 @@ def check_claim(
     return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
 
 
-def applies(claim: Claim, result: Trajectory) -> NDArray[np.bool_]:
-    """The communication points of a run at which a closed form says something."""
+def applies(claim: Claim, result: Trajectory, values: Mapping[str, float]) -> NDArray[np.bool_]:
+    """The communication points of a run at which a closed form says something; `values`: parameters."""
     chosen = np.ones(len(result), dtype=bool)
     if claim.while_closed is not None:
         chosen &= result[f"contact.{claim.while_closed}"]
@@ -249,7 +251,7 @@ def applies(claim: Claim, result: Trajectory) -> NDArray[np.bool_]:
         left = result[f"departure.{claim.until_departure}.count"] > 0
         chosen &= np.logical_and.accumulate(closed & ~left)
     if claim.when is not None:
-        chosen &= evaluate(claim.when, result, result, {}, claim.name) != 0
+        chosen &= evaluate(claim.when, result, result, values, claim.name) != 0
     if claim.at_departure is not None:
         left = result[f"departure.{claim.at_departure}.count"] > 0
         chosen &= (np.cumsum(left) == 1) & result[f"contact.{claim.at_departure}"][0]

@@ -63,6 +63,11 @@ static int is_bounded(const Solver *s, int i) {
                                    : i < s->system->contacts + s->system->jumps;
 }
 
+static int is_inside(const Solver *s, int i, double value) {
+    const Range r = indicators_range(s, i);
+    return !(range_inside(r, value) < -r.slack);
+}
+
 Clearance clearance_between(Solver *s, const Looks *looks, int k, double *y) {
     const int width = indicators_count(s->system);
     const double *at_a = looks->values + k * width, *at_b = at_a + width;
@@ -71,15 +76,11 @@ Clearance clearance_between(Solver *s, const Looks *looks, int k, double *y) {
     const int moving = inputs_move(s);
     const Interval *rates = NULL;
     Clearance found = CLEAR;
+    for (int i = 0; i < width; i++)
+        if (is_inside(s, i, at_a[i]) && !is_inside(s, i, at_b[i])) found = BRACKETS;
     for (int i = 0; i < width; i++) {
         const Range r = indicators_range(s, i);
-        const double inside = range_inside(r, at_b[i]);
-        if (inside < -r.slack) found = BRACKETS;
-        if (range_inside(r, at_a[i]) < -r.slack) return BRACKETS;
-    }
-    for (int i = 0; i < width; i++) {
-        const Range r = indicators_range(s, i);
-        if (!is_bounded(s, i)) continue;
+        if (!is_bounded(s, i) || !is_inside(s, i, at_a[i])) continue;
         if (rates == NULL) rates = bound_rates(s, a, b, y);
         Interval rate = rates[i];
         if (moving && i >= s->system->contacts) rate = interval_unknown();
@@ -88,7 +89,7 @@ Clearance clearance_between(Solver *s, const Looks *looks, int k, double *y) {
             continue;
         }
         const Interval fall = {-rate.high, -rate.low};
-        if (range_inside(r, at_b[i]) < -r.slack) {
+        if (!is_inside(s, i, at_b[i])) {
             if (h > FINE * step && rate.low < 0 && rate.high > 0) return UNKNOWN;
         } else if ((r.low > -HUGE_VAL &&
                     lowest(at_a[i] - r.low, at_b[i] - r.low, rate, h) < -r.slack) ||
