@@ -19,6 +19,7 @@ from .archive import pack
 from .claims import pack_closed_forms
 from .compiler import HOST
 
+SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
 TARGETS = ("python", "native")
 PAGE = "documentation/index.html"
 
@@ -73,10 +74,20 @@ def put_figures(
 
 
 def _as_built(prepared: Prepared, target: str) -> Prepared:
-    """A python FMU has no model exchange."""
-    if target == "native":
-        return prepared
-    return replace(prepared, table=prepared.table.without_local_derivatives())
+    """With the nominal values of states; a python FMU has no model exchange."""
+    table = prepared.table.with_nominals(_nominals(prepared))
+    return replace(
+        prepared, table=table if target == "native" else table.without_local_derivatives()
+    )
+
+
+def _nominals(prepared: Prepared) -> dict[str, float]:
+    """The sizes by which the errors of the states are measured at the described start, in two digits."""
+    scale = prepared.structure.start.state.scale
+    states = prepared.whole.states  # a coordinate, its velocity, the next coordinate, ...
+    names = [*states[::2], *states[1::2]]
+    sizes = zip(names, scale, strict=True)
+    return {name: float(f"{size:.1e}") for name, size in sizes if size > SMALLEST_NOMINAL}
 
 
 def write_whole(path: Path, content: bytes) -> None:

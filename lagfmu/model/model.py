@@ -57,7 +57,7 @@ class Model(ModelFields):
     given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
     numbers in SI.  `descriptions` may explain coordinates.  `outputs` are quantities besides those
-    that every FMU reports.
+    that every FMU reports.  `author`, `version`, `license` and `copyright` are told to importers.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """

@@ -133,6 +133,10 @@ class ModelFields:
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
     outputs: Sequence[Output] = ()
+    author: str = ""
+    version: str = ""
+    license: str = ""
+    copyright: str = ""
 
     @property
     def energy_expression(self) -> Expr:
