@@ -82,12 +82,12 @@ def _as_built(prepared: Prepared, target: str) -> Prepared:
 
 
 def _nominals(prepared: Prepared) -> dict[str, float]:
-    """The sizes by which the errors of the states are measured at the described start, in two digits."""
-    scale = prepared.structure.start.state.scale
+    """The sizes of coordinates at the described start, and times the natural rate those of velocities."""
+    state = prepared.structure.start.state
     states = prepared.whole.states  # a coordinate, its velocity, the next coordinate, ...
-    names = [*states[::2], *states[1::2]]
-    sizes = zip(names, scale, strict=True)
-    return {name: float(f"{size:.1e}") for name, size in sizes if size > SMALLEST_NOMINAL}
+    sizes = dict(zip(states[::2], state.size, strict=True))
+    rates = {v: size * state.rate for v, size in zip(states[1::2], state.size, strict=True)}
+    return {n: float(f"{x:.1e}") for n, x in (sizes | rates).items() if x > SMALLEST_NOMINAL}
 
 
 def write_whole(path: Path, content: bytes) -> None:
