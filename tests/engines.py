@@ -71,8 +71,8 @@ def in_libcosim(job: Job) -> list[list[float]]:
     for instance, given in job["values"].items():
         for name, value in given.items():
             at = (number[instance], reference(job, instance, name), value)
-            if isinstance(value, str):
-                must(execution.string_initial_value(*at))
+            if isinstance(value, int):
+                must(execution.integer_initial_value(*at))
             else:
                 must(execution.real_initial_value(*at))
     for source, output, sink, taken in job["connections"]:
@@ -158,7 +158,7 @@ def in_fmuloader(job: Job) -> list[list[float]]:
         slave.setup_experiment(0.0)
         slave.enter_initialization_mode()
         for name, value in job["values"].get(instance, {}).items():
-            give = slave.set_string if isinstance(value, str) else slave.set_real
+            give = slave.set_integer if isinstance(value, int) else slave.set_real
             give([reference(job, instance, name)], [value])
 
     def exchange(rates: bool) -> None:

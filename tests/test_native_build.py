@@ -87,7 +87,7 @@ def test_both_targets_have_the_same_variables(native_fmu, python_fmu, name):
             for element in root.find(part).iter():
                 attributes = {k: v for k, v in element.attrib.items() if k != "reinit"}
                 if element.get("name") == "solver.method":
-                    attributes.pop("description")
+                    attributes.pop("description")  # rattle is native only
                 found.append((element.tag, attributes))
         return found
 
