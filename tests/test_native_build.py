@@ -373,11 +373,11 @@ def test_platforms_are_chosen_by_name():
 def test_without_a_compiler_the_remedy_is_named(prepared, tmp_path, monkeypatch):
     """None at all, or one for this machine only."""
     monkeypatch.setattr(compiler, "find_compiler", lambda: None)
-    with pytest.raises(BuildError, match=r"pip install lagfmu\[native\]"):
+    with pytest.raises(BuildError, match=r"pip install ziglang"):
         write(prepared("PendulumAngle"), tmp_path, target="native")
     only = compiler.Compiler(("cc",), False, "cc")
     monkeypatch.setattr(compiler, "find_compiler", lambda: only)
-    with pytest.raises(BuildError, match=r"this machine only.*pip install lagfmu\[native\]"):
+    with pytest.raises(BuildError, match=r"this machine only.*pip install ziglang"):
         write(prepared("PendulumAngle"), tmp_path, target="native", platforms=("all",))
     assert not list(tmp_path.iterdir())
 
