@@ -1,51 +1,9 @@
-"""Lagrange's equations with multipliers, from SymPy to FMUs that report the forces of constraint."""
+"""Lagrange's equations with multipliers, from SymPy to FMUs that report the forces of constraint.
 
-from .api import build_fmu
-from .errors import LagfmuError, VerificationError
-from .mechanics.equations import EquationsOfMotion, derive
-from .mechanics.integrability.classify import classify
-from .model.closed_form import ClosedForm, Conserved, departure, initial, output
-from .model.convert import from_lagranges_method
-from .model.model import (
-    Contact,
-    Embedding,
-    Holonomic,
-    Input,
-    Model,
-    Nonholonomic,
-    Output,
-    Parameter,
-)
-from .model.reactions import force_of_constraint, multiplier
-from .model.scene import Scene
-from .verification.simulate import simulate
-from .verification.verify import Verification, verify
+The public names are those of __init__.pyi; each is imported when it is first asked for, so that what needs no
+SymPy (a worker of a sweep, `lagfmu --version`) does not wait for it.
+"""
 
-__all__ = [
-    "ClosedForm",
-    "Conserved",
-    "Contact",
-    "Embedding",
-    "EquationsOfMotion",
-    "Holonomic",
-    "Input",
-    "LagfmuError",
-    "Model",
-    "Nonholonomic",
-    "Output",
-    "Parameter",
-    "Scene",
-    "Verification",
-    "VerificationError",
-    "build_fmu",
-    "classify",
-    "departure",
-    "derive",
-    "force_of_constraint",
-    "from_lagranges_method",
-    "initial",
-    "multiplier",
-    "output",
-    "simulate",
-    "verify",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

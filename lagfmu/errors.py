@@ -20,6 +20,19 @@ class ModelError(LagfmuError):
         super().__init__(f"model {name!r} has {count}:\n{lines}")
 
 
+class TableError(LagfmuError):
+    """A table that is no function; `problems` lists everything that is wrong with it at once."""
+
+    def __init__(self, name: str, problems: Sequence[str]) -> None:
+        self.name = name
+        self.problems = tuple(problems)
+        super().__init__(f"spline {name!r}: " + "; ".join(self.problems))
+
+
+class LagfmuWarning(UserWarning):
+    """Something that is allowed, and may not be what was meant."""
+
+
 class UnitError(LagfmuError):
     """A unit that cannot be read, or is not coherent SI."""
 

@@ -46,6 +46,7 @@ class Page:
     def __init__(self, browser: Any, path: Any, **options: Any) -> None:
         self.context = browser.new_context(offline=True, **options)
         self.tab = self.context.new_page()
+        self.tab.set_default_timeout(8000)
         self.problems: list[str] = []
         self.requests: list[str] = []
         self.tab.on(
@@ -65,6 +66,27 @@ class Page:
         """The message with which a run is refused."""
         script = "s => lagfmu.run(s).then(() => 'not refused', e => e.message)"
         return str(self.tab.evaluate(script, settings))
+
+    def until(self, expression: str, seconds: float = 30.0) -> Any:
+        """The expression's value once it is true.  (The page's own policy forbids playwright's waiting,
+        which evaluates text in the page.)"""
+        for _ in range(int(seconds / 0.05)):
+            found = self.tab.evaluate(f"() => {expression}")
+            if found:
+                return found
+            self.tab.wait_for_timeout(50)
+        raise AssertionError(f"{expression} did not become true within {seconds} s")
+
+    def slide(self, name: str, value: float) -> None:
+        """Moves the slider of a parameter, start value or input, and waits for the curves."""
+        before = self.until("lagfmu.runs")
+        script = """([name, value]) => {
+            const slider = document.querySelector(`input[data-name="${name}"]`);
+            slider.value = value;
+            slider.dispatchEvent(new Event("input"));
+        }"""
+        self.tab.evaluate(script, [name, value])
+        self.until(f"lagfmu.runs > {before}")
 
     def close(self) -> None:
         self.context.close()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from browser import Page, chromium
 from fmi2 import Library
 
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
+from lagfmu.live.playable import of_fmu
+from lagfmu.live.render import Playable, render
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import Prepared, prepare
 
@@ -32,6 +36,8 @@ FILES = {
     "SliderCrank": "slider_crank",
     "DoublePendulum": "double_pendulum",
     "BouncingBall": "bouncing_ball",
+    "Crane": "crane",
+    "HalfCar": "half_car",
 }
 
 
@@ -108,3 +114,55 @@ def fmu(target: str, request: pytest.FixtureRequest) -> Fmu:
     """fmu(NAME): path of the FMU of the present target."""
     made: Fmu = request.getfixturevalue(f"{target}_fmu")
     return made
+
+
+@pytest.fixture(scope="session")
+def playable(native_fmu: Fmu) -> Callable[[str], Playable]:
+    """playable(NAME): the parts of the page of an FMU of models/, compiled once."""
+    compiler = find_compiler()
+    if compiler is None or not compiler.cross:
+        pytest.skip("no ziglang: pip install -e '.[native]'")
+    made: dict[str, Playable] = {}
+
+    def get(name: str) -> Playable:
+        if name not in made:
+            made[name] = of_fmu(native_fmu(name))
+        return made[name]
+
+    return get
+
+
+@pytest.fixture(scope="session")
+def page_file(playable: Callable[[str], Playable], tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """page_file(NAME): the page on disk."""
+    folder = tmp_path_factory.mktemp("pages")
+
+    def get(name: str) -> Path:
+        path = folder / f"{name}.html"
+        if not path.exists():
+            path.write_text(render(playable(name)), encoding="utf-8")
+        return path
+
+    return get
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture
+def opened(browser: Any, page_file: Any) -> Iterator[Callable[..., Page]]:
+    """opened(NAME): its page in Chromium; at the end nothing must have gone wrong in it."""
+    pages: list[Page] = []
+
+    def get(name: str, **options: Any) -> Page:
+        pages.append(Page(browser, page_file(name), **options))
+        return pages[-1]
+
+    yield get
+    for page in pages:
+        page.close()
+        assert page.problems == []
+        assert all(r.startswith(("file:", "blob:", "data:")) for r in page.requests)

@@ -91,7 +91,7 @@ int bench_moved(const Bench *b, int i, const char **name, double *given, double 
 
 int bench_start(Bench *b, double t, const double *q, const double *v, double tolerance) {
     b->moved = 0;
-    b->solver.settings = (Settings){DOP853, tolerance, 0, 0};
+    b->solver.settings = (Settings){DOP853, tolerance, 0, 0, 1e6};
     b->solver.drive.since = t;
     return solver_start(&b->solver, t, q, v, b->rank, moved, b);
 }

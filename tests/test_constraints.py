@@ -327,6 +327,57 @@ def test_exact_set_and_redundant_forms():
     check(classify([d(x) - d(y), x * d(x) + d(z)], [x, y, z]), Kind.HOLONOMIC, 2, 2)
 
 
+# --- on the surfaces of holonomic constraints ------------------------------------------------
+
+
+COIN = [d(x) - R * cos(phi) * d(theta), d(y) - R * sin(phi) * d(theta)]
+
+
+@pytest.mark.parametrize("held", [phi, phi - alpha, 2 * phi - alpha])
+def test_a_coin_whose_heading_is_held_rolls_along_a_line(held):
+    """With phi held, x = R theta cos(phi): two integrals, where the free coin has none."""
+    free = classify(COIN, [x, y, phi, theta])
+    assert (free.kind, free.holonomic_rank) == (Kind.NONHOLONOMIC, 0)
+    answer = classify(COIN, [x, y, phi, theta], holonomic=[held])
+    assert (answer.kind, answer.rank, answer.holonomic_rank) == (Kind.HOLONOMIC, 2, 2)
+    assert len(answer.integrals) == 2
+
+
+def test_a_coin_that_is_turned_at_a_given_rate_is_nonholonomic():
+    """phi = omega t takes one coordinate, not the constraint's nature: theta may be anything."""
+    answer = classify(COIN, [x, y, phi, theta], holonomic=[phi - omega * t])
+    assert (answer.kind, answer.holonomic_rank) == (Kind.NONHOLONOMIC, 0)
+
+
+def test_a_cylinder_that_rolls_in_a_cylinder_has_one_degree_of_freedom():
+    """Its centre on a circle, x^2 + y^2 = R^2: x dy - y dx is R^2 times an angle's differential, there."""
+    rolling = x * d(y) - y * d(x) + R**2 * d(theta)
+    assert classify(rolling, [x, y, theta]).kind is Kind.NONHOLONOMIC
+    answer = classify(rolling, [x, y, theta], holonomic=[x**2 + y**2 - R**2])
+    assert (answer.kind, answer.rank, answer.holonomic_rank) == (Kind.INTEGRABLE, 1, 1)
+    polar = classify(
+        (R - 1) * d(phi) + d(theta), [x, y, phi, theta], holonomic=[x - sin(phi), y - cos(phi)]
+    )
+    assert polar.kind is Kind.HOLONOMIC
+
+
+def test_a_form_that_the_surface_implies_constrains_nothing():
+    """x dx + y dy = 0 on every circle, dz - y dx = 0 where z and y are held at 0."""
+    circle = classify(x * d(x) + y * d(y), [x, y], holonomic=[x**2 + y**2 - 1])
+    corner = classify(d(z) - y * d(x), [x, y, z], holonomic=[z, y])
+    assert circle.rank == corner.rank == 0
+    assert "constrains nothing" in circle.certificate
+
+
+def test_a_surface_beside_does_not_make_a_knife_edge_integrable():
+    """A bead elsewhere on a circle has nothing to do with the knife edge: it stays nonholonomic."""
+    answer = classify(
+        sin(phi) * d(x) - cos(phi) * d(y), [x, y, phi, z, s], holonomic=[z**2 + s**2 - 1]
+    )
+    assert (answer.kind, answer.rank, answer.holonomic_rank) == (Kind.NONHOLONOMIC, 1, 0)
+    assert answer.witness != 0
+
+
 # --- limits --------------------------------------------------------------------------------
 
 
@@ -345,9 +396,9 @@ def test_undecided_in_regions():
     assert answer.kind is Kind.UNDECIDED
 
 
-@pytest.mark.parametrize(("limit", "value"), [("_LARGEST", 3), ("_SECONDS", -1.0)])
+@pytest.mark.parametrize(("limit", "value"), [("_LARGEST", 3), ("_EFFORT", -1.0)])
 def test_too_long_to_decide(monkeypatch, limit, value):
-    """An expression that outgrows memory or time is undecided, too: no guess, and no crash."""
+    """An expression that outgrows memory or effort is undecided, too: no guess, and no crash."""
     monkeypatch.setattr(f"lagfmu.mechanics.integrability.tower.{limit}", value)
     answer = classify([sin(phi) * d(x) - (x + y + z) * d(y), d(z) - y * d(x)], [x, y, z, phi])
     assert answer.kind is Kind.UNDECIDED

@@ -4,18 +4,17 @@ it refuses a run."""
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from browser import Page, chromium
+from browser import Page
 from conftest import FILES
 from typer.testing import CliRunner
 
 from lagfmu.cli.app import app
-from lagfmu.fmu.compiler import find_compiler
 from lagfmu.live.playable import of_fmu
 from lagfmu.live.render import Playable, render
 from lagfmu.verification.simulate import read_description, simulate
@@ -25,59 +24,6 @@ pytest.importorskip("wasmtime", reason="pip install -e '.[test]'")
 from wasm import Module
 
 ROUNDING = 1e-14  # relative: the two C libraries differ in the last place of sin, cos and pow
-Playables = Callable[[str], Playable]
-
-
-@pytest.fixture(scope="module")
-def playable(native_fmu: Callable[[str], Path]) -> Playables:
-    """playable(NAME): the parts of the page of an FMU of models/, compiled once."""
-    compiler = find_compiler()
-    if compiler is None or not compiler.cross:
-        pytest.skip("no ziglang: pip install -e '.[native]'")
-    made: dict[str, Playable] = {}
-
-    def get(name: str) -> Playable:
-        if name not in made:
-            made[name] = of_fmu(native_fmu(name))
-        return made[name]
-
-    return get
-
-
-@pytest.fixture(scope="module")
-def page_file(playable: Playables, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """page_file(NAME): the page on disk."""
-    folder = tmp_path_factory.mktemp("pages")
-
-    def get(name: str) -> Path:
-        path = folder / f"{name}.html"
-        if not path.exists():
-            path.write_text(render(playable(name)), encoding="utf-8")
-        return path
-
-    return get
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
-
-
-@pytest.fixture
-def opened(browser: Any, page_file: Any) -> Iterator[Callable[..., Page]]:
-    """opened(NAME): its page in Chromium; at the end nothing must have gone wrong in it."""
-    pages: list[Page] = []
-
-    def get(name: str, **options: Any) -> Page:
-        pages.append(Page(browser, page_file(name), **options))
-        return pages[-1]
-
-    yield get
-    for page in pages:
-        page.close()
-        assert page.problems == []
-        assert all(r.startswith(("file:", "blob:", "data:")) for r in page.requests)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +63,7 @@ def allowed(fmu: Path, run: Any) -> dict[str, float]:
 
 @pytest.mark.parametrize("name", FILES)
 def test_the_module_is_the_native_fmu(
-    name: str, playable: Playables, native: Callable[[str], Any]
+    name: str, playable: Callable[[str], Playable], native: Callable[[str], Any]
 ) -> None:
     """In wasmtime: what the module answers is what the machine's own binary answers, but for rounding in
     the C library; and it asks nothing of its host."""
@@ -216,7 +162,7 @@ def test_without_zig_the_message_says_what_to_do(
 
 
 def test_a_page_is_the_same_from_model_and_fmu(
-    playable: Playables, native_fmu: Callable[[str], Path], tmp_path: Path
+    playable: Callable[[str], Playable], native_fmu: Callable[[str], Path], tmp_path: Path
 ) -> None:
     """lagfmu page MODEL.py and lagfmu page of the FMU built of it: one page, byte for byte."""
     model = Path(__file__).parent.parent / "models" / "hemisphere.py"

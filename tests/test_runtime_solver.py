@@ -32,6 +32,7 @@ from lagfmu.solver.contacts import complementary_modes
 from lagfmu.solver.failure import StartFailureError, StepFailureError
 from lagfmu.solver.impact import impact
 from lagfmu.solver.instant import Instant
+from lagfmu.solver.motion import project
 from lagfmu.solver.observe import observe
 from lagfmu.solver.precedence import GIVEN, OMITTED, SET
 from lagfmu.solver.state import Settings
@@ -397,6 +398,34 @@ def test_constraints_that_no_velocity_satisfies_are_still_refused(bench):
     system = lower(derive(model))
     with pytest.raises(StartFailureError, match="no velocities satisfy"):
         initial.start(system, Settings(), 0.0, [0, 0], [0, 1], [], [2.0, 1e-3])
+
+
+def test_where_curves_touch_a_projection_ends_at_rounding(bench):
+    """y = 0 and y = k x^2 touch at x = 0, where Newton's method only halves x: 1e-9 m from there f is 1e-18 m
+    beside a length of 1 m, rounding; 1e-3 m from there it is not, and what is told is that the place is
+    singular, not that steps are too long."""
+    k, length = symbols("k length", positive=True)
+    model = Model(
+        name="Tangent",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("line", y), Holonomic("curve", y - k * x**2)],
+        parameters=[MASS, Parameter(k, 1.0, "1/m"), Parameter(length, 1.0, "m")],
+        start={x: 0.0, y: 0.0},
+    )
+    one = bench(model)
+    system, p = one.system, one.p.tolist()
+    one.array("state.size", 2)[:] = 1.0
+    one.array("state.offset", 2)[:] = 0.0
+    q, _ = one.project([1e-9, 0.0], [0.0, 0.0], [1, 1])
+    assert abs(q[0]) < 1e-9
+    at = Instant(system, 0.0, [], p)
+    moved, _ = project(at, np.array([1e-9, 0.0]), np.zeros(2), [0, 1], np.zeros(2), np.ones(2))
+    assert abs(moved[0]) < 1e-9
+    with pytest.raises(AssertionError, match="singular"):
+        one.project([1e-3, 0.0], [0.0, 0.0], [1, 1])
+    with pytest.raises(StepFailureError, match="singular"):
+        project(at, np.array([1e-3, 0.0]), np.zeros(2), [0, 1], np.zeros(2), np.ones(2))
 
 
 def test_a_moving_start_is_exact_at_any_time_and_input(bench):

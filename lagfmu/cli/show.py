@@ -93,7 +93,7 @@ def _classes(eom: EquationsOfMotion, console: Console) -> None:
         note = f", while {closed} is closed" if closed is not None else ""
         if isinstance(c, Nonholonomic):
             forms[c.name] = sp.sympify(c.expression)
-            found = classify(forms[c.name], list(eom.model.coordinates))
+            found = _classified(eom, [c])
             _class(eom, console, f"{c.name:{width}}", found, note)
             continue
         kind = "contact (unilateral, holonomic while closed)"
@@ -103,8 +103,21 @@ def _classes(eom: EquationsOfMotion, console: Console) -> None:
             kind += ", rheonomic"
         _line(console, f"{c.name:{width}}", kind + note)
     if len(forms) > 1:
-        found = classify(list(forms.values()), list(eom.model.coordinates))
+        rolling = [c for c in eom.constraints if isinstance(c, Nonholonomic)]
+        found = _classified(eom, rolling)
         _class(eom, console, " and ".join(forms), found, "")
+
+
+def _classified(eom: EquationsOfMotion, forms: list[Nonholonomic]) -> Classification:
+    """On the surfaces of the holonomic constraints that act whenever one of the forms does."""
+    closed = {getattr(c, "while_closed", None) for c in forms} - {None}
+    surfaces = []
+    for c in eom.constraints:
+        acting = c.name if isinstance(c, Contact) else getattr(c, "while_closed", None)
+        if not isinstance(c, Nonholonomic) and (acting is None or acting in closed):
+            surfaces.append(sp.sympify(c.expression))
+    expressions = [sp.sympify(c.expression) for c in forms]
+    return classify(expressions, list(eom.model.coordinates), holonomic=surfaces)
 
 
 def _class(

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import difflib
 import json
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
 
-from ..errors import ModelError, VerificationError
+from ..errors import ModelError, TableError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
 from ..model.goal import parse
 from ..model.scene import Scene
-from .formula import read_formula, text_of
+from ..model.spline import Spline
+from .formula import functions_of, read_formula, text_of
 
 Expr = Any
 FORMAT = 1
@@ -129,12 +131,13 @@ def pack_closed_forms(
     table: VariableTable,
     numbers: Mapping[str, Expr] | None = None,
     held: Collection[str] = (),
+    tables: Sequence[Spline] = (),
 ) -> bytes:
     """JSON with the claims; expressions are indexed symbols, so that any name can be read back.
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
-    closed.  Claims that need a variable which the scene leaves out are left out too.  Raises ModelError
-    if a claim uses what no FMU of the model has.
+    closed, `tables` those that the model looks up.  Claims that need a variable which the scene leaves
+    out are left out too.  Raises ModelError if a claim uses what no FMU of the model has.
     """
     claims = [
         claim
@@ -156,7 +159,7 @@ def pack_closed_forms(
                     + (f"; did you mean {near[0]!r}?" if near else "")
                 )
     goal = None if scene.accuracy is None else parse(scene.accuracy)
-    packed = []
+    packed, functions = [], functions_of(tables)
     for claim in kept:
         entry: dict[str, Any] = {
             key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
@@ -171,12 +174,19 @@ def pack_closed_forms(
         entry["symbols"] = {short: str(symbol) for symbol, short in names.items()}
         packed.append(entry)
         try:
-            _claim(entry)  # it has to come back
+            _claim(entry, functions)  # it has to come back
         except ValueError as error:
             problems.append(f"closed form {claim.name!r} cannot be carried by an FMU: {error}")
     if problems:
         raise ModelError(scene.name, problems)
-    return json.dumps({"format": FORMAT, "closed_forms": packed}, indent=1).encode()
+    record: dict[str, Any] = {"format": FORMAT, "closed_forms": packed}
+    if tables:
+        record["tables"] = [
+            {"name": s.name, "x": s.x, "y": s.y, "ends": s.ends}
+            | {"x_unit": s.x_unit.name, "y_unit": s.y_unit.name}
+            for s in tables
+        ]
+    return json.dumps(record, indent=1).encode()
 
 
 def unpack_closed_forms(content: bytes, name: str) -> list[Claim]:
@@ -184,15 +194,27 @@ def unpack_closed_forms(content: bytes, name: str) -> list[Claim]:
 
     Raises VerificationError if the file is not lagfmu's.
     """
+    return _unpacked(content, name)[0]
+
+
+def tables_in(content: bytes, name: str) -> list[Spline]:
+    """The tables that an FMU's equations look up.  Raises VerificationError."""
+    return _unpacked(content, name)[1]
+
+
+def _unpacked(content: bytes, name: str) -> tuple[list[Claim], list[Spline]]:
     try:
         if len(content) > LARGEST_RECORD:
             raise ValueError(f"{len(content)} bytes, expected at most {LARGEST_RECORD}")
         data = json.loads(content)
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise ValueError(f"expected format {FORMAT}")
-        if not isinstance(data.get("closed_forms"), list):
-            raise ValueError("expected a list of closed forms")
-        return [_claim(entry) for entry in data["closed_forms"]]
+        for what, field in (("closed forms", "closed_forms"), ("tables", "tables")):
+            if not isinstance(data.get(field, []), list) or "closed_forms" not in data:
+                raise ValueError(f"expected a list of {what}")
+        tables = [_spline(entry) for entry in data.get("tables", [])]
+        functions = functions_of(tables)
+        return [_claim(entry, functions) for entry in data["closed_forms"]], tables
     except (ValueError, RecursionError) as error:
         raise VerificationError(
             f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "
@@ -206,7 +228,20 @@ def _text(e: Expr, names: dict[Expr, str]) -> str:
     return text_of(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}))
 
 
-def _claim(entry: Any) -> Claim:
+def _spline(entry: Any) -> Spline:
+    """A table of the record.  Raises ValueError with what is wrong in it."""
+    fields = ("name", "x", "y", "x_unit", "y_unit", "ends")
+    if not isinstance(entry, dict) or set(entry) != set(fields):
+        raise ValueError("a table with other fields than this version of lagfmu knows")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # told when the FMU was built
+            return Spline(*(entry[f] for f in fields))
+    except TableError as error:
+        raise ValueError(str(error)) from None
+
+
+def _claim(entry: Any, tables: Mapping[str, Any]) -> Claim:
     """One entry of the record.  Raises ValueError with what is wrong in it."""
     texts = {"name", *CONDITIONS, *EXPRESSIONS}
     numbers = {"within", "rounding"}
@@ -237,5 +272,5 @@ def _claim(entry: Any) -> Claim:
         fields["accuracy"] = float(entry["accuracy"])
     for key in EXPRESSIONS:
         text = entry[key]
-        fields[key] = None if text is None else read_formula(text, symbols)
+        fields[key] = None if text is None else read_formula(text, symbols, tables)
     return Claim(**fields)

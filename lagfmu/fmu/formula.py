@@ -14,10 +14,14 @@ import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import sympy as sp
 from sympy.printing.str import StrPrinter
+
+from ..model.spline import HIGHEST as HIGHEST_DERIVATIVE
+from ..model.spline import Spline
 
 Expr = Any
 
@@ -126,8 +130,21 @@ def text_of(e: Expr) -> str:
     return str(_Printer({"order": None}).doprint(e))
 
 
-def read_formula(text: str, symbols: Mapping[str, Expr]) -> Expr:
-    """The expression that a text says; `symbols` are the names that it may use.
+def functions_of(tables: Sequence[Spline]) -> dict[str, _Function]:
+    """The tables and their derivatives, by the names that they have in a formula."""
+    return {
+        spline.derivative(order).__name__: _one(
+            spline.derivative(order), partial(spline.table, order=order)
+        )
+        for spline in tables
+        for order in range(HIGHEST_DERIVATIVE + 1)
+    }
+
+
+def read_formula(
+    text: str, symbols: Mapping[str, Expr], tables: Mapping[str, _Function] | None = None
+) -> Expr:
+    """The expression that a text says; `symbols` are the names, `tables` the further functions of it.
 
     Nothing of the text is run.  Raises ValueError with what is not allowed in it.
     """
@@ -140,7 +157,7 @@ def read_formula(text: str, symbols: Mapping[str, Expr]) -> Expr:
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         raise ValueError(f"{_short(text)} is no formula ({error})") from None
     try:
-        return _Reader(symbols).read(tree)
+        return _Reader(symbols, tables or {}).read(tree)
     except (ArithmeticError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"{_short(text)} is no formula ({error})") from None
 
@@ -159,8 +176,8 @@ class _Read:
 
 
 class _Reader:
-    def __init__(self, symbols: Mapping[str, Expr]) -> None:
-        self.symbols = symbols
+    def __init__(self, symbols: Mapping[str, Expr], tables: Mapping[str, _Function]) -> None:
+        self.symbols, self.tables = symbols, tables
         self.nodes = self.joined = 0
 
     def read(self, tree: ast.expr) -> Expr:
@@ -287,7 +304,7 @@ class _Reader:
             raise ValueError(f"{_short(name)} is called with {node.keywords[0].arg!r}=...")
         if name == "Piecewise":
             return self._piecewise(node.args, depth)
-        known = FUNCTIONS.get(name)
+        known = FUNCTIONS.get(name) or self.tables.get(name)
         arities = (2,) if name in EQUALITIES else known.arities if known else ()
         if not arities:
             raise ValueError(

@@ -51,7 +51,7 @@ Names are the model's: der_theta is the velocity of theta, lambda stands on the 
 """
 
 from {package}.fmu.slave import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
-from {package}.solver.system import Embedding, Own, Row, System
+{vocabulary}
 {equations}
 
 # name, type, what may set it, start, min, max, positive, given in the model; the position is the reference
@@ -88,7 +88,7 @@ def build(
         )
     methods = tuple(m for m in scene.selectable if m in IN_PYTHON)
     table = table.offering(methods)
-    runtime = _runtime(scene, system)
+    runtime = _runtime(scene, system, bool(eom.model.splines))
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
     text = _script(eom, reduction, scene, table, package, methods)
     module = f"{scene.name}_{_digest(text.encode())}"
@@ -128,7 +128,12 @@ def _script(
 ) -> str:
     rows = "".join(f"    {_row(v)!r},\n" for v in table.variables)
     equations = source(eom, reduction, scene.formulation or "multipliers")
+    words = ["Embedding", "Friction", "Lookups", "Own", "Row", "System"]
+    vocabulary = f"from {package}.solver.system import {', '.join(words)}"
+    if "= Cubic(" in equations:
+        vocabulary = f"from {package}.solver.cubic import Cubic\n{vocabulary}"
     return SCRIPT.format(
+        vocabulary=vocabulary,
         name=scene.name,
         version=version(),
         package=package,
@@ -150,10 +155,10 @@ def _row(v: Variable) -> tuple[Any, ...]:
     return v.name, kind, v.role, start, v.minimum, v.maximum, v.positive, v.given
 
 
-def _runtime(scene: Scene, system: System) -> dict[str, bytes]:
+def _runtime(scene: Scene, system: System, tables: bool) -> dict[str, bytes]:
     """Relative path -> content of the files of lagfmu that the FMU carries."""
     root = files("lagfmu")
-    gone = files_left_out(scene, system)
+    gone = files_left_out(scene, system, tables)
     own = {k: text.encode() for k, text in files_of_its_own(scene, system).items()}
     found = {"__init__.py": b"", "fmu/__init__.py": b""}
     for entry in SHIPPED:

@@ -91,6 +91,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         self.observed: list[Any] | None = None
         self.expected: list[float] = []
         self.warned = False
+        self.outside: set[str] = set()  # tables that were looked up beyond their ends
 
     # -------------------------------------------------------------- life cycle
 
@@ -151,6 +152,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             self.state, self.values, self.observed = before, values, None
             self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
             return False
+        self._warn_of_tables()
         self._report_events(before, self.state)
         if self.state.choice.product and not before.choice.product:
             self.log(self.state.choice.message(), Fmi2Status.ok, "logEvents")
@@ -190,6 +192,21 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                     "communication point; connect its derivatives as well"
                 )
                 self.warned = True
+
+    def _warn_of_tables(self) -> None:
+        """Once for each: a table is looked up beyond its ends."""
+        lookups, state = self.system.lookups, self.state
+        if lookups is None or state is None:
+            return
+        u = [*self._values(self.inputs), *state.levels]
+        places = lookups.places(state.t, state.q, state.v, u, self.p)
+        for (name, first, last), x in zip(lookups.reach, places, strict=True):
+            if not first <= x <= last and name not in self.outside:
+                self.outside.add(name)
+                self._warn(
+                    f"table {name} is looked up at {x!r}, outside of its points from {first!r} to "
+                    f"{last!r}: it goes on as a straight line"
+                )
 
     # -------------------------------------------------------------- values
 

@@ -93,6 +93,8 @@ def _number(v: Any) -> float | str | None:
 def _group(v: Any, role: str, named: set[str]) -> str:
     """The heading under which a curve stands."""
     head = v.name.split(".")[0]
+    if v.name.startswith("Q.") and v.name.count(".") > 1:
+        return "Forces of each constraint"
     if head in GROUPS and head != v.name:
         return GROUPS[head]
     if v.name.startswith("der("):

@@ -20,7 +20,19 @@ from markupsafe import Markup
 
 from .markup import Section, as_json
 
-APPLICATION = ("api.js",)
+APPLICATION = (
+    "api.js",
+    "format.js",
+    "settings.js",
+    "controls.js",
+    "trajectory.js",
+    "charts.js",
+    "expression.js",
+    "picture.js",
+    "player.js",
+    "accuracy.js",
+    "main.js",
+)
 WORKER = ("fmu.js", "worker.js")
 LIBRARY, LIBRARY_STYLE, LICENCE = "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"
 
@@ -48,6 +60,7 @@ def render(playable: Playable) -> str:
         name=playable.name,
         description=playable.facts["description"],
         equations=playable.equations,
+        picture=playable.facts["picture"] is not None,
         facts=as_json(playable.facts),
         module=packed,
         style=Markup(_text("vendor", LIBRARY_STYLE) + _text("page.css")),

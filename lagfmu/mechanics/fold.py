@@ -32,7 +32,7 @@ def numbers_of(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> dic
     inputs = {name_of(i.symbol): i for i in eom.model.inputs}
     driven = select(scene.inputs, list(inputs), "input", problems)
     for name, i in inputs.items():
-        if name not in driven:
+        if name not in driven and not i.rate:  # one that moves by itself stays an input
             u = eom.symbols.get(i.symbol, i.symbol)
             rate = eom.rates.get(u)
             values |= {u: float(i.start)} | ({rate: 0.0, eom.rates[rate]: 0.0} if rate else {})
@@ -125,6 +125,7 @@ def _expressions(eom: EquationsOfMotion) -> list[Expr]:
     flat += [*eom.f, eom.kinetic, eom.potential]
     flat += [e for o in eom.outputs for e in (o.expression, o.otherwise)]
     flat += [eom.plain(c.restitution) for c in eom.constraints if isinstance(c, Contact)]
+    flat += [e for law in eom.frictions for e in law.expressions]
     return [sp.sympify(e) for e in flat if e is not None]
 
 

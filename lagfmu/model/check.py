@@ -13,10 +13,13 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
+from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
-from .reactions import reactions_in
+from .picture import check_picture
+from .reactions import reaction_units, reactions_in
+from .spline import Spline, splines_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
 
@@ -33,9 +36,12 @@ def problems_of(model: ModelFields) -> list[str]:
     _check_numbers(model, problems)
     _check_symbols(model, problems)
     check_outputs(model, problems)
+    check_picture(model, problems)
+    _check_splines(model, problems)
     units = declared_units(model, problems)
     if not problems:
         _check_dimensions(model, units, problems)
+        problems += check_frictions(model, units, reaction_units(model, units))
         check_output_units(model, units, problems)
     return problems
 
@@ -66,6 +72,12 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
             )
     for i in model.inputs:
         _finite(f"start of input {name_of(i.symbol)!r}", i.start, problems)
+        _finite(f"rate of input {name_of(i.symbol)!r}", i.rate, problems)
+        if _number(i.rate) and i.rate != 0 and i not in model.prescribed:
+            problems.append(
+                f"rate of input {name_of(i.symbol)!r} is {i.rate!r}, but only an input that stands in a "
+                "constraint (a prescribed motion) has one: leave it out"
+            )
     states = {s for q in model.coordinates for s in (q, q.diff(t))}
     _check_start("start", model.start, states, problems)
     if model.embedding is not None:
@@ -98,6 +110,31 @@ def _number(value: object) -> bool:
 def _finite(what: str, value: object, problems: list[str]) -> None:
     if not _number(value):
         problems.append(f"{what} is {value!r}, expected a finite number")
+
+
+def splines_of(model: ModelFields) -> list[Spline]:
+    """The tables that stand in a model's expressions, by name."""
+    relations = model.embedding.relations.values() if model.embedding else ()
+    others = [0 if o.otherwise is None else o.otherwise for o in model.outputs]
+    return splines_in(
+        [
+            *(e for _, e in _expressions(model)),
+            *(o.expression for o in model.outputs),
+            *others,
+            *relations,
+        ]
+    )
+
+
+def _check_splines(model: ModelFields, problems: list[str]) -> None:
+    """Two tables of one name could not be told apart in the FMU's code and closed forms."""
+    splines = splines_of(model)
+    taken = [s.name + ("_" + "x" * order if order else "") for s in splines for order in range(4)]
+    for s in splines:
+        if taken.count(s.name) > 1:
+            problems.append(
+                f"two tables are called {s.name!r}, or one as the other's slope: rename one"
+            )
 
 
 def _expressions(model: ModelFields) -> list[tuple[str, Expr]]:

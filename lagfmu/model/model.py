@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..errors import ModelError
-from .check import declared_units, problems_of
+from .check import declared_units, problems_of, splines_of
+from .frictions import split
 from .kinds import check_containers
 from .parts import (
     NAME,
@@ -21,6 +22,7 @@ from .parts import (
     Contact,
     Embedding,
     Expr,
+    Friction,
     Holonomic,
     Input,
     ModelFields,
@@ -30,6 +32,7 @@ from .parts import (
     name_of,
 )
 from .reactions import reaction_units
+from .spline import Spline
 from .units import Unit
 
 __all__ = [
@@ -39,6 +42,7 @@ __all__ = [
     "Contact",
     "Embedding",
     "Expr",
+    "Friction",
     "Holonomic",
     "Input",
     "Model",
@@ -57,7 +61,8 @@ class Model(ModelFields):
     given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
     numbers in SI.  `descriptions` may explain coordinates.  `outputs` are quantities besides those
-    that every FMU reports.  `author`, `version`, `license` and `copyright` are told to importers.
+    that every FMU reports, `picture` how it looks.  A `Friction` is written among `constraints` and kept in
+    `frictions`.  `author`, `version`, `license` and `copyright` are told to importers.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -70,8 +75,11 @@ class Model(ModelFields):
             raise ModelError(str(self.name), problems)
         for name in ("coordinates", "forces", "start", "descriptions"):
             object.__setattr__(self, name, dict(getattr(self, name)))
-        for name in ("constraints", "parameters", "inputs", "outputs"):
+        for name in ("constraints", "parameters", "inputs", "outputs", "picture"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
+        constraints, frictions = split(self.constraints)
+        object.__setattr__(self, "constraints", constraints)
+        object.__setattr__(self, "frictions", (*self.frictions, *frictions))
         problems = problems_of(self)
         if problems:
             raise ModelError(str(self.name), problems)
@@ -82,9 +90,19 @@ class Model(ModelFields):
         return declared_units(self, [])
 
     @cached_property
+    def splines(self) -> tuple[Spline, ...]:
+        """The tables that stand in it, by name."""
+        return tuple(splines_of(self))
+
+    @cached_property
     def reactions(self) -> dict[Expr, Unit]:
         """The unit of each `multiplier` and `force_of_constraint`."""
         return reaction_units(self, self.units)
+
+    @cached_property
+    def limited(self) -> dict[str, Friction]:
+        """The constraints that hold by friction alone, by name."""
+        return {name: f for f in self.frictions for name in f.of}
 
     def constraint(self, name: str) -> Constraint:
         """The constraint called `name`; KeyError if there is none."""

@@ -41,13 +41,14 @@ class Input:
 
     A dynamicsymbol that stands in a holonomic constraint or a contact is a prescribed motion: the
     FMU then has the inputs `u`, `der(u)` and `der(u,2)`, because the constraint's second derivative
-    needs them.
+    needs them.  `start` and `rate` [unit/s] are its value and its velocity until the importer sets them.
     """
 
     symbol: Expr
     unit: str = "1"
     start: float = 0.0
     description: str = ""
+    rate: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,28 @@ class Contact:
 
 
 Constraint = Holonomic | Nonholonomic | Contact
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction: the constraints `of`, one or two, hold while |lambda| <= static * |normal|.
+
+    Beyond that they slip, and lambda = -kinetic * |normal| * s/|s| with the slip velocity s = G v - nu
+    (two constraints: orthogonal velocities).  `normal` [N] is linear in `multiplier(NAME)`s; `static` and
+    `kinetic` (the same as `static` if None) are numbers or expressions without dimension.
+    """
+
+    name: str
+    of: Sequence[str]
+    normal: Expr
+    static: Expr
+    kinetic: Expr = None
+    description: str = ""
+
+    @property
+    def sliding(self) -> Expr:
+        """The coefficient of kinetic friction."""
+        return self.static if self.kinetic is None else self.kinetic
 
 
 @dataclass(frozen=True)
@@ -132,11 +155,13 @@ class ModelFields:
     embedding: Embedding | None = None
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
+    frictions: Sequence[Friction] = ()
     outputs: Sequence[Output] = ()
     author: str = ""
     version: str = ""
     license: str = ""
     copyright: str = ""
+    picture: Sequence[Any] = ()  # of the shapes in picture.py
 
     @property
     def energy_expression(self) -> Expr:

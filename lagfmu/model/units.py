@@ -326,6 +326,8 @@ class _Walker:
             for _, condition in expr.args:
                 self._condition(condition)
             return self._agree([value for value, _ in expr.args], expected, expr)
+        if hasattr(expr, "spline"):
+            return self._spline(expr)
         if isinstance(expr, sp.atan2):
             self._agree(expr.args, None, expr)
         elif isinstance(expr, (sp.sign, sp.Heaviside)):
@@ -339,6 +341,18 @@ class _Walker:
             )
             return None
         return ONE
+
+    def _spline(self, expr: Expr) -> Unit:
+        """A table's value, or [y]/[x]^k of its derivative; its argument has the unit of its x."""
+        spline, order = expr.spline, expr.order
+        unit = self.walk(expr.args[0], spline.x_unit)
+        if unit is not None and not unit.same_dimension(spline.x_unit):
+            self.report(
+                f"the argument of {plain(expr)!r} has unit {_shown(unit)}, expected "
+                f"{_shown(spline.x_unit)} as the table {spline.name!r} has: correct one of them"
+            )
+        found: Unit = spline.y_unit / spline.x_unit**order if order else spline.y_unit
+        return found
 
     def _pure(self, args: Iterable[Expr], role: str, whole: Expr) -> None:
         for arg in args:

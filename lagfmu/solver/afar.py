@@ -84,7 +84,10 @@ def _newton(
         if (np.abs(f[own]) <= allowed[own]).all() and len(own) < len(fixed):
             break  # what is left is not for these coordinates
         try:
-            step = stage.nearest(M, G[fixed][own], -f[own])
+            off = float(
+                (np.abs(f[own]) / np.where(unit[own] > 0, unit[own], np.inf)).max(initial=0.0)
+            )
+            step = stage.nearest(M, G[fixed][own], -f[own], off)
         except StepFailureError:
             break
         for damping in 2.0 ** -np.arange(25):

@@ -12,8 +12,8 @@ from .solution import Solution
 from .system import Matrix, Vector
 
 
-def kkt(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
-    """None where the matrix is singular to working precision."""
+def kkt(M: Matrix, b: Vector, G: Matrix, c: Vector, least: float = 0.0) -> Solution | None:
+    """None where the matrix is singular to working precision, or its reciprocal condition below `least`."""
     n, m = len(b), len(c)
     K = np.zeros((n + m, n + m))
     K[:n, :n] = M
@@ -33,7 +33,7 @@ def kkt(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
     if info != 0:
         return None
     rcond, _ = lapack.dgecon(lu, np.abs(A).sum(axis=0).max())
-    if rcond < 1e-14:
+    if rcond < max(1e-14, least):
         return None
     right = np.concatenate([b, c]) * d
     z = lapack.dgetrs(lu, pivots, right)[0]

@@ -17,36 +17,40 @@ from . import dependent
 from .failure import StepFailureError
 from .kkt import kkt
 from .schur import schur
-from .solution import Solution
+from .solution import ON, Solution, loose
 from .system import Matrix, Vector
 
 
-def solve(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool = False) -> Solution:
+def solve(
+    M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool = False, off: float = 0.0
+) -> Solution:
     """x (n) and lambda (m) of M x = b + G^T lambda, G x = c.
 
     `nearest`, for a projection: a coordinate with neither mass nor constraint stays; where dependent rows
     contradict each other, as those of a c do that is nothing but rounding, c is met as nearly as can be
-    (least squares in rows of comparable units).
+    (least squares in rows of comparable units).  `off`: how far the state is off the constraints, relative to
+    their size; rows that depend on each other on them do so there, and are not asked to agree.
 
     Raises StepFailureError if a value is not finite, the mass matrix is singular on the constraint
     surface, or dependent constraints contradict each other.
     """
     _check_finite(M, b, G, c)
-    found = schur(M, b, G, c) or kkt(M, b, G, c)
+    least = loose(off) ** 2
+    found = schur(M, b, G, c, least) or kkt(M, b, G, c, least)
     if found is None:
         if dependent.orthogonal is None:
             raise StepFailureError(
                 "the mass matrix is singular at this state: a coordinate has no mass"
             )
-        found = dependent.orthogonal(M, b, G, c, nearest)
+        found = dependent.orthogonal(M, b, G, c, nearest, off)
     return _finite(found)
 
 
-def solve_nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
+def solve_nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector, off: float = 0.0) -> Solution:
     """The same by nullspace.py, where that is safe."""
     _check_finite(M, b, G, c)
-    found = dependent.nullspace(M, b, G, c) if len(G) else None
-    return solve(M, b, G, c) if found is None else _finite(found)
+    found = dependent.nullspace(M, b, G, c) if len(G) and off <= ON else None
+    return solve(M, b, G, c, off=off) if found is None else _finite(found)
 
 
 def _check_finite(M: Matrix, b: Vector, G: Matrix, c: Vector) -> None:

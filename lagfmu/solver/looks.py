@@ -14,7 +14,6 @@ import numpy as np
 
 from .indicators import indicators
 from .leg import Leg
-from .motion import motion
 from .system import Vector
 
 LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
@@ -59,7 +58,7 @@ def _top_of_rebound(leg: Leg, t: float, y: Vector, values: Vector) -> float:
     if not left:
         return float("inf")
     q, v = leg.split(y)
-    now = motion(leg.at(t), q, v, leg.rows)
+    now = leg.near(t, q, v)
     speed, pull = now.G @ v - now.nu, now.gamma - now.G @ now.vdot
     return min(
         (

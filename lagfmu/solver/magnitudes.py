@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .failure import StepFailureError
-from .instant import Instant
-from .motion import EPS, Motion, motion
+from .instant import Instant, Motion
+from .motion import EPS, independent, motion
 from .state import Settings, State
 from .system import Matrix, System, Vector
 
@@ -164,7 +164,8 @@ def _held(at: Instant, state: State, now: Motion) -> tuple[Vector, Vector]:
 
     Both 0 at the edge of what the equations describe.
     """
-    active, size = at.system.active(state.closed), np.array(state.size)
+    active = independent(now, at.system.active(state.closed))
+    size = np.array(state.size)
     back, noise = np.zeros(at.system.n), np.zeros(at.system.n)
     for j in np.flatnonzero(size):
         moved = np.array(state.q)

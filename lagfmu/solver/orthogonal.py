@@ -12,24 +12,24 @@ from scipy.linalg import lapack
 
 from .failure import StepFailureError
 from .schur import half_solve, mass_factor
-from .solution import RANK, Solution
+from .solution import ON, RANK, Solution, loose
 from .system import Matrix, Vector
 
 CONSISTENT = 1e-7  # a dependent row may miss its right-hand side by this, relative to its terms
 
 
-def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool) -> Solution:
+def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: float) -> Solution:
     """Raises StepFailureError if the constraints contradict each other, or M is singular on their surface."""
     factor = mass_factor(M)
     if factor is None:
-        return _least_norm(M, b, G, c, nearest)
+        return _least_norm(M, b, G, c, nearest, off)
     L, s = factor
     W = half_solve(L, (G * s).T)
     r = np.sqrt(np.einsum("ij,ij->j", W, W))
     r[r == 0] = 1.0
     W = W / r
     U, sigma, Vt = np.linalg.svd(W, full_matrices=True)
-    rank = int((sigma > RANK).sum())
+    rank = int((sigma > max(RANK, loose(off))).sum())
     null = Vt[rank:]
 
     def substitute(b: Vector, c: Vector) -> tuple[Vector, Vector, Vector]:
@@ -43,7 +43,8 @@ def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool) -> Sol
     x, lam, right = substitute(b, c)
     size = np.abs(c / r).max(initial=0) + np.abs(right).max(initial=0)
     size += np.abs(half_solve(L, (b + G.T @ lam) * s)).max(initial=0)
-    if not nearest and len(null) and np.abs(null @ right).max() > CONSISTENT * size:
+    strict = not nearest and off <= ON
+    if strict and len(null) and np.abs(null @ right).max() > CONSISTENT * size:
         raise StepFailureError(
             "the constraints contradict each other at this state: dependent rows of G ask for "
             "different accelerations"
@@ -60,13 +61,13 @@ def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool) -> Sol
     return Solution(x, lam, unique)
 
 
-def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool) -> Solution:
+def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: float) -> Solution:
     """Dependent constraints and a massless coordinate together: the KKT matrix's least norm."""
     n, m = len(b), len(c)
     K = np.block([[M, G.T], [G, np.zeros((m, m))]])
     d = 1 / np.sqrt(np.maximum(np.abs(K).max(axis=1), np.finfo(float).tiny))
     U, sigma, Vt = np.linalg.svd(K * d * d[:, None])
-    keep = sigma > RANK * sigma[0]
+    keep = sigma > max(RANK, loose(off)) * sigma[0]
     null = Vt[~keep]
     if not nearest and len(null) and np.abs(null[:, :n]).max() > 1e-8:
         raise StepFailureError(
@@ -74,7 +75,7 @@ def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool) -> So
             "nor a constraint that determines its acceleration"
         )
     right = np.concatenate([b, c]) * d
-    missed = 0.0 if nearest else np.abs(U[:, ~keep].T @ right).max(initial=0)
+    missed = 0.0 if nearest or off > ON else np.abs(U[:, ~keep].T @ right).max(initial=0)
     if missed > CONSISTENT * np.abs(right).max():
         raise StepFailureError("the constraints contradict each other at this state")
     z = Vt[keep].T @ ((U[:, keep].T @ right) / sigma[keep]) * d

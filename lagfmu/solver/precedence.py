@@ -42,11 +42,11 @@ class Stage:
         held = {k for k, j in zip(*system.jacobian, strict=True) if self.free[j]}
         return [k for k in rows if k in held]
 
-    def nearest(self, M: Matrix, G: Matrix, c: Vector) -> Vector:
-        """dq (n), zero where nothing is free, with G dq = c as nearly as can be."""
+    def nearest(self, M: Matrix, G: Matrix, c: Vector, off: float = 0.0) -> Vector:
+        """dq (n), zero where nothing is free, with G dq = c as nearly as can be; `off` as in linear.py."""
         M = np.where(np.outer(self.free, self.free), M, np.diag(M.diagonal()))
         M = M * self.weight * self.weight[:, None]
-        return solve(M, np.zeros(len(M)), np.where(self.free, G, 0.0), c, nearest=True).x
+        return solve(M, np.zeros(len(M)), np.where(self.free, G, 0.0), c, True, off).x
 
 
 def stages(rank: Sequence[int]) -> Iterator[Stage]:

@@ -15,8 +15,8 @@ TRUSTED = 1e-5  # reciprocal condition above which the Schur complement is used
 EXACT = 1e-2  # and above which its solution needs no refinement
 
 
-def schur(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
-    """None where it is not safe."""
+def schur(M: Matrix, b: Vector, G: Matrix, c: Vector, least: float = 0.0) -> Solution | None:
+    """None where it is not safe, or the reciprocal condition is below `least`."""
     factor = mass_factor(M)
     if factor is None:
         return None
@@ -35,7 +35,7 @@ def schur(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:
         if info != 0:
             return None
         rcond, info = lapack.dpocon(C, np.abs(S).sum(axis=0).max(), uplo="L")
-        if rcond < TRUSTED:
+        if rcond < max(TRUSTED, least):
             return None
 
     def substitute(b: Vector, c: Vector) -> tuple[Vector, Vector]:

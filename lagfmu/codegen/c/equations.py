@@ -14,12 +14,12 @@ from typing import Any
 import sympy as sp
 
 from ...mechanics.differential import Differential
-from ...mechanics.equations import TIME, EquationsOfMotion
+from ...mechanics.equations import TIME, EquationsOfMotion, FrictionLaw
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
 from .function import FILL, Result, function
-from .printer import HELPERS, identifiers
+from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
 
 Expr = Any
@@ -68,6 +68,7 @@ def model_source(
             ]
         ) + _pointer("reduced_equations")
     helpers = [code for name, code in {**HELPERS, "fill": FILL}.items() if f"{name}(" in text]
+    helpers += [table_text(s) for s in eom.model.splines if f"&{table_name(s)}," in text]
     model = eom.model
     description = f": {model.description}" if model.description else ""
     head = HEAD.format(name=model.name, description=_comment(description), index=index)
@@ -192,6 +193,10 @@ class _Reported:
             self.along[f"d{a}"] = tuple(self.change[s] for s in group)
 
 
+def _coefficients(law: FrictionLaw) -> tuple[tuple[Expr, str], ...]:
+    return ((law.static, "static"), (law.kinetic, "kinetic"))
+
+
 class _System:
     """One System: its functions, patterns and the table that holds them together."""
 
@@ -229,6 +234,16 @@ class _System:
         )
         text = tables.of_what_is_read if self.eom.bare else tables.text
         return "\n".join([*functions.values(), text(set(functions))])
+
+    def _coulomb(self) -> dict[str, list[Result]]:
+        laws = self.eom.frictions
+        mu = [(e, f"{what} of {a.name}") for a in laws for e, what in _coefficients(a)]
+        pressing = [(c, f"{a.name}, {name}") for a in laws for name, c in a.normal.items()]
+        return {
+            "coefficients": [Result(sp.sympify(e), text) for e, text in mu],
+            "load": [Result(sp.sympify(a.load), a.name) for a in laws],
+            "pressing": [Result(sp.sympify(c), text) for c, text in pressing],
+        }
 
     def _functions(self) -> dict[str, str]:
         """The text of each function of the System that is needed."""
@@ -291,12 +306,26 @@ class _System:
                 {"p": words.p},
                 {"e": _results(restitution, rows)},
             )
+        if eom.frictions:
+            found["coulomb"] = define(
+                "coulomb",
+                "Coefficients, static and kinetic, and normal force load + sum of c * lambda [N].",
+                words.state,
+                self._coulomb(),
+            )
         if self.tangents and (energy or not eom.bare):
             found["tangent"] = define(
                 "tangent",
                 "The change of all of these along the direction (dt, dq, dv, du).",
                 words.along,
                 changes,
+            )
+        if eom.lookups:
+            found["lookups"] = define(
+                "lookups",
+                "Where tables are looked up.",
+                words.state,
+                {"places": _results([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])},
             )
         if self.jumps.surfaces:
             table = _real([*eom.q, *eom.v, *eom.u, *eom.p, TIME])

@@ -33,12 +33,39 @@ FUNCTIONS = {
     sp.sign: "sign",
     sp.Heaviside: "heaviside",
 }
+CUBIC = """/* A tabulated function and its derivatives: y = c0 + c1 s + c2 s^2 + c3 s^3, s = x - x[k], between
+ * knots (de Boor, A Practical Guide to Splines, ch. IV); a straight line, or the period, outside. */
+typedef struct {
+    int n, periodic;
+    const double *x;      /* (n) knots */
+    const double (*c)[4]; /* (n) the last row holds beyond the last knot */
+} Cubic;
+
+static double cubic(const Cubic *table, int order, double x) {
+    const double first = table->x[0], last = table->x[table->n - 1];
+    if (table->periodic) x -= (last - first) * floor((x - first) / (last - first));
+    int k = 0;
+    for (int end = table->n; end - k > 1;) {
+        const int middle = k + (end - k) / 2;
+        if (table->x[middle] <= x)
+            k = middle;
+        else
+            end = middle;
+    }
+    const double s = x - table->x[k], *c = table->c[k];
+    const double c2 = s < 0.0 ? 0.0 : c[2], c3 = s < 0.0 ? 0.0 : c[3];
+    if (order == 0) return c[0] + s * (c[1] + s * (c2 + s * c3));
+    if (order == 1) return c[1] + s * (2.0 * c2 + s * 3.0 * c3);
+    return order == 2 ? 2.0 * c2 + s * 6.0 * c3 : 6.0 * c3;
+}
+"""
 HELPERS = {  # what <math.h> has not; printed into a file that calls it
     "sign": "static double sign(double x) {\n    return (x > 0.0) - (x < 0.0);\n}\n",
     "heaviside": (
         "static double heaviside(double x, double at_zero) {\n"
         "    return x > 0.0 ? 1.0 : x < 0.0 ? 0.0 : at_zero;\n}\n"
     ),
+    "cubic": CUBIC,
 }
 
 KEYWORDS = """
@@ -59,9 +86,10 @@ MATH = """
 """
 OURS = """
     t q v u p s sdot M F G nu gamma f h e energy dt dq dv du ds dsdot dM dF dG dnu dgamma df denergy fill
-    shared blocks vdot Q dvdot dlambda dQ w dw other dother
-    sign heaviside Kind Formulation Row System Plan Type Role Place Variable near far small interface
-    linux unix i386 main
+    places shared blocks vdot Q dvdot dlambda dQ w dw other dother
+    sign heaviside cubic Cubic
+    Kind Formulation Row System Plan Type Role Place Variable near far small interface
+    linux unix i386 main Friction coefficients load pressing
 """
 TAKEN = frozenset(
     [
@@ -76,6 +104,24 @@ MACROS = re.compile(  # of <math.h> and <stddef.h>, and our own constants
     r"|(FP|MATH|AT|ROLE|TYPE|LAGFMU|DEFAULT|MODEL)_\w*|VARIABLES|VARIABLE_COUNT"
     r"|HOLONOMIC|NONHOLONOMIC|CONTACT|MULTIPLIERS|NULLSPACE|MINIMAL|is[a-z]\w*|_\w*)\Z"
 )
+
+
+def table_name(spline: Any) -> str:
+    """The C name of a table, which no symbol of a model has (MACROS)."""
+    return f"LAGFMU_TABLE_{spline.name}"
+
+
+def table_text(spline: Any) -> str:
+    """C text that defines a table."""
+    name, table = table_name(spline), spline.table
+    knots = "".join(f"    {x!r},\n" for x in table.knots)
+    rows = "".join(f"    {{{', '.join(map(repr, row))}}},\n" for row in table.coefficients)
+    fields = f"{len(table.knots)}, {int(table.periodic)}, {name}_x, {name}_c"
+    return (
+        f"static const double {name}_x[] = {{\n{knots}}};\n"
+        f"static const double {name}_c[][4] = {{\n{rows}}};\n"
+        f"static const Cubic {name} = {{{fields}}};\n"
+    )
 
 
 def identifiers(symbols: Sequence[Expr], taken: Sequence[str] = ()) -> dict[Expr, str]:
@@ -158,6 +204,8 @@ class Printer:
             return self._sum(x - y * sp.floor(x / y)), SUM
         if isinstance(e, Boolean):
             return self._condition(e), ATOM  # 0.0 or 1.0
+        if hasattr(e, "spline"):
+            return f"cubic(&{table_name(e.spline)}, {e.order}, {self(e.args[0])})", ATOM
         name = FUNCTIONS.get(e.func)
         if name is None:
             rewritten = _rewritten(e)

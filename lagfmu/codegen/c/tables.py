@@ -63,6 +63,10 @@ class Tables:
             self._integers("dimension", dimension),
             self._integers("extent_dimension", extent),
         ]
+        frictions, press = self._frictions()
+        if frictions:
+            parts.append(self._array("const Friction", "frictions", frictions))
+            parts.append(self._integers("press", press))
         folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
         if self.floors:
             parts.append(self._integers("floors", [int(x) for x in self.floors]))
@@ -76,7 +80,9 @@ class Tables:
             solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
             parts.append(f"{solve}\n" if solve else "")
         own, more = self._outputs(functions)
-        parts.append(own)
+        reach, ends = self._lookups(functions)
+        parts += [own, reach]
+        more |= ends
         fields = {
             "n": eom.n,
             "m": eom.m,
@@ -115,6 +121,14 @@ class Tables:
             **{name: name for name in ("outputs", "outputs_tangent") if name in functions},
             **more,
         }
+        if frictions:
+            fields |= {
+                "frictions": len(frictions),
+                "presses": len(press),
+                "friction": f"{p}frictions",
+                "press": f"{p}press",
+                "coulomb": f"{p}coulomb",
+            }
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return "".join(parts) + f"static const System {p}equations = {{\n{lines}}};\n"
 
@@ -127,6 +141,17 @@ class Tables:
         text += self._integers("guarded", [int(o.otherwise is not None) for o in outputs])
         names = {"output_names": "output_names", "guarded": "guarded"}
         return text, {"output_count": len(outputs), **names}
+
+    def _lookups(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
+        """The names and ends of the tables that are looked up, and the System's fields for them."""
+        if "lookups" not in functions:
+            return "", {}
+        tables, p = [s for s, _ in self.eom.lookups], self.prefix
+        text = self._array("const char *const", "lookup_names", [f'"{s.name}"' for s in tables])
+        text += self._array("const double", "lookup_first", [repr(s.x[0]) for s in tables])
+        text += self._array("const double", "lookup_last", [repr(s.x[-1]) for s in tables])
+        names = ("lookup_names", "lookup_first", "lookup_last", "lookups")
+        return text, {"lookup_count": len(tables), **{name: p + name for name in names}}
 
     def _array(self, kind: str, name: str, items: Sequence[str]) -> str:
         head = f"static {kind} {self.prefix}{name}[] = {{"
@@ -141,6 +166,7 @@ class Tables:
 
     def _rows(self) -> list[str]:
         position = {c.name: k for k, c in enumerate(self.constraints)}
+        owner = {name: i + 1 for i, law in enumerate(self.eom.frictions) for name in law.of}
         items = []
         for c in self.constraints:
             kind = "HOLONOMIC"
@@ -149,8 +175,26 @@ class Tables:
             elif isinstance(c, Nonholonomic):
                 kind = "NONHOLONOMIC"
             closed = getattr(c, "while_closed", None)
-            items.append(f'{{"{c.name}", {kind}, {-1 if closed is None else position[closed]}}}')
+            tail = f", {owner[c.name]}" if c.name in owner else ""
+            gate = -1 if closed is None else position[closed]
+            items.append(f'{{"{c.name}", {kind}, {gate}{tail}}}')
         return items or ['{"", HOLONOMIC, -1}']
+
+    def _frictions(self) -> tuple[list[str], list[int]]:
+        """The frictions as Friction in system.h, and the rows that press."""
+        position = {c.name: k for k, c in enumerate(self.constraints)}
+        items: list[str] = []
+        press: list[int] = []
+        for law in self.eom.frictions:
+            rows = [position[name] for name in law.of]
+            normal = [position[name] for name in law.normal]
+            gated = law.load == 0 and all(isinstance(self.constraints[k], Contact) for k in normal)
+            items.append(
+                f'{{"{law.name}", {len(rows)}, {{{", ".join(map(str, rows))}}}, {len(press)}, '
+                f"{len(normal)}, {int(gated and bool(normal))}}}"
+            )
+            press += normal
+        return items, press
 
     def _dimensions(self) -> tuple[list[int], list[int], int]:
         """One number for each dimension of coordinates; that of each parameter; that of angles; -1: none."""
@@ -184,6 +228,7 @@ def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:
         found.append(f"the formulation is {formulation!r}, expected 'multipliers'")
     if not _constant_mass(eom):
         found.append("the mass matrix holds more than parameters")
+    found += [f"the friction {law.name!r} jumps" for law in eom.frictions]
     moved = [
         str(q)
         for q, e in zip(eom.q, eom.F, strict=True)

@@ -13,8 +13,9 @@ from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact, Nonholonomic
+from ...solver.cubic import Cubic
 from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
-from .function import function, identifiers
+from .function import function, identifiers, table_name
 
 Expr = Any
 
@@ -22,13 +23,13 @@ Expr = Any
 def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations in the given formulation.
 
-    It needs the names System, Row, Own and Embedding of `lagfmu.solver.system`.
+    It needs the names System, Row, Own, Friction, Lookups and Embedding of `lagfmu.solver.system`, and Cubic
+    where there are tables.
     """
     eom, reduction, jumps = levelled(eom, reduction)
     if reduction is None:
-        return _imported(
-            _system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
-        )
+        text = _system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
+        return _imported(_tables(eom, text) + text)
     parts = [_bare_system(eom) if eom.bare else _system(eom, "", "multipliers")]
     names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.driven, *eom.p, TIME])
     names[TIME] = "t"
@@ -52,7 +53,22 @@ def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str
             jumps,
         )
     )
-    return _imported("\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n")
+    text = "\n\n".join(parts) + "\n\nSYSTEM = SYSTEM_OF_REDUCED_COORDINATES\n"
+    return _imported(_tables(eom, text) + text)
+
+
+def _tables(eom: EquationsOfMotion, text: str) -> str:
+    """The tables that the text looks up."""
+    lines = []
+    for s in eom.model.splines:
+        name, table = table_name(s), s.table
+        if f"{name}(" in text:
+            rows = "".join(f"        {row!r},\n" for row in table.coefficients)
+            lines.append(
+                f"{name} = Cubic(\n    {table.knots!r},\n    (\n{rows}    ),\n"
+                f"    {table.periodic!r},\n)\n\n\n"
+            )
+    return "".join(lines)
 
 
 def _imported(text: str) -> str:
@@ -70,8 +86,11 @@ def compile_system(text: str) -> System:
     scope: dict[str, Any] = {
         "System": vocabulary.System,
         "Own": vocabulary.Own,
+        "Lookups": vocabulary.Lookups,
+        "Cubic": Cubic,
         "Row": vocabulary.Row,
         "Embedding": vocabulary.Embedding,
+        "Friction": vocabulary.Friction,
     }
     exec(compile(text, "<lagfmu equations>", "exec"), scope)
     system: System = scope["SYSTEM"]
@@ -130,6 +149,8 @@ def _system(
         text = "Newton's coefficient of restitution of each row; 0 for one that is no contact."
         arguments, results = {"p": eom.p}, {"e": restitution}
         parts.append(function(f"{prefix}restitution", text, arguments, results, names))
+    if eom.frictions:
+        parts.append(_coulomb(eom, state, names))
     energies = []
     if rows is None:  # the energies of the full system serve the reduced one too
         energies = _energies(eom, names)
@@ -139,6 +160,13 @@ def _system(
         parts.append(function(f"{prefix}surfaces", text, still, {"h": [s.h for s in found]}, names))
     own = _outputs(eom) if rows is None else []
     parts += [text for _, text in own]
+    looked_up = ""
+    if eom.lookups:
+        text = "Where tables are looked up."
+        places = {"w": [x for _, x in eom.lookups]}
+        parts.append(function(f"{prefix}lookups", text, state, places, names))
+        reach = [(s.name, s.x[0], s.x[-1]) for s, _ in eom.lookups]
+        looked_up = f"    lookups=Lookups({prefix}lookups, {tuple(reach)!r}),\n"
     label = f"SYSTEM_OF_{prefix.upper()}COORDINATES"
     parts.append(
         f"{label} = System(\n"
@@ -159,9 +187,39 @@ def _system(
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
         f"{_surfaces(prefix, jumps, len(eom.driven))}"
-        f"{_listed(own)})\n"
+        + (f"    frictions={_frictions(eom)},\n    coulomb=coulomb,\n" if eom.frictions else "")
+        + f"{_listed(own)}{looked_up})\n"
     )
     return "\n\n".join(parts)
+
+
+def _coulomb(eom: EquationsOfMotion, state: Any, names: dict[Expr, str]) -> str:
+    """The function that gives each friction's coefficients and normal force."""
+    laws = eom.frictions
+    return function(
+        "coulomb",
+        "Coefficients (static, kinetic) of each friction; N = load + sum of normal * lambda [N].",
+        state,
+        {
+            "static": [law.static for law in laws],
+            "kinetic": [law.kinetic for law in laws],
+            "load": [law.load for law in laws],
+            "normal": [c for law in laws for c in law.normal.values()],
+        },
+        names,
+    )
+
+
+def _frictions(eom: EquationsOfMotion) -> str:
+    """Name, rows that are limited, rows whose multipliers press, and is the normal force a contact's."""
+    position = {c.name: k for k, c in enumerate(eom.constraints)}
+    items = []
+    for law in eom.frictions:
+        rows = tuple(position[name] for name in law.of)
+        normal = tuple(position[name] for name in law.normal)
+        gated = law.load == 0 and all(isinstance(eom.constraints[k], Contact) for k in normal)
+        items.append(f"Friction({law.name!r}, {rows!r}, {normal!r}, {gated and bool(normal)!r}),")
+    return f"({' '.join(items)})"
 
 
 def _surfaces(prefix: str, jumps: Jumps, count: int) -> str:
@@ -238,6 +296,7 @@ def _constraints(eom: EquationsOfMotion, rows: Sequence[int] | None) -> list[Any
 def _rows(eom: EquationsOfMotion, rows: Sequence[int] | None) -> str:
     constraints = _constraints(eom, rows)
     position = {c.name: k for k, c in enumerate(constraints)}
+    owner = {name: i for i, law in enumerate(eom.frictions) for name in law.of}
     items = []
     for c in constraints:
         kind = HOLONOMIC
@@ -247,6 +306,8 @@ def _rows(eom: EquationsOfMotion, rows: Sequence[int] | None) -> str:
             kind = NONHOLONOMIC
         closed = getattr(c, "while_closed", None)
         tail = "" if closed is None else f", {position[closed]}"
+        if c.name in owner:
+            tail = f", {None if closed is None else position[closed]}, {owner[c.name]}"
         items.append(f"Row({c.name!r}, {kind!r}{tail}),")
     return f"({' '.join(items)})"
 

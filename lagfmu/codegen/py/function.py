@@ -19,8 +19,10 @@ from ...errors import DerivationError
 Expr = Any
 ARGUMENTS = (
     *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "h", "e", "energy"),
-    *("vdot", "lam", "Q", "w"),
+    *("vdot", "lam", "Q", "w", "static", "kinetic", "load", "normal"),
 )
+
+TABLE = "table_of_"
 
 
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
@@ -48,8 +50,17 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
     def _print_Exp1(self, number: Expr) -> str:
         return repr(float(number))
 
+    def _print_SplineBase(self, call: Expr) -> str:
+        order = f", {call.order}" if call.order else ""
+        return f"{table_name(call.spline)}({self._print(call.args[0])}{order})"
+
     def _print_Integer(self, number: Expr) -> str:
         return str(number) if abs(int(number)) < 2**53 else repr(float(number))
+
+
+def table_name(spline: Any) -> str:
+    """The Python name of a table."""
+    return f"{TABLE}{spline.name}"
 
 
 def identifiers(symbols: Sequence[Expr]) -> dict[Expr, str]:
@@ -64,6 +75,8 @@ def identifiers(symbols: Sequence[Expr]) -> dict[Expr, str]:
         if text.startswith("level("):
             text = f"level_{text[6:-1]}"
         text = text.replace(".", "_")
+        if text.startswith(TABLE):
+            text = f"x_{text}"
         while text in taken:
             text += "_"
         taken.add(text)

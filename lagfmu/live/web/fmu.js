@@ -24,9 +24,9 @@ function isClose(a, b) {
 /* Problems of the settings in words; an FMU would not know these names. */
 function problemsOf(variables, settings) {
   const problems = [];
-  const kinds = { parameters: "parameter", start: "start", inputs: "input" };
-  for (const [key, role] of Object.entries(kinds)) {
-    const known = variables.filter((v) => v.role === role).map((v) => v.name);
+  const kinds = { parameters: ["parameter", "solver"], start: ["start"], inputs: ["input"] };
+  for (const [key, roles] of Object.entries(kinds)) {
+    const known = variables.filter((v) => roles.includes(v.role) && v.type !== "String").map((v) => v.name);
     for (const [name, value] of Object.entries(settings[key] || {})) {
       if (!known.includes(name)) {
         const listed = known.join(", ") || "none: this FMU has no such variable";

@@ -1,6 +1,6 @@
 """Pfaffian systems: what `classify` classifies with.  Each file imports from those above it.
 
-- `undecided`: giving up, and in time
+- `undecided`: giving up, by an effort that is counted
 - `fractions`: rational functions, no operation of which takes long
 - `generators`, `samples`, `tower`: is an expression zero?
 - `echelon`: linear algebra where that is known

@@ -23,12 +23,14 @@ from typing import Any
 
 from sympy import Eq, Symbol, factor_terms, sympify
 from sympy import Integral as Integral_
+from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
 from .coefficients import Chart, pfaffian
 from .echelon import rref
 from .frobenius import curvature, derived_flag, exact, obstruction
 from .integrals import first_integrals
+from .surfaces import on_surfaces
 from .tower import Tower
 from .undecided import Undecided, within
 
@@ -36,7 +38,7 @@ __all__ = ["Classification", "Integral", "Kind", "classify", "pfaffian"]
 
 Expr = Any  # SymPy has no types
 
-_SECONDS = 8.0  # for the integrals of a set, and again for those of its forms one by one
+_EFFORT = 3e6  # for the integrals of a set, and again for those of its forms one by one
 
 
 class Kind(StrEnum):
@@ -80,66 +82,91 @@ class Classification:
 
 
 def classify(
-    forms: Sequence[Expr] | Expr, coordinates: Sequence[Expr], *, integrate: bool = True
+    forms: Sequence[Expr] | Expr,
+    coordinates: Sequence[Expr],
+    *,
+    holonomic: Sequence[Expr] = (),
+    integrate: bool = True,
 ) -> Classification:
     """Classify a Pfaffian constraint, or a set of them.
+
+    `holonomic` are functions f(q, t) that are 0 besides: the forms are classified on f = 0.  A coordinate
+    in which an f is linear with a constant factor is put in; the differentials of the other f belong to the
+    set, whose ranks are then those on nearly all surfaces f = const.  Ranks, witness and integrals are
+    of what that leaves of the forms, and factors those modulo the differentials.
 
     `forms` are linear in the velocities q_j' of the `coordinates` q_j (`dynamicsymbols`), and set
     to zero; every other symbol is a generic parameter, every other function an unknown one.
     Numbers with a decimal point are read as the decimal number with 14 digits.  With
-    `integrate=False`, the integrals are not looked for; else, for some seconds.
+    `integrate=False`, the integrals are not looked for; else, with an effort that is
+    counted in operations: the answer is the same on every machine and under any load.
     """
-    return _classify(forms, coordinates, integrate, _SECONDS)
+    given = tuple(forms) if isinstance(forms, list | tuple) else (forms,)
+    plain = tuple(f.lhs - f.rhs if isinstance(f, Eq) else sympify(f) for f in given)
+    for form in plain:
+        pfaffian(form, coordinates)  # it is one, as it was given
+    left, surfaces, free = on_surfaces(plain, tuple(coordinates), holonomic)
+    return _classify(left, free, surfaces, integrate, _EFFORT)
 
 
 def _classify(
-    forms: Sequence[Expr] | Expr, coordinates: Sequence[Expr], integrate: bool, seconds: float
+    forms: tuple[Expr, ...],
+    coordinates: tuple[Expr, ...],
+    surfaces: tuple[Expr, ...],
+    integrate: bool,
+    effort: float,
 ) -> Classification:
-    forms = tuple(forms) if isinstance(forms, list | tuple) else (forms,)
-    forms = tuple(f.lhs - f.rhs if isinstance(f, Eq) else sympify(f) for f in forms)
-    coordinates = tuple(coordinates)
-    split = [pfaffian(form, coordinates) for form in forms]
+    time = dynamicsymbols._t
+    held = tuple(f.diff(time) for f in surfaces)
+    split = [pfaffian(form, coordinates) for form in (*forms, *held)]
     rows = [[*a, a0] for a, a0 in split]
     used: set[Any] = set().union(*(entry.free_symbols for row in rows for entry in row))
     chart = Chart(coordinates, {symbol for symbol in used if isinstance(symbol, Symbol)})
     rows = [[chart.there(entry) for entry in row] for row in rows]
     each: tuple[Classification, ...] = ()
     if len(forms) > 1:
-        share = seconds / len(forms)
-        each = tuple(_classify(form, coordinates, integrate, share) for form in forms)
-    known = [chart.there(i.f) for c in each for i in c.integrals]
-    return _Analysis(forms, rows, chart, each).run(known, seconds if integrate else 0.0)
+        share = effort / len(forms)
+        each = tuple(_classify((form,), coordinates, surfaces, integrate, share) for form in forms)
+    levels = [chart.there(f) for f in surfaces]
+    known = [*levels, *(chart.there(i.f) for c in each for i in c.integrals)]
+    analysis = _Analysis(forms, held, rows, chart, each)
+    return analysis.run(known, levels, effort if integrate else 0.0)
 
 
 class _Analysis:
-    """Frobenius' theorem and the derived flag for the rows a of one-forms sum_j a_j dx_j."""
+    """Frobenius' theorem and the derived flag for the rows a of one-forms sum_j a_j dx_j: the forms, and
+    `held`, which are differentials."""
 
     def __init__(
         self,
         forms: tuple[Expr, ...],
+        held: tuple[Expr, ...],
         rows: list[list[Expr]],
         chart: Chart,
         each: tuple[Classification, ...],
     ) -> None:
         self.forms, self.rows, self.chart, self.each = forms, rows, chart, each
+        self.all = (*forms, *held)
         self.variables = chart.variables
         self.width = len(self.variables)
         self.tower = Tower(self.variables, [entry for row in rows for entry in row])
 
-    def run(self, known: list[Expr], seconds: float) -> Classification:
-        rank = 0
+    def run(self, known: list[Expr], levels: list[Expr], effort: float) -> Classification:
+        rank = fixed = 0
         try:
             for entry in (entry for row in self.rows for entry in row if entry.has(Integral_)):
                 raise Undecided(entry, "an integral, which is not looked into")
             matrix = [[self.tower.element(entry) for entry in row] for row in self.rows]
             reduced, pivots = self._echelon(matrix)
-            rank = len(pivots)
+            count = len(pivots)
+            fixed = len(rref(self.tower, matrix[len(self.forms) :], self.width)[1]) if levels else 0
+            rank = count - fixed
             self._consistent(reduced, pivots)
-            basis = [row[: self.width] for row in reduced[:rank]]
+            basis = [row[: self.width] for row in reduced[:count]]
             bend = curvature(self.tower, basis, pivots)
             first, witness, where = obstruction(self.tower, matrix, bend, pivots)
             flag, bottom = derived_flag(self.tower, basis, bend)
-            stands = all(exact(self.tower, row) for row in matrix)
+            stands = all(exact(self.tower, row) for row in matrix[: len(self.forms)])
         except Undecided as undecided:
             return self._answer(
                 Kind.UNDECIDED,
@@ -151,6 +178,7 @@ class _Analysis:
                 self.chart.back(undecided.expr),
                 (),
             )
+        flag = [rank - fixed for rank in flag]
         depth = flag[-1]
         if stands:
             kind = Kind.HOLONOMIC
@@ -159,16 +187,16 @@ class _Analysis:
         else:
             kind = Kind.PARTLY if depth else Kind.NONHOLONOMIC
         found: list[Integral] = []
-        if seconds and depth:
+        if effort and depth:
             rows = [[self.tower.back(entry) for entry in row] for row in bottom]
-            with within(seconds):
+            with within(effort):
                 candidates = first_integrals(self.rows, rows, self.variables, known)
-            for f in candidates:
+            for f in (f for f in candidates if f not in levels):
                 with suppress(Undecided):  # it has passed, but its factors may be too long
-                    found.append(self._integral(f, reduced[:rank], pivots))
+                    found.append(self._integral(f, reduced[:count], pivots))
         witness = self.chart.back(factor_terms(self.tower.back(witness)))
         text = self._certificate(kind, flag, first, witness, where)
-        if seconds and len(found) < depth:
+        if effort and len(found) < depth:
             text += (
                 f"; of {depth} integrals, {len(found)} "
                 f"{'was' if len(found) == 1 else 'were'} found in closed form"
@@ -200,14 +228,14 @@ class _Analysis:
         if self.width - 1 not in pivots:
             return
         row = reduced[pivots.index(self.width - 1)]
-        used = [k for k in range(len(self.forms)) if row[self.width + k]]
+        used = [k for k in range(len(self.all)) if row[self.width + k]]
         if len(used) == 1 and not any(self.rows[used[0]][:-1]):
             raise DerivationError(
-                f"constraint {self.forms[used[0]]} has no velocity in it: it is no Pfaffian "
+                f"constraint {self.all[used[0]]} has no velocity in it: it is no Pfaffian "
                 "constraint; if it is f(q, t) = 0, it is holonomic as it stands, and its Pfaffian "
                 "form is its derivative by time"
             )
-        names = ", ".join(str(self.forms[k]) for k in used)
+        names = ", ".join(str(self.all[k]) for k in used)
         raise DerivationError(
             f"contradictory constraints {names}: a combination of them has no velocity in it, and "
             "is not zero; remove or correct one of them"
@@ -235,13 +263,17 @@ class _Analysis:
         where: tuple[int, ...],
     ) -> str:
         names = [str(variable.name) for variable in self.variables]
-        count = len(self.forms)
+        count, held = len(self.forms), len(self.all) - len(self.forms)
         alone = count == 1
         wedge = "omega" if alone else " ^ ".join(f"omega_{k + 1}" for k in range(count))
         if flag[0] < count and not alone:
             wedge = f"({flag[0]} independent ones of omega_1 ... omega_{count})"
+        if held:
+            wedge += " ^ dg" if held == 1 else "".join(f" ^ dg_{k + 1}" for k in range(held))
         if flag[0] == 0:
-            return "holonomic: the form is zero identically, and constrains nothing"
+            return "holonomic: the form is zero identically, and constrains nothing" + (
+                " that the holonomic constraints do not" if held else ""
+            )
         if kind is Kind.HOLONOMIC:
             return f"holonomic: d({'omega' if alone else 'omega_k'}) = 0 as the forms stand"
         if kind is Kind.INTEGRABLE:

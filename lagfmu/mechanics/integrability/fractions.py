@@ -4,7 +4,7 @@ A field operation may take minutes: the heuristic GCD of n-variate polynomials p
 after the other for the variables, and ends with integers of |f| prod_k (1 + deg_k) digits (Liao and
 Fateman, *ISSAC '95*, pp. 240-247).  What an operation will cost is therefore estimated before it is
 begun, from terms, degrees and coefficients, so that the answer is the same on every machine; and the
-owner of the field may look at the clock before each.
+owner of the field is told the effort of each, and may refuse it.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ Polynomial = Any  # SymPy carries no types
 
 PAIRS = 2 * 10**6  # of terms in one product: some seconds
 BITS = 10**11  # of integers in one GCD, times the terms: some seconds
+BITS_AT_ONCE = 2e4  # of such integers for a unit of effort
+LEAST = 80.0  # effort of the least operation
 LONG = Symbol("(a long expression)")
 
 
 class Field:
-    """Rational functions of `symbols`; `look` is called before each operation, and may raise."""
+    """Rational functions of `symbols`; `look` is called with the effort of each operation before it is
+    begun, and may raise."""
 
-    def __init__(self, symbols: Sequence[Any], look: Callable[[], None]) -> None:
+    def __init__(self, symbols: Sequence[Any], look: Callable[[float], None]) -> None:
         self.symbols = tuple(symbols)
         self.ngens = len(self.symbols)
         self.look = look
@@ -44,8 +47,7 @@ class Field:
         denom = self.ring.one if denom is None else denom
         if not denom:
             raise ZeroDivisionError("zero denominator")
-        self.look()
-        admit_gcd(numer, denom)
+        self.look(LEAST + admit_gcd(numer, denom))
         return Fraction(self, *numer.cancel(denom))
 
     def generator(self, symbol: Any) -> Fraction:
@@ -149,28 +151,35 @@ class Fraction:
         return value if isinstance(value, Fraction) else self.field.number(value)
 
     def _times(self, f: Polynomial, g: Polynomial) -> Polynomial:
-        self.field.look()
+        self.field.look(len(f) * len(g))
         _admit(len(f) * len(g) <= PAIRS)
         return f * g
 
     def _raised(self, f: Polynomial, power: int) -> Polynomial:
         """f**power, which has one term for each choice of `power` terms of f at most."""
-        self.field.look()
+        terms = 1
         if power > 1 and len(f) > 1:
             dense = prod(power * degree + 1 for degree in f.degrees())
-            _admit(dense <= PAIRS or comb(len(f) + power - 1, power) <= PAIRS)
+            terms = min(dense, comb(len(f) + power - 1, power))
+            _admit(terms <= PAIRS)
+        self.field.look(terms)
         return f**power
 
 
-def admit_gcd(f: Polynomial, g: Polynomial) -> None:
-    """Raises `Undecided` where the GCD of two polynomials would take too long."""
+def admit_gcd(f: Polynomial, g: Polynomial) -> float:
+    """The effort of the GCD of two polynomials.  Raises `Undecided` where it would take too long."""
     terms = len(f) + len(g)
-    if len(f) < 2 or len(g) < 2 or gcd_bits(f, g, (1,) * f.ring.ngens) * terms <= BITS:
-        return  # the GCD with a monomial takes no time
+    if len(f) < 2 or len(g) < 2:
+        return float(terms)  # the GCD with a monomial
+    size = gcd_bits(f, g, (1,) * f.ring.ngens) * terms
+    if size <= BITS:
+        return terms + size / BITS_AT_ONCE
     steps = tuple(
         gcd(*powers) or 1 for powers in zip(*f.itermonoms(), *g.itermonoms(), strict=True)
     )
-    _admit(gcd_bits(f, g, steps) * terms <= BITS)
+    size = gcd_bits(f, g, steps) * terms
+    _admit(size <= BITS)
+    return terms + size / BITS_AT_ONCE
 
 
 def gcd_bits(f: Polynomial, g: Polynomial, steps: Sequence[int]) -> int:

@@ -41,12 +41,13 @@ from sympy.core.function import AppliedUndef
 from sympy.integrals.manualintegrate import manualintegrate
 from sympy.simplify.fu import TR8
 
-from .undecided import late
+from .undecided import late, spend
 
 Expr = Any  # SymPy has no types
 
 _LONG = 600  # operations of an integrand beyond which no integration is tried
 _TERM = 40  # operations of one term of it
+_SEARCHING = 2e4  # effort of the search for its integral, an operation
 
 
 def quadrature(expr: Expr, x: Expr) -> Expr | None:
@@ -80,6 +81,7 @@ def _primitive_of(term: Expr, x: Expr) -> Expr | None:
             if not term.subs(x, low).has(S.NaN, S.ComplexInfinity, S.Infinity):
                 return Integral(term.xreplace({x: s}), (s, low, x))
         return None
+    spend(_SEARCHING * term.count_ops())
     return _search(term, x)
 
 

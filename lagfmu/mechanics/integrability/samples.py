@@ -15,8 +15,11 @@ import mpmath
 from sympy import Abs, Dummy, Float, Integer, Integral, Rational, exp, sign, sin
 from sympy.core.function import AppliedUndef
 
+from .undecided import spend
+
 DIGITS = 60
 _POINTS = 3
+_EVALUATING = 500.0  # effort of one value
 
 
 class Samples:
@@ -69,6 +72,7 @@ class Samples:
         for symbol in used:
             if symbol in values:
                 continue
+            spend(_EVALUATING)
             meaning = self.meaning[symbol]
             concrete = self._concrete(meaning)
             for free in sorted(concrete.free_symbols, key=str):

@@ -9,7 +9,6 @@ and g' = P' g/(q P) for g**q = P (Bronstein, *Symbolic Integration I*, ch. 3).
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -18,11 +17,13 @@ from sympy import Dummy, Poly, S, Symbol, cos, exp, expand, sign, simplify, sin,
 from .fractions import LONG, Field
 from .generators import Generators
 from .samples import DIGITS, Samples
-from .undecided import Undecided, deadline, late
+from .undecided import Undecided, deadline, late, spend, spent_beyond
 
-_SECONDS = 20.0
+_EFFORT = 8e6  # of all that one tower decides
 _LARGEST = 3000  # terms of a numerator and a denominator; beyond that, the answer is "undecided"
-_SIMPLIFIABLE = 150  # operations up to which SymPy's simplify is asked
+_SIMPLIFIABLE = 150  # operations up to which SymPy's simplify is asked, ...
+_SIMPLIFYING = 2e4  # ... and the effort for each
+_LOOK = 20.0  # effort of an operation on elements besides its polynomials
 
 
 class Tower:
@@ -30,7 +31,7 @@ class Tower:
 
     def __init__(self, variables: Sequence[Any], scan: Iterable[Any] = ()) -> None:
         self.variables = tuple(variables)
-        self._deadline = deadline(_SECONDS)
+        self._deadline = deadline(_EFFORT)
         self._generators = Generators(self.variables)
         self._samples = Samples(self._generators.meaning)
         self._derivatives: dict[tuple[Any, Any], Any] = {}
@@ -41,9 +42,10 @@ class Tower:
     def _field(self) -> None:
         self.K = Field(list(self._generators.meaning), self._look)
 
-    def _look(self) -> None:
-        if time.monotonic() > self._deadline:
-            raise Undecided(LONG, "not decided in the time allowed")
+    def _look(self, effort: float = _LOOK) -> None:
+        spend(effort)
+        if spent_beyond(self._deadline):
+            raise Undecided(LONG, "not decided with the effort allowed")
 
     def element(self, expr: Any) -> Any:
         """`expr` as an element of the field, which grows when it has to."""
@@ -155,8 +157,10 @@ class Tower:
             raise Undecided(expr, "no point was found at which it can be evaluated")
         if any(signs):
             raise Undecided(expr, "zero in one region and not in another")
-        if expr.count_ops() <= _SIMPLIFIABLE and not late() and simplify(expr) == 0:
-            return True
+        if expr.count_ops() <= _SIMPLIFIABLE and not late():
+            spend(_SIMPLIFYING * expr.count_ops())
+            if simplify(expr) == 0:
+                return True
         raise Undecided(expr, f"zero to {DIGITS // 2} digits, which is no proof")
 
     def zero(self, expr: Any) -> bool:

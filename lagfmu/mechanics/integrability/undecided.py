@@ -1,4 +1,4 @@
-"""Giving up: what cannot be decided, and what is not found in the time allowed.
+"""Giving up: what cannot be decided, and what is not found with the effort allowed.
 
 The zero problem is undecidable for the expressions that SymPy can write down (Richardson, *Journal of
 Symbolic Logic* 33, 1968): an answer may be "undecided", and every search has an end.
@@ -7,7 +7,6 @@ Symbolic Logic* 33, 1968): an answer may be "undecided", and every search has an
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -15,6 +14,7 @@ from typing import Any
 
 from sympy import PolynomialError
 
+_SPENT: ContextVar[float] = ContextVar("spent", default=0.0)
 _UNTIL: ContextVar[float] = ContextVar("until", default=math.inf)
 
 
@@ -39,21 +39,35 @@ FAILURES = (
 )
 
 
+def spend(effort: float) -> None:
+    """Work that is about to be done; 1 is a product of two terms, some microseconds.
+
+    Effort is counted from the sizes of what is worked on, never measured: what is found, and what is
+    given up, is the same on every machine and under any load.
+    """
+    _SPENT.set(_SPENT.get() + effort)
+
+
 @contextmanager
-def within(seconds: float) -> Iterator[None]:
-    """Towers made within this block decide nothing after so many seconds."""
-    token = _UNTIL.set(deadline(seconds))
+def within(effort: float) -> Iterator[None]:
+    """Towers made within this block decide nothing after so much effort."""
+    token = _UNTIL.set(deadline(effort))
     try:
         yield
     finally:
         _UNTIL.reset(token)
 
 
-def deadline(seconds: float) -> float:
-    """The moment after so many seconds, or that of the innermost `within` if it is earlier."""
-    return min(time.monotonic() + seconds, _UNTIL.get())
+def deadline(effort: float) -> float:
+    """Where so much more has been spent, or what the innermost `within` allows if that is less."""
+    return min(_SPENT.get() + effort, _UNTIL.get())
+
+
+def spent_beyond(limit: float) -> bool:
+    """More has been spent than a `deadline` allows."""
+    return _SPENT.get() > limit
 
 
 def late() -> bool:
-    """The time of the innermost `within` is over."""
-    return time.monotonic() > _UNTIL.get()
+    """What the innermost `within` allows is spent."""
+    return spent_beyond(_UNTIL.get())

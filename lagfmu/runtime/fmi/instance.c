@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "indicators.h"
 #include "leg.h"
 #include "magnitudes.h"
 #include "outputs.h"
@@ -31,9 +32,10 @@ void instance_layout(Instance *x, Arena *arena) {
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
-        x->happened = arena_ints(&scratch, system->contacts);
+        x->happened = arena_ints(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
+        x->places = arena_doubles(&scratch, system->lookup_count);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
         if (pass == 1) break;
         x->saved_size = saved.used;
@@ -105,6 +107,11 @@ static int ready(const Instance *x, const Variable *v, double *value) {
         case AT_CONTACT: *value = s->state.closed[v->index]; return 1;
         case AT_COUNT: *value = s->state.count[v->index]; return 1;
         case AT_DEPARTURE_TIME: *value = s->state.departure_time[v->index]; return 1;
+        case AT_SLIP_COUNT: *value = s->state.slip_count[v->index]; return 1;
+        case AT_SLIP_TIME: *value = s->state.slip_time[v->index]; return 1;
+        case AT_SLIP_Q: *value = s->state.slip_q[v->contact * s->system->n + v->index]; return 1;
+        case AT_SLIP_V: *value = s->state.slip_v[v->contact * s->system->n + v->index]; return 1;
+        case AT_LOST: *value = s->state.now.lost; return 1;
         default: return 0;
     }
 }
@@ -136,6 +143,10 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
         case AT_KINETIC: *value = o->energy[0]; break;
         case AT_POTENTIAL: *value = o->energy[1]; break;
         case AT_TOTAL: *value = o->energy[0] + o->energy[1]; break;
+        case AT_STICKS: *value = o->sticks[v->index]; break;
+        case AT_SLIP: *value = o->slip[v->index]; break;
+        case AT_MARGIN: *value = o->margin[v->index]; break;
+        case AT_POWER: *value = o->power[v->index]; break;
         case AT_OUTPUT: *value = o->own[v->index]; break;
         case AT_DEPARTURE_Q:
             *value = departed(x, v->contact, v->index, o->departure_q, state->departure_q);
@@ -290,7 +301,7 @@ Status instance_observe(Instance *x) {
 static void warn_of_jumps(Instance *x) {
     const System *s = x->solver.system;
     const double *u = x->solver.drive.value;
-    for (int i = 0; i < s->prescribed_count && !x->warned; i++) {
+    for (int i = 0; i < s->prescribed_count && !(x->warned & 1); i++) {
         const int k = s->prescribed[i];
         if (u[k] == x->expected[k] || u[k + 1] != 0 || u[k + 2] != 0) continue;
         const char *name = "";
@@ -301,7 +312,27 @@ static void warn_of_jumps(Instance *x) {
                        "communication point; connect its derivatives as well",
                        name, name, name);
         x->tell(x->context, NOTE_WARNING, x->note);
-        x->warned = 1;
+        x->warned |= 1;
+    }
+}
+
+/* Once for each: a table is looked up beyond its ends. */
+static void warn_of_tables(Instance *x) {
+    Solver *s = &x->solver;
+    const System *system = s->system;
+    const Instant at = leg_instant(s, s->state.now.t);
+    system->lookups(at.t, s->state.q, s->state.v, at.u, at.p, x->places);
+    for (int i = 0; i < system->lookup_count && i < 30; i++) {
+        const double first = system->lookup_first[i], last = system->lookup_last[i];
+        const int told = 2 << i;
+        if ((x->warned & told) || (x->places[i] >= first && x->places[i] <= last)) continue;
+        x->warned |= told;
+        (void)snprintf(x->note, sizeof x->note,
+                       "table %s is looked up at %s, outside of its points from %s to %s: it goes on "
+                       "as a straight line",
+                       system->lookup_names[i], digits(x->places[i]).text, digits(first).text,
+                       digits(last).text);
+        x->tell(x->context, NOTE_WARNING, x->note);
     }
 }
 
@@ -352,6 +383,7 @@ Status instance_step(Instance *x, double t_end) {
         return FAILED;
     }
     move_inputs(x, t_end);
+    if (s->system->lookup_count > 0) warn_of_tables(x);
     if (s->system->contacts > 0) report_events(x);
     if (product == 0 && s->state.now.choice.product > 0) {
         stiffness_message(&s->state.now.choice, x->note, sizeof x->note);
@@ -369,8 +401,10 @@ Status instance_differentiate(Instance *x, Direction d) {
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
     const Instant at = leg_instant(s, s->state.now.t);
-    system_active(s->system, s->state.closed, s->active);
-    if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
+    leg_begin(s);
+    if (mechanism_motion_near(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                              s->state.size) != OK)
+        return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
         return FAILED;
     if (full == NULL) {

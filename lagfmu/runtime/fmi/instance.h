@@ -24,7 +24,8 @@ typedef struct {
     int phase;              /* for the caller, saved with the state */
     int started;            /* 1: the consistent start has been found */
     int running;            /* 1: the start is over, only inputs can be set */
-    int warned;             /* 1: a jump of a prescribed motion has been told */
+    int warned;             /* 1: a jump of a prescribed motion has been told; 2 << i: lookup i outside */
+    double *places;         /* (lookup_count) scratch */
     int observed, evaluated;
     double *q0, *v0;        /* (n) start values as they were set */
     Rank *rank;             /* (2 n) who said them; found anew at each start */

@@ -1,6 +1,9 @@
 /* dependent.c -- the rungs that only constraints need, as linear.c climbs them. */
 #include "dependent.h"
 
+#include <math.h>
+
+#include "cod.h"
 #include "leastnorm.h"
 #include "nullspace.h"
 #include "orthogonal.h"
@@ -36,5 +39,33 @@ static Status solve(Linear *l, const double *b, const double *c, double *x, doub
     return OK;
 }
 
-static const Dependent ALL = {doubles, ints, factor_nullspace, factor, solve};
+/* G^T itself, its columns scaled: where M is singular there is no metric. */
+static int basis_unweighted(Linear *l, int *basis) {
+    const System *s = l->system;
+    Cod cod;
+    int acting = 0, *rows = l->pivots;
+    for (int k = 0; k < s->m; k++)
+        if (l->active[k]) rows[acting++] = k;
+    cod_place(&cod, s->n, acting, l->dense, rows + s->m);
+    for (int j = 0; j < acting; j++) {
+        double *column = cod.A + j * s->n, sum = 0;
+        for (int i = 0; i < s->n; i++) column[i] = 0;
+        for (int e = s->row_start[rows[j]]; e < s->row_start[rows[j] + 1]; e++)
+            sum = fmax(sum, fabs(l->G[e]));
+        for (int e = s->row_start[rows[j]]; e < s->row_start[rows[j] + 1]; e++)
+            column[s->entry_column[e]] = l->G[e] / (sum > 0 ? sum : 1);
+    }
+    cod_factor(&cod, linear_rank_threshold(l));
+    for (int j = cod.rank; j < acting; j++) basis[rows[cod.column[j]]] = 0;
+    return cod.rank < acting;
+}
+
+static int basis(Linear *l, int *rows) {
+    if (l->rung == RUNG_LEAST_NORM) return basis_unweighted(l, rows);
+    const Weighted w = weighted_view(l);
+    for (int j = w.cod.rank; j < w.acting; j++) rows[w.rows[w.cod.column[j]]] = 0;
+    return w.cod.rank < w.acting;
+}
+
+static const Dependent ALL = {doubles, ints, factor_nullspace, factor, solve, basis};
 const Dependent *const DEPENDENT = &ALL;

@@ -15,6 +15,8 @@ typedef struct {
     Status (*factor)(Linear *l);
     /* By the rung that was factored.  FAILED: the constraints contradict each other. */
     Status (*solve)(Linear *l, const double *b, const double *c, double *x, double *lambda);
+    /* See linear_basis(); of the rung that was factored, whose factors are lost. */
+    int (*basis)(Linear *l, int *basis);
 } Dependent;
 
 /* NULL in an FMU without constraints: its parts.c says so, and dependent.c is not there. */

@@ -104,7 +104,7 @@ static void solve_lu(void *context, double *x) {
     lu_solve(k->size, k->A, k->pivots, x);
 }
 
-int kkt_factor(Linear *l) {
+int kkt_factor(Linear *l, double least) {
     Kkt k = view(l);
     if (!equilibrate(l, &k)) return 0;
     kkt_matrix(l, k.scale, k.place, k.A);
@@ -115,7 +115,7 @@ int kkt_factor(Linear *l) {
         norm = fmax(norm, sum);
     }
     if (lu_factor(k.size, k.A, k.pivots) != 0) return 0;
-    return norm * inverse_norm(k.size, solve_lu, &k, k.work) <= 1 / REGULAR;
+    return norm * inverse_norm(k.size, solve_lu, &k, k.work) <= 1 / fmax(REGULAR, least);
 }
 
 static void substitute(Linear *l, const double *b, const double *c, double *x, double *lambda) {

@@ -13,7 +13,7 @@ int kkt_ints(int n, int m);
 int kkt_matrix(const Linear *l, const double *scale, const int *place, double *A);
 
 /* 1 if the matrix is regular to working precision. */
-int kkt_factor(Linear *l);
+int kkt_factor(Linear *l, double least);
 
 void kkt_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 

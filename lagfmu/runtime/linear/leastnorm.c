@@ -15,8 +15,8 @@
 #include "kkt.h"
 #include "residual.h"
 
-static const double RANK = 1e-12;      /* rows that stand out by less, relatively, are dependent */
 static const double CONSISTENT = 1e-7; /* a dependent row may miss its right-hand side by this */
+static const double ON = 1e-13;        /* a state closer to the constraints than this is on them */
 static const double VANISHES = 1e-8;   /* component of a unit null vector that counts as zero */
 
 /* The scaled KKT matrix of the rows that act, decomposed. */
@@ -78,7 +78,7 @@ Status least_norm_factor(Linear *l) {
     int n = l->system->n;
     scale_rows(l, &w);
     kkt_matrix(l, w.scale, w.place, w.cod.A);
-    cod_factor(&w.cod, RANK);
+    cod_factor(&w.cod, linear_rank_threshold(l));
     *w.rank = w.cod.rank;
     for (int j = w.cod.rank; j < w.cod.columns; j++) {
         for (int i = 0; i < w.cod.columns; i++) w.z[i] = i == j;
@@ -117,7 +117,7 @@ static void substitute(Linear *l, const double *b, const double *c, double *x, d
 Status least_norm_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     Whole w = whole_view(l);
     double most = right(l, &w, b, c);
-    for (int i = w.cod.rank; i < w.cod.rows && !l->nearest; i++)
+    for (int i = w.cod.rank; i < w.cod.rows && !l->nearest && !(l->off > ON); i++)
         if (fabs(w.z[i]) > CONSISTENT * most)
             return fail(l->why, "the constraints contradict each other at this state");
     substitute(l, b, c, x, lambda);

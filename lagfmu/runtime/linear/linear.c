@@ -12,7 +12,21 @@
 #include "kkt.h"
 #include "schur.h"
 
+static const double RANK = 1e-12;  /* rows of unit norm that stand out by less are dependent, ... */
+static const double TURNED = 1e2;  /* ... and by less than so many times the distance from the constraints, ... */
+static const double LOOSEST = 1e-3; /* ... which says nothing of rows at a larger angle */
+
 static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
+
+double linear_rank_threshold(const Linear *l) {
+    return fmax(RANK, fmin(TURNED * l->off, LOOSEST));
+}
+
+/* The square of that: what the condition of the rungs below tells. */
+static double loose(const Linear *l) {
+    const double angle = fmin(TURNED * l->off, LOOSEST);
+    return l->dense != NULL && DEPENDENT != NULL ? angle * angle : 0;
+}
 
 void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     int n = s->n, m = s->m;
@@ -28,6 +42,7 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     l->dense = NULL;
     l->pivots = NULL;
     l->nearest = 0;
+    l->off = 0;
     if (n + m > DENSE_MOST) return;
     size_t doubles = kkt_doubles(n, m), ints = (size_t)kkt_ints(n, m);
     if (DEPENDENT != NULL) {
@@ -96,7 +111,7 @@ static Status too_large(const Linear *l) {
 static Status climb(Linear *l) {
     if (check_factored(l) != OK) return FAILED;
     if (l->dense == NULL) return too_large(l);
-    if (kkt_factor(l)) {
+    if (kkt_factor(l, loose(l))) {
         l->rung = RUNG_KKT;
         return OK;
     }
@@ -107,7 +122,7 @@ static Status climb(Linear *l) {
 /* By the plan's lists, or a rung above. */
 static Status factor_lists(Linear *l) {
     l->rung = RUNG_SCHUR;
-    return schur_factor(l) ? OK : climb(l);
+    return schur_factor(l) && schur_of(l)->condition * loose(l) <= 1 ? OK : climb(l);
 }
 
 Status linear_factor(Linear *l, const double *M, const double *G, const int *active) {
@@ -119,7 +134,7 @@ Status linear_factor(Linear *l, const double *M, const double *G, const int *act
         l->unique[k] = 1;
         all &= active[k];
     }
-    if (all && l->system->solve != NULL) {
+    if (all && l->system->solve != NULL && !(l->off > 0)) {
         l->rung = RUNG_WRITTEN_OUT; /* it factors and solves at once */
         return OK;
     }
@@ -161,6 +176,12 @@ Status linear_nearest(Linear *l, const double *c, double *x) {
     const Status status = linear_solve(l, NULL, c, x, NULL);
     l->nearest = 0;
     return status;
+}
+
+int linear_basis(Linear *l, int *basis) {
+    for (int k = 0; k < l->system->m; k++) basis[k] = l->active[k];
+    if (l->rung != RUNG_ORTHOGONAL && l->rung != RUNG_LEAST_NORM) return 0;
+    return DEPENDENT->basis(l, basis);
 }
 
 Status linear_project(Linear *l, const double *M, const double *G, const int *active,

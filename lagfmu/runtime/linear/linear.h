@@ -28,6 +28,7 @@ typedef struct {
     double *sparse;       /* workspace of schur.c */
     double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
     int *pivots;
+    double off;           /* how far off the constraints the state is, relative to their size; 0: on them */
     int nearest;          /* 1 within linear_nearest() and linear_project() */
 } Linear;
 
@@ -52,5 +53,13 @@ Status linear_nearest(Linear *l, const double *c, double *x);
 /* Factors and does that at once; a coordinate that has neither mass nor a constraint stays. */
 Status linear_project(Linear *l, const double *M, const double *G, const int *active,
                       const double *c, double *x);
+
+/* How far rows of unit norm have to stand out to count as independent: rows that depend on each other on
+ * the constraints are at angles of the order of `off` away from them. */
+double linear_rank_threshold(const Linear *l);
+
+/* 1 if the rows that were factored last depend on each other.  basis (m): then as many of them as are
+ * independent, otherwise all.  Factors are lost. */
+int linear_basis(Linear *l, int *basis);
 
 #endif

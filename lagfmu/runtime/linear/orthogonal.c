@@ -10,13 +10,13 @@
 #include "residual.h"
 #include "weighted.h"
 
-static const double RANK = 1e-12;      /* rows of unit norm that stand out by less are dependent */
 static const double CONSISTENT = 1e-7; /* a dependent row may miss its right-hand side by this */
+static const double ON = 1e-13;        /* a state closer to the constraints than this is on them */
 static const double VANISHES = 1e-8;   /* component of a unit null vector that counts as zero */
 
 int orthogonal_factor(Linear *l) {
     Weighted w;
-    if (!weighted_factor(l, RANK, &w)) return 0;
+    if (!weighted_factor(l, linear_rank_threshold(l), &w)) return 0;
     for (int j = w.cod.rank; j < w.acting; j++) {
         for (int i = 0; i < w.acting; i++) w.w[i] = i == j;
         cod_from_rows(&w.cod, w.w, w.spare);
@@ -50,7 +50,7 @@ static int consistent(const Linear *l, const double *b, const double *c) {
 }
 
 Status orthogonal_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
-    if (!l->nearest && !consistent(l, b, c))
+    if (!l->nearest && !(l->off > ON) && !consistent(l, b, c))
         return fail(l->why,
                     "the constraints contradict each other at this state: dependent rows of G ask "
                     "for different accelerations");

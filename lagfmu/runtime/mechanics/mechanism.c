@@ -7,9 +7,11 @@
 
 #include "digits.h"
 
-void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why) {
+void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
+                      const Sliding *sliding) {
     b->system = s;
     b->why = why;
+    b->dependent = 0;
     b->M = arena_doubles(arena, s->masses);
     b->F = arena_doubles(arena, s->n);
     b->G = arena_doubles(arena, s->entries);
@@ -22,6 +24,8 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why) {
     b->trial = arena_doubles(arena, s->n);
     b->fixed = arena_ints(arena, s->m);
     linear_layout(&b->linear, arena, s, why);
+    b->sliding = s->frictions > 0 ? sliding : NULL;
+    if (b->sliding != NULL) b->sliding->layout(b, arena);
 }
 
 static int all_finite(int count, const double *x) {
@@ -68,10 +72,41 @@ Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f) 
 
 Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                         const int *active) {
+    if (b->sliding != NULL) return b->sliding->motion(b, at, q, v, active);
     evaluate(b, at, q, v);
     if (linear_factor(&b->linear, b->M, b->G, active) == OK &&
         linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) == OK)
         return OK; /* linear.h: what it solves is finite */
     (void)check_values(b, at); /* the cause, if it is the equations */
     return FAILED;
+}
+
+/* The largest |f - offset| of the rows, relative to the terms of G size. */
+static Status find_off(Mechanism *b, Instant at, const double *q, const int *active,
+                       const double *offset, const double *size, double *off) {
+    const System *s = b->system;
+    *off = 0;
+    if (mechanism_residual(b, at, q, b->f) != OK) return FAILED;
+    for (int k = 0; k < s->m; k++) {
+        if (!active[k] || s->rows[k].kind == NONHOLONOMIC) continue;
+        double reach = 0;
+        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
+            const int j = s->entry_column[e];
+            reach += fabs(b->G[e]) * fmax(fabs(q[j]), size[j]);
+        }
+        if (reach > 0) *off = fmax(*off, fabs(b->f[k] - offset[k]) / reach);
+    }
+    return OK;
+}
+
+Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
+                             const int *active, const double *offset, const double *size) {
+    double off;
+    if (!b->dependent) return mechanism_motion(b, at, q, v, active);
+    if (mechanism_evaluate(b, at, q, v) != OK) return FAILED;
+    if (find_off(b, at, q, active, offset, size, &off) != OK) return FAILED;
+    b->linear.off = off;
+    const Status status = mechanism_motion(b, at, q, v, active);
+    b->linear.off = 0;
+    return status;
 }

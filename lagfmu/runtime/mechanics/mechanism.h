@@ -11,16 +11,8 @@
 
 #include <math.h>
 
-typedef struct {
-    const System *system;
-    Linear linear;
-    double *M, *F, *G, *nu, *gamma; /* values at the state that was evaluated last */
-    double *vdot, *lambda;          /* of the latest motion(): (n), (m) */
-    double *f;                      /* (m) scratch for residuals */
-    double *dq, *trial;             /* (n) scratch of project() */
-    int *fixed;                     /* (m) scratch of project(): position constraints that act */
-    Why *why;
-} Mechanism;
+struct Frictions;
+typedef struct Mechanism Mechanism;
 
 /* A time [s] with the inputs and parameters then. */
 typedef struct {
@@ -28,7 +20,31 @@ typedef struct {
     const double *u, *p;
 } Instant;
 
-void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why);
+/* What friction adds (friction.h). */
+typedef struct {
+    void (*layout)(Mechanism *b, Arena *arena);
+    /* (m) `active` with the rows that stick by friction */
+    const int *(*acting)(Mechanism *b, const int *active);
+    Status (*motion)(Mechanism *b, Instant at, const double *q, const double *v, const int *active);
+} Sliding;
+
+struct Mechanism {
+    const System *system;
+    Linear linear;
+    double *M, *F, *G, *nu, *gamma; /* values at the state that was evaluated last */
+    double *vdot, *lambda;          /* of the latest motion(): (n), (m) */
+    double *f;                      /* (m) scratch for residuals */
+    double *dq, *trial;             /* (n) scratch of project() */
+    int *fixed;                     /* (m) scratch of project(): position constraints that act */
+    int dependent;                  /* 1: rows that act depend on each other, on the constraints */
+    Why *why;
+    const Sliding *sliding;     /* NULL without frictions */
+    struct Frictions *friction; /* what `sliding` works with */
+};
+
+/* `sliding`: what a system with frictions needs, not used without. */
+void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
+                      const Sliding *sliding);
 
 /* sum_j G_kj x_j for the row k of the G that was evaluated last. */
 static inline double mechanism_row(const Mechanism *b, int k, const double *x) {
@@ -62,6 +78,11 @@ Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
 /* evaluate, factor, solve: b->vdot (n) and b->lambda (m), 0 where a row does not act. */
 Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                         const int *active);
+
+/* The same for a state off the constraints: what depends on each other on them does so here, and is not
+ * asked to agree.  `offset` (m), `size` (n) as below. */
+Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
+                             const int *active, const double *offset, const double *size);
 
 /* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
  * v are moved in place.  For states that are nearly consistent; initial.c deals with the others.

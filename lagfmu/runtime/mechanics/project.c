@@ -21,6 +21,9 @@
 
 enum { ITERATIONS = 10 };
 static const double SMALL = 1e-12;    /* relative residual that rounding may leave */
+static const double ROUNDING = 100 * DBL_EPSILON; /* and that is left in peace where Newton's method still
+                                                    * gains, but slowly */
+static const double LINEAR = 0.1; /* ratio of successive errors: the convergence is linear, G loses rank */
 static const double CONTRACTS = 1e-4; /* reduction of the error for which factors are kept */
 
 /* How far the positions are off: `error` is the largest |f - offset| relative to its own terms. */
@@ -54,7 +57,7 @@ static Status measure(Mechanism *b, Instant at, const double *q, const double *o
     return OK;
 }
 
-static Status no_arrival(Mechanism *b, Instant at, const Miss *miss) {
+static Status no_arrival(Mechanism *b, Instant at, const Miss *miss, double before) {
     const char *comma = "";
     Digits t = digits(at.t);
     fail(b->why, "the step to t = %s s cannot be projected onto the constraints ", t.text);
@@ -63,7 +66,9 @@ static Status no_arrival(Mechanism *b, Instant at, const Miss *miss) {
             why_append(b->why, "%s'%s'", comma, b->system->rows[k].name);
             comma = ", ";
         }
-    why_append(b->why, " (missed by %.3g): take smaller steps", miss->largest);
+    why_append(b->why, " (missed by %.3g): %s", miss->largest,
+               miss->error > LINEAR * before ? "the configuration is singular, or nearly so"
+                                             : "take smaller steps");
     return FAILED;
 }
 
@@ -77,9 +82,11 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
         *moved = count > 0;
         if (miss.rounding || miss.error < DBL_EPSILON * DBL_EPSILON) return OK;
         if (miss.error > before / 2 && miss.error < SMALL) return OK; /* rounding in f is left */
-        if (count == ITERATIONS) return no_arrival(b, at, &miss);
+        if (count == ITERATIONS && miss.error < ROUNDING) return OK;
+        if (count == ITERATIONS) return no_arrival(b, at, &miss, before);
         int stale = count > 0 && !(miss.error <= CONTRACTS * before);
         if (stale && mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
+        b->linear.off = b->dependent ? miss.error : 0;
         if ((stale || count == 0) &&
             linear_factor(&b->linear, b->M, b->G, b->fixed) == FAILED)
             return FAILED;
@@ -109,6 +116,7 @@ Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const i
                          const double *offset, const double *size) {
     const System *s = b->system;
     int acting = 0, fixed = 0, moved = 0;
+    if (b->sliding != NULL) active = b->sliding->acting(b, active);
     for (int k = 0; k < s->m; k++) {
         b->fixed[k] = active[k] && s->rows[k].kind != NONHOLONOMIC;
         acting |= active[k];
@@ -117,8 +125,10 @@ Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const i
     if (!acting) return OK;
     if (mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
     memcpy(b->trial, q, (size_t)s->n * sizeof *q);
-    if (fixed && project_positions(b, at, b->trial, v, offset, size, &moved) == FAILED)
-        return FAILED;
+    const Status status =
+        fixed ? project_positions(b, at, b->trial, v, offset, size, &moved) : OK;
+    b->linear.off = 0;
+    if (status != OK) return FAILED;
     if (moved && mechanism_evaluate(b, at, b->trial, v) == FAILED) return FAILED;
     if (project_velocities(b, v, active) == FAILED) return FAILED;
     memcpy(q, b->trial, (size_t)s->n * sizeof *q);

@@ -49,6 +49,14 @@ static double norm(const System *s, const int *rows, const double *f, const doub
     return sqrt(sum);
 }
 
+/* The largest f of the rows relative to its terms; allowed (m): 1e3 roundings of these. */
+static double find_off(const System *s, const int *rows, const double *f, const double *allowed) {
+    double off = 0;
+    for (int k = 0; k < s->m; k++)
+        if (rows[k] && allowed[k] > 0) off = fmax(off, 1e3 * EPS * fabs(f[k]) / allowed[k]);
+    return off;
+}
+
 static Status cannot_be_projected(const Start *x, const int *rows, const double *f,
                                   const double *allowed) {
     const System *s = x->s->system;
@@ -92,7 +100,10 @@ static Status newton(const Start *x, int stage, double *q, const int *rows) {
         find_allowed(x, q, x->s->state.size, 1e3, trial, allowed);
         if (!all && arrived(s, own, f, allowed)) break; /* what is left is not for these coordinates */
         for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
-        if (precedence_nearest(b, x->rank_q, stage, own, f_trial) == FAILED) break;
+        b->linear.off = find_off(s, own, f, allowed);
+        const Status status = precedence_nearest(b, x->rank_q, stage, own, f_trial);
+        b->linear.off = 0;
+        if (status == FAILED) break;
         double damping = 1;
         int halvings = 0;
         for (; halvings < HALVINGS; halvings++, damping /= 2) {

@@ -153,12 +153,16 @@ static Status find_modes(const Start *x) {
     if (s->contacts > 0 && PARTS.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
                                                 touching, NULL) == FAILED)
         return afar_refused(x->s);
+    if (s->frictions > 0 &&
+        PARTS.slides->begin(x->s, x->at, state->closed, touching) == FAILED)
+        return afar_refused(x->s);
     system_active(s, state->closed, x->s->active);
     if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,
                           state->size) == FAILED)
         return afar_refused(x->s);
     if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
         return afar_refused(x->s);
+    leg_choose_rows(x->s);
     return OK;
 }
 
@@ -215,6 +219,7 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
     jumps_settle(s, leg_instant(s, t), q0, v0, NULL, NULL);
     if (s->system->contacts > 0 && PARTS.impact_check(s) != OK) return FAILED;
     const Start x = {s, {t, s->u, s->p}, q0, v0, rank, rank + s->system->n};
+    s->stepped.dependent = 1; /* it is not known yet */
     magnitudes_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;
     jumps_settle(s, x.at, s->state.q, v0, NULL, NULL);

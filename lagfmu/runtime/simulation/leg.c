@@ -16,7 +16,19 @@ static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may mov
                                                   * tolerance, and at least, relative to the state */
 static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the state: it means nothing */
 
-void leg_begin(Solver *s) { system_active(s->system, s->state.closed, s->active); }
+void leg_begin(Solver *s) {
+    system_active(s->system, s->state.closed, s->active);
+    s->stepped.dependent = s->state.now.dependent;
+}
+
+void leg_choose_rows(Solver *s) {
+    s->state.now.dependent = linear_basis(&s->stepped.linear, s->state.basis);
+    s->stepped.dependent = s->state.now.dependent;
+}
+
+const int *leg_rows(const Solver *s) {
+    return s->state.now.dependent ? s->state.basis : s->active;
+}
 
 Instant leg_instant(Solver *s, double t) {
     const System *system = s->system;
@@ -28,7 +40,12 @@ Instant leg_instant(Solver *s, double t) {
 static Status rate(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
-    if (mechanism_motion(&s->stepped, leg_instant(s, t), y, y + n, s->active) != OK) return FAILED;
+    const Instant at = leg_instant(s, t);
+    const Status status = s->system->frictions > 0
+                              ? mechanism_motion_near(&s->stepped, at, y, y + n, s->active,
+                                                      s->state.offset, s->state.size)
+                              : mechanism_motion(&s->stepped, at, y, y + n, leg_rows(s));
+    if (status != OK) return FAILED;
     for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
         dydt[j] = y[n + j];
         dydt[n + j] = s->stepped.vdot[j];
@@ -38,7 +55,8 @@ static Status rate(void *context, double t, const double *y, double *dydt) {
 
 static Status jacobian(void *context, double t, const double *y, double *J, double *dfdt) {
     Solver *s = context;
-    return sensitivity_jacobian(&s->sensitivity, &s->stepped, leg_instant(s, t), s->active, y, J,
+    if (s->system->frictions > 0) return PARTS.slides->jacobian(s, t, y, J, dfdt);
+    return sensitivity_jacobian(&s->sensitivity, &s->stepped, leg_instant(s, t), leg_rows(s), y, J,
                                 dfdt);
 }
 
@@ -65,6 +83,21 @@ static Status check_fixed_step(Solver *s, const Integrator *i) {
     return OK;
 }
 
+/* The accelerations at the state on the constraints where a step begins: by all rows, of which those that
+ * depend on others are then left out in the step's stages, which lie off the constraints. */
+static Status accept(Solver *s, Integrator *i) {
+    const int n = s->system->n;
+    if (i != &s->integrator || !i->fresh || s->system->m < 2) return OK;
+    const double *y = i->y;
+    if (mechanism_motion(&s->stepped, leg_instant(s, i->t), y, y + n, s->active) != OK)
+        return FAILED;
+    leg_choose_rows(s);
+    memcpy(i->f, y + n, (size_t)n * sizeof *y);
+    memcpy(i->f + n, s->stepped.vdot, (size_t)n * sizeof *y);
+    i->fresh = 0;
+    return OK;
+}
+
 Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
     const Control c = control(s, longest);
     if (s->settings.method == RATTLE) {
@@ -72,6 +105,7 @@ Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
         return PARTS.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,
                                  t_bound);
     }
+    if (accept(s, i) != OK) return FAILED;
     const Ode ode = {s, rate, jacobian, &s->why};
     if (i->method->step(i, &ode, &c, t_bound) != OK) return FAILED;
     return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;

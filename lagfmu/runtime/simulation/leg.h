@@ -11,6 +11,13 @@
 /* The rows that act in the present modes. */
 void leg_begin(Solver *s);
 
+/* Where `stepped` was solved for all rows that act, on the constraints: which of them depend on others is
+ * remembered; factors are lost. */
+void leg_choose_rows(Solver *s);
+
+/* (m) The rows for states off the constraints: those that act, as many of them as are independent. */
+const int *leg_rows(const Solver *s);
+
 /* Time t with the inputs then, and the levels of jumps behind them (kept in s->u). */
 Instant leg_instant(Solver *s, double t);
 

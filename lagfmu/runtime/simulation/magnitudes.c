@@ -25,6 +25,8 @@
  * which the floor of the scale, below 1e-6, still forgives. */
 #include "magnitudes.h"
 
+#include "leg.h"
+
 #include <float.h>
 #include <string.h>
 
@@ -159,7 +161,7 @@ static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
         const double q = state->q[j], size = state->size[j];
         if (!(size > 0)) continue;
         state->q[j] += SHIFT * size;
-        evaluated = mechanism_motion(b, at, state->q, state->v, s->active) == OK;
+        evaluated = mechanism_motion(b, at, state->q, state->v, leg_rows(s)) == OK;
         state->q[j] = q;
         for (int i = 0; i < n; i++) {
             const double change = fabs(b->vdot[i] - vdot[i]) / SHIFT;

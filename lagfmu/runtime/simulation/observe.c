@@ -79,12 +79,26 @@ static Status observe_residuals(const Solver *s, Instant at, Mechanism *b, Obser
     const System *system = b->system;
     if (mechanism_residual(b, at, o->q, o->residual) == FAILED) return FAILED;
     for (int k = 0; k < system->m; k++) {
-        if (system->rows[k].kind == NONHOLONOMIC)
+        if (system->rows[k].kind == NONHOLONOMIC || system->rows[k].friction != 0)
             o->residual[k] = mechanism_slip(b, k, o->v);
         else
             o->residual[k] -= level(s, k);
     }
     return OK;
+}
+
+/* What frictions do, of the latest motion. */
+static void observe_frictions(const Solver *s, Observed *o) {
+    const struct Frictions *f = s->stepped.friction;
+    for (int i = 0; i < s->system->frictions; i++) {
+        const int slips = !f->slide[i].sticks;
+        const double *force = f->tangential + 2 * i, *slip = f->slip + 2 * i;
+        o->sticks[i] = f->loaded[i] && !slips;
+        o->slip[2 * i] = slip[0];
+        o->slip[2 * i + 1] = slip[1];
+        o->margin[i] = f->mu[2 * i] * f->normal[i] - hypot(force[0], force[1]);
+        o->power[i] = slips ? force[0] * slip[0] + force[1] * slip[1] : 0;
+    }
 }
 
 /* Accelerations, lambda, Q and residuals. */
@@ -94,8 +108,12 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
         full_active(s);
         active = s->active_full;
     }
-    if (mechanism_motion(b, at, o->q, o->v, active) == FAILED) return FAILED;
+    const Status status = b->dependent ? mechanism_motion_near(b, at, o->q, o->v, active, s->state.offset,
+                                                               s->state.size)
+                                       : mechanism_motion(b, at, o->q, o->v, active);
+    if (status == FAILED) return FAILED;
     observe_forces(b, o);
+    if (s->system->frictions > 0) observe_frictions(s, o);
     return observe_residuals(s, at, b, o);
 }
 
@@ -172,6 +190,7 @@ Status solver_observe(Solver *s, Observed *o) {
     Mechanism *b = s->system->embed != NULL ? &s->full : &s->stepped;
     const Instant at = leg_instant(s, s->state.now.t);
     system_active(s->system, s->state.closed, s->active);
+    s->stepped.dependent = s->state.now.dependent;
     if (s->system->embed != NULL && observe_stepped(s, at, o) == FAILED) return FAILED;
     expand(s, at.t, s->state.q, s->state.v, o->q, o->v);
     if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;

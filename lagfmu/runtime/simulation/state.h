@@ -4,6 +4,7 @@
 #define LAGFMU_STATE_H
 
 #include "arena.h"
+#include "friction.h"
 #include "integrator.h"
 #include "stiffness.h"
 #include "system.h"
@@ -35,6 +36,7 @@ void drive_at(const System *s, const Drive *drive, double t, double *u);
 typedef struct {
     double t;            /* [s] the communication point */
     double rate;         /* [1/s] the motion's natural rate at the start */
+    int dependent;       /* 1: at the latest state on the constraints, rows that act depended on each other */
     double step;         /* [s] the step to try next */
     double span;         /* [s] the communication step that led to t; 0: none */
     int steps;           /* internal steps taken so far */
@@ -45,6 +47,8 @@ typedef struct {
     double t_old, t_integrator, h_next, error_old; /* of the integrator, when it is ahead */
     int fresh;
     Choice choice;       /* of the method `auto` */
+    double lost;         /* [J] that frictions and impacts have dissipated, ... */
+    double lost_old, lost_ahead; /* ... and so far where the integrator began its step, and stands */
 } Numbers;
 
 /* ... and its arrays, which lie in one block. */
@@ -56,11 +60,16 @@ typedef struct {
     double *scale;            /* (2 n) magnitudes below which errors in q and v are measured absolutely */
     double *size;             /* (n) the coordinates' magnitudes, for rounding */
     double *gap;              /* (contacts) |f| below which a contact touches */
+    int *basis;               /* (m) rows that act, as many of them as were independent there */
     int *closed, *armed;      /* (contacts) */
     int *left;                /* (indicators) its range at the event ahead: 1 upwards, -1 downwards */
     int *count;               /* (contacts) departures so far */
     double *departure_time;   /* (contacts) [s] of the latest */
     double *departure_q, *departure_v; /* (contacts * n) state then */
+    Slide *slide;             /* (frictions) how they stand */
+    int *slip_count;          /* (frictions) starts of slipping so far */
+    double *slip_time;        /* (frictions) [s] of the latest */
+    double *slip_q, *slip_v;  /* (frictions * n) state then */
     double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
     double *y, *f, *y_old, *f_old, *dense; /* the integrator's own, shared with it */
     char *block;              /* all of the arrays above */

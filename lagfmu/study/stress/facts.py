@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import VerificationError
-from ...fmu.claims import Claim, unpack_closed_forms
+from ...fmu.claims import Claim, tables_in, unpack_closed_forms
 from ...verification.simulate import file_stem, read_description
-from ...verification.verify import claims_in
+from ...verification.verify import RECORD, claims_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -54,6 +54,7 @@ class Facts:
     stop_time: float
     step_size: float
     tolerance: float
+    tabulated: bool = False  # numbers with units that no parameter scales
 
     def share(self, constraint: str, coordinate: str) -> str | None:
         """The output with the constraint's share in Q, if it acts on the coordinate."""
@@ -101,6 +102,7 @@ def facts_of(path: Path) -> Facts:
         )
     with zipfile.ZipFile(path) as archive:
         python = "resources/slavemodule.txt" in archive.namelist()
+        tables = tables_in(archive.read(RECORD), str(path))
     reals = [v for v in description.modelVariables if v.type == "Real"]
     bases = {
         u.name: tuple(int(getattr(u.baseUnit, b, 0) or 0) for b in BASE)
@@ -139,6 +141,7 @@ def facts_of(path: Path) -> Facts:
         stop_time=stop,
         step_size=float(getattr(experiment, "stepSize", None) or stop / 500),
         tolerance=float(getattr(experiment, "tolerance", None) or 1e-8),
+        tabulated=bool(tables),
     )
 
 

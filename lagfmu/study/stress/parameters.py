@@ -29,6 +29,8 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
         for p in facts.parameters
         for value in _edges(p)
     ]
+    if facts.tabulated:  # its tables stay in SI units
+        return found
     for axis, unit in enumerate(UNITS):
         for power in (-30, 30) if quick else BINARY:
             name = f"unit of {unit} scaled by 2^{power}"

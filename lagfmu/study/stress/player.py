@@ -151,6 +151,11 @@ class Player:
             found |= dict(zip(names, self.call(f"get{kind}", self.references(names)), strict=True))
         return found
 
+    def inputs(self) -> dict[str, float]:
+        """All inputs, as they stand."""
+        names = [i.name for i in self.facts.inputs]
+        return dict(zip(names, self.call("getReal", self.references(names)), strict=True))
+
     def save(self) -> Any:
         """fmi2GetFMUstate."""
         return self.call("getFMUstate")
@@ -192,6 +197,8 @@ def play(
             if drive is not None:
                 fed = dict(drive(t))
                 player.set(fed)
+            elif fed:  # a prescribed motion may move by itself
+                fed = player.inputs()
             rows[k]["time"] = t
             for name, value in (player.read() | fed).items():
                 rows[name][k] = value

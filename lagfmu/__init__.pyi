@@ -1,0 +1,65 @@
+"""Lagrange's equations with multipliers, from SymPy to FMUs that report the forces of constraint."""
+
+from .api import build_fmu
+from .errors import LagfmuError, VerificationError
+from .mechanics.equations import EquationsOfMotion, derive
+from .mechanics.integrability.classify import classify
+from .model.closed_form import ClosedForm, Conserved, departure, initial, output
+from .model.convert import from_lagranges_method
+from .model.model import (
+    Contact,
+    Embedding,
+    Friction,
+    Holonomic,
+    Input,
+    Model,
+    Nonholonomic,
+    Output,
+    Parameter,
+)
+from .model.picture import Arrow, Disk, Ground, Line, Path, Rod, Spring
+from .model.reactions import force_of_constraint, multiplier
+from .model.scene import Scene
+from .model.spline import Spline
+from .study.sweep.sweep import sweep
+from .verification.simulate import simulate
+from .verification.verify import Verification, verify
+
+__all__ = [
+    "Arrow",
+    "ClosedForm",
+    "Conserved",
+    "Contact",
+    "Disk",
+    "Embedding",
+    "EquationsOfMotion",
+    "Friction",
+    "Ground",
+    "Holonomic",
+    "Input",
+    "LagfmuError",
+    "Line",
+    "Model",
+    "Nonholonomic",
+    "Output",
+    "Parameter",
+    "Path",
+    "Rod",
+    "Scene",
+    "Spline",
+    "Spring",
+    "Verification",
+    "VerificationError",
+    "build_fmu",
+    "classify",
+    "departure",
+    "derive",
+    "force_of_constraint",
+    "from_lagranges_method",
+    "initial",
+    "multiplier",
+    "output",
+    "simulate",
+    "sweep",
+    "verify",
+]

@@ -1,0 +1,97 @@
+/* controls.js -- a slider and a number for each parameter, start value and input. */
+
+const TITLES = [
+  ["parameter", "Parameters", true],
+  ["start", "Start values", true],
+  ["input", "Inputs, held over the run", true],
+];
+
+/* 1, 2 or 5 times a power of ten, about a two-hundredth of the width. */
+function niceStep(width) {
+  const rough = width / 200;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const factor = [1, 2, 5, 10].find((f) => f * power >= rough) || 10;
+  return Number((factor * power).toPrecision(1));
+}
+
+/* The ends of a slider: the bounds, and where there are none what the value suggests. */
+function rangeOf(v) {
+  const value = Number(v.start);
+  const size = Math.abs(value);
+  let low = value < 0 ? 3 * value : 0;
+  let high = value > 0 ? 3 * value : 0;
+  if (v.role !== "parameter") {
+    const reach = v.unit === "rad" ? Math.PI : Math.max(2 * size, 1);
+    const center = v.unit === "rad" ? 0 : value;
+    low = Math.min(center - reach, value);
+    high = Math.max(center + reach, value);
+  } else if (value === 0) {
+    [low, high] = [-1, 1];
+  }
+  if (v.min !== null) low = v.min;
+  if (v.max !== null) high = v.max;
+  if (!(low < high)) [low, high] = [low - 1, low + 1];
+  const step = niceStep(high - low);
+  return { low: Math.floor(low / step + 1e-9) * step, high: Math.ceil(high / step - 1e-9) * step, step };
+}
+
+class Dial {
+  constructor(variable, settings, changed) {
+    this.variable = variable;
+    this.settings = settings;
+    const { low, high, step } = rangeOf(variable);
+    const id = `dial-${variable.reference}`;
+    const hint = variable.description;
+    this.slider = element("input", {
+      type: "range",
+      min: Number(low.toPrecision(12)),
+      max: Number(high.toPrecision(12)),
+      step,
+      id,
+      "data-name": variable.name,
+      "aria-label": [variable.name, hint].filter(Boolean).join(", "),
+    });
+    this.number = element("input", {
+      type: "number",
+      step: "any",
+      "aria-label": `${variable.name}, as a number${variable.unit ? ` in ${variable.unit}` : ""}`,
+    });
+    const name = element("label", { for: id }, element("code", {}, variable.name));
+    if (hint) name.append(" ", element("small", {}, hint));
+    const unit = element("span", { class: "unit" }, variable.unit);
+    this.row = element("div", { class: "dial" }, name, this.slider, this.number, unit);
+    this.slider.addEventListener("input", () => this.take(this.slider.valueAsNumber, changed));
+    this.number.addEventListener("input", () => this.take(this.number.valueAsNumber, changed));
+    this.show();
+  }
+
+  take(value, changed) {
+    if (!Number.isFinite(value)) return; // half typed
+    this.settings.set(this.variable, value);
+    this.show(document.activeElement === this.number);
+    changed();
+  }
+
+  show(typing = false) {
+    const value = this.settings.get(this.variable);
+    this.slider.value = value;
+    this.slider.setAttribute("aria-valuetext", withUnit(value, this.variable.unit));
+    if (!typing) this.number.value = Number(Number(value).toPrecision(12));
+    this.row.classList.toggle("changed", this.settings.values.has(this.variable.name));
+  }
+}
+
+/* All dials, in one fieldset a role; returns a function that shows the settings anew. */
+function buildDials(box, settings, changed) {
+  const dials = [];
+  for (const [role, title, open] of TITLES) {
+    const found = SETTABLE.filter((v) => v.role === role);
+    if (!found.length) continue;
+    const made = found.map((v) => new Dial(v, settings, changed));
+    dials.push(...made);
+    box.append(
+      element("details", { open }, element("summary", {}, title), ...made.map((d) => d.row))
+    );
+  }
+  return () => dials.forEach((d) => d.show());
+}

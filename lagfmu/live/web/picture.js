@@ -1,0 +1,272 @@
+/* picture.js -- the mechanism at a time: the model's shapes as SVG, forces of constraint as arrows. */
+
+const SVG = "http://www.w3.org/2000/svg";
+const SAMPLES = 120; // points of a path; rows that the view is fitted to
+const MARGIN = 44;
+const LONGEST = 0.22; // of the view: the arrow of the largest force
+
+function svg(tag, attributes = {}) {
+  const made = document.createElementNS(SVG, tag);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  return made;
+}
+
+const pointsOf = (list) => list.map(([x, y]) => `${x.toFixed(2)},${y.toFixed(2)}`).join(" ");
+
+/* Each kind: `points` gives what must be in view, in the world; `draw` sets its elements on the screen. */
+const SHAPES = {
+  line: {
+    make: () => [svg("polyline", { class: "line" })],
+    points: (s, look) => s.points.map((p) => p(look)),
+    draw: ([line], s, look, view) =>
+      line.setAttribute("points", pointsOf(s.points.map((p) => view.screen(p(look))))),
+  },
+  rod: {
+    make: () => [
+      svg("line", { class: "rod" }),
+      svg("circle", { class: "joint", r: 3.5 }),
+      svg("circle", { class: "joint", r: 3.5 }),
+    ],
+    points: (s, look) => s.points.map((p) => p(look)),
+    draw([bar, ...joints], s, look, view) {
+      const ends = s.points.map((p) => view.screen(p(look)));
+      setLine(bar, ends[0], ends[1]);
+      joints.forEach((joint, k) => setCenter(joint, ends[k]));
+    },
+  },
+  spring: {
+    make: () => [svg("polyline", { class: "spring" })],
+    points: (s, look) => s.points.map((p) => p(look)),
+    draw([line], s, look, view) {
+      const [a, b] = s.points.map((p) => view.screen(p(look)));
+      const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+      const length = Math.hypot(dx, dy) || 1;
+      const [nx, ny] = [(-dy / length) * 6, (dx / length) * 6];
+      const turns = 2 * s.coils;
+      const found = [a];
+      for (let k = 0; k <= turns; k++) {
+        const part = 0.12 + (0.76 * k) / turns;
+        const side = k === 0 || k === turns ? 0 : k % 2 ? 1 : -1;
+        found.push([a[0] + part * dx + side * nx, a[1] + part * dy + side * ny]);
+      }
+      line.setAttribute("points", pointsOf([...found, b]));
+    },
+  },
+  disk: {
+    make: (s) => [
+      svg("polyline", { class: "trace" }),
+      svg("circle", { class: s.radius ? "disk" : "particle", r: 6 }),
+      svg("line", { class: "spoke" }),
+    ],
+    points(s, look) {
+      const c = s.center(look);
+      const r = s.radius ? s.radius(look) : 0;
+      return [c.map((x) => x - r), c.map((x) => x + r)];
+    },
+    draw([trace, circle, spoke], s, look, view) {
+      const c = view.screen(s.center(look));
+      setCenter(circle, c);
+      const r = s.radius ? Math.abs(s.radius(look)) * view.scale : 6;
+      circle.setAttribute("r", r);
+      if (s.angle && s.radius) {
+        const a = s.angle(look);
+        setLine(spoke, c, [c[0] + r * Math.cos(a), c[1] - r * Math.sin(a)]);
+      }
+      if (s.trace) trace.setAttribute("points", pointsOf(view.past(s.center).map(view.screen)));
+    },
+  },
+  ground: {
+    make: () => [svg("line", { class: "ground" }), svg("path", { class: "hatch" })],
+    points: (s, look) => s.points.map((p) => p(look)),
+    draw([line, hatch], s, look, view) {
+      const [a, b] = s.points.map((p) => view.screen(p(look)));
+      setLine(line, a, b);
+      const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+      const [tx, ty] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+      const strokes = [];
+      for (let d = 4; d < length; d += 9) {
+        const [x, y] = [a[0] + d * tx, a[1] + d * ty];
+        const [ex, ey] = [x - 7 * tx - 7 * ty, y - 7 * ty + 7 * tx];
+        strokes.push(`M${x.toFixed(1)} ${y.toFixed(1)}L${ex.toFixed(1)} ${ey.toFixed(1)}`);
+      }
+      hatch.setAttribute("d", strokes.join(""));
+    },
+  },
+  path: {
+    make: () => [svg("polyline", { class: "path" })],
+    points: (s, look) => pathPoints(s, look),
+    draw: ([line], s, look, view) =>
+      line.setAttribute("points", pointsOf(pathPoints(s, look).map(view.screen))),
+  },
+  arrow: {
+    make: () => [
+      svg("line", { class: "arrow" }),
+      svg("polygon", { class: "head" }),
+      svg("text", { class: "force" }),
+    ],
+    points: (s, look) => [s.at(look)],
+    draw([shaft, head, label], s, look, view) {
+      const force = s.vector(look);
+      const size = Math.hypot(...force);
+      const from = view.screen(s.at(look));
+      const flat = view.flat(force).map((x) => (x * view.reach) / view.strongest);
+      const to = [from[0] + flat[0], from[1] - flat[1]];
+      const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
+      const seen = Number.isFinite(length) && length > 1.5;
+      for (const part of [shaft, head, label]) part.style.display = seen ? "" : "none";
+      if (!seen) return;
+      const [tx, ty] = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
+      const tip = Math.min(9, length);
+      const base = [to[0] - tip * tx, to[1] - tip * ty];
+      setLine(shaft, from, base);
+      const side = tip * 0.45;
+      head.setAttribute(
+        "points",
+        pointsOf([to, [base[0] - side * ty, base[1] + side * tx], [base[0] + side * ty, base[1] - side * tx]])
+      );
+      label.textContent = `${s.name} ${withUnit(size, "N", 3)}`;
+      label.setAttribute("x", Math.min(Math.max(to[0] + 6 * tx, 4), view.width - 4));
+      const y = to[1] + 6 * ty + (ty > 0 ? 10 : 0);
+      label.setAttribute("y", Math.min(Math.max(y, 13), view.height - 5));
+      label.setAttribute("text-anchor", to[0] > view.width * 0.66 ? "end" : "start");
+    },
+  },
+};
+
+function setLine(line, [x1, y1], [x2, y2]) {
+  for (const [key, value] of Object.entries({ x1, y1, x2, y2 })) line.setAttribute(key, value);
+}
+
+function setCenter(circle, [cx, cy]) {
+  circle.setAttribute("cx", cx);
+  circle.setAttribute("cy", cy);
+}
+
+function pathPoints(s, look) {
+  const [low, high] = s.range.map((f) => f(look));
+  const found = [];
+  for (let k = 0; k <= SAMPLES; k++) {
+    const value = low + ((high - low) * k) / SAMPLES;
+    found.push(s.point((name) => (name === s.over ? value : look(name))));
+  }
+  return found;
+}
+
+const compiledPoint = (point) => {
+  const parts = point.map(compiled);
+  return (look) => parts.map((f) => f(look));
+};
+
+function compiledShape(s) {
+  const found = { ...s };
+  if (s.points) found.points = s.points.map(compiledPoint);
+  for (const key of ["center", "at", "point", "vector"]) if (s[key]) found[key] = compiledPoint(s[key]);
+  for (const key of ["radius", "angle"]) if (s[key] !== undefined) found[key] = compiled(s[key]);
+  if (s.range) found.range = s.range.map(compiled);
+  return found;
+}
+
+class Picture {
+  constructor(root, facts) {
+    this.root = root;
+    this.space = facts.dimensions === 3;
+    this.azimuth = -1.05;
+    this.elevation = 0.42;
+    this.shapes = facts.shapes
+      .filter((s) => s.kind in SHAPES)
+      .map((s) => {
+        const kind = SHAPES[s.kind];
+        const parts = kind.make(s);
+        root.append(...parts);
+        return { shape: compiledShape(s), kind, parts };
+      });
+    for (const { parts, shape } of this.shapes) if (shape.kind === "arrow") root.append(...parts);
+    this.screen = this.screen.bind(this);
+    this.flat = this.flat.bind(this);
+    this.past = this.past.bind(this);
+  }
+
+  /* A vector of the world in the plane of the screen, y up. */
+  flat(v) {
+    if (!this.space) return [v[0], v[1]];
+    const [x, y, z] = v;
+    const { azimuth: a, elevation: e } = this;
+    const depth = x * Math.cos(a) + y * Math.sin(a);
+    return [-x * Math.sin(a) + y * Math.cos(a), z * Math.cos(e) - depth * Math.sin(e)];
+  }
+
+  screen(p) {
+    const [x, y] = this.flat(p);
+    return [this.left + (x - this.low[0]) * this.scale, this.bottom - (y - this.low[1]) * this.scale];
+  }
+
+  look(place) {
+    const { trajectory } = this;
+    return (name) => trajectory.at(name, place);
+  }
+
+  /* Fits the view to the whole run, and the arrows to its largest force. */
+  show(trajectory) {
+    this.trajectory = trajectory;
+    const low = [Infinity, Infinity];
+    const high = [-Infinity, -Infinity];
+    const forces = new Map();
+    const stride = Math.max(1, Math.floor(trajectory.time.length / SAMPLES));
+    for (let row = 0; row < trajectory.time.length; row += stride) {
+      const look = this.look([row, 0]);
+      for (const { shape, kind } of this.shapes) {
+        if (shape.kind === "arrow") {
+          const size = Math.hypot(...shape.vector(look));
+          if (size > 0) forces.set(shape, [...(forces.get(shape) || []), size]);
+        }
+        if (shape.kind === "path" && row > 0 && !shape.moves) continue;
+        for (const p of kind.points(shape, look)) {
+          const [x, y] = this.flat(p);
+          if (!Number.isFinite(x) || !Number.isFinite(y)) continue;
+          low[0] = Math.min(low[0], x);
+          low[1] = Math.min(low[1], y);
+          high[0] = Math.max(high[0], x);
+          high[1] = Math.max(high[1], y);
+        }
+      }
+    }
+    let strongest = 0;
+    for (const sizes of forces.values()) {
+      sizes.sort((a, b) => a - b);
+      strongest = Math.max(strongest, sizes[Math.floor(0.98 * (sizes.length - 1))]); // not a spike
+    }
+    this.strongest = strongest || 1;
+    this.low = Number.isFinite(low[0]) ? low : [0, 0];
+    this.high = Number.isFinite(high[0]) ? high : [1, 1];
+    this.fit();
+  }
+
+  fit() {
+    const { width, height } = this.root.getBoundingClientRect();
+    this.width = Math.max(width, 100);
+    this.height = Math.max(height, 100);
+    this.root.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
+    const [w, h] = [this.high[0] - this.low[0], this.high[1] - this.low[1]];
+    const room = [this.width - 2 * MARGIN, this.height - 2 * MARGIN];
+    this.scale = Math.min(room[0] / (w || 1e-9), room[1] / (h || 1e-9), 1e9);
+    if (w === 0 && h === 0) this.scale = 1;
+    this.left = (this.width - w * this.scale) / 2;
+    this.bottom = (this.height + h * this.scale) / 2;
+    this.reach = LONGEST * Math.min(this.width, this.height);
+  }
+
+  past(center) {
+    const found = [];
+    const last = this.placed[0];
+    const stride = Math.max(1, Math.floor(last / (4 * SAMPLES)));
+    for (let row = 0; row <= last; row += stride) found.push(center(this.look([row, 0])));
+    found.push(center(this.look(this.placed)));
+    return found;
+  }
+
+  now(t) {
+    this.placed = this.trajectory.place(t);
+    const look = this.look(this.placed);
+    for (const { shape, kind, parts } of this.shapes) kind.draw(parts, shape, look, this);
+  }
+}

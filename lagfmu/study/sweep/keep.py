@@ -1,0 +1,69 @@
+"""What a study keeps of a run: NAME:last, :max, :min, :mean, :time-of-max, or all points, :trajectory."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ...errors import SimulationError
+from ...fmu.session import LAST, MAX, MEAN, MIN, TIME_OF_MAX, TYPES
+
+REDUCTIONS = {"last": LAST, "max": MAX, "min": MIN, "mean": MEAN, "time-of-max": TIME_OF_MAX}
+TRAJECTORY = "trajectory"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The reductions (variable, how) in the order asked for, and the variables kept at all points."""
+
+    numbers: tuple[tuple[str, str], ...]
+    trajectories: tuple[str, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """NAME:HOW of each number."""
+        return tuple(f"{name}:{how}" for name, how in self.numbers)
+
+    @property
+    def plan(self) -> tuple[tuple[str, int], ...]:
+        """For the session: the numbers, then the variables whose trajectories are kept."""
+        found = [(name, REDUCTIONS[how]) for name, how in self.numbers]
+        return (*found, *((name, LAST) for name in self.trajectories))
+
+
+def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
+    """`known` maps the FMU's variables to their FMI types.  Without texts: the largest multipliers, and
+    counts and times of departures.  Raises SimulationError with all problems at once."""
+    if not texts:
+        texts = [f"{n}:max" for n in known if n.startswith("lambda.")]
+        texts += [f"{n}:last" for n in known if n.startswith("departure.") and n.count(".") == 2
+                  and n.endswith((".count", ".time"))]  # fmt: skip
+        if not texts:
+            texts = [f"{n}:last" for n in known if n.startswith("energy.")]
+    numbers, trajectories, problems = [], [], []
+    for text in dict.fromkeys(texts):
+        name, sign, how = text.rpartition(":")
+        if not sign or (how not in REDUCTIONS and how != TRAJECTORY and text in known):
+            name, how = text, "last"
+        if how != TRAJECTORY and how not in REDUCTIONS:
+            ways = ", ".join((*REDUCTIONS, TRAJECTORY))
+            problems.append(f"{text!r}: {how!r} is unknown, expected one of {ways}")
+        elif name not in known or known[name] not in TYPES:
+            problems.append(missing(name, [n for n in known if known[n] in TYPES]))
+        elif how == TRAJECTORY:
+            trajectories.append(name)
+        else:
+            numbers.append((name, how))
+    if problems:
+        raise SimulationError("keep: " + "; ".join(problems))
+    return Kept(tuple(numbers), tuple(trajectories))
+
+
+def missing(name: str, known: Iterable[str], what: str = "is not in the FMU") -> str:
+    """What to say of a name that the FMU does not have."""
+    known = list(known)
+    near = difflib.get_close_matches(name, known, 1)
+    if near:
+        return f"{name!r} {what}; did you mean {near[0]!r}?"
+    return f"{name!r} {what}, expected one of {', '.join(known) or 'none'}"

@@ -1,0 +1,130 @@
+"""A picture of a study: one varied quantity a curve, two a map, samples scatter plots and histograms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import SimulationError
+
+FAILED = "#c0392b"
+INK = "#1f5fa8"
+STYLE = {
+    "svg.hashsalt": "lagfmu",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "axes.axisbelow": True,
+}
+
+
+def plot(found: Any, path: Path) -> Path:
+    """Draw the numbers that were kept.  Raises SimulationError if the file cannot be written."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    names = [
+        str(n)
+        for n, a in found.data_vars.items()
+        if a.dtype.kind == "f" and n != "reached" and "time" not in a.dims
+    ]
+    if not names:
+        raise SimulationError("there is nothing to plot: keep numbers of each run")
+    dims = [d for d in found["status"].dims if d != "run"]
+    with mpl.rc_context(STYLE):
+        if "run" in found.dims or len(dims) > 2:
+            figure = _scatter(found, names, Figure)
+        else:
+            figure = _grid(found, names, dims, Figure)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+        except (OSError, ValueError) as error:
+            raise SimulationError(f"cannot write {str(path)!r}: {error}") from None
+    return path
+
+
+def _label(found: Any, name: str) -> str:
+    unit = found[name].attrs.get("units", "")
+    return f"{name} [{unit}]" if unit else name
+
+
+def _grid(found: Any, names: list[str], dims: list[str], Figure: Any) -> Any:
+    """A panel a kept quantity: a curve over one axis, a map over two."""
+    width, height = (7.0, 2.4) if len(dims) == 1 else (6.0, 4.2)
+    figure = Figure(figsize=(width, height * len(names)), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
+    bad = found["status"].values != "ok"
+    for panel, name in zip(panels, names, strict=True):
+        x = found[dims[0]].values
+        if len(dims) == 1:
+            panel.plot(x, found[name].values, color=INK, marker="." if len(x) < 60 else None)
+            if bad.any():
+                panel.plot(x[bad], np.zeros(bad.sum()), "x", color=FAILED, clip_on=False,
+                           transform=panel.get_xaxis_transform(), label="refused")  # fmt: skip
+                panel.legend(frameon=False)
+            panel.set_ylabel(_label(found, name))
+        else:
+            y = found[dims[1]].values
+            drawn = panel.pcolormesh(x, y, found[name].values.T, shading="nearest", cmap="viridis")
+            figure.colorbar(drawn, ax=panel, label=_label(found, name))
+            if bad.any():
+                i, j = np.nonzero(bad)
+                panel.plot(x[i], y[j], "x", color=FAILED, label="refused")
+                panel.legend(frameon=True)
+            panel.set_ylabel(_label(found, dims[1]))
+            panel.grid(visible=False)
+        for axis, values in (("x", x), *((("y", found[dims[1]].values),) if len(dims) > 1 else ())):
+            if _logarithmic(values):
+                getattr(panel, f"set_{axis}scale")("log")
+    panels[-1].set_xlabel(_label(found, dims[0]))
+    return figure
+
+
+def _logarithmic(values: Any) -> bool:
+    """True if the values are spaced evenly in the logarithm."""
+    if len(values) < 3 or not (values > 0).all():
+        return False
+    steps = np.diff(np.log(values))
+    return bool(
+        np.allclose(steps, steps[0]) and not np.allclose(np.diff(values), values[1] - values[0])
+    )
+
+
+def _scatter(found: Any, names: list[str], Figure: Any) -> Any:
+    """What varied across, what was kept down; histograms of each on the edges."""
+    varied = [
+        n for n, c in found.coords.items() if n not in ("run", "time") and c.dtype.kind == "f"
+    ]
+    stacked = found.stack(all_runs=found["status"].dims) if "run" not in found.dims else found
+    good = stacked["status"].values == "ok"
+    columns, rows = len(varied) + 1, len(names) + 1
+    figure = Figure(figsize=(2.4 * columns, 2.1 * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False)
+    bins = min(50, max(8, int(np.sqrt(good.sum()))))
+    for i, name in enumerate(names):
+        y = stacked[name].values
+        for j, cause in enumerate(varied):
+            panel = panels[i][j]
+            panel.plot(stacked[cause].values[good], y[good], ".", ms=2, color=INK, alpha=0.4,
+                       rasterized=True)  # fmt: skip
+            if i == 0 and (~good).any():
+                panel.plot(stacked[cause].values[~good], np.zeros((~good).sum()), "x", ms=3,
+                           color=FAILED, transform=panel.get_xaxis_transform(), clip_on=False)  # fmt: skip
+            if j == 0:
+                panel.set_ylabel(_label(found, name))
+        panels[i][-1].hist(y[good], bins=bins, orientation="horizontal", color=INK)
+        panels[i][-1].sharey(panels[i][0])
+    for j, cause in enumerate(varied):
+        panels[-1][j].hist(stacked[cause].values[good], bins=bins, color=INK)
+        panels[-1][j].set_xlabel(_label(found, cause))
+    corner = panels[-1][-1]
+    corner.axis("off")
+    refused = int((~good).sum())
+    corner.text(0.5, 0.5, f"{good.sum()} runs" + (f"\n{refused} refused (x)" if refused else ""),
+                ha="center", va="center")  # fmt: skip
+    return figure

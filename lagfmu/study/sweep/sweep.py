@@ -1,0 +1,340 @@
+"""sweep(): many runs of one FMU, as an xarray Dataset and, if asked for, a file."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SimulationError
+from ...fmu.archive import version
+from ...fmu.compiler import find_compiler
+from ...fmu.session import TYPES, Plan, plug
+from ...fmu.write import write
+from ...model.file import load
+from ...model.model import Model
+from ...model.scene import Scene
+from ...prepare.prepare import prepare
+from ...verification.simulate import Trajectory, communication_points, read_description
+from .design import Design, Values, design
+from .engine import connected, distributed, local
+from .keep import kept as parsed
+from .keep import missing
+from .table import Layout, Parts, dataset, write_parquet
+
+MOST = 2000  # runs in a chunk
+FEWEST = 100  # chunks, of a large sweep
+MEMORY = 0.1  # of this machine's, for one table: it is held a few times over
+SUFFIXES = (".parquet", ".nc", ".zarr")
+
+Progress = Callable[[int, int, int], None]  # runs done, of how many, of those refused
+
+
+def sweep(
+    target: str | os.PathLike[str] | Model,
+    vary: Mapping[str, Sequence[float] | Values] | None = None,
+    *,
+    sample: Mapping[str, Any] | None = None,
+    runs: int | None = None,
+    seed: int = 0,
+    sampling: str = "latin-hypercube",
+    rows: Any = None,
+    keep: Sequence[str] = (),
+    stop_time: float | None = None,
+    step_size: float | None = None,
+    tolerance: float | None = None,
+    inputs: Trajectory | None = None,
+    scene: Scene | str | None = None,
+    out: str | os.PathLike[str] | None = None,
+    on: Any = None,
+    workers: int | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+    command: str = "",
+) -> Any:
+    """Run an FMU (or a model, or a model file, built natively where a compiler is at hand) many times.
+
+    What varies are parameters, start values and `solver.*`: `vary` maps names to values, all of which are
+    crossed; `sample` maps names to frozen distributions of SciPy, of which `runs` points are drawn by
+    `sampling` ('latin-hypercube' or 'sobol') with `seed`; `rows` is a table with a column a quantity (a
+    pandas DataFrame, a structured array, or a dict of sequences).
+
+    `keep` are 'NAME:last', ':max', ':min', ':mean', ':time-of-max' (over communication points and departures)
+    or ':trajectory'; if empty, the largest multipliers, and counts and times of departures.  `out` is a file:
+    .parquet for a row a run, .nc or .zarr for all, trajectories included; finished chunks stand in OUT.parts
+    at once, and `resume` goes on from them.  `on` is a Dask scheduler's address or a
+    `dask.distributed.Client`; without it `workers` processes of this machine do the runs (all cores).
+
+    Returns an xarray.Dataset over the crossed quantities, or over `run`; a run that is refused has NaN, its
+    `status` and `reason`.  Raises SimulationError with what was expected.
+    """
+    _require()
+    with _fmu(target, scene) as path:
+        return _sweep(
+            path,
+            _design(vary, sample, runs, seed, sampling, rows),
+            keep,
+            _times(path, stop_time, step_size),
+            tolerance,
+            inputs,
+            None if out is None else Path(out),
+            on,
+            workers,
+            resume,
+            progress,
+            command,
+        )
+
+
+def _sweep(
+    path: Path,
+    varied: Design,
+    keep: Sequence[str],
+    times: NDArray[np.float64],
+    tolerance: float | None,
+    inputs: Trajectory | None,
+    out: Path | None,
+    on: Any,
+    workers: int | None,
+    resume: bool,
+    progress: Progress | None,
+    command: str,
+) -> Any:
+    description = read_description(path)
+    if description.coSimulation is None:
+        raise SimulationError(
+            f"{str(path)!r} has no co-simulation: a sweep steps FMUs by fmi2DoStep"
+        )
+    variables = {v.name: v for v in description.modelVariables}
+    kept = parsed(keep, {n: v.type for n, v in variables.items()})
+    drives = _drives(inputs, times, variables)
+    _check(varied, variables, drives[0])
+    if out is not None and out.suffix not in SUFFIXES:
+        raise SimulationError(f"--out {str(out)!r}: expected a file .parquet, .nc or .zarr")
+    if kept.trajectories and out is not None and out.suffix == ".parquet":
+        raise SimulationError("trajectories do not fit a Parquet file: --out FILE.nc or FILE.zarr")
+    size = 8 * len(varied) * (len(kept.numbers) + len(kept.trajectories) * len(times))
+    if size > memory():
+        raise SimulationError(
+            f"{len(varied)} runs would keep {size / 1e9:.3g} GB, more than the {memory() / 1e9:.3g} GB that "
+            "fit here: keep less, or make fewer runs"
+        )
+    chunk = min(MOST, max(1, -(-len(varied) // FEWEST)))
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    plan = Plan(
+        vary=varied.names,
+        keep=kept.plan,
+        times=times,
+        tolerance=tolerance or 0.0,
+        drive=drives[0],
+        drives=drives[1],
+        events=_events(variables),
+        whole=bool(kept.trajectories),
+    )
+    facts = {
+        "fmu": path.name,
+        "fmu_sha256": digest,
+        "lagfmu": version(),
+        "fmpy": fmpy.__version__,
+        "command": command,
+        "stop_time": repr(float(times[-1])),
+        "step_size": repr(float(times[1] - times[0])),
+        "tolerance": repr(tolerance) if tolerance else "the FMU's own",
+    }
+    units = {
+        n: str(v.unit or getattr(v.declaredType, "unit", "") or "") for n, v in variables.items()
+    }
+    layout = Layout(varied, kept, units, facts)
+    driven = "" if drives[1] is None else hashlib.sha256(drives[1].tobytes()).hexdigest()
+    identity = {k: facts[k] for k in ("fmu_sha256", "stop_time", "step_size", "tolerance")}
+    identity |= {"design": varied.digest, "keep": repr(kept), "inputs": driven, "chunk": str(chunk)}
+    parts = Parts(None if out is None else out.with_name(f"{out.name}.parts"), identity, resume)
+    try:
+        failed = _run(path, plan, layout, parts, chunk, on, workers, progress)
+        if out is not None and out.suffix == ".parquet":
+            write_parquet(parts, out)
+        whole = parts.trajectories() if kept.trajectories else None
+        found = dataset(layout, list(parts.tables()), times, whole)
+        found.attrs["refused"] = sum(failed.values())
+        if out is not None and out.suffix != ".parquet":
+            _save(found, out)
+    except BaseException:
+        if parts.temporary:
+            parts.remove()
+        raise
+    parts.remove()
+    return found
+
+
+def _run(
+    path: Path,
+    plan: Plan,
+    layout: Layout,
+    parts: Parts,
+    chunk: int,
+    on: Any,
+    workers: int | None,
+    progress: Progress | None,
+) -> Counter[str]:
+    """What is not yet there; the reasons of the runs that were refused."""
+    total, done = len(layout.design), parts.done
+    table = layout.design.table
+    left = [
+        (n, table[n * chunk : (n + 1) * chunk]) for n in range(-(-total // chunk)) if n not in done
+    ]
+    finished, failed = total - sum(len(v) for _, v in left), Counter[str]()
+    folder = fmpy.extract(str(path))
+    plugged = plug(path, read_description(path), folder)
+    if progress is not None:
+        progress(finished, total, 0)
+    client, ours = (None, False) if on is None else connected(on)
+    try:
+        if client is None:
+            results = local(plugged, plan, left, workers or os.cpu_count() or 1)
+        else:
+            results = distributed(client, path, plugged, plan, left)
+        for number, outcome in results:
+            first = number * chunk
+            parts.write(number, layout.part(first, outcome), layout.trajectories(outcome))
+            failed.update(outcome.reasons.values())
+            finished += len(outcome.status)
+            if progress is not None:
+                progress(finished, total, sum(failed.values()))
+    finally:
+        if client is not None and ours:
+            client.close()
+        shutil.rmtree(folder, ignore_errors=True)
+    return failed
+
+
+def memory() -> float:
+    """Bytes that one table may have."""
+    try:
+        return MEMORY * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return 4e9
+
+
+def _require() -> None:
+    missing = []
+    for name in ("pandas", "pyarrow", "xarray"):
+        try:
+            __import__(name)
+        except ImportError:
+            missing.append(name)
+    if missing:
+        raise SimulationError(f"a sweep needs {', '.join(missing)}: pip install 'lagfmu[study]'")
+
+
+@contextmanager
+def _fmu(target: Any, scene: Scene | str | None) -> Iterator[Path]:
+    """The FMU, built into a folder that goes again if the target is a model."""
+    if isinstance(target, Model):
+        model, chosen = target, scene if isinstance(scene, Scene) else Scene(target.name)
+    else:
+        path = Path(target)
+        if path.suffix != ".py":
+            yield path
+            return
+        file = load(path)
+        model = file.model
+        names = [s.name for s in file.scenes]
+        if isinstance(scene, Scene):
+            chosen = scene
+        elif scene is not None and scene not in names:
+            raise SimulationError(f"{path}: no FMU is called {scene!r}; known: {', '.join(names)}")
+        else:
+            chosen = file.scenes[0 if scene is None else names.index(scene)]
+    kind = "native" if find_compiler() is not None else "python"
+    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+        yield write(prepare(model, chosen), folder, target=kind)
+
+
+def _design(
+    vary: Mapping[str, Sequence[float] | Values] | None,
+    sample: Mapping[str, Any] | None,
+    runs: int | None,
+    seed: int,
+    sampling: str,
+    rows: Any,
+) -> Design:
+    table = None
+    if rows is not None:
+        names = tuple(rows.dtype.names if isinstance(rows, np.ndarray) else rows.keys())
+        table = (names, np.column_stack([np.asarray(rows[n], dtype=float) for n in names]))
+    return design(vary, sample, runs, seed, sampling, table, memory())
+
+
+def _times(path: Path, stop_time: float | None, step_size: float | None) -> NDArray[np.float64]:
+    experiment = read_description(path).defaultExperiment
+    stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
+    step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
+    for what, value in (("stop_time", stop), ("step_size", step)):
+        if not 0 < value < np.inf:
+            raise SimulationError(f"{what} = {value!r} s, expected a positive number")
+    return communication_points(stop, step)
+
+
+def _check(varied: Design, variables: Mapping[str, Any], driven: Sequence[str]) -> None:
+    """Every varied name is something that the FMU lets be set before it starts."""
+    settable = [
+        n
+        for n, v in variables.items()
+        if v.type in TYPES
+        and (v.causality in ("parameter", "input") or v.initial in ("exact", "approx"))
+    ]
+    problems = [missing(n, settable, "cannot be set") for n in varied.names if n not in settable]
+    problems += [
+        f"{n} varies and comes from the file of inputs" for n in varied.names if n in driven
+    ]
+    if problems:
+        raise SimulationError("; ".join(problems))
+
+
+def _drives(
+    inputs: Trajectory | None, times: NDArray[np.float64], variables: Mapping[str, Any]
+) -> tuple[tuple[str, ...], NDArray[np.float64] | None]:
+    """Inputs, interpolated linearly at the communication points."""
+    if inputs is None:
+        return (), None
+    names = tuple(n for n in inputs.dtype.names or () if n != "time")
+    known = [n for n, v in variables.items() if v.causality == "input"]
+    unknown = [missing(n, known) for n in names if n not in known]
+    if unknown or "time" not in (inputs.dtype.names or ()):
+        raise SimulationError("inputs: " + ("; ".join(unknown) or "there is no column 'time'"))
+    if not (np.diff(inputs["time"]) >= 0).all() or not np.isfinite(inputs["time"]).all():
+        raise SimulationError("inputs: the times are not sorted, expected rising seconds")
+    table = np.column_stack([np.interp(times, inputs["time"], inputs[n]) for n in names])
+    return names, table
+
+
+def _events(variables: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """(count, time) of every kind of departure that the FMU reports."""
+    counts = [n for n in variables if n.startswith("departure.") and n.endswith(".count")]
+    pairs = [(n, n.removesuffix("count") + "time") for n in counts]
+    return tuple(p for p in pairs if p[1] in variables)
+
+
+def _save(found: Any, out: Path) -> None:
+    """netCDF or Zarr.  Raises SimulationError."""
+    try:
+        if out.suffix == ".zarr":
+            found.to_zarr(out, mode="w")
+        else:
+            found.to_netcdf(out, engine="h5netcdf")
+    except (ImportError, ModuleNotFoundError, ValueError) as error:
+        raise SimulationError(
+            f"cannot write {str(out)!r}: {error}; pip install 'lagfmu[study]'"
+        ) from None
+    except OSError as error:
+        raise SimulationError(f"cannot write {str(out)!r}: {error.strerror or error}") from None

@@ -1,0 +1,80 @@
+"""Half a car on a tabulated road: wheels that leave the road over a bump, and land."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import MODELS
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from lagfmu import simulate
+from lagfmu.model.file import load
+
+M, J, m, g, a, b, k, c, v = 1200.0, 1500.0, 80.0, 9.81, 1.2, 1.5, 4e4, 3e3, 14.0
+
+
+def first_departure() -> float:
+    """The front wheel's, from the body's own equations on two moving feet: independent of lagfmu."""
+    road = next(s for s in load(MODELS / "half_car.py").model.splines)
+    y = CubicSpline(road.x, road.y, bc_type="natural")
+    load_f, load_r = M * g * b / (a + b), M * g * a / (a + b)
+
+    def forces(t, state):
+        z, th, dz, dth = state
+        s = 2.0 + v * t
+        df = y(s + a) - z - a * th
+        dr = y(s - b) - z + b * th
+        rf = y(s + a, 1) * v - dz - a * dth
+        rr = y(s - b, 1) * v - dz + b * dth
+        return load_f + k * df + c * rf, load_r + k * dr + c * rr
+
+    def rate(t, state):
+        f, r = forces(t, state)
+        return [state[2], state[3], (f + r) / M - g, (a * f - b * r) / J]
+
+    def load_of_front(t, state):
+        return m * (g + y(2.0 + v * t + a, 2) * v**2) + forces(t, state)[0]
+
+    load_of_front.terminal, load_of_front.direction = True, -1
+    found = solve_ivp(
+        rate,
+        (0, 1),
+        [0, 0, 0, 0],
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-14,
+        events=load_of_front,
+        max_step=1e-3,
+    )
+    return float(found.t_events[0][0])
+
+
+def test_the_front_wheel_leaves_where_its_load_vanishes(native_fmu):
+    """The departure is that of an independent integration; both wheels leave, and land again."""
+    run = simulate(native_fmu("HalfCar"), tolerance=1e-10)
+    assert run["departure.front.time"][-1] == pytest.approx(first_departure(), abs=1e-9)
+    for wheel in ("front", "rear"):
+        shut = run[f"contact.{wheel}"]
+        assert run[f"departure.{wheel}.count"][-1] >= 1
+        assert shut[0]
+        assert shut[-1]
+        assert not shut.all()
+        assert (run[f"lambda.{wheel}"][~shut] == 0).all()
+    assert ((run["front.share"] >= 0) & (run["front.share"] <= 1)).all()
+
+
+def test_the_wheels_carry_the_car(native_fmu):
+    """Rolling on the flat again they share the weight by their levers; the travel settles to nothing."""
+    run = simulate(native_fmu("HalfCar"), 2.0, start_values={"s": 12.0})
+    share = (M * g * b / (a + b) + m * g) / ((M + 2 * m) * g)
+    assert run["front.share"][-1] == pytest.approx(share, rel=1e-3)
+    assert abs(run["front.travel"][-1]) < 1e-3
+
+
+def test_both_targets_take_the_same_road(native_fmu, python_fmu):
+    """The same loads up to the bump, from both."""
+    runs = [simulate(fmu("HalfCar"), 0.3, 0.01) for fmu in (native_fmu, python_fmu)]
+    for name in ("lambda.front", "lambda.rear", "body.acceleration", "road.drag"):
+        scale = np.abs(runs[0][name]).max()
+        np.testing.assert_allclose(runs[0][name], runs[1][name], atol=1e-6 * scale, rtol=0)

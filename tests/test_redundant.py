@@ -1,0 +1,117 @@
+"""Constraints that follow from others: as many steps as without them, and the same motion."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from redundant import SYSTEMS
+
+from lagfmu import Scene, simulate
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.prepare.consistency import RedundantConstraintWarning
+from lagfmu.prepare.prepare import prepare
+from lagfmu.prepare.starts import StartMovedWarning
+
+SPAN = 1.0  # s
+Pair = tuple[Path, Path]
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Pair]:
+    """pair(NAME, TARGET): the system without redundant constraints, and with them."""
+    folder = tmp_path_factory.mktemp("redundant")
+    made: dict[tuple[str, str], Pair] = {}
+
+    def get(name: str, target: str) -> Pair:
+        if target == "native" and find_compiler() is None:
+            pytest.skip("no C compiler on this machine")
+        if (name, target) not in made:
+            models = [SYSTEMS[name](redundant) for redundant in (False, True)]
+            scenes = [Scene(m.name, stop_time=SPAN, step_size=SPAN / 20) for m in models]
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RedundantConstraintWarning)
+                warnings.simplefilter("ignore", StartMovedWarning)
+                paths = [
+                    write(prepare(m, s), folder / target / str(k), target=target)
+                    for k, (m, s) in enumerate(zip(models, scenes, strict=True))
+                ]
+            made[name, target] = (paths[0], paths[1])
+        return made[name, target]
+
+    return get
+
+
+def run(fmu: Path, method: str, tolerance: float) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StartMovedWarning)
+        return simulate(fmu, tolerance=tolerance, start_values={"solver.method": method})
+
+
+def compare(fmus: Pair, method: str, tolerance: float) -> None:
+    """Steps within 1.5, and the motions within what two integrations of this tolerance differ by."""
+    plain, redundant = (run(fmu, method, tolerance) for fmu in fmus)
+    assert redundant["solver.steps"][-1] <= 1.5 * plain["solver.steps"][-1]
+    for name in plain.dtype.names:
+        if name.startswith(("x", "y", "a", "turn")):
+            assert np.abs(redundant[name] - plain[name]).max() < max(1e4 * tolerance, 1e-9), name
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_redundant_constraints_cost_no_steps(name, pair):
+    """Stages lie off the constraints, where rows that depend on each other ask for different accelerations:
+    as many as are independent on the constraints say what acts."""
+    for tolerance in (1e-6, 1e-9, 1e-12):
+        compare(pair(name, "native"), "dop853", tolerance)
+    for tolerance in (1e-6, 1e-9):
+        compare(pair(name, "native"), "radau5", tolerance)
+    compare(pair(name, "native"), "rk4", 1e-6)
+
+
+@pytest.mark.parametrize("name", ["closed_chain", "spatial_loop"])
+def test_redundant_constraints_cost_no_steps_in_python(name, pair):
+    """The same in SciPy's integrators."""
+    compare(pair(name, "python"), "dop853", 1e-7)
+    compare(pair(name, "python"), "radau5", 1e-4)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_an_importers_integrator_does_not_meet_them_either(name, pair, monkeypatch):
+    """Model exchange: as many evaluations of the derivatives as without the redundancy, within 1.5."""
+    count = 0
+    plain = fmpy.fmi2.FMU2Model.getDerivatives
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal count
+        count += 1
+        return plain(*arguments)
+
+    monkeypatch.setattr(fmpy.fmi2.FMU2Model, "getDerivatives", counted)
+    for tolerance in (1e-4, 1e-6):
+        found = []
+        for fmu in pair(name, "native"):
+            count = 0
+            fmpy.simulate_fmu(
+                str(fmu),
+                fmi_type="ModelExchange",
+                relative_tolerance=tolerance,
+                output_interval=SPAN / 20,
+            )
+            found.append(count)
+        assert found[1] <= 1.5 * found[0]
+
+
+def test_multipliers_of_redundant_constraints_are_shared_with_least_norm(pair):
+    """Three parallel cranks carry the platform together: the force on it is that of two cranks, and what no
+    measurement of the motion can tell, which crank carries how much, is flagged."""
+    plain, redundant = (run(fmu, "dop853", 1e-10) for fmu in pair("platform", "native"))
+    for name in ("Q.x", "Q.y", "Q.turn"):
+        np.testing.assert_allclose(redundant[name], plain[name], atol=1e-6)
+    assert not redundant["unique.crank3"].any()
+    assert plain["unique.crank1"].all()

@@ -1,0 +1,358 @@
+"""lagfmu sweep: many runs of one FMU, each as if it were the only one."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import MODELS
+from typer.testing import CliRunner
+
+import lagfmu
+from lagfmu.cli import app
+from lagfmu.errors import SimulationError
+from lagfmu.fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, Session, plug
+from lagfmu.study.sweep import engine
+from lagfmu.study.sweep.design import axis, design, distribution, sampled
+from lagfmu.study.sweep.host import Host
+from lagfmu.verification.simulate import read_description
+
+THETA = np.linspace(0.05, 1.0, 12)
+KEEP = ("lambda.surface:max", "departure.surface.time:last", "lambda.surface:time-of-max")
+
+
+@pytest.fixture(scope="module")
+def hemisphere(native_fmu) -> Path:
+    return native_fmu("Hemisphere")
+
+
+@pytest.fixture(scope="module")
+def plugged(hemisphere, tmp_path_factory):
+    import fmpy
+
+    folder = fmpy.extract(str(hemisphere), str(tmp_path_factory.mktemp("unpacked")))
+    return plug(hemisphere, read_description(hemisphere), folder)
+
+
+def test_the_particle_leaves_where_the_energy_says_in_every_run(hemisphere):
+    """cos(theta) = (2/3) cos(theta0) at the departure, whatever the mass; the largest normal force of a start
+    from rest is that at the start, m g cos(theta0)."""
+    found = lagfmu.sweep(
+        hemisphere,
+        {"theta": THETA, "m": [0.5, 2.0]},
+        keep=[*KEEP, "departure.surface.theta:last"],
+        stop_time=2.0,
+        tolerance=1e-10,
+    )
+    assert found["departure.surface.theta:last"].dims == ("theta", "m")
+    cosine = np.cos(found["departure.surface.theta:last"])
+    assert np.abs(cosine - 2 / 3 * np.cos(found.theta)).max() < 1e-9
+    weight = found.m * 9.81 * np.cos(found.theta)
+    assert np.abs(found["lambda.surface:max"] / weight - 1).max() < 1e-9
+    assert (found["lambda.surface:time-of-max"] == 0).all()
+    assert (found.status == "ok").all()
+    assert found["lambda.surface:max"].attrs["units"] == "N"
+    assert found.theta.attrs["units"] == "rad"
+
+
+def test_a_run_in_a_sweep_is_the_run_alone(hemisphere):
+    """Bit for bit what fmpy's simulate_fmu gives: an instance that is reset remembers nothing."""
+    import fmpy
+
+    found = lagfmu.sweep(
+        hemisphere,
+        {"theta": THETA},
+        keep=["lambda.surface:trajectory"],
+        stop_time=1.0,
+        step_size=0.05,
+    )
+    for k in (0, 5, 11):
+        alone = fmpy.simulate_fmu(
+            str(hemisphere), stop_time=1.0, step_size=0.05, output_interval=0.05,
+            start_values={"theta": THETA[k]}, output=["lambda.surface"],
+        )  # fmt: skip
+        assert (found["lambda.surface"].values[k] == alone["lambda.surface"]).all()
+
+
+def test_the_loop_in_c_and_the_one_in_python_give_the_same_bits(plugged):
+    """An FMU of another tool, which has no lagfmu_batch, is run by the same steps."""
+    keep = (("lambda.surface", MAX), ("lambda.surface", MEAN), ("theta", TIME_OF_MAX), ("r", LAST))
+    events = (("departure.surface.count", "departure.surface.time"),)
+    plan = Plan(("theta",), keep, np.linspace(0, 1.5, 31), 1e-9, events=events, whole=True)
+    session = Session(plugged)
+    rows = np.array([[0.1], [0.9], [-5e300], [0.3]])
+    fast = session.batch(plan, rows)
+    slow = replace(fast, result=np.full_like(fast.result, np.nan), reasons={})
+    slow = replace(slow, trajectory=np.full_like(fast.trajectory, np.nan))
+    slow = replace(slow, status=np.zeros(4, np.int32), reached=np.zeros(4))
+    session._looped(plan, rows, slow)
+    session.close()
+    good = [0, 1, 3]
+    assert (fast.result[good] == slow.result[good]).all()
+    assert (fast.trajectory[good] == slow.trajectory[good]).all()
+    assert fast.status.tolist() == slow.status.tolist()
+    assert fast.status[2] > 1
+    assert fast.reasons.keys() == slow.reasons.keys() == {2}
+    assert "theta" in fast.reasons[2]
+
+
+def test_the_largest_value_is_looked_for_at_departures_too(plugged):
+    """theta grows until the particle leaves, and on: at the departure itself it is between two communication
+    points, and what is kept there changes nothing of the run that goes on."""
+    events = (("departure.surface.count", "departure.surface.time"),)
+    wide = Plan(("theta",), (("contact.surface", MAX), ("lambda.surface", LAST), ("der(r)", LAST)),
+                np.array([0.0, 2.0]), 1e-9, events=events)  # fmt: skip
+    session = Session(plugged)
+    rows = np.array([[0.3]])
+    seen = session.batch(wide, rows)
+    blind = session.batch(replace(wide, events=()), rows)
+    session.close()
+    assert (seen.result == blind.result).all()
+
+
+def test_results_do_not_depend_on_the_number_of_workers(hemisphere):
+    """Chunks go to whoever is free: the same bytes of numbers."""
+    runs = [
+        lagfmu.sweep(hemisphere, {"theta": np.linspace(0.1, 1, 150)}, keep=KEEP, workers=n)
+        for n in (1, 3)
+    ]
+    for name in KEEP:
+        assert runs[0][name].values.tobytes() == runs[1][name].values.tobytes()
+
+
+def test_a_refused_run_is_a_row_with_its_reason(hemisphere):
+    """A radius below zero is no hemisphere: NaN, the status and the FMU's own words; the others are there."""
+    found = lagfmu.sweep(hemisphere, {"a": [1.0, -1.0, 0.5]}, keep=["energy.total:last"])
+    assert found.status.values.tolist() == ["ok", "error", "ok"]
+    assert np.isnan(found["energy.total:last"].values[1])
+    assert "'a' = -1.0 is outside its bounds" in str(found.reason.values[1])
+    assert found.attrs["refused"] == 1
+
+
+class Deadly(Host):
+    """A host whose process dies in one run of a chunk: that with theta = 0.5."""
+
+    def _ask(self, plan, values):
+        if self.process is None:
+            super()._ask(plan, values[:0])
+        if (values[:, 0] == 0.5).any():
+            os.kill(self.process.pid, signal.SIGKILL)
+        return super()._ask(plan, values)
+
+
+def test_a_crash_loses_one_row_and_not_its_chunk(plugged):
+    """The process of the FMU is killed whenever one run of five is tried: that run is told, the rest done."""
+    plan = Plan(("theta",), (("theta", LAST),), np.array([0.0, 0.1]))
+    host = Deadly(plugged)
+    found = host.run(plan, np.array([[0.1], [0.2], [0.5], [0.7], [0.9]]))
+    host.close()
+    assert found.status.tolist() == [0, 0, 6, 0, 0]
+    assert "signal 9" in found.reasons[2]
+    assert np.isfinite(found.result[:, 0]).tolist() == [True, True, False, True, True]
+
+
+def test_an_interrupted_sweep_goes_on_where_it_stopped(hemisphere, tmp_path):
+    """The client dies after some chunks: with `resume` the rest is done, every run is there once, and the
+    file has the bytes of numbers of a sweep that was never interrupted."""
+    import pyarrow.parquet as pq
+
+    values = {"theta": np.linspace(0.1, 1, 120)}
+    whole, broken = tmp_path / "whole.parquet", tmp_path / "broken.parquet"
+    lagfmu.sweep(hemisphere, values, keep=KEEP, out=whole)
+
+    def stop(done, total, refused):
+        if done >= 30:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        lagfmu.sweep(hemisphere, values, keep=KEEP, out=broken, progress=stop)
+    parts = broken.with_name("broken.parquet.parts")
+    assert 0 < len(list(parts.glob("part_*"))) < 60
+    with pytest.raises(SimulationError, match="--resume"):
+        lagfmu.sweep(hemisphere, values, keep=KEEP, out=broken)
+    with pytest.raises(SimulationError, match="another sweep"):
+        lagfmu.sweep(hemisphere, {"theta": [1.0]}, keep=KEEP, out=broken, resume=True)
+    lagfmu.sweep(hemisphere, values, keep=KEEP, out=broken, resume=True)
+    assert not parts.exists()
+    a, b = pq.read_table(whole), pq.read_table(broken)
+    assert a["run"].to_pylist() == list(range(120))
+    assert a.equals(b)
+    assert a.schema.field("lambda.surface:max").metadata[b"unit"] == b"N"
+    facts = json.loads(a.schema.metadata[b"lagfmu"])
+    assert len(facts["fmu_sha256"]) == 64
+
+
+def test_inputs_come_from_a_table(native_fmu):
+    """A cart that is pushed harder and harder goes where it goes when it is simulated alone."""
+    inputs = np.zeros(3, dtype=[("time", float), ("F", float)])
+    inputs["time"], inputs["F"] = [0.0, 0.5, 1.0], [0.0, 1.0, 5.0]
+    path, span = native_fmu("CartPendulum"), {"stop_time": 1.0, "step_size": 0.05}
+    found = lagfmu.sweep(path, {"m": [0.1, 0.2]}, keep=["s:last"], inputs=inputs, **span)
+    for k, m in enumerate((0.1, 0.2)):
+        alone = lagfmu.simulate(path, start_values={"m": m}, inputs=inputs, **span)
+        assert found["s:last"].values[k] == pytest.approx(alone["s"][-1], rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["latin-hypercube", "sobol"])
+def test_samples_follow_their_distributions(method):
+    """Means and standard deviations of 4,096 points; the same seed gives the same points."""
+    laws = dict(
+        map(distribution, ["m ~ normal(1, 0.05)", "a ~ uniform(2, 4)", "k ~ loguniform(1, 100)"])
+    )
+    points = sampled(laws, 4096, 7, method)
+    assert points[:, 0].mean() == pytest.approx(1, abs=1e-3)
+    assert points[:, 0].std() == pytest.approx(0.05, rel=1e-2)
+    assert points[:, 1].mean() == pytest.approx(3, abs=1e-2)
+    assert np.log10(points[:, 2]).mean() == pytest.approx(1, abs=1e-2)
+    assert (points == sampled(laws, 4096, 7, method)).all()
+
+
+def test_axes_are_crossed_in_the_order_in_which_they_are_given():
+    """The last axis runs fastest."""
+    found = design(dict(map(axis, ["x=0:1:2", "y=1,2,3", "z=1:100:3:log"])))
+    assert found.table[:4].tolist() == [[0, 1, 1], [0, 1, 10], [0, 1, 100], [0, 2, 1]]
+    assert len(found) == 18
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--vary", "thta=1,2"], "'thta' cannot be set; did you mean 'theta'?"),
+        (["--vary", "theta=1:1:5"], "the step is zero"),
+        (["--vary", "theta=0:1:10:log"], "both ends above zero"),
+        (["--vary", "theta=1:2"], "FROM:TO:COUNT"),
+        (["--vary", "theta=one"], "'one' is no finite number"),
+        (["--vary", "theta=0:1:1000000000"], "8 GB"),
+        (["--vary", "theta=0:1:100000", "--vary", "m=1:2:100000"], "1e+10 runs"),
+        (["--sample", "m ~ normal(1, 0.1)"], "runs = None"),
+        (["--sample", "m ~ normal(1, 0.1)", "--runs", "0"], "runs = 0"),
+        (["--sample", "m ~ normal(1, 0.1)", "--runs", "1000000000"], "8 GB"),
+        (["--sample", "m ~ cauchy(1, 0.1)", "--runs", "5"], "loguniform(low, high)"),
+        (["--sample", "m ~ uniform(2, 1)", "--runs", "5"], "low = 2.0"),
+        (["--vary", "theta=1,2", "--keep", "lambda.surfce:max"], "did you mean 'lambda.surface'?"),
+        (["--vary", "theta=1,2", "--keep", "lambda.surface:peak"], "time-of-max"),
+        (["--vary", "theta=1,2", "--out", "runs.xls"], ".parquet, .nc or .zarr"),
+        ([], "nothing varies"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_told_with_the_remedy(hemisphere, options, message):
+    """Before anything is run: the name, what was given, what was expected."""
+    done = CliRunner().invoke(app, ["sweep", str(hemisphere), *options])
+    assert done.exit_code == 1
+    assert message in " ".join(done.output.split())
+
+
+def test_the_command_writes_a_table_and_a_figure(hemisphere, tmp_path):
+    """Half of these starts stand off the sphere by less than nothing: refused, and marked."""
+    out, figure = tmp_path / "runs.nc", tmp_path / "runs.svg"
+    done = CliRunner().invoke(
+        app,
+        ["sweep", str(hemisphere), "--vary", "a=-1:1:6", "--keep", "energy.total:max",
+         "--keep", "theta:trajectory", "--out", str(out), "--plot", str(figure)],
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "6 runs, 3 refused" in done.output
+    assert "and 2 like it" in done.output
+    import xarray as xr
+
+    with xr.open_dataset(out, engine="h5netcdf") as found:
+        assert found["theta"].dims == ("a", "time")
+        assert found.attrs["fmu"] == hemisphere.name
+    assert "refused" in figure.read_text()
+
+
+def test_a_model_file_is_built_first(tmp_path):
+    """One command from a model to a table."""
+    path = MODELS / "atwood.py"
+    done = CliRunner().invoke(app, ["sweep", str(path), "--vary", "m1=1,2", "--stop-time", "0.1"])
+    assert done.exit_code == 0, done.output
+    assert "2 runs, 0 refused" in done.output
+
+
+def test_the_client_never_loads_the_binary(hemisphere):
+    """Host processes do: a crash of the FMU is none of the client's."""
+    code = (
+        "import lagfmu, sys\n"
+        f"lagfmu.sweep({str(hemisphere)!r}, {{'theta': [0.1, 0.2]}})\n"
+        "maps = open('/proc/self/maps').read()\n"
+        "assert 'Hemisphere' not in maps, 'loaded'\n"
+    )
+    if not Path("/proc/self/maps").exists():
+        pytest.skip("no /proc on this machine")
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
+
+
+@contextlib.contextmanager
+def cluster(folder: Path, workers: int):
+    """A scheduler and workers as a user starts them; the address and the workers' processes."""
+    dask, file = [sys.executable, "-m", "dask"], folder / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    command = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    scheduler = subprocess.Popen([*dask, *command, "--scheduler-file", str(file)], **quiet)
+    started = [scheduler]
+
+    def worker() -> subprocess.Popen[bytes]:
+        options = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--scheduler-file", str(file)]
+        place = ["--local-directory", str(folder), "--death-timeout", "60"]
+        process = subprocess.Popen([*dask, "worker", *options, *place], **quiet)
+        started.append(process)
+        return process
+
+    try:
+        for _ in range(600):
+            if file.exists() and file.read_text().strip():
+                break
+            time.sleep(0.1)
+        address = json.loads(file.read_text())["address"]
+        yield address, [worker() for _ in range(workers)], worker
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def test_a_cluster_gives_the_same_numbers_even_if_its_workers_die(hemisphere, tmp_path):
+    """Two Dask workers, one of which is killed again and again while it works: every run is there exactly
+    once, with the bytes of the run on this machine."""
+    pytest.importorskip("distributed")
+    values = {"theta": np.linspace(0.05, 1.0, 300)}
+    here = lagfmu.sweep(hemisphere, values, keep=KEEP)
+    with cluster(tmp_path, 2) as (address, workers, another):
+        done = threading.Event()
+        killed = []
+
+        def murder() -> None:
+            while not done.wait(2.0) and len(killed) < 3:
+                workers[-1].kill()
+                killed.append(workers[-1])
+                workers.append(another())
+
+        killer = threading.Thread(target=murder)
+        killer.start()
+        try:
+            there = lagfmu.sweep(hemisphere, values, keep=KEEP, on=address)
+        finally:
+            done.set()
+            killer.join()
+    for name in KEEP:
+        assert here[name].values.tobytes() == there[name].values.tobytes()
+
+
+def test_a_scheduler_that_does_not_answer_is_told(hemisphere, monkeypatch):
+    """Nobody listens there."""
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(engine, "PATIENCE", "1s")
+    with pytest.raises(
+        SimulationError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
+    ):
+        lagfmu.sweep(hemisphere, {"theta": [0.1]}, on="tcp://127.0.0.1:9")
