@@ -26,6 +26,7 @@ from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
+from ..solver.rates import half_connected
 from ..solver.restored import restored, restored_settings
 from ..solver.state import SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
@@ -139,7 +140,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         try:
             before = self._checked(current_time, step_size)
             u = self._values(self.inputs)
-            self._warn_of_jumps(u)
+            self._warn_of_rates(u, before.span)
             self.state = advance(
                 self.system, self.settings, before, u, self.p, current_time + step_size
             )
@@ -181,17 +182,22 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             )
         return state
 
-    def _warn_of_jumps(self, u: Sequence[float]) -> None:
-        """Once: a prescribed motion moves, but its derivatives are left at zero."""
-        for k in self.system.prescribed:
-            still = u[k + 1] == 0 and u[k + 2] == 0
-            if self.expected and u[k] != self.expected[k] and still and not self.warned:
-                name = self.names[self.inputs[k]]
-                self._warn(
-                    f"input {name} moves while der({name}) = der({name},2) = 0: it jumps at each "
-                    "communication point; connect its derivatives as well"
-                )
-                self.warned = True
+    def _warn_of_rates(self, u: Sequence[float], h: float) -> None:
+        """Once, at the first step that shows it: not all three inputs of a motion are connected."""
+        if self.warned or not self.expected or not h > 0:
+            return
+        bad = [
+            self.names[self.inputs[k]]
+            for k in self.system.prescribed
+            if half_connected(u[k : k + 3], self.expected[k : k + 3], h)
+        ]
+        if bad:
+            self._warn(
+                f"prescribed motion {', '.join(bad)} has moved over the last {h:.3g} s otherwise than its "
+                "rates der() and der(,2) say, so that the forces of constraint are wrong: connect all "
+                'three inputs, or build the FMU with Input(..., rates="estimated")'
+            )
+            self.warned = True
 
     def _warn_of_tables(self) -> None:
         """Once for each: a table is looked up beyond its ends."""

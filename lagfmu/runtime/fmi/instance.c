@@ -287,23 +287,45 @@ Status instance_observe(Instance *x) {
 
 /* ------------------------------------------------------------------ step */
 
-/* Once: a prescribed motion moves, but its derivatives are left at zero. */
-static void warn_of_jumps(Instance *x) {
+static const char *input_name(int k) {
+    for (int j = 0; j < VARIABLE_COUNT; j++)
+        if (VARIABLES[j].place == AT_INPUT && VARIABLES[j].index == k) return VARIABLES[j].name;
+    return "";
+}
+
+/* 1 where u has moved over the last step h and der(u) has not moved accordingly, or der(u) and not
+ * der(u,2): by more than half of the step's own size.  Between points that belong to one motion
+ *   u1 - u0 = h (u0' + u1')/2 - h^2 (u1'' - u0'')/12 + O(h^5) ,  u1' - u0' = h (u0'' + u1'')/2 + O(h^3)
+ * `went`: where its rates have carried it to. */
+static int half_connected(const double *u, const double *went, double h) {
+    const double a = went[2], v = went[1] - h * a, x = went[0] - h * (v + h * a / 2);
+    const double way = u[0] - x, speed = u[1] - v, size = fabs(x) + fabs(u[0]);
+    const double miss = fabs(way - h * (v + u[1]) / 2 + h * h * (u[2] - a) / 12);
+    const double miss_rate = fabs(speed - h * (a + u[2]) / 2);
+    if (miss > 1e-9 * size && miss > (fabs(way) + h * (fabs(v) + fabs(u[1])) / 2) / 2) return 1;
+    return h * miss_rate > 1e-9 * size &&
+           miss_rate > (fabs(speed) + h * (fabs(a) + fabs(u[2])) / 2) / 2;
+}
+
+/* Once, at the first step that shows it: of a prescribed motion not all three inputs are connected. */
+static void warn_of_rates(Instance *x) {
     const System *s = x->solver.system;
-    const double *u = x->solver.drive.value;
-    for (int i = 0; i < s->prescribed_count && !(x->warned & 1); i++) {
+    const double *u = x->solver.drive.value, h = x->solver.state.now.span;
+    Why names = {""};
+    if ((x->warned & 1) || !(h > 0)) return;
+    for (int i = 0; i < s->prescribed_count; i++) {
         const int k = s->prescribed[i];
-        if (u[k] == x->expected[k] || u[k + 1] != 0 || u[k + 2] != 0) continue;
-        const char *name = "";
-        for (int j = 0; j < VARIABLE_COUNT; j++)
-            if (VARIABLES[j].place == AT_INPUT && VARIABLES[j].index == k) name = VARIABLES[j].name;
-        (void)snprintf(x->note, sizeof x->note,
-                       "input %s moves while der(%s) = der(%s,2) = 0: it jumps at each "
-                       "communication point; connect its derivatives as well",
-                       name, name, name);
-        x->tell(x->context, NOTE_WARNING, x->note);
-        x->warned |= 1;
+        if (!half_connected(u + k, x->expected + k, h)) continue;
+        why_append(&names, "%s%s", names.text[0] == '\0' ? "" : ", ", input_name(k));
     }
+    if (names.text[0] == '\0') return;
+    (void)snprintf(x->note, sizeof x->note,
+                   "prescribed motion %.200s has moved over the last %.3g s otherwise than its rates der() "
+                   "and der(,2) say, so that the forces of constraint are wrong: connect all three "
+                   "inputs, or build the FMU with Input(..., rates=\"estimated\")",
+                   names.text, h);
+    x->tell(x->context, NOTE_WARNING, x->note);
+    x->warned |= 1;
 }
 
 /* Once for each: a table is looked up beyond its ends. */
@@ -364,7 +386,7 @@ static void note_contacts(Instance *x) {
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
     instance_save(x, x->backup);
-    if (s->system->prescribed_count > 0) warn_of_jumps(x);
+    if (s->system->prescribed_count > 0) warn_of_rates(x);
     if (s->system->contacts > 0) note_contacts(x);
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;
