@@ -138,7 +138,7 @@ def _variable(
         typed["min"] = number(v.minimum)
     if v.maximum is not None:
         typed["max"] = number(v.maximum)
-    if v.start is not None:
+    if v.start is not None and v.initial != "calculated":
         typed["start"] = _start(v.start)
     if v.derivative_of is not None:
         typed["derivative"] = str(index[v.derivative_of])

@@ -9,6 +9,7 @@
 #include "leg.h"
 #include "magnitudes.h"
 #include "outputs.h"
+#include "rates.h"
 
 static const double SMALLEST_TOLERANCE = 1e-14;
 
@@ -28,6 +29,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->v0 = arena_doubles(&saved, system->n);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
+        x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
@@ -61,7 +63,8 @@ void instance_reset(Instance *x) {
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->started = x->running = x->warned = x->observed = x->evaluated = 0;
     for (int k = 0; k < VARIABLE_COUNT; k++)
-        if (VARIABLES[k].role != ROLE_OUTPUT && VARIABLES[k].type == TYPE_REAL)
+        if (VARIABLES[k].type == TYPE_REAL &&
+            (VARIABLES[k].role != ROLE_OUTPUT || VARIABLES[k].place == AT_INPUT))
             instance_set(x, &VARIABLES[k], VARIABLES[k].start);
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
 }
@@ -192,8 +195,16 @@ void instance_set(Instance *x, const Variable *v, double value) {
     }
 }
 
+static int is_estimated(const System *s, int k) {
+    for (int i = 0; i < s->estimated_count; i++)
+        if (s->estimated[i] == k) return 1;
+    return 0;
+}
+
 /* Where a prescribed motion stands in u: 0, 1 or 2 for u, der(u), der(u,2); -1 for other inputs. */
 static int order_in_motion(const System *s, int k) {
+    for (int i = 0; i < s->estimated_count; i++)
+        if (k == s->estimated[i] + 3) return 3;
     for (int i = 0; i < s->prescribed_count; i++)
         if (k >= s->prescribed[i] && k <= s->prescribed[i] + 2) return k - s->prescribed[i];
     return -1;
@@ -293,18 +304,20 @@ static const char *input_name(int k) {
     return "";
 }
 
-/* 1 where u has moved over the last step h and der(u) has not moved accordingly, or der(u) and not
- * der(u,2): by more than half of the step's own size.  Between points that belong to one motion
- *   u1 - u0 = h (u0' + u1')/2 - h^2 (u1'' - u0'')/12 + O(h^5) ,  u1' - u0' = h (u0'' + u1'')/2 + O(h^3)
- * `went`: where its rates have carried it to. */
-static int half_connected(const double *u, const double *went, double h) {
-    const double a = went[2], v = went[1] - h * a, x = went[0] - h * (v + h * a / 2);
-    const double way = u[0] - x, speed = u[1] - v, size = fabs(x) + fabs(u[0]);
-    const double miss = fabs(way - h * (v + u[1]) / 2 + h * h * (u[2] - a) / 12);
-    const double miss_rate = fabs(speed - h * (a + u[2]) / 2);
-    if (miss > 1e-9 * size && miss > (fabs(way) + h * (fabs(v) + fabs(u[1])) / 2) / 2) return 1;
-    return h * miss_rate > 1e-9 * size &&
-           miss_rate > (fabs(speed) + h * (fabs(a) + fabs(u[2])) / 2) / 2;
+/* The rates of motions that have only values; one that was not set keeps its latest, one that never was
+ * goes on by its rates. */
+static void estimate_rates(Instance *x) {
+    const System *s = x->solver.system;
+    double *u = x->solver.drive.value;
+    for (int i = 0; i < s->estimated_count; i++) {
+        const int k = s->estimated[i];
+        Past *past = &x->past[i];
+        if (!x->set[k] && past->count == 0) continue;
+        if (!x->set[k]) u[k] = past->u[0];
+        const int given = !x->set[k + 1] ? 0 : x->set[k + 2] ? 2 : 1;
+        rates_estimate(past, x->solver.state.now.t, u + k, given);
+        solver_inputs_changed(&x->solver);
+    }
 }
 
 /* Once, at the first step that shows it: of a prescribed motion not all three inputs are connected. */
@@ -315,7 +328,7 @@ static void warn_of_rates(Instance *x) {
     if ((x->warned & 1) || !(h > 0)) return;
     for (int i = 0; i < s->prescribed_count; i++) {
         const int k = s->prescribed[i];
-        if (!half_connected(u + k, x->expected + k, h)) continue;
+        if (is_estimated(s, k) || !rates_half_connected(u + k, x->expected + k, h)) continue;
         why_append(&names, "%s%s", names.text[0] == '\0' ? "" : ", ", input_name(k));
     }
     if (names.text[0] == '\0') return;
@@ -386,6 +399,7 @@ static void note_contacts(Instance *x) {
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
     instance_save(x, x->backup);
+    if (s->system->estimated_count > 0) estimate_rates(x);
     if (s->system->prescribed_count > 0) warn_of_rates(x);
     if (s->system->contacts > 0) note_contacts(x);
     x->observed = x->evaluated = 0;
@@ -490,7 +504,8 @@ Status instance_rates(Instance *x, Direction *d) {
     memcpy(w->dv, vdot, (size_t)system->n * sizeof *w->dv);
     for (int k = 0; k < system->inputs; k++) {
         const int order = order_in_motion(system, k);
-        w->du[k] = order < 0 ? s->drive.first[k] : order < 2 ? s->drive.value[k + 1] : 0;
+        const int last = is_estimated(system, k - order) ? 3 : 2;
+        w->du[k] = order < 0 ? s->drive.first[k] : order < last ? s->drive.value[k + 1] : 0;
     }
     *d = (Direction){1, w->dq, w->dv, w->du};
     return instance_differentiate(x, *d);
