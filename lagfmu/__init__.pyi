@@ -9,6 +9,7 @@ from .model.convert import from_lagranges_method
 from .model.model import (
     Contact,
     Embedding,
+    Friction,
     Holonomic,
     Input,
     Model,
@@ -16,6 +17,7 @@ from .model.model import (
     Output,
     Parameter,
 )
+from .model.picture import Arrow, Disk, Ground, Line, Path, Rod, Spring
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
@@ -24,20 +26,28 @@ from .verification.simulate import simulate
 from .verification.verify import Verification, verify
 
 __all__ = [
+    "Arrow",
     "ClosedForm",
     "Conserved",
     "Contact",
+    "Disk",
     "Embedding",
     "EquationsOfMotion",
+    "Friction",
+    "Ground",
     "Holonomic",
     "Input",
     "LagfmuError",
+    "Line",
     "Model",
     "Nonholonomic",
     "Output",
     "Parameter",
+    "Path",
+    "Rod",
     "Scene",
     "Spline",
+    "Spring",
     "Verification",
     "VerificationError",
     "build_fmu",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
-from .fmu.write import put_figures, write
+from .fmu.write import put, put_figures, write
 from .model.closed_form import ClosedForm, Conserved
 from .model.goal import parse
 from .model.model import Model
@@ -17,6 +17,7 @@ from .model.scene import Scene
 from .prepare.prepare import Prepared, prepare
 from .study.tradeoff.choose import choose
 from .study.tradeoff.page import section
+from .verification.crosscheck import layered
 from .verification.verify import Verification, verify
 
 
@@ -36,6 +37,7 @@ def build_fmu(
     target: str = "python",
     platforms: Sequence[str] = (HOST,),
     check: bool = True,
+    reference: bool = False,
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
@@ -44,14 +46,15 @@ def build_fmu(
 
     `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them.  With `check` the
     FMU is simulated through fmpy and held against them here, and its page shows the figures; a native FMU
-    is simulated only if it has a binary for this machine.
+    is simulated only if it has a binary for this machine.  With `reference` it carries the results of its
+    default experiment at a tolerance of 1e-12 (FMI-LS-REF).
 
     Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
     VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
     scene, choice = settled(model, scene or Scene(model.name), closed_forms, target)
     prepared = prepare(model, scene)
-    built = package(prepared, out, closed_forms, target, platforms, choice, check)
+    built = package(prepared, out, closed_forms, target, platforms, choice, check, reference)
     found = built.verification
     if found is not None and not found.passed:
         failed = "; ".join(str(c) for c in found.checks if not c.passed)
@@ -67,14 +70,16 @@ def package(
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
     check: bool = True,
+    reference: bool = False,
 ) -> Built:
     """What `prepare` made as an FMU: built once, verified once, its figures put in."""
     path = write(prepared, out, closed_forms, target, platforms, choice)
     runs_here = target == "python" or host() in chosen(platforms)
-    if not (check and runs_here):
-        return Built(path, None)
-    found = verify(path)
-    put_figures(path, prepared, found.rows(), target, choice)
+    found = verify(path) if check and runs_here else None
+    if found is not None:
+        put_figures(path, prepared, found.rows(), target, choice)
+    if reference and runs_here:
+        put(path, layered(path, found))
     return Built(path, found)
 
 

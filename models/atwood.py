@@ -8,9 +8,12 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
+    Disk,
     Holonomic,
+    Line,
     Model,
     Output,
     Parameter,
@@ -23,6 +26,8 @@ from lagfmu import (
 t = dynamicsymbols._t
 x1, x2 = dynamicsymbols("x1 x2")
 m1, m2, g = symbols("m1 m2 g", positive=True)
+
+WHEEL, LENGTH = 0.3, 2.0  # m, of the drawn pulley and string
 
 T = (m1 * x1.diff() ** 2 + m2 * x2.diff() ** 2) / 2
 V = -(m1 * g * x1 + m2 * g * x2)
@@ -44,6 +49,15 @@ model = Model(
         x2: "second mass, down from the start",
     },
     outputs=[Output("tension", -multiplier("string"), "N", "pull of the string on either mass")],
+    picture=[
+        Disk((0, 0), radius=WHEEL, angle=-x2 / WHEEL),
+        Line((-WHEEL, 0), (-WHEEL, -LENGTH - x1)),
+        Line((WHEEL, 0), (WHEEL, -LENGTH - x2)),
+        Disk((-WHEEL, -LENGTH - x1)),
+        Disk((WHEEL, -LENGTH - x2)),
+        Arrow("string", at=(-WHEEL, -LENGTH - x1)),
+        Arrow("string", at=(WHEEL, -LENGTH - x2)),
+    ],
 )
 
 scenes = [Scene("Atwood", stop_time=1.0, step_size=0.01)]

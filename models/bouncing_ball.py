@@ -8,7 +8,18 @@ bounces themselves are impulses.  Infinitely many of them end in a finite time, 
 from sympy import Eq, Piecewise, floor, log, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Contact, Model, Parameter, Scene, initial, output
+from lagfmu import (
+    Arrow,
+    ClosedForm,
+    Contact,
+    Disk,
+    Ground,
+    Model,
+    Parameter,
+    Scene,
+    initial,
+    output,
+)
 
 t = dynamicsymbols._t
 y = dynamicsymbols("y")
@@ -31,6 +42,11 @@ model = Model(
     start={y: 1.0},
     description="Ball that bounces on the floor until it rests",
     descriptions={y: "height above the floor"},
+    picture=[
+        Ground((-0.5, 0), (0.5, 0)),
+        Disk((0, y)),
+        Arrow("floor", at=(0, y)),
+    ],
 )
 
 scenes = [Scene("BouncingBall", stop_time=3.0, step_size=0.01)]

@@ -10,13 +10,18 @@ from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
+    Disk,
+    Ground,
     Holonomic,
     Input,
+    Line,
     Model,
     Output,
     Parameter,
+    Rod,
     Scene,
     multiplier,
     output,
@@ -26,6 +31,8 @@ t = dynamicsymbols._t
 s, x, y, F = dynamicsymbols("s x y F")
 M, m, g, L = symbols("M m g L", positive=True)
 c = symbols("c", nonnegative=True)
+
+CART = 0.15  # m, height of the drawn cart
 
 model = Model(
     name="CartPendulum",
@@ -51,6 +58,19 @@ model = Model(
     outputs=[
         Output("tension", -2 * L * multiplier("rod"), "N", "pull of the rod on the bob"),
         Output("drive.power", F * s.diff(), "W", "power of the driving force"),
+    ],
+    picture=[
+        Ground((-3 * L, -CART), (3 * L, -CART)),
+        Line(
+            (s - 2 * CART, -CART),
+            (s + 2 * CART, -CART),
+            (s + 2 * CART, 0),
+            (s - 2 * CART, 0),
+            (s - 2 * CART, -CART),
+        ),
+        Rod((s, 0), (x, y)),
+        Disk((x, y), trace=True),
+        Arrow("rod", at=(x, y)),
     ],
 )
 

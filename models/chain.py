@@ -6,12 +6,24 @@ at rest -(n - k + 1) m g/(2 l).  Hanging, its small oscillations have the freque
 the zeros z of the Laguerre polynomial of degree n (Daniel Bernoulli, 1732).
 """
 
+from itertools import pairwise
 from math import cos, sin
 
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Holonomic, Model, Parameter, Scene, output
+from lagfmu import (
+    Arrow,
+    ClosedForm,
+    Conserved,
+    Disk,
+    Holonomic,
+    Model,
+    Parameter,
+    Rod,
+    Scene,
+    output,
+)
 
 m, g, l = symbols("m g l", positive=True)  # noqa: E741 - the literature's letter
 ANGLE = 1.0  # rad from the downward vertical, of all links at the start
@@ -53,6 +65,11 @@ def chain(n):
         start=start,
         description=f"Chain of {n} bobs on massless links",
         descriptions={q: f"bob {k}" for k, bob in enumerate(p, 1) for q in bob},
+        picture=[
+            *(Rod(p, q) for p, q in pairwise(bobs(n))),
+            *(Disk(bob) for bob in p),
+            *(Arrow(f"link{k}", at=bob) for k, bob in enumerate(p, 1)),
+        ],
     )
 
 

@@ -10,7 +10,18 @@ from math import cos, sin
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Holonomic, Model, Parameter, Scene, output
+from lagfmu import (
+    Arrow,
+    ClosedForm,
+    Conserved,
+    Disk,
+    Holonomic,
+    Model,
+    Parameter,
+    Rod,
+    Scene,
+    output,
+)
 
 x1, y1, x2, y2 = dynamicsymbols("x1 y1 x2 y2")
 m1, m2, g, L1, L2 = symbols("m1 m2 g L1 L2", positive=True)
@@ -47,6 +58,14 @@ model = Model(
         x2: "lower bob, to the right of the pivot",
         y2: "lower bob, above the pivot",
     },
+    picture=[
+        Rod((0, 0), (x1, y1)),
+        Rod((x1, y1), (x2, y2)),
+        Disk((x1, y1)),
+        Disk((x2, y2), trace=True),
+        Arrow("upper", at=(x1, y1)),
+        Arrow("lower", at=(x2, y2)),
+    ],
 )
 
 scenes = [Scene("DoublePendulum", stop_time=10.0, step_size=0.01)]

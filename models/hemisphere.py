@@ -4,15 +4,19 @@ r [m] from the centre, theta [rad] from the vertical.  The surface pushes and ne
 lambda [N] is the normal force, positive outward, and the particle leaves where it reaches zero.
 """
 
-from sympy import cos, sin, symbols
+from sympy import cos, pi, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Contact,
+    Disk,
+    Ground,
     Model,
     Parameter,
+    Path,
     Scene,
     departure,
     initial,
@@ -22,6 +26,7 @@ from lagfmu import (
 t = dynamicsymbols._t
 r, theta = dynamicsymbols("r theta")
 m, g, a = symbols("m g a", positive=True)
+turn = symbols("turn")  # along the drawn surface
 
 T = m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2
 V = m * g * r * cos(theta)
@@ -39,6 +44,12 @@ model = Model(
     start={r: 1.0, theta: 0.01},
     description="Particle that slides down a smooth hemisphere and leaves it",
     descriptions={r: "distance from the centre", theta: "angle from the vertical"},
+    picture=[
+        Ground((-2 * a, 0), (2 * a, 0)),
+        Path((a * sin(turn), a * cos(turn)), turn, -pi / 2, pi / 2),
+        Disk((r * sin(theta), r * cos(theta)), trace=True),
+        Arrow("surface", at=(r * sin(theta), r * cos(theta))),
+    ],
 )
 
 scenes = [Scene("Hemisphere", stop_time=2.0, step_size=0.01)]

@@ -7,10 +7,22 @@ The second FMU has theta alone (y eliminated) and reports the same lambda.
 
 from math import pi
 
-from sympy import sin, symbols
+from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Holonomic, Model, Parameter, Scene, initial, output
+from lagfmu import (
+    Arrow,
+    ClosedForm,
+    Conserved,
+    Disk,
+    Ground,
+    Holonomic,
+    Model,
+    Parameter,
+    Scene,
+    initial,
+    output,
+)
 
 t = dynamicsymbols._t
 y, theta = dynamicsymbols("y theta")
@@ -20,6 +32,15 @@ alpha = symbols("alpha", real=True)
 I = M * R**2 / 2  # noqa: E741 - the literature's letter
 T = M * y.diff() ** 2 / 2 + I * theta.diff() ** 2 / 2
 V = -M * g * y * sin(alpha)
+
+
+def along(way, height=0):
+    """The point a way down the incline and a height above it."""
+    return (
+        way * cos(alpha) + height * sin(alpha),
+        -way * sin(alpha) + height * cos(alpha),
+    )
+
 
 model = Model(
     name="InclineDisk",
@@ -35,6 +56,11 @@ model = Model(
     start={y: 0.0, theta: 0.0},
     description="Disk rolling down an incline without slipping",
     descriptions={y: "distance down the incline", theta: "rotation of the disk"},
+    picture=[
+        Ground(along(0), along(2)),
+        Disk(along(y, R), radius=R, angle=-theta),
+        Arrow("rolling", at=along(y), along=(cos(alpha), -sin(alpha))),
+    ],
 )
 
 scenes = [

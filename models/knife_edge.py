@@ -10,12 +10,26 @@ from math import pi
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Model, Nonholonomic, Parameter, Scene, initial, output
+from lagfmu import (
+    Arrow,
+    ClosedForm,
+    Conserved,
+    Disk,
+    Model,
+    Nonholonomic,
+    Parameter,
+    Rod,
+    Scene,
+    initial,
+    output,
+)
 
 t = dynamicsymbols._t
 x, y, phi = dynamicsymbols("x y phi")
 m, J, g = symbols("m J g", positive=True)
 alpha = symbols("alpha", real=True)
+
+blade = 0.2  # m, half of the drawn blade
 
 T = m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * phi.diff() ** 2 / 2
 V = -m * g * x * sin(alpha)
@@ -44,6 +58,14 @@ model = Model(
         y: "distance across the incline",
         phi: "heading of the blade",
     },
+    picture=[
+        Rod(
+            (y - blade * sin(phi), -x + blade * cos(phi)),
+            (y + blade * sin(phi), -x - blade * cos(phi)),
+        ),
+        Disk((y, -x), trace=True),
+        Arrow("edge", at=(y, -x)),
+    ],
 )
 
 scenes = [Scene("KnifeEdge", stop_time=10.0, step_size=0.01)]

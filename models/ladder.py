@@ -13,11 +13,14 @@ from sympy import Heaviside, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Contact,
+    Ground,
     Model,
     Parameter,
+    Rod,
     Scene,
     departure,
     initial,
@@ -31,6 +34,9 @@ m, g, l = symbols("m g l", positive=True)  # noqa: E741 - the literature's lette
 I = m * l**2 / 12  # noqa: E741 - the literature's letter
 T = m * (x.diff() ** 2 + y.diff() ** 2) / 2 + I * theta.diff() ** 2 / 2
 V = m * g * y
+
+lower = (x + l * cos(theta) / 2, y - l * sin(theta) / 2)
+upper = (x - l * cos(theta) / 2, y + l * sin(theta) / 2)
 
 model = Model(
     name="Ladder",
@@ -53,6 +59,14 @@ model = Model(
         y: "middle of the ladder, above the floor",
         theta: "angle of the ladder above the floor",
     },
+    picture=[
+        Ground((0, 0), (2 * l, 0)),
+        Ground((0, 5 * l / 4), (0, 0)),
+        Rod(lower, upper),
+        Arrow("wall", at=upper),
+        Arrow("floor", at=lower),
+        Arrow("top", at=upper),
+    ],
 )
 
 scenes = [Scene("Ladder", stop_time=1.5, step_size=0.01)]

@@ -6,15 +6,18 @@ bottom the particle stays on all the way round if v0^2 >= 5 g a, swings to and f
 otherwise leaves the loop, flies a parabola, and meets the loop again.
 """
 
-from sympy import Heaviside, symbols
+from sympy import Heaviside, cos, pi, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Contact,
+    Disk,
     Model,
     Parameter,
+    Path,
     Scene,
     departure,
     initial,
@@ -24,6 +27,7 @@ from lagfmu import (
 t = dynamicsymbols._t
 x, y = dynamicsymbols("x y")
 m, g, a = symbols("m g a", positive=True)
+turn = symbols("turn")  # along the drawn loop
 
 T = m * (x.diff() ** 2 + y.diff() ** 2) / 2
 V = m * g * y
@@ -43,6 +47,11 @@ model = Model(
     start={x: 0.0, y: -1.0, x.diff(): 6.0},
     description="Particle that runs up the inside of a vertical loop and falls off it",
     descriptions={x: "to the right of the centre", y: "above the centre"},
+    picture=[
+        Path((a * sin(turn), a * cos(turn)), turn, 0, 2 * pi),
+        Disk((x, y), trace=True),
+        Arrow("loop", at=(x, y)),
+    ],
 )
 
 scenes = [Scene("Loop", stop_time=2.0, step_size=0.01)]

@@ -9,13 +9,16 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
+    Disk,
     Embedding,
     Holonomic,
     Model,
     Output,
     Parameter,
+    Rod,
     Scene,
     initial,
     multiplier,
@@ -53,6 +56,11 @@ model = Model(
     outputs=[
         Output("tension", -2 * L * multiplier("rod"), "N", "pull of the rod on the bob"),
         Output("bob.height", y + L, "m", "bob, above its lowest place"),
+    ],
+    picture=[
+        Rod((0, 0), (x, y)),
+        Disk((x, y)),
+        Arrow("rod", at=(x, y)),
     ],
 )
 

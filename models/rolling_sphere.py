@@ -6,13 +6,15 @@ the friction on the rolling sphere, positive in the sense of a growing theta: it
 negative.  The friction acts while the surface is touched, and goes with it.
 """
 
-from sympy import Rational, cos, sin, symbols
+from sympy import Rational, cos, pi, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Contact,
+    Disk,
     Model,
     Nonholonomic,
     Parameter,
@@ -56,6 +58,12 @@ model = Model(
         theta: "angle of the line of centres from the vertical",
         phi: "rotation of the rolling sphere",
     },
+    picture=[
+        Disk((0, 0), radius=a),
+        Disk((r * sin(theta), r * cos(theta)), radius=R, angle=pi / 2 - phi),
+        Arrow("surface", at=(r * sin(theta), r * cos(theta))),
+        Arrow("rolling", at=(a * sin(theta), a * cos(theta)), along=(cos(theta), -sin(theta))),
+    ],
 )
 
 scenes = [Scene("RollingSphere", stop_time=2.0, step_size=0.01)]

@@ -5,13 +5,16 @@ wire's angle; phi = omega t is a constraint that depends on time.  lambda [N.m] 
 torque, positive in the sense of a growing phi; its power lambda omega feeds the bead's energy.
 """
 
-from sympy import cosh, sinh, sqrt, symbols
+from sympy import cos, cosh, sin, sinh, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
+    Disk,
     Holonomic,
+    Line,
     Model,
     Output,
     Parameter,
@@ -43,6 +46,12 @@ model = Model(
     outputs=[
         Output("motor.power", multiplier("drive") * phi.diff(), "W", "power of the motor"),
         Output("bead.speed", sqrt(r.diff() ** 2 + (r * phi.diff()) ** 2), "m/s"),
+    ],
+    picture=[
+        Disk((0, 0), radius=0.02),
+        Line((-cos(phi), -sin(phi)), (cos(phi), sin(phi))),
+        Disk((r * cos(phi), r * sin(phi)), trace=True),
+        Arrow("drive", at=(r * cos(phi), r * sin(phi))),
     ],
 )
 

@@ -10,13 +10,38 @@ the crank.  Once the slider has set out, the spring's own motion dies within m c
 from sympy import Piecewise, cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Holonomic, Input, Model, Output, Parameter, Scene, multiplier, output
+from lagfmu import (
+    Arrow,
+    ClosedForm,
+    Disk,
+    Ground,
+    Holonomic,
+    Input,
+    Line,
+    Model,
+    Output,
+    Parameter,
+    Rod,
+    Scene,
+    Spring,
+    multiplier,
+    output,
+)
 
 phi, x, y, tau = dynamicsymbols("phi x y tau")
 J, m, M, r, l, s, k, c = symbols("J m M r l s k c", positive=True)  # noqa: E741 - the literature's
 
 stretch, slip = y - x - s, y.diff() - x.diff()
 pull = k * stretch + c * slip  # of the spring and its damper, on the slider
+
+BLOCK = 0.03  # m, half of the drawn slider
+
+
+def block(at):
+    """The corners of a slider at a place, the first again at the end."""
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
+    return [(at + BLOCK * i, BLOCK * j) for i, j in corners]
+
 
 model = Model(
     name="SliderCrank",
@@ -55,6 +80,16 @@ model = Model(
         Output("rod.thrust", 2 * l * multiplier("rod"), "N", "push of the rod on the slider"),
         Output("crank.power", tau * phi.diff(), "W", "power of the torque on the crank"),
         Output("spring.pull", pull, "N", "pull of the spring and its damper on the slider"),
+    ],
+    picture=[
+        Ground((0, -BLOCK), (2 * (r + l), -BLOCK)),
+        Disk((0, 0), radius=r, angle=phi),
+        Rod((0, 0), (r * cos(phi), r * sin(phi))),
+        Rod((r * cos(phi), r * sin(phi)), (x, 0)),
+        Spring((x + BLOCK, 0), (y - BLOCK, 0)),
+        Line(*block(x)),
+        Line(*block(y)),
+        Arrow("rod", at=(x, 0), along=(2 * (x - r * cos(phi)), -2 * r * sin(phi))),
     ],
 )
 

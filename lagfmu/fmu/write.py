@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ..errors import BuildError
 from ..model.closed_form import ClosedForm, Conserved
 from ..page.documentation import page
+from ..page.picture import IN_FMU, as_bytes, picture_of
 from ..prepare.prepare import Prepared
 from ..prepare.starts import check_given, tell
 from . import native, python
@@ -53,6 +54,9 @@ def write(
             prepared.model.splines,
         ),
     }
+    picture = picture_of(prepared)
+    if picture is not None:
+        extra[IN_FMU] = as_bytes(picture)
     equations = (prepared.coded, prepared.coded_reduction)
     made = (*equations, prepared.scene, prepared.table, prepared.system, extra)
     content = native.build(*made, platforms) if target == "native" else python.build(*made)
@@ -71,10 +75,14 @@ def put_figures(
     choice: str = "",
 ) -> None:
     """Put verification results into the page of an FMU that stands at `path`; nothing else changes."""
+    put(path, {PAGE: page(_as_built(prepared, target), figures, choice).encode()})
+
+
+def put(path: Path, more: Mapping[str, bytes]) -> None:
+    """Put files into an FMU that stands at `path`, or replace them."""
     with zipfile.ZipFile(path) as archive:
         contents = {name: archive.read(name) for name in archive.namelist()}
-    contents[PAGE] = page(_as_built(prepared, target), figures, choice).encode()
-    write_whole(path, pack(contents))
+    write_whole(path, pack(contents | dict(more)))
 
 
 def _as_built(prepared: Prepared, target: str) -> Prepared:

@@ -10,6 +10,7 @@ from typing import Any
 from ..errors import BuildError
 from ..fmu.native import IDENTITY, sources_of
 from ..page.documentation import mathml
+from ..page.picture import IN_FMU, picture_of, read_picture
 from ..page.typeset import typeset
 from ..prepare.prepare import Prepared
 from .facts import facts
@@ -27,7 +28,8 @@ def of_prepared(prepared: Prepared) -> Playable:
         (s.title, s.remark, [(e.label, safe_mathml(mathml(e.latex)), e.text) for e in s.equations])
         for s in typeset(prepared.equations, prepared.reduction, prepared.formulation)
     ]
-    return _playable(made.description, sections, {**made.runtime, **made.generated})
+    sources = {**made.runtime, **made.generated}
+    return _playable(made.description, sections, sources, picture_of(prepared))
 
 
 def of_fmu(path: Path) -> Playable:
@@ -46,6 +48,7 @@ def of_fmu(path: Path) -> Playable:
             description = archive.read("modelDescription.xml")
             documented = "documentation/index.html"
             page = archive.read(documented) if documented in names else b""
+            picture = read_picture(archive.read(IN_FMU)) if IN_FMU in names else None
     except (zipfile.BadZipFile, KeyError, OSError) as error:
         raise BuildError(
             f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
@@ -55,14 +58,14 @@ def of_fmu(path: Path) -> Playable:
             f"{str(path)!r} holds no C sources of lagfmu, which a page is compiled from: build it with "
             "--target native, or make the page from the model file"
         )
-    return _playable(description, equations_of(page), sources)
+    return _playable(description, equations_of(page), sources, picture)
 
 
 def _playable(
     description: bytes,
     equations: list[Section],
     sources: Mapping[str, bytes],
-    picture: dict[str, Any] | None = None,
+    picture: dict[str, Any] | None,
 ) -> Playable:
     # the page's instance is its own: one GUID for all, so that the same equations are the same bytes
     sources = {**sources, "identity.h": IDENTITY.format(guid="{page}").encode()}

@@ -13,10 +13,12 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
+from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
-from .reactions import reactions_in
+from .picture import check_picture
+from .reactions import reaction_units, reactions_in
 from .spline import Spline, splines_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
@@ -39,10 +41,12 @@ def problems_of(model: ModelFields) -> list[str]:
     _check_numbers(model, problems)
     _check_symbols(model, problems)
     check_outputs(model, problems)
+    check_picture(model, problems)
     _check_splines(model, problems)
     units = declared_units(model, problems)
     if not problems:
         _check_dimensions(model, units, problems)
+        problems += check_frictions(model, units, reaction_units(model, units))
         check_output_units(model, units, problems)
     return problems
 

@@ -13,12 +13,14 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
+from .frictions import check_kinds
 from .parts import (
     NAME,
     RESERVED,
     Contact,
     Embedding,
     Expr,
+    Friction,
     Holonomic,
     Input,
     ModelFields,
@@ -68,6 +70,7 @@ def check_containers(model: ModelFields) -> list[str]:
             ("parameters", model.parameters, "Parameter"),
             ("inputs", model.inputs, "Input"),
             ("outputs", model.outputs, "Output"),
+            ("picture", model.picture, "Line"),
         )
         if isinstance(value, str) or not isinstance(value, Iterable)
     ]
@@ -78,7 +81,7 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
     kinds: tuple[tuple[str, Sequence[object], tuple[type, ...]], ...] = (
         ("parameters", model.parameters, (Parameter,)),
         ("inputs", model.inputs, (Input,)),
-        ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact)),
+        ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact, Friction)),
         ("outputs", model.outputs, (Output,)),
     )
     for field_name, items, types in kinds:
@@ -88,6 +91,7 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
             for item in items
             if not isinstance(item, types)
         ]
+    check_kinds(model, problems)
     if problems:
         return
     for kind, symbol in [

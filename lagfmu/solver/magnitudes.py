@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .failure import StepFailureError
-from .instant import Instant
-from .motion import EPS, Motion, independent, motion
+from .instant import Instant, Motion
+from .motion import EPS, independent, motion
 from .state import Settings, State
 from .system import Matrix, System, Vector
 

@@ -126,6 +126,7 @@ class Accuracy {
     const power = (u, ticks) => ticks.map((v) => (v === null ? "" : shown(v, 2)));
     const decades = (u, ticks) => ticks.map((v) => (Math.log10(v) % 1 === 0 ? v : null));
     const thirds = (u, ticks) => ticks.map((v) => (Math.log10(v) % 3 === 0 ? v : null));
+    const both = { grid: { ...line, filter: thirds }, ticks: { ...line, filter: thirds } };
     const series = methods.map((m, i) => ({
       label: m === null ? "error" : m,
       stroke: color(`--curve${i % 8}`),
@@ -143,8 +144,8 @@ class Accuracy {
         height: 210,
         scales: { x: { time: false, distr: 3 }, y: { distr: 3 } },
         axes: [
-          { ...axis, label: "steps", labelSize: 18, values: power, filter: decades },
-          { ...axis, size: 64, values: power, filter: thirds, grid: { ...line, filter: thirds } },
+          { ...axis, label: "steps", labelSize: 18, values: power, filter: decades, ticks: { ...line, filter: decades } },
+          { ...axis, size: 64, values: power, filter: thirds, ...both },
         ],
         cursor: { drag: { x: false, y: false } },
         series: [{ label: "steps" }, ...series],

@@ -2,7 +2,7 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 const SAMPLES = 120; // points of a path; rows that the view is fitted to
-const MARGIN = 34;
+const MARGIN = 44;
 const LONGEST = 0.22; // of the view: the arrow of the largest force
 
 function svg(tag, attributes = {}) {
@@ -126,7 +126,8 @@ const SHAPES = {
       );
       label.textContent = `${s.name} ${withUnit(size, "N", 3)}`;
       label.setAttribute("x", Math.min(Math.max(to[0] + 6 * tx, 4), view.width - 4));
-      label.setAttribute("y", to[1] + 6 * ty + (ty > 0 ? 10 : 0));
+      const y = to[1] + 6 * ty + (ty > 0 ? 10 : 0);
+      label.setAttribute("y", Math.min(Math.max(y, 13), view.height - 5));
       label.setAttribute("text-anchor", to[0] > view.width * 0.66 ? "end" : "start");
     },
   },
@@ -201,7 +202,7 @@ class Picture {
 
   look(place) {
     const { trajectory } = this;
-    return (name) => (name === "t" ? trajectory.time[place[0]] : trajectory.at(name, place));
+    return (name) => trajectory.at(name, place);
   }
 
   /* Fits the view to the whole run, and the arrows to its largest force. */

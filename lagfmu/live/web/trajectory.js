@@ -33,6 +33,7 @@ class Trajectory {
 
   /* A variable's value at a place; between two rows linear, if it is continuous. */
   at(name, [row, part]) {
+    if (name === "time") return this.time[row] + (part ? part * (this.time[row + 1] - this.time[row]) : 0);
     const k = PLACE.get(name);
     if (k === undefined) return this.fixed.get(name);
     const column = this.columns[k];

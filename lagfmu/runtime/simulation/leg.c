@@ -40,8 +40,12 @@ Instant leg_instant(Solver *s, double t) {
 static Status rate(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
-    if (mechanism_motion(&s->stepped, leg_instant(s, t), y, y + n, leg_rows(s)) != OK)
-        return FAILED;
+    const Instant at = leg_instant(s, t);
+    const Status status = s->system->frictions > 0
+                              ? mechanism_motion_near(&s->stepped, at, y, y + n, s->active,
+                                                      s->state.offset, s->state.size)
+                              : mechanism_motion(&s->stepped, at, y, y + n, leg_rows(s));
+    if (status != OK) return FAILED;
     for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
         dydt[j] = y[n + j];
         dydt[n + j] = s->stepped.vdot[j];
@@ -51,6 +55,7 @@ static Status rate(void *context, double t, const double *y, double *dydt) {
 
 static Status jacobian(void *context, double t, const double *y, double *J, double *dfdt) {
     Solver *s = context;
+    if (s->system->frictions > 0) return PARTS.slides->jacobian(s, t, y, J, dfdt);
     return sensitivity_jacobian(&s->sensitivity, &s->stepped, leg_instant(s, t), leg_rows(s), y, J,
                                 dfdt);
 }

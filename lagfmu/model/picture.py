@@ -1,0 +1,181 @@
+"""How a model looks: shapes whose points [m] are expressions of coordinates, parameters and time.
+
+A point is (x, y), to the right and up, or (x, y, z) with z up; all points of a picture have as many
+coordinates.  A shape may also hold velocities, inputs and `output(name)` of whatever the FMU reports.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+from sympy.physics.vector import dynamicsymbols
+
+from .parts import Expr, ModelFields, name_of
+
+Point = tuple[Expr, ...]
+
+
+@dataclass(frozen=True, init=False)
+class Line:
+    """A thin line through points: a string, a wire, the outline of a cart."""
+
+    points: tuple[Point, ...]
+
+    def __init__(self, *points: Point) -> None:
+        object.__setattr__(self, "points", points)
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A bar between two joints."""
+
+    start: Point
+    end: Point
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A coil spring between two points."""
+
+    start: Point
+    end: Point
+    coils: int = 8
+
+
+@dataclass(frozen=True)
+class Disk:
+    """A disk or sphere; without `radius` [m] a particle.  `angle` [rad], counterclockwise from the right,
+    draws a spoke, `trace` the way that the centre has gone."""
+
+    center: Point
+    radius: Expr | None = None
+    angle: Expr | None = None
+    trace: bool = False
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What does not move: a line, hatched on the right-hand side of the way from start to end."""
+
+    start: Point
+    end: Point
+
+
+@dataclass(frozen=True)
+class Path:
+    """A curve: the point, for the symbol `over` from `first` to `last`."""
+
+    point: Point
+    over: Expr
+    first: Expr
+    last: Expr
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """The force of constraint of `constraint` on the body at the point `at` [N].
+
+    Its direction follows from virtual work: F . d(at)/dq_j = lambda a_kj for the coordinates that `at`
+    depends on.  Where that leaves it open, `along` gives it, with F = lambda along.
+    """
+
+    constraint: str
+    at: Point
+    along: Point | None = None
+
+
+Shape = Line | Rod | Spring | Disk | Ground | Path | Arrow
+SHAPES = (Line, Rod, Spring, Disk, Ground, Path, Arrow)
+
+
+def points_of(shape: Shape) -> list[Point]:
+    """The points and directions of a shape."""
+    if isinstance(shape, Line):
+        return list(shape.points)
+    if isinstance(shape, Rod | Spring | Ground):
+        return [shape.start, shape.end]
+    if isinstance(shape, Disk):
+        return [shape.center]
+    if isinstance(shape, Path):
+        return [shape.point]
+    return [shape.at] if shape.along is None else [shape.at, shape.along]
+
+
+def check_picture(model: ModelFields, problems: list[str]) -> None:
+    """What is wrong with the picture: kinds, points, symbols, constraints that are not there."""
+    sizes = set()
+    for number, shape in enumerate(model.picture, 1):
+        what = f"picture, shape {number}"
+        if not isinstance(shape, SHAPES):
+            known = ", ".join(s.__name__ for s in SHAPES)
+            problems.append(f"{what} is {shape!r}, expected one of {known}")
+            continue
+        what += f" ({type(shape).__name__})"
+        wrong = [p for p in points_of(shape) if not _is_point(p)]
+        problems += [
+            f"{what}: {p!r} is no point, expected (x, y) or (x, y, z), each a number or a SymPy expression"
+            for p in wrong
+        ]
+        if wrong:
+            continue
+        sizes |= {len(p) for p in points_of(shape)}
+        if isinstance(shape, Line) and len(shape.points) < 2:
+            problems.append(f"{what}: {len(shape.points)} points, expected two or more")
+        if isinstance(shape, Arrow):
+            _check_arrow(model, shape, what, problems)
+        problems += [
+            f"{what}: {name} is neither coordinate, parameter nor input: declare it, or use output(name)"
+            for name in sorted(set(_unknown(model, shape)))
+        ]
+    if len(sizes) > 1:
+        problems.append(
+            "the picture has points in the plane and in space: write all with as many coordinates"
+        )
+
+
+def _is_point(point: object) -> bool:
+    return (
+        isinstance(point, tuple | list)
+        and len(point) in (2, 3)
+        and all(
+            isinstance(sp.sympify(x, strict=False), sp.Expr) and not isinstance(x, str)
+            for x in point
+        )
+    )
+
+
+def _check_arrow(model: ModelFields, arrow: Arrow, what: str, problems: list[str]) -> None:
+    known = [c.name for c in model.constraints if hasattr(c, "expression")]
+    if arrow.constraint not in known:
+        problems.append(
+            f"{what}: no constraint is called {arrow.constraint!r}, expected one of "
+            f"{', '.join(known) or 'none: the model has no constraint'}"
+        )
+
+
+def expressions_of(shape: Shape) -> Iterator[Expr]:
+    """Every expression of a shape."""
+    for point in points_of(shape):
+        yield from (sp.sympify(x) for x in point)
+    if isinstance(shape, Disk):
+        yield from (sp.sympify(x) for x in (shape.radius, shape.angle) if x is not None)
+    if isinstance(shape, Path):
+        yield from (sp.sympify(x) for x in (shape.first, shape.last))
+
+
+def _unknown(model: ModelFields, shape: Shape) -> Iterator[str]:
+    """Names that are none of the model's; those with a dot are outputs."""
+    extra = model.embedding.coordinates if model.embedding else {}
+    known: set[Any] = {*model.coordinates, *extra, dynamicsymbols._t}
+    known |= {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs}
+    own = {o.name for o in model.outputs}
+    if isinstance(shape, Path):
+        known.add(shape.over)
+    for expression in expressions_of(shape):
+        for symbol in expression.free_symbols | expression.atoms(AppliedUndef):
+            if symbol not in known and "." not in str(symbol) and str(symbol) not in own:
+                yield name_of(symbol)

@@ -1,0 +1,234 @@
+"""A model's picture as data: {"dimensions": 2 or 3, "shapes": [{"kind": "rod", "points": [...]}, ...]}.
+
+An expression is a number, the name of an FMU's variable, or a list [operation, operand, ...].  It travels
+in the FMU (resources/picture.json); the live page evaluates it, and `values` does for films.  It is data:
+nothing of it is ever run.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from ..errors import BuildError, ModelError
+from ..mechanics.equations import TIME
+from ..model.closed_form import in_variables
+from ..model.model import Model, Nonholonomic
+from ..model.picture import Arrow, Disk, Ground, Line, Path, Point, Rod, Shape, Spring, points_of
+from ..prepare.prepare import Prepared
+
+Expr = Any
+Packed = float | str | list[Any]
+FUNCTIONS: Mapping[Any, str] = {
+    **{f: f.__name__ for f in (sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.atan2)},
+    **{f: f.__name__ for f in (sp.sinh, sp.cosh, sp.tanh, sp.exp, sp.log, sp.sign)},
+    **{sp.Abs: "abs", sp.Min: "min", sp.Max: "max", sp.Add: "+", sp.Mul: "*", sp.Pow: "^"},
+}
+OPERATIONS: Mapping[str, Callable[..., Any]] = {
+    "+": lambda *x: sum(x),
+    "*": lambda *x: math.prod(x),
+    "^": np.power,
+    **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh")},
+    **{name: getattr(np, name) for name in ("exp", "log", "sign", "abs")},
+    **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2},
+    **{"min": lambda *x: np.minimum.reduce(x), "max": lambda *x: np.maximum.reduce(x)},
+}
+FIELDS = {  # kind -> names of its points, lists of points, single expressions, and the rest
+    "line": ((), ("points",), (), ()),
+    "rod": ((), ("points",), (), ()),
+    "spring": ((), ("points",), (), ("coils",)),
+    "ground": ((), ("points",), (), ()),
+    "disk": (("center",), (), ("radius", "angle"), ("trace",)),
+    "path": (("point",), (), (), ("over", "range")),
+    "arrow": (("at", "vector"), (), (), ("name",)),
+}
+NEEDED = ("points", "center", "point", "over", "range", "at", "vector", "name")
+DEEPEST = 200
+IN_FMU = "resources/picture.json"
+
+
+def picture_of(prepared: Prepared) -> dict[str, Any] | None:
+    """The picture of a model in a scene; shapes that need what the FMU does not report are left out.
+
+    Raises ModelError for an expression that cannot be drawn, and for an arrow without a direction.
+    """
+    model = prepared.model
+    if not model.picture:
+        return None
+    told = ("output", "parameter", "input")
+    names = {v.name for v in prepared.table.variables if v.causality in told} | {"time"}
+    problems: list[str] = []
+    shapes = []
+    for number, shape in enumerate(model.picture, 1):
+        try:
+            shapes.append(_packed(model, shape, prepared.numbers))
+        except ValueError as error:
+            problems.append(f"picture, shape {number} ({type(shape).__name__}): {error}")
+    if problems:
+        raise ModelError(model.name, problems)
+    kept = [s for s in shapes if _names(s) - {s.get("over")} <= names]
+    if not kept:
+        return None
+    return {"dimensions": len(points_of(model.picture[0])[0]), "shapes": kept}
+
+
+def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str, Any]:
+    def expression(e: Expr) -> Packed:
+        return pack(in_variables(e), numbers)
+
+    def point(p: Point) -> list[Packed]:
+        return [expression(x) for x in p]
+
+    if isinstance(shape, Line):
+        return {"kind": "line", "points": [point(p) for p in shape.points]}
+    if isinstance(shape, Rod):
+        return {"kind": "rod", "points": [point(shape.start), point(shape.end)]}
+    if isinstance(shape, Ground):
+        return {"kind": "ground", "points": [point(shape.start), point(shape.end)]}
+    if isinstance(shape, Spring):
+        ends = [point(shape.start), point(shape.end)]
+        return {"kind": "spring", "points": ends, "coils": int(shape.coils)}
+    if isinstance(shape, Path):
+        reach = [expression(shape.first), expression(shape.last)]
+        return {
+            "kind": "path",
+            "point": point(shape.point),
+            "over": str(shape.over),
+            "range": reach,
+        }
+    if isinstance(shape, Disk):
+        found: dict[str, Any] = {"kind": "disk", "center": point(shape.center)}
+        for key, value in (("radius", shape.radius), ("angle", shape.angle)):
+            if value is not None:
+                found[key] = expression(value)
+        return found | ({"trace": True} if shape.trace else {})
+    along = direction(model, shape) if shape.along is None else shape.along
+    force = sp.Symbol(f"lambda.{shape.constraint}", real=True)
+    vector = [pack(in_variables(sp.sympify(x)) * force, numbers) for x in along]
+    return {"kind": "arrow", "name": shape.constraint, "at": point(shape.at), "vector": vector}
+
+
+def direction(model: Model, arrow: Arrow) -> tuple[Expr, ...]:
+    """The force on the point `at` for lambda = 1, from virtual work: J^T F = a, J = d(at)/dq (d, n).
+
+    Only the coordinates that `at` depends on count.  With fewer of them than d it is the force along the
+    point's motion.  Raises ValueError if no force at this point does the work of the constraint.
+    """
+    constraint = model.constraint(arrow.constraint)
+    expression = sp.sympify(constraint.expression)
+    at = sp.Matrix([sp.sympify(x) for x in arrow.at])
+    q = [c for c in model.coordinates if at.has(c)]
+    wanted = f"give the direction, Arrow({arrow.constraint!r}, at, along=(...))"
+    if not q:
+        raise ValueError(f"the point does not move with the coordinates: {wanted}")
+    rates = [c.diff(TIME) if isinstance(constraint, Nonholonomic) else c for c in q]
+    a = sp.Matrix([expression.diff(r) for r in rates])
+    J = at.jacobian(q)
+    if len(q) < at.rows:
+        gram = J.T * J
+        if sp.simplify(gram.det()) == 0:
+            raise ValueError(f"the point's velocity is not settled by the coordinates: {wanted}")
+        return tuple(sp.simplify(x) for x in J * gram.LUsolve(a))
+    unknown = sp.symbols(f"F:{at.rows}")
+    solved = sp.solve(list(J.T * sp.Matrix(unknown) - a), unknown, dict=True)
+    if len(solved) != 1 or len(solved[0]) < at.rows:
+        raise ValueError(f"no force at this point does the work of the constraint: {wanted}")
+    return tuple(sp.simplify(solved[0][f]) for f in unknown)
+
+
+def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
+    """An expression of the FMU's variables as data.  Raises ValueError for a function it cannot hold."""
+    if expression.is_Symbol:
+        name = str(expression)
+        return float(numbers[name]) if name in numbers else name
+    if expression.is_number:
+        value = float(expression)
+        if not math.isfinite(value):
+            raise ValueError(f"{expression} is no finite number")
+        return value
+    operation = FUNCTIONS.get(expression.func)
+    if operation is None:
+        known = ", ".join(sorted(f for f in FUNCTIONS.values() if f.isalpha()))
+        raise ValueError(f"{expression} cannot be drawn, expected sums, products, powers, {known}")
+    return [operation, *(pack(a, numbers) for a in expression.args)]
+
+
+def _names(packed: Any) -> set[str]:
+    """The variables of a shape, and what its path runs over."""
+    if isinstance(packed, Mapping):
+        keys = ("points", "center", "radius", "angle", "point", "range", "at", "vector")
+        return set().union(*(_names(packed[k]) for k in keys if k in packed))
+    if isinstance(packed, str):
+        return set() if packed in OPERATIONS else {packed}
+    return set().union(*map(_names, packed)) if isinstance(packed, list) else set()
+
+
+def values(packed: Packed, look: Callable[[str], Any]) -> Any:
+    """The value of an expression; `look` gives a variable's value, or an array of them."""
+    if isinstance(packed, str):
+        return look(packed)
+    if isinstance(packed, list):
+        return OPERATIONS[packed[0]](*(values(p, look) for p in packed[1:]))
+    return packed
+
+
+def as_bytes(picture: Mapping[str, Any]) -> bytes:
+    """The picture as it travels in an FMU."""
+    return json.dumps(picture, ensure_ascii=False, sort_keys=True, allow_nan=False).encode()
+
+
+def read_picture(text: bytes) -> dict[str, Any]:
+    """The picture in an FMU.  Raises BuildError for what is none: an FMU may come from anywhere."""
+    try:
+        found = json.loads(text)
+        shapes = [_checked_shape(s) for s in found["shapes"]]
+        if found["dimensions"] not in (2, 3):
+            raise ValueError(f"dimensions = {found['dimensions']!r}")
+        return {"dimensions": found["dimensions"], "shapes": shapes}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise BuildError(
+            f"resources/picture.json is no picture of lagfmu's ({type(error).__name__}: {error}): "
+            "build the FMU anew"
+        ) from None
+
+
+def _checked_shape(shape: Mapping[str, Any]) -> dict[str, Any]:
+    points, lists, single, rest = FIELDS[shape["kind"]]
+    found: dict[str, Any] = {"kind": str(shape["kind"])}
+    for key in (*points, *lists, *single, *rest):
+        if key not in shape:
+            if key in NEEDED:
+                raise ValueError(f"a {shape['kind']} without {key}")
+            continue
+        value = shape[key]
+        if key in points or key == "range":
+            value = [_checked(x) for x in value]
+        elif key in lists:
+            value = [[_checked(x) for x in p] for p in value]
+        elif key in single:
+            value = _checked(value)
+        elif key in ("over", "name"):
+            value = str(value)
+        elif key == "coils":
+            value = min(max(int(value), 1), 100)
+        else:
+            value = bool(value)
+        found[key] = value
+    return found
+
+
+def _checked(packed: Any, depth: int = 0) -> Packed:
+    if depth > DEEPEST:
+        raise ValueError("an expression is nested too deeply")
+    if isinstance(packed, str):
+        return packed
+    if isinstance(packed, list) and packed and packed[0] in OPERATIONS and len(packed) > 1:
+        return [packed[0], *(_checked(p, depth + 1) for p in packed[1:])]
+    if isinstance(packed, int | float) and not isinstance(packed, bool) and math.isfinite(packed):
+        return float(packed)
+    raise ValueError(f"{packed!r} is no expression")

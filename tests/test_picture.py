@@ -1,0 +1,248 @@
+"""Pictures: forces of constraint as arrows by virtual work, shapes as data, and every model's on its page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sympy as sp
+from browser import Page
+from conftest import FILES, MODELS
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Arrow, Disk, Holonomic, Line, Model, Parameter, Rod, Scene, output
+from lagfmu import Path as Curve
+from lagfmu.errors import BuildError, ModelError
+from lagfmu.live.playable import of_fmu
+from lagfmu.model.file import load
+from lagfmu.page.picture import as_bytes, direction, pack, picture_of, read_picture, values
+from lagfmu.prepare.prepare import Prepared, prepare
+
+x, y, theta = dynamicsymbols("x y theta")
+L = sp.symbols("L", positive=True)
+
+
+def model_of(name: str) -> Model:
+    return load(MODELS / f"{name}.py").model
+
+
+def pendulum(**fields: Any) -> Model:
+    return replace(model_of("pendulum"), **fields)
+
+
+def test_the_normal_force_is_radial() -> None:
+    """On the hemisphere lambda (sin theta, cos theta) does the work of r - a = 0."""
+    model = model_of("hemisphere")
+    r = next(iter(model.coordinates))
+    at = (r * sp.sin(theta), r * sp.cos(theta))
+    found = direction(model, Arrow("surface", at))
+    assert sp.simplify(sp.Matrix(found) - sp.Matrix([sp.sin(theta), sp.cos(theta)])).is_zero_matrix
+
+
+def test_a_torque_is_a_force_over_its_arm() -> None:
+    """The wire's torque lambda pushes the bead across the wire with lambda/r."""
+    model = model_of("rotating_wire")
+    r, phi = model.coordinates
+    found = direction(model, Arrow("drive", (r * sp.cos(phi), r * sp.sin(phi))))
+    across = sp.Matrix([-sp.sin(phi), sp.cos(phi)]) / r
+    assert sp.simplify(sp.Matrix(found) - across).is_zero_matrix
+
+
+def test_a_wall_pushes_the_ladders_end_level() -> None:
+    """Three coordinates, two components: the force (1, 0) at the upper end does all the wall's work."""
+    model = model_of("ladder")
+    arrow = next(s for s in model.picture if isinstance(s, Arrow) and s.constraint == "wall")
+    assert direction(model, arrow) == (1, 0)
+
+
+def test_a_blade_is_held_sideways() -> None:
+    """lambda of x' sin phi - y' cos phi = 0 acts along (sin phi, -cos phi)."""
+    model = model_of("knife_edge")
+    cx, cy, phi = model.coordinates
+    assert direction(model, Arrow("edge", (cx, cy))) == (sp.sin(phi), -sp.cos(phi))
+
+
+def test_a_force_elsewhere_does_not_do_the_work() -> None:
+    """No force at the ladder's middle turns the ladder as the wall does: a direction is asked for."""
+    model = model_of("ladder")
+    cx, cy, angle = model.coordinates
+    with pytest.raises(ValueError, match="along="):
+        direction(model, Arrow("wall", (cx + 0 * angle, cy + sp.cos(angle))))
+    with pytest.raises(ValueError, match="does not move"):
+        direction(model, Arrow("wall", (0, 0)))
+
+
+def test_all_that_is_wrong_is_told_at_once() -> None:
+    """Kinds, points, names and constraints, each with what was expected."""
+    other = sp.symbols("other")
+    with pytest.raises(ModelError) as caught:
+        pendulum(
+            picture=[
+                "rod",
+                Rod((0, 0), 1),
+                Line((0, 0)),
+                Disk((other, 0)),
+                Arrow("rope", at=(x, y)),
+                Disk((0, 0, 0)),
+            ]
+        )
+    told = str(caught.value)
+    for part in (
+        "'rod'",
+        "no point",
+        "two or more",
+        "other",
+        "'rope'",
+        "expected one of rod",
+        "space",
+    ):
+        assert part in told, part
+
+
+def test_what_cannot_be_drawn_is_named() -> None:
+    """A function that the page does not have is refused when the FMU is built."""
+    model = pendulum(picture=[Disk((sp.besselj(0, x), y))])
+    with pytest.raises(ModelError, match="besselj"):
+        picture_of(prepare(model, Scene("P")))
+
+
+def test_an_expression_keeps_its_value() -> None:
+    """Packed and evaluated again, an expression has the value that SymPy gives it."""
+    a, b = sp.symbols("a b")
+    expression = (
+        sp.sqrt(a**2 + b) * sp.atan2(a, b) - sp.Max(a, b, 2) * sp.exp(-a) / sp.Abs(b) + sp.pi
+    )
+    numbers = {"a": -0.7, "b": 1.9}
+    expected = float(expression.subs({a: numbers["a"], b: numbers["b"]}))
+    packed = json.loads(json.dumps(pack(expression)))
+    assert values(packed, numbers.__getitem__) == pytest.approx(expected, rel=1e-14)
+
+
+def test_fixed_numbers_are_put_in_and_what_is_not_reported_is_left_out() -> None:
+    """Of a scene that reports x alone, with L fixed, only shapes of x and L are drawn."""
+    length = pendulum().parameters[2].symbol
+    model = pendulum(picture=[Disk((x, length)), Disk((x, y))])
+    picture = picture_of(prepare(model, Scene("P", outputs=("x",), fixed=("L",))))
+    assert picture == {"dimensions": 2, "shapes": [{"kind": "disk", "center": ["x", 1.0]}]}
+
+
+def test_a_picture_may_show_what_the_fmu_reports() -> None:
+    """output(name) stands for a variable of the FMU; a curve runs over a symbol of its own."""
+    s = sp.symbols("s")
+    shapes = [Curve((s, s**2), s, -1, output("energy.total")), Rod((0, 0), (output("tension"), 0))]
+    picture = picture_of(prepare(pendulum(picture=shapes), Scene("P")))
+    assert picture is not None
+    assert picture["shapes"][0]["range"] == [-1.0, "energy.total"]
+    assert read_picture(as_bytes(picture)) == picture
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"[]",
+        b"{}",
+        b'{"dimensions": 2, "shapes": [{"kind": "rod"}]}',
+        b'{"dimensions": 2, "shapes": [{"kind": "script", "points": []}]}',
+        b'{"dimensions": 2, "shapes": [{"kind": "disk", "center": [["eval", "x"], 0]}]}',
+        b'{"dimensions": 2, "shapes": [{"kind": "disk", "center": [NaN, 0]}]}',
+        b'{"dimensions": 9, "shapes": []}',
+        b'{"dimensions": 2, "shapes": [{"kind": "disk", "center": ' + b"[" * 9000,
+    ],
+)
+def test_a_forged_picture_is_refused(text: bytes) -> None:
+    """What stands in an FMU is data that is looked at, never run."""
+    with pytest.raises(BuildError, match="picture"):
+        read_picture(text)
+
+
+@pytest.mark.parametrize("name", sorted(set(FILES.values())))
+def test_every_model_has_a_picture(name: str) -> None:
+    """Each model of models/ shows its body and, where it has constraints, at least one force."""
+    shapes = model_of(name).picture
+    assert any(isinstance(s, Arrow) for s in shapes)
+    assert any(not isinstance(s, Arrow) for s in shapes)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_mechanism_is_drawn(
+    name: str,
+    opened: Callable[..., Page],
+    prepared: Callable[[str], Prepared],
+    native_fmu: Callable[[str], Path],
+) -> None:
+    """At the start, in the middle and at the end every shape has its place on the screen, and the picture
+    in the FMU is the model's."""
+    picture = picture_of(prepared(name))
+    assert picture is not None
+    assert of_fmu(native_fmu(name)).facts["picture"] == picture
+    page = opened(name)
+    page.until("lagfmu.runs")
+    for key in ("Home", "PageUp", "End"):
+        page.tab.locator("#scrub").focus()
+        page.tab.keyboard.press(key)
+        drawn = page.tab.evaluate("() => document.getElementById('picture').innerHTML")
+        assert "NaN" not in drawn
+        assert "Infinity" not in drawn
+    assert page.tab.evaluate("() => document.querySelectorAll('#picture *').length") >= len(
+        picture["shapes"]
+    )
+
+
+def test_the_arrow_is_as_long_as_the_force(opened: Callable[..., Page]) -> None:
+    """At rest on top of the hemisphere the arrow says m g cos(theta0), upward; in flight there is none."""
+    page = opened("Hemisphere")
+    page.until("lagfmu.runs")
+    label = page.tab.locator("#picture .force")
+    assert label.text_content() == "surface 9.81 N"
+    shaft = page.tab.locator("#picture .arrow")
+    assert float(shaft.get_attribute("y2")) < float(shaft.get_attribute("y1"))
+    page.tab.locator("#scrub").focus()
+    page.tab.keyboard.press("End")
+    assert not shaft.is_visible()
+
+
+def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
+    """A spherical pendulum: z stays upward on the screen as the view is turned."""
+    from lagfmu.live.playable import of_prepared
+    from lagfmu.live.render import render
+
+    z = dynamicsymbols("z")
+    m, g = sp.symbols("m g", positive=True)
+    speed = x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2
+    model = Model(
+        name="Spherical",
+        lagrangian=m * speed / 2 - m * g * z,
+        coordinates={x: "m", y: "m", z: "m"},
+        constraints=[Holonomic("rod", x**2 + y**2 + z**2 - L**2)],
+        parameters=[Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1, "m")],
+        start={x: 0.6, z: -0.8, y.diff(): 1.0},
+        picture=[
+            Rod((0, 0, 0), (x, y, z)),
+            Disk((x, y, z), trace=True),
+            Arrow("rod", at=(x, y, z)),
+        ],
+    )
+    out = tmp_path / "spherical.html"
+    out.write_text(render(of_prepared(prepare(model, Scene("Spherical")))), encoding="utf-8")
+    page = Page(browser, out)
+    page.until("lagfmu.runs")
+    places = []
+    for angle in (-60, 30):
+        page.tab.evaluate(
+            """(angle) => {
+                const turn = document.getElementById("turn");
+                turn.value = angle;
+                turn.dispatchEvent(new Event("input"));
+            }""",
+            angle,
+        )
+        bar = page.tab.locator("#picture .rod")
+        places.append([float(str(bar.get_attribute(k))) for k in ("x1", "y1", "x2", "y2")])
+        assert places[-1][3] > places[-1][1]  # the bob hangs below the pivot
+    assert places[0] != places[1]
+    page.close()
+    assert page.problems == []
