@@ -112,7 +112,7 @@ def sources_of(
     description = model_description(
         table,
         scene,
-        eom.model.description or f"{eom.model.name}: forces of constraint as outputs",
+        eom.model,
         f"lagfmu {version()}",
         {
             **({} if system.estimated else {"ModelExchange": {**common, **MODEL_EXCHANGE}}),

@@ -14,7 +14,7 @@ import functools
 import json
 import math
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, TypeVar
 
@@ -64,13 +64,13 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
 
     The generated subclass gives `system`, `variables` (name, kind, role, start, min, max, must it be
     positive, does the model give the start; the position is the value reference), `default_tolerance`, the
-    `methods` that can be chosen, the default method and fixed step, and `identity`.
+    `numbers` of the methods that can be chosen, the default method and fixed step, and `identity`.
     """
 
     system: System
     variables: Sequence[tuple[str, str, str, Any, float | None, float | None, bool, bool]]
     default_tolerance: float
-    methods: Sequence[str]
+    numbers: Mapping[int, str]
     default_method: str
     default_step: float
     identity: str
@@ -256,7 +256,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set parameters, start values (before the end of initialization) or inputs."""
         for vr, value in zip(vrs, values, strict=True):  # all are checked before one is set
-            name, _, _, _, low, high, positive, _ = self._settable(vr, "Real")
+            name, _, _, _, low, high, positive, _ = self._settable(vr, "Real", value)
             if not math.isfinite(value):
                 raise Refused(f"{name!r} = {value!r}, expected a finite number")
             if (low is not None and value < low) or (high is not None and value > high):
@@ -267,40 +267,49 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """Set `solver.method`."""
+        """No variable is a String."""
         for vr, value in zip(vrs, values, strict=True):
-            name = self._settable(vr, "String")[0]
-            if value not in self.methods:
-                raise Refused(f"{name!r} = {value!r}, expected one of {', '.join(self.methods)}")
-        self._set(vrs, values)
+            self._settable(vr, "String", value)
 
     @guarded
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """No Integer can be set."""
-        for vr in vrs:
-            self._settable(vr, "Integer")
+        """Set `solver.method`, an Enumeration; no other Integer can be set."""
+        for vr, value in zip(vrs, values, strict=True):
+            name = self._settable(vr, "Integer", value)[0]
+            if value not in self.numbers:
+                offered = ", ".join(f"{k} ({method})" for k, method in self.numbers.items())
+                raise Refused(f"{name!r} = {value!r}, expected one of {offered}")
+        self._set(vrs, values)
 
     @guarded
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
         """No Boolean can be set."""
-        for vr in vrs:
-            self._settable(vr, "Boolean")
+        for vr, value in zip(vrs, values, strict=True):
+            self._settable(vr, "Boolean", value)
 
     def _variable(self, vr: int, kind: str) -> Any:
         if not 0 <= vr < len(self.variables) or self.variables[vr][1] != kind:
             raise Refused(f"value reference {vr} is no {kind} variable of this FMU")
         return self.variables[vr]
 
-    def _settable(self, vr: int, kind: str) -> Any:
+    def _settable(self, vr: int, kind: str, value: Any) -> Any:
+        """The variable, if it may be set to the value now: a fixed parameter only to what it is."""
         variable = self._variable(vr, kind)
         name, role = variable[0], variable[2]
         if role in ("output", "estimate"):
             raise Refused(f"{name!r} is calculated and cannot be set")
-        if self.running and role != "input":
+        if self.running and role != "input" and not self._is_same(vr, value):
             raise Refused(f"{name!r} can only be set before the end of the initialization")
         return variable
 
+    def _is_same(self, vr: int, value: Any) -> bool:
+        """A fixed parameter that is set once more to the bits that it has: some importers do."""
+        fixed = self.variables[vr][2] in ("parameter", "solver")
+        return fixed and float(value).hex() == float(self.values[vr]).hex()
+
     def _set(self, vrs: list[int], values: Sequence[Any]) -> None:
+        if all(self._is_same(vr, value) for vr, value in zip(vrs, values, strict=True)):
+            return
         for vr, value in zip(vrs, values, strict=True):
             self.values[vr] = value
         self.fresh.update(vrs)
@@ -343,7 +352,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                 f"{SMALLEST_TOLERANCE!r} is used"
             )
         self.settings = Settings(
-            method=value.get("solver.method", self.default_method),
+            method=self.numbers.get(value.get("solver.method", 0), self.default_method),
             tolerance=max(tolerance, SMALLEST_TOLERANCE),
             step=value.get("solver.step", self.default_step),
             maximum_step=value["solver.maximum_step"],
@@ -427,7 +436,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         if not (math.isfinite(start) and stop > start and 0 <= tolerance < math.inf):
             raise ValueError(f"its experiment is {state['experiment']!r}")
         settings, kept = state["settings"], state["state"]
-        settings = None if settings is None else restored_settings(settings, self.methods)
+        settings = (
+            None if settings is None else restored_settings(settings, tuple(self.numbers.values()))
+        )
         kept = None if kept is None else restored(self.system, kept)
         if not isinstance(running, bool) or (running and None in (settings, kept)):
             raise ValueError(f"its mode is {running!r}")
@@ -441,7 +452,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             good = good and (low is None or number >= low) and (high is None or number <= high)
             good = good and (not positive or number > 0)
         else:
-            good = value in self.methods if name == "solver.method" else True
+            good = value in self.numbers if name == "solver.method" else True
         if not good:
             raise ValueError(f"its {name} is {value!r}")
 

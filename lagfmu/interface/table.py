@@ -5,6 +5,7 @@ Names, order, references, causality, units, start values and dependencies are de
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
@@ -258,7 +259,7 @@ class _Builder:
         ) -> Variable:
             return Variable(
                 name=f"solver.{name}",
-                kind="String" if isinstance(start, str) else "Real",
+                kind="Enumeration" if isinstance(start, str) else "Real",
                 role="solver",
                 causality="parameter",
                 variability="fixed",
@@ -272,6 +273,7 @@ class _Builder:
 
         methods = self.scene.selectable
         choice = setting("method", self.scene.method, None, described(methods))
+        choice = dataclasses.replace(choice, items=tuple(methods))
         step = setting(
             "step", self.scene.step, SECOND, "largest fixed step of rk4; 0: chosen from the start"
         )

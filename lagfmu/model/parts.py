@@ -160,6 +160,10 @@ class ModelFields:
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
     frictions: Sequence[Friction] = ()
     outputs: Sequence[Output] = ()
+    author: str = ""
+    version: str = ""
+    license: str = ""
+    copyright: str = ""
     picture: Sequence[Any] = ()  # of the shapes in picture.py
 
     @property
