@@ -10,6 +10,8 @@ from pathlib import Path
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
 from .fmu.write import put_figures, write
+from .live.playable import of_prepared
+from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
 from .model.goal import parse
 from .model.model import Model
@@ -36,6 +38,7 @@ def build_fmu(
     target: str = "python",
     platforms: Sequence[str] = (HOST,),
     check: bool = True,
+    page: bool = False,
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
@@ -46,12 +49,15 @@ def build_fmu(
     FMU is simulated through fmpy and held against them here, and its page shows the figures; a native FMU
     is simulated only if it has a binary for this machine.
 
+    With `page` its documentation holds the page in which it runs (documentation/play.html), which needs
+    ziglang.
+
     Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
     VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
     scene, choice = settled(model, scene or Scene(model.name), closed_forms, target)
     prepared = prepare(model, scene)
-    built = package(prepared, out, closed_forms, target, platforms, choice, check)
+    built = package(prepared, out, closed_forms, target, platforms, choice, check, page)
     found = built.verification
     if found is not None and not found.passed:
         failed = "; ".join(str(c) for c in found.checks if not c.passed)
@@ -67,9 +73,11 @@ def package(
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
     check: bool = True,
+    page: bool = False,
 ) -> Built:
     """What `prepare` made as an FMU: built once, verified once, its figures put in."""
-    path = write(prepared, out, closed_forms, target, platforms, choice)
+    live = render(of_prepared(prepared)) if page else ""
+    path = write(prepared, out, closed_forms, target, platforms, choice, live)
     runs_here = target == "python" or host() in chosen(platforms)
     if not (check and runs_here):
         return Built(path, None)

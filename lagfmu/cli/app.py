@@ -148,6 +148,10 @@ def build(
             "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
         ),
     ] = None,
+    page_: Annotated[
+        bool,
+        typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
+    ] = False,
     outputs: Outputs = None,
     fixed: Fixed = None,
     inputs: Inputs = None,
@@ -185,7 +189,7 @@ def build(
                 if name is None and any(v is not None for v in narrowing):
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
                 built = package(
-                    prepared, out / kind, file.closed_forms, kind, places, choice, check
+                    prepared, out / kind, file.closed_forms, kind, places, choice, check, page_
                 )
             path, found = built.path, built.verification
             console.print(
