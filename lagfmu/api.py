@@ -10,7 +10,7 @@ from pathlib import Path
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
 from .fmu.write import put_figures, write
-from .live.playable import of_prepared
+from .live.playable import playable
 from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
 from .model.goal import parse
@@ -76,7 +76,7 @@ def package(
     page: bool = False,
 ) -> Built:
     """What `prepare` made as an FMU: built once, verified once, its figures put in."""
-    live = render(of_prepared(prepared)) if page else ""
+    live = render(playable(prepared)) if page else ""
     path = write(prepared, out, closed_forms, target, platforms, choice, live)
     runs_here = target == "python" or host() in chosen(platforms)
     if not (check and runs_here):

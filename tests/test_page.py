@@ -15,7 +15,7 @@ from conftest import FILES
 from typer.testing import CliRunner
 
 from lagfmu.cli.app import app
-from lagfmu.live.playable import of_fmu
+from lagfmu.live.playable import playable as playable_of
 from lagfmu.live.render import Playable, render
 from lagfmu.verification.simulate import read_description, simulate
 
@@ -129,7 +129,7 @@ def test_what_an_fmu_says_is_text(
                 text = text.replace(b"<math", b"<script>document.title='taken'</script><math", 1)
             new.writestr(name, text)
     out = tmp_path / "evil.html"
-    out.write_text(render(of_fmu(path)), encoding="utf-8")
+    out.write_text(render(playable_of(path)), encoding="utf-8")
     page = Page(browser, out)
     assert page.run()["time"][-1] == 2.0
     assert page.tab.title().startswith("Hemisphere")

@@ -23,6 +23,7 @@ from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
 from ..interface.variables import VariableTable
 from ..live.command import write_page
+from ..live.playable import told_by
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
@@ -32,6 +33,7 @@ from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification, verify
+from .film import film
 from .options import (
     AddOutput,
     Contacts,
@@ -284,6 +286,10 @@ def simulate_command(
         typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
+    animate: Annotated[
+        Path | None,
+        typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
+    ] = None,
     add_output: AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest."""
@@ -317,6 +323,10 @@ def simulate_command(
                 f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
                 soft_wrap=True,
             )
+        if animate is not None:
+            with console.status(f"drawing {name}"):
+                film(told_by(source), result, given, animate, name)
+            console.print(f"[green]wrote[/] {escape(str(animate))}", soft_wrap=True)
 
 
 @app.command()
