@@ -9,6 +9,7 @@ from .model.convert import from_lagranges_method
 from .model.model import (
     Contact,
     Embedding,
+    Friction,
     Holonomic,
     Input,
     Model,
@@ -32,6 +33,7 @@ __all__ = [
     "Disk",
     "Embedding",
     "EquationsOfMotion",
+    "Friction",
     "Ground",
     "Holonomic",
     "Input",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
-from .fmu.write import put_figures, write
+from .fmu.write import put, put_figures, write
 from .live.playable import playable
 from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
@@ -19,6 +19,7 @@ from .model.scene import Scene
 from .prepare.prepare import Prepared, prepare
 from .study.tradeoff.choose import choose
 from .study.tradeoff.page import section
+from .verification.crosscheck import layered
 from .verification.verify import Verification, verify
 
 
@@ -38,6 +39,7 @@ def build_fmu(
     target: str = "python",
     platforms: Sequence[str] = (HOST,),
     check: bool = True,
+    reference: bool = False,
     page: bool = False,
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
@@ -47,7 +49,8 @@ def build_fmu(
 
     `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them.  With `check` the
     FMU is simulated through fmpy and held against them here, and its page shows the figures; a native FMU
-    is simulated only if it has a binary for this machine.
+    is simulated only if it has a binary for this machine.  With `reference` it carries the results of its
+    default experiment at a tolerance of 1e-12 (FMI-LS-REF).
 
     With `page` its documentation holds the page in which it runs (documentation/play.html), which needs
     ziglang.
@@ -57,7 +60,7 @@ def build_fmu(
     """
     scene, choice = settled(model, scene or Scene(model.name), closed_forms, target)
     prepared = prepare(model, scene)
-    built = package(prepared, out, closed_forms, target, platforms, choice, check, page)
+    built = package(prepared, out, closed_forms, target, platforms, choice, check, reference, page)
     found = built.verification
     if found is not None and not found.passed:
         failed = "; ".join(str(c) for c in found.checks if not c.passed)
@@ -73,16 +76,18 @@ def package(
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
     check: bool = True,
+    reference: bool = False,
     page: bool = False,
 ) -> Built:
     """What `prepare` made as an FMU: built once, verified once, its figures put in."""
     live = render(playable(prepared)) if page else ""
     path = write(prepared, out, closed_forms, target, platforms, choice, live)
     runs_here = target == "python" or host() in chosen(platforms)
-    if not (check and runs_here):
-        return Built(path, None)
-    found = verify(path)
-    put_figures(path, prepared, found.rows(), target, choice)
+    found = verify(path) if check and runs_here else None
+    if found is not None:
+        put_figures(path, prepared, found.rows(), target, choice, page)
+    if reference and runs_here:
+        put(path, layered(path, found))
     return Built(path, found)
 
 

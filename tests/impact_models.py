@@ -22,7 +22,9 @@ def restitution(value: float) -> Parameter:
     return Parameter(e, value, "1", min=0, max=1)
 
 
-def rod(order: Sequence[int] = (0, 1), value: float = 0.5, **start: float) -> Model:
+def rod(
+    order: Sequence[int] = (0, 1), value: float = 0.5, inertia: float = 2.0, **start: float
+) -> Model:
     """A rod of length 2 l with a foot at each end, its moment of inertia J larger than m l^2."""
     feet = [
         Contact("left", z - l * sin(theta), restitution=e),
@@ -36,7 +38,7 @@ def rod(order: Sequence[int] = (0, 1), value: float = 0.5, **start: float) -> Mo
         parameters=[
             MASS,
             GRAVITY,
-            Parameter(J, 2.0, "kg.m^2"),
+            Parameter(J, inertia, "kg.m^2"),
             Parameter(l, 1.0, "m"),
             restitution(value),
         ],

@@ -286,7 +286,7 @@ static const Method *const METHODS_OF_SWING[] = {&rattle};
 Swing *swing_new(const double *y, const double *p) {
     Swing *w = calloc(1, sizeof *w);
     for (int pass = 0; pass < 2; pass++) {
-        mechanism_layout(&w->b, &w->scratch, &pendulum, &w->why);
+        mechanism_layout(&w->b, &w->scratch, &pendulum, &w->why, NULL);
         integrator_layout(&w->i, &w->saved, &w->scratch, 4, METHODS_OF_SWING, 1);
         if (pass == 1) break;
         w->saved.base = calloc(1, w->saved.used);

@@ -174,7 +174,7 @@ def test_a_landing_between_two_points_is_seen(lawful):
 MUTANTS = {
     "lambda": ("observe.c", "b->lambda, (size_t)s->m * sizeof *o->lambda);", "LAMBDA"),
     "projection": ("project.c", "    if (!acting) return OK;", "    return OK;"),
-    "departure": ("leg.c", "values[c] = b->lambda[system->contact[c]];", "DEPARTURE"),
+    "departure": ("indicators.c", "values[c] = b->lambda[system->contact[c]];", "DEPARTURE"),
     "method": ("dop853.c", "b1 = 0.054293734116568765", "b1 = 0.054293744116568765"),
 }
 CHANGED = {

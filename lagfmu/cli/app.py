@@ -21,6 +21,7 @@ from ..errors import LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
+from ..fmu.write import write_whole
 from ..interface.variables import VariableTable
 from ..live.command import write_page
 from ..live.playable import told_by
@@ -31,8 +32,11 @@ from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
+from ..verification.crosscheck import as_csv, write_crosscheck
+from ..verification.reference import read_table
+from ..verification.report import exit_code
 from ..verification.simulate import read_description, simulate
-from ..verification.verify import Verification, verify
+from ..verification.verify import Verification
 from .film import film
 from .options import (
     AddOutput,
@@ -53,6 +57,7 @@ from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
 from .tradeoff import chosen_for, compare
+from .verify import examine, write_reports
 
 app = typer.Typer(
     help="Lagrange's equations with multipliers, from SymPy to FMUs that report forces of constraint.",
@@ -98,6 +103,9 @@ Tolerance = Annotated[
 ]
 StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
 StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
+InputFile = Annotated[
+    Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
+]
 
 
 @contextlib.contextmanager
@@ -111,7 +119,7 @@ def _plainly() -> Iterator[None]:
             errors.print(
                 f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
             )
-            raise typer.Exit(1) from None
+            raise typer.Exit(getattr(error, "code", 1)) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
                 errors.print(
@@ -131,6 +139,9 @@ def build(
         list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
     ] = None,
     check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
+    reference: Annotated[
+        bool, typer.Option("--reference", help="Put reference results inside (FMI-LS-REF).")
+    ] = False,
     target: Annotated[
         Target, typer.Option(help="python: needs Python where it runs. native: compiled C.")
     ] = Target.python,
@@ -191,7 +202,15 @@ def build(
                 if name is None and any(v is not None for v in narrowing):
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
                 built = package(
-                    prepared, out / kind, file.closed_forms, kind, places, choice, check, page_
+                    prepared,
+                    out / kind,
+                    file.closed_forms,
+                    kind,
+                    places,
+                    choice,
+                    check,
+                    reference,
+                    page_,
                 )
             path, found = built.path, built.verification
             console.print(
@@ -256,18 +275,67 @@ def show(
 
 @app.command(name="verify")
 def verify_command(
-    fmu: FmuPath,
+    fmus: Annotated[list[Path], typer.Argument(metavar="FILE.fmu...", help="FMUs.")],
     set_: Settings = None,
     stop_time: StopTime = None,
     step_size: StepSize = None,
     tolerance: Tolerance = None,
+    inputs: InputFile = None,
+    reference: Annotated[
+        Path | None, typer.Option(help="CSV of a run that this one is held against besides.")
+    ] = None,
+    rtol: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="RTOL|NAME=RTOL",
+            help="Allowed part of a reference column's largest value (default 1e-6); repeatable.",
+        ),
+    ] = None,
+    atol: Annotated[float, typer.Option(help="Allowed besides, in the column's unit.")] = 0.0,
+    json: Annotated[Path | None, typer.Option(help="Write everything as JSON.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")] = None,
 ) -> None:
-    """Simulate an FMU through fmpy and hold it against the closed forms that it carries."""
+    """Simulate FMUs through fmpy and hold them against the closed forms that they carry.
+
+    Exit codes: 0 all hold, 1 a statement fails, 2 wrong usage, 3 an FMU could not be run.
+    """
     with _plainly():
-        found = verify(fmu, _assignments(set_), stop_time, step_size, tolerance)
-        _print(found)
-    if not found.passed:
-        raise typer.Exit(1)
+        done = examine(
+            fmus,
+            _assignments(set_),
+            stop_time,
+            step_size,
+            tolerance,
+            inputs,
+            reference,
+            rtol or (),
+            atol,
+        )
+        write_reports(done, json, junit)
+        for one in done:
+            if one.found is not None:
+                _print(one.found)
+            else:
+                errors.print(
+                    f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
+                )
+    raise typer.Exit(exit_code(done))
+
+
+@app.command(name="reference")
+def reference_command(
+    fmu: FmuPath,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder (default: NAME).")] = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    inputs: InputFile = None,
+) -> None:
+    """Write reference results of an FMU for other tools: the files of the FMI cross-check."""
+    with _plainly():
+        signals = None if inputs is None else read_table(inputs)
+        folder = out or Path(fmu.stem)
+        for path in write_crosscheck(fmu, folder, stop_time, step_size, signals):
+            console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
 
 
 @app.command(name="simulate")
@@ -290,6 +358,7 @@ def simulate_command(
         Path | None,
         typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
     ] = None,
+    inputs: InputFile = None,
     add_output: AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest."""
@@ -313,7 +382,10 @@ def simulate_command(
         besides = _besides(variable or (), known)
         given = _assignments(set_)
         with console.status(f"simulating {name}"):
-            result = simulate(source, stop_time, step_size, tolerance, given, besides=besides)
+            signals = None if inputs is None else read_table(inputs)
+            result = simulate(
+                source, stop_time, step_size, tolerance, given, signals, besides=besides
+            )
         _print_last(name, result, units, variable or ())
         if csv is not None:
             _save(csv, result)
@@ -461,9 +533,7 @@ def sweep(
     stop_time: StopTime = None,
     step_size: StepSize = None,
     tolerance: Tolerance = None,
-    inputs: Annotated[
-        Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
-    ] = None,
+    inputs: InputFile = None,
     scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
     out: Annotated[
         Path | None,
@@ -582,13 +652,8 @@ def _print_last(
 
 
 def _save(path: Path, result: Any) -> None:
-    import fmpy.util
-
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fmpy.util.write_csv(str(path), result)
-    except OSError as error:
-        raise SimulationError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+    """All columns; names are quoted, because that of an acceleration holds a comma."""
+    write_whole(path, as_csv(result, [n for n in result.dtype.names if n != "time"]).encode())
 
 
 def main() -> None:

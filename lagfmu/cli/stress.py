@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,11 @@ from rich.markup import escape
 from ..errors import BuildError, LagfmuError
 from ..fmu.write import write, write_whole
 from ..model.file import load
+from ..model.model import Model
+from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.stress.facts import facts_of
+from ..study.stress.geometry import lay_geometry, twin
 from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import UNFINISHED, WRONG, Row
 from ..study.stress.report import MEANING, Stressed, as_json, as_markdown, summary, table
@@ -89,8 +93,19 @@ def _fmus(
                 prepared = prepare(file.model, scene)
                 fmu = write(prepared, folder, file.closed_forms, target=target)
                 lay_beside(fmu, prepared)
+                if prepared.system.contacts:
+                    lay_geometry(fmu, prepared)
+                if len(prepared.system.contacts) > 1:
+                    _turned(file.model, scene, fmu, target)
                 built.append(fmu)
     return built
+
+
+def _turned(model: Model, scene: Scene, fmu: Path, target: str) -> None:
+    """The same with its constraints declared in the opposite order, where the judge looks for it."""
+    other = replace(model, constraints=tuple(reversed(model.constraints)))
+    path = write(prepare(other, scene), fmu.parent / "reversed", (), target=target)
+    path.replace(twin(fmu))
 
 
 def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> Stressed:

@@ -93,18 +93,21 @@ def sources_of(
     gone = files_left_out(scene, system)
     runtime = {file: text for file, text in everything.items() if file not in gone}
     generated = {
-        "model.c": model_source(eom, reduction, formulation, needs_tangents(scene)).encode(),
+        "model.c": model_source(
+            eom, reduction, formulation, needs_tangents(scene, system)
+        ).encode(),
         "variables.c": variables_source(table, eom, reduction, scene, system).encode(),
     }
     parts = parts_source(scene, system)
     if parts is not None:
         generated["parts.c"] = parts.encode()
+    differentiable = scene.differentiable and not system.frictions
     common = {
         "modelIdentifier": scene.name,
         **CAPABILITIES,
-        "providesDirectionalDerivative": "true" if scene.differentiable else "false",
+        "providesDirectionalDerivative": "true" if differentiable else "false",
     }
-    order = {"maxOutputDerivativeOrder": "1" if scene.differentiable else "0"}
+    order = {"maxOutputDerivativeOrder": "1" if differentiable else "0"}
     sources = sorted(f for f in {*runtime, *generated} if f.endswith(".c"))
     description = model_description(
         table,
@@ -117,7 +120,7 @@ def sources_of(
         },
         b"".join(name.encode() + text for name, text in {**runtime, **generated}.items()),
         sources=sources,
-        event_indicators=len(system.contacts) + len(system.floors),
+        event_indicators=len(system.contacts) + len(system.floors) + 2 * len(system.frictions),
         reinitialized=table.states if system.rows else (),
     )
     generated["identity.h"] = IDENTITY.format(guid=guid_of(description)).encode()

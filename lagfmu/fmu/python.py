@@ -130,7 +130,7 @@ def _script(
         for v in table.variables
     )
     equations = source(eom, reduction, scene.formulation or "multipliers")
-    words = ["Embedding", "Lookups", "Own", "Row", "System"]
+    words = ["Embedding", "Friction", "Lookups", "Own", "Row", "System"]
     vocabulary = f"from {package}.solver.system import {', '.join(words)}"
     if "= Cubic(" in equations:
         vocabulary = f"from {package}.solver.cubic import Cubic\n{vocabulary}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -77,13 +77,17 @@ def put_figures(
     figures: Sequence[tuple[str, ...]],
     target: str,
     choice: str = "",
+    live: bool = False,
 ) -> None:
     """Put verification results into the page of an FMU that stands at `path`; nothing else changes."""
+    put(path, {PAGE: page(_as_built(prepared, target), figures, choice, live).encode()})
+
+
+def put(path: Path, more: Mapping[str, bytes]) -> None:
+    """Put files into an FMU that stands at `path`, or replace them."""
     with zipfile.ZipFile(path) as archive:
         contents = {name: archive.read(name) for name in archive.namelist()}
-    live = LIVE in contents
-    contents[PAGE] = page(_as_built(prepared, target), figures, choice, live).encode()
-    write_whole(path, pack(contents))
+    write_whole(path, pack(contents | dict(more)))
 
 
 def _as_built(prepared: Prepared, target: str) -> Prepared:

@@ -20,7 +20,10 @@ from ..model.model import Contact, Nonholonomic, name_of
 from ..model.scene import Scene
 from ..model.units import (
     ENERGY,
+    FORCE,
+    METRE,
     ONE,
+    POWER,
     SECOND,
     Unit,
     dimension_of,
@@ -32,6 +35,7 @@ from ..solver.state import MAXIMUM_STEPS
 from .variables import Value, Variable, VariableTable
 
 Expr = Any
+SPEED = METRE / SECOND
 
 
 def variable_table(
@@ -92,7 +96,8 @@ class _Builder:
         """States that the projection of the start values can move."""
         moved: set[str] = set()
         eom = self.stepped
-        for coordinates, rows in coupled(eom):
+        for coordinates, group in coupled(eom):
+            rows = {k for k in group if eom.constraints[k].name not in eom.limited}
             if any(eom.f[k] is not None for k in rows):
                 moved |= {str(eom.q[j]) for j in coordinates}
             if rows:
@@ -217,6 +222,7 @@ class _Builder:
             *self.energies(),
             *self.own_outputs(),
             *self.contact_outputs(),
+            *self.friction_outputs(),
             self.output("solver.steps", "internal steps taken so far", None, (), "Integer"),
         ]
         n = len(self.state_names) // 2
@@ -376,13 +382,15 @@ class _Builder:
             lam = multiplier_unit(unit, isinstance(c, Nonholonomic))
             row = self.group(row=k)
             variables.append(self.output(f"lambda.{c.name}", f"multiplier of {what}", lam, row))
-            if isinstance(c, Nonholonomic):
+            if isinstance(c, Nonholonomic) or c.name in self.eom.limited:
                 text = f"velocity residual of {what}"
                 own = {j: a for (i, j), a in jacobian.items() if i == k}
                 behind = self.symbols(*own.values(), self.eom.nu[k], *(self.eom.v[j] for j in own))
             else:
                 text = f"position residual of {what}"
                 behind = self.symbols(self.eom.f[k])
+            if c.name in self.eom.limited and not isinstance(c, Nonholonomic):
+                unit = unit.per_second()
             variables.append(self.output(f"residual.{c.name}", text, unit, behind))
             text = f"true where lambda.{c.name} is determined uniquely"
             variables.append(self.output(f"unique.{c.name}", text, None, entries, "Boolean"))
@@ -456,3 +464,43 @@ class _Builder:
                     ),
                 ]
         return variables
+
+    def friction_outputs(self) -> list[Variable]:
+        variables = []
+        row = {c.name: k for k, c in enumerate(self.eom.constraints)}
+        for law in self.eom.frictions:
+            what = f"friction {law.name}" + (f": {law.description}" if law.description else "")
+            behind = self.group(row=row[law.of[0]]) | self.symbols(*law.expressions)
+            names = self.known | behind
+            force, head = FORCE, f"slipping.{law.name}"
+            text = f"true while {what} sticks (and its normal contact is closed)"
+            variables.append(self.output(f"sticks.{law.name}", text, None, names, "Boolean"))
+            for name in law.of:
+                text = f"slip velocity G v - nu of {name}"
+                variables.append(self.output(f"slip.{name}", text, SPEED, self._rates(row[name])))
+            text = f"static coefficient times normal force less |lambda| of {what}"
+            variables.append(self.output(f"margin.{law.name}", text, force, names))
+            text = f"power of {what}, lambda times slip velocity, never positive"
+            variables.append(self.output(f"power.{law.name}", text, POWER, names))
+            tail = f"the latest start of slipping of {law.name}, 0 before the first"
+            variables += [
+                self.output(
+                    f"{head}.count", f"starts of slipping of {law.name}", None, (), "Integer"
+                ),
+                self.output(f"{head}.time", f"time of {tail}", SECOND, (), discrete=True),
+            ]
+            for q, v in zip(self.eom.q, self.eom.v, strict=True):
+                for name, s in ((f"{q}", f"{q}"), (f"velocity.{q}", f"{v}")):
+                    text = f"{s} at {tail}"
+                    variables.append(
+                        self.output(f"{head}.{name}", text, self.units[s], (), discrete=True)
+                    )
+        if self.eom.frictions:
+            text = "energy that frictions and impacts have turned into heat since the start"
+            variables.append(self.output("energy.dissipated", text, ENERGY, ()))
+        return variables
+
+    def _rates(self, k: int) -> set[str]:
+        """The symbols behind G v - nu of a row."""
+        own = {j: a for (i, j), a in self.eom.G.todok().items() if i == k}
+        return self.symbols(*own.values(), self.eom.nu[k], *(self.eom.v[j] for j in own))

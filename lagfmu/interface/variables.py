@@ -12,7 +12,9 @@ from ..methods import described
 from ..model.units import Unit
 
 Value = float | int | bool | str
-RECORD = re.compile(r"contact\.\w+\Z|departure\.\w+\.count\Z|solver\.steps\Z")
+RECORD = re.compile(
+    r"contact\.\w+\Z|departure\.\w+\.count\Z|solver\.steps\Z|sticks\.\w+\Z|slipping\.\w+\.count\Z"
+)
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,8 @@ class VariableTable:
 
         Local, if they are not among the outputs, but there are the states, so that their start values
         can be set, their derivatives for model exchange, and the record of the run: the steps that
-        were taken, and which contacts are closed or have opened, for that says which closed form holds.
+        were taken, which contacts are closed or have opened and which frictions stick or have slipped, for
+        that says which closed form holds.
         """
         moving = {*self.states, *self.derivatives}
         kept = []

@@ -6,7 +6,7 @@ from .equations import EquationsOfMotion
 
 
 def coupled(eom: EquationsOfMotion) -> list[tuple[frozenset[int], frozenset[int]]]:
-    """(coordinates, rows) that one linear solve ties together, by the sparsity of M and G."""
+    """(coordinates, rows) that one linear solve ties together, by the sparsity of M, G and frictions."""
     parent = list(range(eom.n + eom.m))
 
     def root(i: int) -> int:
@@ -19,6 +19,11 @@ def coupled(eom: EquationsOfMotion) -> list[tuple[frozenset[int], frozenset[int]
         parent[root(i)] = root(j)
     for k, j in eom.G.todok():
         parent[root(eom.n + k)] = root(j)
+    position = {c.name: eom.n + k for k, c in enumerate(eom.constraints)}
+    for law in eom.frictions:
+        first, *others = (position[name] for name in (*law.of, *law.normal))
+        for i in others:
+            parent[root(i)] = root(first)
     groups: dict[int, list[int]] = {}
     for i in range(eom.n + eom.m):
         groups.setdefault(root(i), []).append(i)

@@ -22,13 +22,44 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
-from ..model.model import Constraint, Model, Nonholonomic, Output, Parameter, name_of
-from ..model.reactions import force_of_constraint, multiplier
+from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
+from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
 
 Expr = Any
 TIME = dynamicsymbols._t
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    """|lambda| of the rows `of` is at most static * |N|, and kinetic * |N| while they slip.
+
+    N = load + sum_k normal[k] lambda_k [N], with names of constraints and plain symbols.
+    """
+
+    name: str
+    of: tuple[str, ...]
+    normal: Mapping[str, Expr]
+    load: Expr
+    static: Expr
+    kinetic: Expr
+    description: str = ""
+
+    @property
+    def expressions(self) -> tuple[Expr, ...]:
+        """All of its expressions."""
+        return (self.load, self.static, self.kinetic, *self.normal.values())
+
+    def mapped(self, change: Callable[[Expr], Expr]) -> FrictionLaw:
+        """The same with `change` done to every expression."""
+        return replace(
+            self,
+            normal={k: change(c) for k, c in self.normal.items()},
+            load=change(self.load),
+            static=change(self.static),
+            kinetic=change(self.kinetic),
+        )
 
 
 @dataclass(frozen=True)
@@ -47,7 +78,8 @@ class EquationsOfMotion:
     A scene may need less than the model (prune.py): then some coordinates and constraints are not
     there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
     equations are of coordinates that are only read: nothing is solved for them.  `levels`: where forces
-    jump, the symbols behind the inputs that say on which side (jumps.py).
+    jump, the symbols behind the inputs that say on which side (jumps.py).  `frictions` say which
+    constraints hold only as long as their multipliers stay below a part of a normal force.
     """
 
     model: Model
@@ -66,6 +98,7 @@ class EquationsOfMotion:
     symbols: dict[Expr, Expr]
     rates: dict[Expr, Expr]
     constraints: tuple[Constraint, ...]
+    frictions: tuple[FrictionLaw, ...] = ()
     outputs: tuple[Output, ...] = ()
     numbers: Mapping[Expr, Expr] = field(default_factory=dict)
     bare: bool = False
@@ -156,8 +189,14 @@ class EquationsOfMotion:
             f=each(self.f),
             kinetic=kinetic,
             potential=potential,
+            frictions=tuple(law.mapped(change) for law in self.frictions),
             outputs=tuple(_changed(o, change) for o in self.outputs),
         )
+
+    @cached_property
+    def limited(self) -> dict[str, FrictionLaw]:
+        """The constraints that hold by friction alone, by name."""
+        return {name: law for law in self.frictions for name in law.of}
 
     def plain(self, expression: Expr) -> Expr:
         """An expression of the model's dynamicsymbols in this object's plain symbols and numbers."""
@@ -250,7 +289,23 @@ def derive(model: Model) -> EquationsOfMotion:
         symbols=table,
         rates=rates,
         constraints=tuple(model.constraints),
+        frictions=tuple(_friction(f, table) for f in model.frictions),
         outputs=tuple(_changed(o, lambda e: e.xreplace(table)) for o in model.outputs),
+    )
+
+
+def _friction(f: Friction, table: dict[Expr, Expr]) -> FrictionLaw:
+    """A friction in plain symbols, its normal force as a sum over multipliers."""
+    normal = sp.sympify(f.normal).xreplace(table)
+    symbols = reactions_in(normal)
+    return FrictionLaw(
+        name=f.name,
+        of=tuple(f.of),
+        normal={str(s).removeprefix("lambda."): normal.diff(s) for s in symbols},
+        load=normal.xreplace(dict.fromkeys(symbols, sp.S.Zero)),
+        static=sp.sympify(f.static).xreplace(table),
+        kinetic=sp.sympify(f.sliding).xreplace(table),
+        description=f.description,
     )
 
 

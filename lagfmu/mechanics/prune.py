@@ -99,6 +99,7 @@ def subjects(
             found[f"Q.{c.name}.{q}"] = frozenset({j}), row
     for o in eom.outputs:
         found[o.name] = _of_output(eom, o)
+    found |= _of_frictions(eom)
     for name, parts in (
         ("kinetic", [eom.kinetic]),
         ("potential", [eom.potential]),
@@ -112,6 +113,27 @@ def subjects(
         moved = frozenset(j for j, phi in enumerate(reduction.phi) if s in phi.free_symbols)
         for name in (f"{s}", f"der({s})", f"der({s},2)"):
             found.setdefault(name, (moved, none))
+    return found
+
+
+def _of_frictions(eom: EquationsOfMotion) -> dict[str, tuple[Indices, Indices]]:
+    """What frictions show: all of it is of the rows that they limit."""
+    none: Indices = frozenset()
+    position = {c.name: k for k, c in enumerate(eom.constraints)}
+    found: dict[str, tuple[Indices, Indices]] = {}
+    every: Indices = frozenset()
+    for law in eom.frictions:
+        rows = frozenset(position[name] for name in law.of)
+        every |= rows
+        names = [f"{head}.{law.name}" for head in ("sticks", "margin", "power")]
+        names += [f"slipping.{law.name}.{tail}" for tail in ("count", "time")]
+        names += [f"slip.{name}" for name in law.of]
+        found |= dict.fromkeys(names, (none, rows))
+        for j, q in enumerate(eom.q):
+            for tail in (f"{q}", f"velocity.{q}"):
+                found[f"slipping.{law.name}.{tail}"] = frozenset({j}), rows
+    if every:
+        found["energy.dissipated"] = none, every
     return found
 
 
@@ -131,6 +153,8 @@ def _behind(eom: EquationsOfMotion, coordinates: Indices, rows: Indices) -> set[
     flat += [eom.F[j] for j in coordinates]
     for k in rows:
         flat += [eom.nu[k], eom.gamma[k], *([] if eom.f[k] is None else [eom.f[k]])]
+        law = eom.limited.get(eom.constraints[k].name)
+        flat += law.expressions if law is not None else ()
     return set().union(*(sp.sympify(e).free_symbols for e in flat)) if flat else set()
 
 
@@ -160,6 +184,7 @@ def only(
             {(row[i], column[j]): a for (i, j), a in values if i in row and j in column},
         )
 
+    kept = {eom.constraints[k].name for k in ks}
     away = [j for j in range(eom.n) if j not in js]
     gone = {s for j in away for s in (eom.q[j], eom.v[j])}
     unsolved = gone | {s for j in away for s in (eom.vdot[j], eom.Q[j])}
@@ -182,6 +207,7 @@ def only(
         potential=whole(eom.potential),
         constraints=pick(eom.constraints, ks),
         outputs=tuple(o for o in eom.outputs if not symbols_of(o) & unsolved),
+        frictions=tuple(law for law in eom.frictions if kept.issuperset(law.of)),
     )
 
 

@@ -13,11 +13,12 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
+from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
 from .picture import check_picture
-from .reactions import reactions_in
+from .reactions import reaction_units, reactions_in
 from .spline import Spline, splines_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
@@ -40,6 +41,7 @@ def problems_of(model: ModelFields) -> list[str]:
     units = declared_units(model, problems)
     if not problems:
         _check_dimensions(model, units, problems)
+        problems += check_frictions(model, units, reaction_units(model, units))
         check_output_units(model, units, problems)
     return problems
 

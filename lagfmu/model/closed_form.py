@@ -26,8 +26,9 @@ class ClosedForm:
     `name` is an output's name (then `actual` may be left out) or a label.  `while_closed`,
     `while_open`: only while that contact is so.  `until_departure`: only as long as that contact, closed
     at the start, has not opened; `at_departure`: only once, when it has first opened, to be used with
-    the `departure` symbols.  `when`: only where this expression of outputs, initial values and time is
-    not 0 (contacts and counts are numbers in it).  Errors are measured relative to `scale` (default: the
+    the `departure` symbols.  `when`: only where this expression of outputs, parameters,
+    initial values and time is not 0 (contacts and counts are numbers in it).  Errors are measured relative
+    to `scale` (default: the
     largest magnitude of `expected` along the run) and allowed up to `within` times the solver's
     tolerance, but at least `rounding`.  `only`: the FMUs that it applies to.
     """

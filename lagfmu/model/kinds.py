@@ -13,12 +13,14 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
+from .frictions import check_kinds
 from .parts import (
     NAME,
     RESERVED,
     Contact,
     Embedding,
     Expr,
+    Friction,
     Holonomic,
     Input,
     ModelFields,
@@ -79,7 +81,7 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
     kinds: tuple[tuple[str, Sequence[object], tuple[type, ...]], ...] = (
         ("parameters", model.parameters, (Parameter,)),
         ("inputs", model.inputs, (Input,)),
-        ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact)),
+        ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact, Friction)),
         ("outputs", model.outputs, (Output,)),
     )
     for field_name, items, types in kinds:
@@ -89,6 +91,7 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
             for item in items
             if not isinstance(item, types)
         ]
+    check_kinds(model, problems)
     if problems:
         return
     for kind, symbol in [

@@ -13,6 +13,7 @@ from functools import cached_property
 
 from ..errors import ModelError
 from .check import declared_units, problems_of, splines_of
+from .frictions import split
 from .kinds import check_containers
 from .parts import (
     NAME,
@@ -21,6 +22,7 @@ from .parts import (
     Contact,
     Embedding,
     Expr,
+    Friction,
     Holonomic,
     Input,
     ModelFields,
@@ -40,6 +42,7 @@ __all__ = [
     "Contact",
     "Embedding",
     "Expr",
+    "Friction",
     "Holonomic",
     "Input",
     "Model",
@@ -58,7 +61,8 @@ class Model(ModelFields):
     given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
     numbers in SI.  `descriptions` may explain coordinates.  `outputs` are quantities besides those
-    that every FMU reports, `picture` how it looks.
+    that every FMU reports, `picture` how it looks.  A `Friction` is written among `constraints` and kept in
+    `frictions`.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -73,6 +77,9 @@ class Model(ModelFields):
             object.__setattr__(self, name, dict(getattr(self, name)))
         for name in ("constraints", "parameters", "inputs", "outputs", "picture"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
+        constraints, frictions = split(self.constraints)
+        object.__setattr__(self, "constraints", constraints)
+        object.__setattr__(self, "frictions", (*self.frictions, *frictions))
         problems = problems_of(self)
         if problems:
             raise ModelError(str(self.name), problems)
@@ -91,6 +98,11 @@ class Model(ModelFields):
     def reactions(self) -> dict[Expr, Unit]:
         """The unit of each `multiplier` and `force_of_constraint`."""
         return reaction_units(self, self.units)
+
+    @cached_property
+    def limited(self) -> dict[str, Friction]:
+        """The constraints that hold by friction alone, by name."""
+        return {name: f for f in self.frictions for name in f.of}
 
     def constraint(self, name: str) -> Constraint:
         """The constraint called `name`; KeyError if there is none."""

@@ -88,6 +88,28 @@ Constraint = Holonomic | Nonholonomic | Contact
 
 
 @dataclass(frozen=True)
+class Friction:
+    """Coulomb friction: the constraints `of`, one or two, hold while |lambda| <= static * |normal|.
+
+    Beyond that they slip, and lambda = -kinetic * |normal| * s/|s| with the slip velocity s = G v - nu
+    (two constraints: orthogonal velocities).  `normal` [N] is linear in `multiplier(NAME)`s; `static` and
+    `kinetic` (the same as `static` if None) are numbers or expressions without dimension.
+    """
+
+    name: str
+    of: Sequence[str]
+    normal: Expr
+    static: Expr
+    kinetic: Expr = None
+    description: str = ""
+
+    @property
+    def sliding(self) -> Expr:
+        """The coefficient of kinetic friction."""
+        return self.static if self.kinetic is None else self.kinetic
+
+
+@dataclass(frozen=True)
 class Output:
     """A quantity of the model's own that the FMU reports: a tension, a height, a power.
 
@@ -133,6 +155,7 @@ class ModelFields:
     embedding: Embedding | None = None
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
+    frictions: Sequence[Friction] = ()
     outputs: Sequence[Output] = ()
     picture: Sequence[Any] = ()  # of the shapes in picture.py
 

@@ -89,7 +89,9 @@ def cost(prepared: Prepared) -> Cost:
         methods=len(prepared.scene.selectable),
         operations=operations(stepped),
         python_bytes=len(source(*made).encode()),
-        native_bytes=len(model_source(*made, needs_tangents(prepared.scene)).encode()),
+        native_bytes=len(
+            model_source(*made, needs_tangents(prepared.scene, prepared.system)).encode()
+        ),
     )
 
 
@@ -145,7 +147,7 @@ def _left_out(full: Prepared, prepared: Prepared) -> Iterable[str]:
     dropped = [m for m in full.scene.selectable if m not in scene.selectable]
     if dropped:
         yield f"methods: {', '.join(dropped)}"
-    if not needs_tangents(scene):
+    if not needs_tangents(scene, full.system):
         yield "derivatives of the equations, and with them directional derivatives"
 
 

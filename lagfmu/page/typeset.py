@@ -16,12 +16,11 @@ from typing import Any
 
 import sympy as sp
 from sympy.core.alphabets import greeks
-from sympy.functions.elementary.trigonometric import TrigonometricFunction
 from sympy.printing.latex import LatexPrinter, tex_greek_dictionary
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 from sympy.printing.str import StrPrinter
-from sympy.simplify.fu import TR8
 
+from ..mechanics import shorter
 from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.formulations.nullspace import accelerations, lambda_free, largest_group
@@ -32,7 +31,6 @@ Expr = Any  # SymPy carries no types
 Printed = tuple[str, str]  # LaTeX, text
 MOST = 24  # equations of a kind that are printed
 LONGEST = 500  # operations beyond which an expression is not printed
-TIDY = 80  # operations below which a factor is sought in products
 MINORS = 3  # constraints in one group beyond which lambda is not eliminated in symbols
 GREEK = {*greeks, *(name.capitalize() for name in greeks), "lambda", "Lambda"}
 PARTS = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
@@ -257,17 +255,16 @@ def _tidy(expression: Expr) -> Expr:
     size = expression.count_ops()
     if size > LONGEST:
         return expression
-    forms = [expression, sp.expand(expression)]
-    if expression.has(TrigonometricFunction) and forms[-1].count_ops() <= LONGEST:
-        forms.append(sp.expand(TR8(forms[-1])))  # products of sines to sums, where they cancel
+    flat = shorter.expanded(expression)
+    forms = [expression, flat, shorter.sums_of_angles(flat)]
     return min(forms, key=lambda e: e.count_ops())
 
 
 def _factored(expression: Expr) -> Expr:
     """A short expression as a product, if that is shorter."""
-    if expression.count_ops() > TIDY or expression.has(sp.Float):
+    if expression.has(sp.Float):
         return _tidy(expression)
-    return min((_tidy(expression), sp.factor(expression)), key=lambda e: e.count_ops())
+    return min((_tidy(expression), shorter.product(expression)), key=lambda e: e.count_ops())
 
 
 # --------------------------------------------------------------------------------- sections

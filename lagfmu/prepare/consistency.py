@@ -176,6 +176,8 @@ def _rank(full: System, G: Matrix) -> tuple[int, tuple[str, ...]]:
     kept: list[int] = []
     redundant = []
     for k in range(full.m):
+        if full.rows[k].friction is not None:
+            continue  # it holds as long as it sticks
         trial = [*kept, k]
         if np.linalg.svd(G[trial], compute_uv=False).min(initial=np.inf) > np.sqrt(RANK) and (
             len(trial) <= full.n

@@ -121,6 +121,10 @@ def _asked(
     eom: EquationsOfMotion, scene: Scene, problems: list[str]
 ) -> tuple[Scene, Reduction | None, tuple[str, ...]]:
     """The scene with its formulation, the reduction to it, and the outputs by name."""
+    if eom.frictions:
+        problems += _refused_with_friction(eom, scene)
+        scene = replace(scene, formulation=scene.formulation or "multipliers")
+        return scene, None, _outputs(eom, None, scene, problems)
     if scene.formulation is not None:
         reduction = reduce(eom) if scene.formulation == "minimal" else None
         return scene, reduction, _outputs(eom, reduction, scene, problems)
@@ -137,6 +141,23 @@ def _asked(
             if reads_only and not ignored:
                 return replace(scene, formulation="minimal"), reduction, outputs
     return chosen, None, _outputs(eom, None, chosen, problems)
+
+
+def _refused_with_friction(eom: EquationsOfMotion, scene: Scene) -> list[str]:
+    """What a scene of a model with friction cannot ask for."""
+    names = ", ".join(repr(law.name) for law in eom.frictions)
+    problems = []
+    if scene.formulation == "minimal":
+        problems.append(
+            f"formulation 'minimal' with friction ({names}): the normal force is needed in every mode, "
+            "and the reduction eliminates it: choose 'multipliers' or 'nullspace'"
+        )
+    if scene.derivatives:
+        problems.append(
+            f"derivatives with friction ({names}): directional derivatives do not know the force of "
+            "sliding: leave `derivatives` out"
+        )
+    return problems
 
 
 def _outputs(

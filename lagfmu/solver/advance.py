@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import at_contacts, at_events
+from . import at_contacts, at_events, at_slides
 from .failure import StepFailureError
 from .indicators import indicators, is_watched
 from .instant import Instant
@@ -49,9 +49,12 @@ def advance(
         if system.floors:  # the inputs may have been set
             levels = levels_at(system, state.t, np.array(state.q), inputs, p)
             state = replace(state, levels=levels)
-        at = Instant(system, state.t, [*inputs, *state.levels], p)
+        at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
         if system.contacts and system.prescribed:
             state = at_contacts.released(at, state, state.span)
+        if system.frictions:
+            state = at_slides.renewed(at, state)
+            at = replace(at, slides=state.slides)
         if is_incomplete(state):
             state = complete(at, settings, state, t_end - state.t)
         headway = Headway(settings, begun, t_end, state.rate)
@@ -108,7 +111,7 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
     solver = leg.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
     steps, choice = state.steps, state.choice
-    watch = is_watched(leg.system)
+    watch, lost = is_watched(leg.system), state.dissipated
     before = indicators(leg, state.t, y) if watch else np.zeros(0)
     while True:
         t0, y0 = solver.t, solver.y
@@ -135,7 +138,13 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)
                 here = replace(state, step=step, steps=steps, armed=tuple(armed), choice=choice)
+                if leg.system.frictions:
+                    lost += at_slides.dissipated(leg, solver.dense_output(), t0, event[0])
+                    here = replace(here, slides=leg.state.slides, dissipated=lost)
                 return _meet(leg, here, t0, y0, *event)
+        if leg.system.frictions:
+            lost += at_slides.dissipated(leg, solver.dense_output(), t0, solver.t)
+            leg.state = replace(leg.state, slides=at_slides.turned(leg, solver.t, y1))
         if choice.implicit:
             choice = implicit_step(choice, float(solver.t - t0))
         if solver.t == t_end:
@@ -152,6 +161,8 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
                 step=step,
                 steps=steps,
                 choice=choice,
+                slides=leg.state.slides,
+                dissipated=lost,
             )
         solver.y, solver.f = y1, leg.accept(solver.t, y1)
         if leg.auto and leg.settings.method == "dop853":
@@ -164,7 +175,8 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
 def _meet(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: dict[int, int]) -> State:
     """The state right after the event at t at which these indicators left their ranges."""
     n, contacts = leg.system.n, len(leg.system.contacts)
-    ways = {k - contacts: way for k, way in left.items() if k >= contacts}
+    jumps = range(contacts, contacts + len(leg.system.floors))
+    ways = {k - contacts: way for k, way in left.items() if k in jumps}
     if ways:
         y0, t0 = leg.reach(t0, y0, t), t
         levels = passed(leg.system, state.levels, ways)
@@ -172,9 +184,9 @@ def _meet(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: dict[in
             state, t=t, q=tuple(y0[:n].tolist()), v=tuple(y0[n:].tolist()), levels=levels
         )
         leg = Leg(leg.system, leg.settings, state, leg.u, leg.p, leg.begun)
-    if not contacts:
+    if not (contacts or leg.system.frictions):
         return state
-    return at_contacts.switched(leg, state, t0, y0, t, [k for k in left if k < contacts])
+    return at_contacts.switched(leg, state, t0, y0, t, [k for k in left if k not in jumps])
 
 
 def _judged(leg: Leg, choice: Choice, solver: Any, t0: float, y0: Vector) -> Choice:

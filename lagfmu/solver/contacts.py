@@ -15,8 +15,8 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from .failure import StepFailureError
-from .instant import Instant
-from .motion import Motion, motion
+from .instant import Instant, Motion
+from .motion import motion
 from .system import Vector
 
 MOST = 12  # contacts whose combinations are tried one by one

@@ -12,10 +12,11 @@ from typing import Any
 
 from scipy.optimize import brentq
 
-from .indicators import Range, indicators, ranges
+from .indicators import indicators, ranges
 from .leg import Leg
 from .looks import look_into_dips, looks
 from .motion import EPS
+from .ranges import Range, first_of_frictions
 from .system import Vector
 
 Event = tuple[
@@ -39,9 +40,11 @@ def first_event(
     for c, closed in enumerate(leg.state.closed):
         if closed:
             look_into_dips(leg, solver, times, values, c)
+    for i in range(2 * len(leg.state.slides)):
+        look_into_dips(leg, solver, times, values, first_of_frictions(leg.system) + i)
     found: list[tuple[float, int, int]] = []
     for k, r in enumerate(ranges(leg)):
-        risen = k >= len(armed) or leg.state.closed[k] or armed[k]
+        risen = leg.state.closed[k] or armed[k] if k < len(armed) else not r.rises
         for i in range(1, len(times)):
             risen = risen or r.inside(values[i - 1][k]) > r.slack
             if r.inside(values[i][k]) < -r.slack:

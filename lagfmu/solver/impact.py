@@ -24,6 +24,7 @@ from .linear import solve
 from .system import Matrix, System, Vector
 
 ROUNDS = 1000  # of impacts at one instant, after which the rest is taken as one plastic impact
+ROUNDING = 1e-14  # of the terms of a speed: one that is none, so that contacts at rest do not jam
 PULL = 1e-9  # of the largest impulse: a negative one that is rounding
 
 
@@ -60,7 +61,9 @@ def impact(
     M, _, G, nu, _ = at.evaluate(q, v)
     assert system.restitution is not None
     e = np.zeros(system.m) if plastic else np.array(system.restitution(at.p), dtype=float)
-    now = Struck(system, at.t, M, G, v, G @ v - nu, e, tuple(sorted(contacts)))
+    slip = G @ v - nu
+    slip[np.abs(slip) <= ROUNDING * (np.abs(G) @ np.abs(v) + np.abs(nu))] = 0.0
+    now = Struck(system, at.t, M, G, v, slip, e, tuple(sorted(contacts)))
     return _bounded(now, _newton(now))
 
 

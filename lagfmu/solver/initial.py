@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import at_contacts
+from . import at_contacts, at_slides
 from .afar import project_from_afar, velocities_from_afar
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
@@ -114,10 +114,23 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
     size = sizes(system, q, at.p, size)
     q, v, closed = _velocities(at, q, v0, closed, size, rank[n:])
     modes: tuple[bool, ...] = ()
+    touching: list[int] = []
     if system.contacts:
         touching = [c for c, shut in enumerate(closed) if shut]
         modes = at_contacts.complementary_modes(at, q, v, closed, touching)
-    q, v = project(at, q, v, system.active(modes), none, size, dependent=True)
+    offset = none
+    if system.frictions:
+
+        def contacts_at(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
+            if not system.contacts:
+                return ()
+            return at_contacts.complementary_modes(at, q, v, shut, touching)
+
+        at = replace(at, slides=at_slides.begun(at, q, v, size))
+        at, modes = at_slides.settle(at, q, v, modes, contacts_at)
+        limited = [row.friction is not None for row in system.rows]
+        offset = np.where(limited, at.residual(q), 0.0)
+    q, v = project(at, q, v, system.active(modes), offset, size, dependent=True)
     nothing = Departure(0, 0.0, (0.0,) * system.n, (0.0,) * system.n)
     state = State(
         t=at.t,
@@ -125,7 +138,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
         v=tuple(v.tolist()),
         closed=modes,
         armed=tuple(not c for c in modes),
-        offset=tuple(none.tolist()),
+        offset=tuple(offset.tolist()),
         scale=(*np.abs(q).tolist(), *np.abs(v).tolist()),
         size=tuple(size.tolist()),
         gap=tuple(gap.tolist()),
@@ -134,6 +147,8 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
         span=0.0,
         steps=0,
         departures=(nothing,) * len(system.contacts),
+        slides=at.slides,
+        slippings=(nothing,) * len(system.frictions),
         levels=tuple(at.u[len(at.u) - len(system.floors) :]),
     )
     # a start value is its own scale: a start at theta0 = 1e-6 is resolved

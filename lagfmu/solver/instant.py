@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .failure import StepFailureError, plain
+from .state import Slide
 from .system import Matrix, System, Vector
 
 
 @dataclass(frozen=True)
 class Instant:
-    """`system` at time t [s] under the inputs u and the parameters p."""
+    """`system` at time t [s] under the inputs u and the parameters p, its frictions in the modes `slides`."""
 
     system: System
     t: float
     u: Sequence[float]
     p: Sequence[float]
+    slides: tuple[Slide, ...] = ()
 
     def evaluate(self, q: Vector, v: Vector) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
         """M (n, n), F (n), G (m, n), nu (m), gamma (m), with arithmetic failures named."""
@@ -39,3 +43,21 @@ class Instant:
                 f"the constraints cannot be evaluated at t = {float(self.t)!r} s ({plain(error)})"
             ) from error
         return np.array(f, dtype=float)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """M, F, G, nu, gamma at a state and the solution for the rows that act (`active`).
+
+    `press`: what frictions do then (friction.py).
+    """
+
+    M: Matrix
+    F: Vector
+    G: Matrix
+    nu: Vector
+    gamma: Vector
+    vdot: Vector
+    lam: Vector
+    unique: NDArray[np.bool_]
+    press: Any = None

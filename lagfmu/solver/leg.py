@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from .failure import StepFailureError, plain
-from .instant import Instant
-from .methods import stepper
-from .motion import Motion, distance, independent, motion, project
+from .instant import Instant, Motion
+from .magnitudes import alike, shared
+from .methods import share, stepper
+from .motion import distance, independent, motion, project
 from .state import Settings, State
 from .stiffness import Choice
 from .system import Matrix, System, Vector
@@ -44,9 +45,11 @@ class Leg:
         self.basis = (
             self.rows
         )  # of a step's stages, which lie off the constraints: those independent on them
+        self.dependent = False
         self.offset = np.array(self.state.offset)
         self.scale = np.array(self.state.scale)
         self.size = np.array(self.state.size)
+        self.tied = alike(self.system)
         self.cause = ""
         self.auto = self.settings.method == "auto"
         if self.auto:
@@ -59,7 +62,7 @@ class Leg:
 
     def at(self, t: float) -> Instant:
         u = self.system.inputs_at(self.u, t - self.begun)
-        return Instant(self.system, t, [*u, *self.state.levels], self.p)
+        return Instant(self.system, t, [*u, *self.state.levels], self.p, self.state.slides)
 
     def split(self, y: Vector) -> tuple[Vector, Vector]:
         return y[: self.system.n], y[self.system.n :]
@@ -68,7 +71,11 @@ class Leg:
         """y' (2 n); not a number where the equations cannot be evaluated: the step is cut there."""
         q, v = self.split(y)
         try:
-            now = motion(self.at(t), q, v, self.basis)
+            now = (
+                self.near(t, q, v)
+                if self.system.frictions
+                else motion(self.at(t), q, v, self.basis)
+            )
         except StepFailureError as error:
             self.cause = str(error)
             return np.full_like(y, np.nan)
@@ -77,7 +84,7 @@ class Leg:
     def accept(self, t: float, y: Vector) -> Vector:
         """y' (2 n) at a state on the constraints, where a step begins: by all rows, of which those that
         depend on others are then left out in its stages."""
-        if len(self.rows) < 2:
+        if len(self.rows) < 2 and not self.system.frictions:
             return self.rate(t, y)
         q, v = self.split(y)
         try:
@@ -85,12 +92,14 @@ class Leg:
         except StepFailureError as error:
             self.cause = str(error)
             return np.full_like(y, np.nan)
-        self.basis = independent(now, self.rows)
+        self.dependent = not now.unique.all()
+        if not self.system.frictions:  # these need all rows: which of them press?
+            self.basis = independent(now, self.rows)
         return np.concatenate([v, now.vdot])
 
     def is_dependent(self) -> bool:
         """True if rows depended on each other at the latest state on the constraints."""
-        return len(self.basis) < len(self.rows)
+        return self.dependent
 
     def near(self, t: float, q: Vector, v: Vector) -> Motion:
         """Accelerations and all multipliers at a state that may lie off the constraints."""
@@ -139,11 +148,12 @@ class Leg:
             first_step = 1 / (FEWEST_STEPS * self.state.rate)
         elif self.settings.method == "rk4":
             first_step = self.settings.step
-        slope = (self.rate, self.jacobian)
-        return stepper(self.settings, slope, t, y, t_bound, self.scale, first_step)
+        slope, scale = (self.rate, self.jacobian), shared(self.tied, self.scale, y)
+        return stepper(self.settings, slope, t, y, t_bound, scale, first_step)
 
     def step(self, solver: Any) -> None:
         """One accepted step, or the reason why there is none."""
+        share(solver, self.settings, shared(self.tied, self.scale, solver.y))
         try:
             message = solver.step()
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:

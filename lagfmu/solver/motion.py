@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
+from . import at_friction
 from .failure import StepFailureError
-from .instant import Instant
+from .instant import Instant, Motion
 from .linear import solve, solve_nullspace
 from .solution import RANK, Solution
 from .system import NONHOLONOMIC, Matrix, Vector
@@ -22,20 +21,6 @@ ROUNDING = 100 * EPS  # and that is left in peace where Newton's method still ga
 LINEAR = 0.1  # ratio of successive residuals: Newton's method converges linearly, G loses rank
 
 
-@dataclass(frozen=True)
-class Motion:
-    """M, F, G, nu, gamma at a state and the solution for the rows that act (`active`)."""
-
-    M: Matrix
-    F: Vector
-    G: Matrix
-    nu: Vector
-    gamma: Vector
-    vdot: Vector
-    lam: Vector
-    unique: NDArray[np.bool_]
-
-
 def motion(
     at: Instant,
     q: Vector,
@@ -44,12 +29,17 @@ def motion(
     off: float = 0.0,
 ) -> Motion:
     """Accelerations (n) and multipliers (m; 0 for rows that do not act) at a state, `off` the constraints."""
+
+    def method(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
+        if at.system.formulation == "nullspace":
+            return solve_nullspace(M, b, G, c, off)
+        return solve(M, b, G, c, off=off)
+
+    if at.slides:
+        return at_friction.motion_with_friction(at, q, v, active, method)
     M, F, G, nu, gamma = at.evaluate(q, v)
     rows = list(active)
-    if at.system.formulation == "nullspace":
-        found: Solution = solve_nullspace(M, F, G[rows], gamma[rows], off)
-    else:
-        found = solve(M, F, G[rows], gamma[rows], off=off)
+    found = method(M, F, G[rows], gamma[rows])
     lam = np.zeros(at.system.m)
     lam[rows] = found.lam
     unique = np.ones(at.system.m, dtype=bool)
@@ -100,6 +90,8 @@ def project(
     constraints.
     """
     rows = list(active)
+    if at.slides:
+        rows = sorted({*rows, *at_friction.sticking(at, rows)})
     if not rows:
         return q, v
     fixed = [k for k in rows if at.system.rows[k].kind != NONHOLONOMIC]

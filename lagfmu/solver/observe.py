@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from . import at_slides
 from .failure import StepFailureError, plain
 from .instant import Instant
 from .motion import motion
@@ -77,8 +78,10 @@ def _solved(
     values: Values = {}
     shut = {system.rows[k].name: c for k, c in zip(system.contacts, state.closed, strict=True)}
     active = full.active([shut[full.rows[k].name] for k in full.contacts])
-    at = Instant(full, state.t, u, p)
+    at = Instant(full, state.t, u, p, state.slides)
     now = motion(at, q, v, active)
+    if system.frictions:
+        values |= at_slides.observed(system, state, now)
     for j, name in enumerate(full.coordinates):
         values[f"der({name},2)"] = float(now.vdot[j])
     f = at.residual(q)
@@ -87,7 +90,11 @@ def _solved(
     for k, row in enumerate(full.rows):
         values[f"lambda.{row.name}"] = float(now.lam[k])
         values[f"unique.{row.name}"] = bool(now.unique[k])
-        miss = slip[k] if row.kind == NONHOLONOMIC else f[k] - kept.get(row.name, 0.0)
+        miss = (
+            slip[k]
+            if row.kind == NONHOLONOMIC or row.friction is not None
+            else f[k] - kept.get(row.name, 0.0)
+        )
         values[f"residual.{row.name}"] = float(miss)
     share = now.G * now.lam[:, None]
     for j, name in enumerate(full.coordinates):

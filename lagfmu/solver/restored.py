@@ -12,12 +12,12 @@ import math
 from dataclasses import fields
 from typing import Any
 
-from .state import Departure, Settings, State
+from .state import Departure, Settings, Slide, State
 from .stiffness import LATEST, MOST, Choice
 from .system import System
 
 MOST_COUNTED = 2**53
-POSITIVE = ("scale", "size", "gap", "rate", "step", "span", "longest", "product", "ratio")
+POSITIVE = ("scale", "size", "gap", "rate", "step", "span", "longest", "product", "ratio", "noise")
 UNBOUNDED = ("step", "rate", "longest", "product", "ratio", "span")  # may be infinite
 MOST_OF = {"failures": MOST, "retries": LATEST}
 
@@ -32,10 +32,14 @@ def restored(system: System, text: Any) -> State:
     n, contacts = system.n, len(system.contacts)
     lengths = {"q": n, "v": n, "size": n, "scale": 2 * n, "offset": system.m}
     lengths |= dict.fromkeys(("closed", "armed", "gap", "departures"), contacts)
+    lengths |= dict.fromkeys(("slides", "slippings"), len(system.frictions))
     for name, length in lengths.items():
         if len(raw[name]) != length:
             raise ValueError(f"its {name} has {len(raw[name])} values, expected {length}")
-    for departure in raw["departures"]:
+    for slide in raw["slides"]:
+        if len(slide["direction"]) != 2:
+            raise ValueError("its slides have other directions")
+    for departure in (*raw["departures"], *raw["slippings"]):
         if not len(departure["q"]) == len(departure["v"]) == n:
             raise ValueError("its departures have other coordinates")
     return State.from_json(json.dumps(raw))
@@ -63,7 +67,7 @@ def _fields(kind: type, raw: Any) -> None:
 
 
 def _value(name: str, kind: str, value: Any) -> None:
-    parts = {"Departure": Departure, "Choice": Choice}
+    parts = {"Departure": Departure, "Choice": Choice, "Slide": Slide}
     if kind in parts:
         _fields(parts[kind], value)
     elif kind.startswith("tuple["):

@@ -38,6 +38,21 @@ class Departure:
 
 
 @dataclass(frozen=True)
+class Slide:
+    """How a friction stands: it sticks, or slips.
+
+    `sign` is that of the multipliers' sum N, so that the normal force is sign * N; `direction` the unit
+    vector of the slip velocity, where that is zero or was last known; slip velocities up to `noise` [m/s]
+    are rounding.
+    """
+
+    sticks: bool = False
+    sign: float = 1.0
+    direction: tuple[float, float] = (1.0, 0.0)
+    noise: float = 0.0
+
+
+@dataclass(frozen=True)
 class State:
     """Time, motion, contact modes, step-size memory.
 
@@ -46,7 +61,9 @@ class State:
     in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
     below which a contact touches; step [s]: the next step to try; span [s]: the communication step that
     led to t (0: none); rate [1/s]: the motion's
-    natural rate at the start; choice: what `auto` remembers; levels: those of jumps (jumps.py).
+    natural rate at the start; choice: what `auto` remembers; levels: those of jumps (jumps.py);
+    slides, slippings: one entry a friction, how it stands and its latest start of slipping; dissipated
+    [J]: by frictions and impacts so far.
     """
 
     t: float
@@ -64,6 +81,9 @@ class State:
     steps: int
     departures: tuple[Departure, ...]
     choice: Choice = field(default_factory=Choice)
+    slides: tuple[Slide, ...] = ()
+    slippings: tuple[Departure, ...] = ()
+    dissipated: float = 0.0
     levels: tuple[float, ...] = ()
 
     def to_json(self) -> str:
@@ -77,9 +97,12 @@ class State:
         for f in fields(State):
             if isinstance(raw[f.name], list):
                 raw[f.name] = tuple(raw[f.name])
-        raw["departures"] = tuple(
-            Departure(d["count"], d["time"], tuple(d["q"]), tuple(d["v"]))
-            for d in raw["departures"]
+        for name in ("departures", "slippings"):
+            raw[name] = tuple(
+                Departure(d["count"], d["time"], tuple(d["q"]), tuple(d["v"])) for d in raw[name]
+            )
+        raw["slides"] = tuple(
+            Slide(x["sticks"], x["sign"], tuple(x["direction"]), x["noise"]) for x in raw["slides"]
         )
         raw["choice"] = Choice(**raw["choice"])
         return State(**raw)

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from . import at_slides
 from .contacts import complementary_modes
 from .impact import impacts
 from .instant import Instant
@@ -64,10 +65,14 @@ def _has_parted(
     )
 
 
-def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, contacts: list[int]) -> State:
-    """The state right after the event at t: contacts opened or struck, modes settled together."""
+def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list[int]) -> State:
+    """The state right after the event at t: contacts opened or struck, modes settled together.
+
+    `left`: the indicators that leave their ranges, of which the first are the contacts'.
+    """
     system, at = leg.system, leg.at(t)
     q, v = leg.split(leg.reach(t0, y0, t))
+    contacts, arriving = [c for c in left if c < len(system.contacts)], v
     leaving = {c for c in contacts if state.closed[c]}
     landing = set(contacts) - leaving
     closed = [shut and c not in leaving for c, shut in enumerate(state.closed)]
@@ -79,6 +84,19 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, contacts: 
         v, struck = impacts(at, q, v, near, slow)
     modes = _settled(at, q, v, state, closed, near, leaving - set(struck), {*struck, *landing})
     offset = _levels(at, q, state, modes)
+    if system.frictions:
+
+        def settled(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
+            own = leaving - set(struck), {*struck, *landing}
+            return _settled(at, q, v, state, shut, near, *own)
+
+        here = replace(state, t=t, closed=modes, offset=tuple(offset.tolist()))
+        at, here = at_slides.switched_slides(at, q, v, arriving, here, left, settled)
+        state, modes, offset = (
+            replace(here, closed=state.closed),
+            here.closed,
+            np.array(here.offset),
+        )
     q, v = project(at, q, v, system.active(modes), offset, leg.size)
     departures = list(state.departures)
     for c, (old, new) in enumerate(zip(state.closed, modes, strict=True)):

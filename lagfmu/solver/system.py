@@ -24,11 +24,24 @@ HOLONOMIC, NONHOLONOMIC, CONTACT = "holonomic", "nonholonomic", "contact"
 
 @dataclass(frozen=True)
 class Row:
-    """One constraint: its name, kind and, if it acts only while a contact is closed, that row."""
+    """One constraint: its name, kind, if it acts only while a contact is closed, that row, and if it
+    holds by friction alone, which friction."""
 
     name: str
     kind: str
     while_closed: int | None = None
+    friction: int | None = None
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction: its name, the rows that it limits (one or two), those whose multipliers make up
+    the normal force, and whether these are contacts alone: without them nothing presses."""
+
+    name: str
+    rows: tuple[int, ...]
+    normal: tuple[int, ...]
+    gated: bool
 
 
 @dataclass(frozen=True)
@@ -63,6 +76,9 @@ class System:
     `extent` (n) the positions in p whose values have it, `folded` (n) the largest magnitude of it among
     the parameters that are numbers in the code; `angles` are those without dimension.
 
+    coulomb(t, q, v, u, p) -> (static, kinetic, load, normal) of the `frictions`: coefficients, and
+    N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`, one after the other.
+
     surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
     is a whole number; `driven`: length of u, the inputs and the levels of jumps behind them.
 
@@ -88,6 +104,8 @@ class System:
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
     outputs: tuple[Own, ...] = ()
+    frictions: tuple[Friction, ...] = ()
+    coulomb: Callable[..., Any] | None = None
     lookups: Lookups | None = None
     surfaces: Callable[..., Any] | None = None
     floors: tuple[bool, ...] = ()
@@ -118,7 +136,9 @@ class System:
     def permanent(self) -> tuple[int, ...]:
         """The rows that always act."""
         return tuple(
-            k for k, row in enumerate(self.rows) if row.kind != CONTACT and row.while_closed is None
+            k
+            for k, row in enumerate(self.rows)
+            if row.kind != CONTACT and row.while_closed is None and row.friction is None
         )
 
     @cached_property
@@ -132,12 +152,14 @@ class System:
         return k, j
 
     def active(self, closed: Sequence[bool]) -> list[int]:
-        """Rows that act while the contacts stand as in `closed` (one entry a contact)."""
+        """Rows that act while the contacts stand as in `closed` (one entry a contact); those that stick
+        by friction come to them in friction.py."""
         shut = {k for k, c in zip(self.contacts, closed, strict=True) if c}
         return [
             k
             for k, row in enumerate(self.rows)
             if (k in shut if row.kind == CONTACT else row.while_closed in shut | {None})
+            and row.friction is None
         ]
 
     def assemble(

@@ -14,7 +14,7 @@ from typing import Any
 import sympy as sp
 
 from ...mechanics.differential import Differential
-from ...mechanics.equations import TIME, EquationsOfMotion
+from ...mechanics.equations import TIME, EquationsOfMotion, FrictionLaw
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
@@ -193,6 +193,10 @@ class _Reported:
             self.along[f"d{a}"] = tuple(self.change[s] for s in group)
 
 
+def _coefficients(law: FrictionLaw) -> tuple[tuple[Expr, str], ...]:
+    return ((law.static, "static"), (law.kinetic, "kinetic"))
+
+
 class _System:
     """One System: its functions, patterns and the table that holds them together."""
 
@@ -230,6 +234,16 @@ class _System:
         )
         text = tables.of_what_is_read if self.eom.bare else tables.text
         return "\n".join([*functions.values(), text(set(functions))])
+
+    def _coulomb(self) -> dict[str, list[Result]]:
+        laws = self.eom.frictions
+        mu = [(e, f"{what} of {a.name}") for a in laws for e, what in _coefficients(a)]
+        pressing = [(c, f"{a.name}, {name}") for a in laws for name, c in a.normal.items()]
+        return {
+            "coefficients": [Result(sp.sympify(e), text) for e, text in mu],
+            "load": [Result(sp.sympify(a.load), a.name) for a in laws],
+            "pressing": [Result(sp.sympify(c), text) for c, text in pressing],
+        }
 
     def _functions(self) -> dict[str, str]:
         """The text of each function of the System that is needed."""
@@ -291,6 +305,13 @@ class _System:
                 "Newton's coefficient of restitution of each row; 0 for one that is no contact.",
                 {"p": words.p},
                 {"e": _results(restitution, rows)},
+            )
+        if eom.frictions:
+            found["coulomb"] = define(
+                "coulomb",
+                "Coefficients, static and kinetic, and normal force load + sum of c * lambda [N].",
+                words.state,
+                self._coulomb(),
             )
         if self.tangents and (energy or not eom.bare):
             found["tangent"] = define(

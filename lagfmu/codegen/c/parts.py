@@ -15,6 +15,7 @@ AT_CONTACTS = {
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }
+FRICTION = ("friction.c", "share.c", "slides.c")  # behind SLIDES
 NO_RUNGS = """
 #include "dependent.h"
 
@@ -43,8 +44,8 @@ const Parts PARTS = {{
 
 def parts_source(scene: Scene, system: System) -> str | None:
     """C text that defines PARTS; None if nothing is left out, as in the runtime's own parts.c."""
-    found, contacts = scene.integrators, bool(system.contacts)
-    if contacts and set(scene.selectable) == set(METHODS):
+    found, contacts = scene.integrators, bool(system.contacts or system.frictions)
+    if system.frictions and set(scene.selectable) == set(METHODS):
         return None
     menu = {m: m for m in found}
     if "auto" in scene.selectable:
@@ -55,22 +56,29 @@ def parts_source(scene: Scene, system: System) -> str | None:
     rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
+    rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
     what = ", ".join(found) + (", contacts" if contacts else "")
+    what += ", frictions" if system.frictions else ""
     rungs = "" if system.is_constrained else NO_RUNGS
     return HEAD.format(name=scene.name, what=what, rungs=rungs) + "".join(rows) + "};\n"
 
 
-def needs_tangents(scene: Scene) -> bool:
-    """True if derivatives of the equations are offered, or needed by an implicit method."""
+def needs_tangents(scene: Scene, system: System) -> bool:
+    """True if derivatives of the equations are offered, or needed by an implicit method; with frictions,
+    of whose force they know nothing, never."""
+    if system.frictions:
+        return False
     return scene.differentiable or "radau5" in scene.integrators
 
 
 def files_left_out(scene: Scene, system: System) -> frozenset[str]:
     """The runtime's files that the FMU does without."""
     gone = {f"{m}.c" for m in INTEGRATORS if m not in scene.integrators}
+    if not system.frictions:
+        gone |= {*FRICTION}
     if not is_watched(system):
         gone |= {*AT_EVENTS.values(), *BEHIND_EVENTS}
-    if not system.contacts:
+    if not (system.contacts or system.frictions):
         gone |= {*AT_CONTACTS.values(), *BEHIND_CONTACTS}
     if not system.is_constrained:
         gone |= {*AT_CONSTRAINTS}

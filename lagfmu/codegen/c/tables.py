@@ -63,6 +63,10 @@ class Tables:
             self._integers("dimension", dimension),
             self._integers("extent_dimension", extent),
         ]
+        frictions, press = self._frictions()
+        if frictions:
+            parts.append(self._array("const Friction", "frictions", frictions))
+            parts.append(self._integers("press", press))
         folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
         if self.floors:
             parts.append(self._integers("floors", [int(x) for x in self.floors]))
@@ -117,6 +121,14 @@ class Tables:
             **{name: name for name in ("outputs", "outputs_tangent") if name in functions},
             **more,
         }
+        if frictions:
+            fields |= {
+                "frictions": len(frictions),
+                "presses": len(press),
+                "friction": f"{p}frictions",
+                "press": f"{p}press",
+                "coulomb": f"{p}coulomb",
+            }
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return "".join(parts) + f"static const System {p}equations = {{\n{lines}}};\n"
 
@@ -154,6 +166,7 @@ class Tables:
 
     def _rows(self) -> list[str]:
         position = {c.name: k for k, c in enumerate(self.constraints)}
+        owner = {name: i + 1 for i, law in enumerate(self.eom.frictions) for name in law.of}
         items = []
         for c in self.constraints:
             kind = "HOLONOMIC"
@@ -162,8 +175,26 @@ class Tables:
             elif isinstance(c, Nonholonomic):
                 kind = "NONHOLONOMIC"
             closed = getattr(c, "while_closed", None)
-            items.append(f'{{"{c.name}", {kind}, {-1 if closed is None else position[closed]}}}')
+            tail = f", {owner[c.name]}" if c.name in owner else ""
+            gate = -1 if closed is None else position[closed]
+            items.append(f'{{"{c.name}", {kind}, {gate}{tail}}}')
         return items or ['{"", HOLONOMIC, -1}']
+
+    def _frictions(self) -> tuple[list[str], list[int]]:
+        """The frictions as Friction in system.h, and the rows that press."""
+        position = {c.name: k for k, c in enumerate(self.constraints)}
+        items: list[str] = []
+        press: list[int] = []
+        for law in self.eom.frictions:
+            rows = [position[name] for name in law.of]
+            normal = [position[name] for name in law.normal]
+            gated = law.load == 0 and all(isinstance(self.constraints[k], Contact) for k in normal)
+            items.append(
+                f'{{"{law.name}", {len(rows)}, {{{", ".join(map(str, rows))}}}, {len(press)}, '
+                f"{len(normal)}, {int(gated and bool(normal))}}}"
+            )
+            press += normal
+        return items, press
 
     def _dimensions(self) -> tuple[list[int], list[int], int]:
         """One number for each dimension of coordinates; that of each parameter; that of angles; -1: none."""
@@ -197,6 +228,7 @@ def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:
         found.append(f"the formulation is {formulation!r}, expected 'multipliers'")
     if not _constant_mass(eom):
         found.append("the mass matrix holds more than parameters")
+    found += [f"the friction {law.name!r} jumps" for law in eom.frictions]
     moved = [
         str(q)
         for q, e in zip(eom.q, eom.F, strict=True)

@@ -95,6 +95,18 @@ def places(system: System, inputs: list[str], parameters: list[str]) -> dict[str
         for j, q in enumerate(full.coordinates):
             found[f"departure.{name}.{q}"] = ("DEPARTURE_Q", j, c)
             found[f"departure.{name}.velocity.{q}"] = ("DEPARTURE_V", j, c)
+    for i, f in enumerate(system.frictions):
+        found[f"sticks.{f.name}"] = ("STICKS", i, NONE)
+        found[f"margin.{f.name}"] = ("MARGIN", i, NONE)
+        found[f"power.{f.name}"] = ("POWER", i, NONE)
+        found[f"slipping.{f.name}.count"] = ("SLIP_COUNT", i, i)
+        found[f"slipping.{f.name}.time"] = ("SLIP_TIME", i, i)
+        for j, k in enumerate(f.rows):
+            found[f"slip.{system.rows[k].name}"] = ("SLIP", 2 * i + j, i)
+        for j, q in enumerate(system.coordinates):
+            found[f"slipping.{f.name}.{q}"] = ("SLIP_Q", j, i)
+            found[f"slipping.{f.name}.velocity.{q}"] = ("SLIP_V", j, i)
+    found["energy.dissipated"] = ("LOST", 0, NONE)
     return found
 
 

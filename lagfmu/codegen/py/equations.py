@@ -23,8 +23,8 @@ Expr = Any
 def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations in the given formulation.
 
-    It needs the names System, Row, Own, Lookups and Embedding of `lagfmu.solver.system`, and Cubic where
-    there are tables.
+    It needs the names System, Row, Own, Friction, Lookups and Embedding of `lagfmu.solver.system`, and Cubic
+    where there are tables.
     """
     eom, reduction, jumps = levelled(eom, reduction)
     if reduction is None:
@@ -90,6 +90,7 @@ def compile_system(text: str) -> System:
         "Cubic": Cubic,
         "Row": vocabulary.Row,
         "Embedding": vocabulary.Embedding,
+        "Friction": vocabulary.Friction,
     }
     exec(compile(text, "<lagfmu equations>", "exec"), scope)
     system: System = scope["SYSTEM"]
@@ -148,6 +149,8 @@ def _system(
         text = "Newton's coefficient of restitution of each row; 0 for one that is no contact."
         arguments, results = {"p": eom.p}, {"e": restitution}
         parts.append(function(f"{prefix}restitution", text, arguments, results, names))
+    if eom.frictions:
+        parts.append(_coulomb(eom, state, names))
     energies = []
     if rows is None:  # the energies of the full system serve the reduced one too
         energies = _energies(eom, names)
@@ -184,9 +187,39 @@ def _system(
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
         f"{_surfaces(prefix, jumps, len(eom.driven))}"
-        f"{_listed(own)}{looked_up})\n"
+        + (f"    frictions={_frictions(eom)},\n    coulomb=coulomb,\n" if eom.frictions else "")
+        + f"{_listed(own)}{looked_up})\n"
     )
     return "\n\n".join(parts)
+
+
+def _coulomb(eom: EquationsOfMotion, state: Any, names: dict[Expr, str]) -> str:
+    """The function that gives each friction's coefficients and normal force."""
+    laws = eom.frictions
+    return function(
+        "coulomb",
+        "Coefficients (static, kinetic) of each friction; N = load + sum of normal * lambda [N].",
+        state,
+        {
+            "static": [law.static for law in laws],
+            "kinetic": [law.kinetic for law in laws],
+            "load": [law.load for law in laws],
+            "normal": [c for law in laws for c in law.normal.values()],
+        },
+        names,
+    )
+
+
+def _frictions(eom: EquationsOfMotion) -> str:
+    """Name, rows that are limited, rows whose multipliers press, and is the normal force a contact's."""
+    position = {c.name: k for k, c in enumerate(eom.constraints)}
+    items = []
+    for law in eom.frictions:
+        rows = tuple(position[name] for name in law.of)
+        normal = tuple(position[name] for name in law.normal)
+        gated = law.load == 0 and all(isinstance(eom.constraints[k], Contact) for k in normal)
+        items.append(f"Friction({law.name!r}, {rows!r}, {normal!r}, {gated and bool(normal)!r}),")
+    return f"({' '.join(items)})"
 
 
 def _surfaces(prefix: str, jumps: Jumps, count: int) -> str:
@@ -263,6 +296,7 @@ def _constraints(eom: EquationsOfMotion, rows: Sequence[int] | None) -> list[Any
 def _rows(eom: EquationsOfMotion, rows: Sequence[int] | None) -> str:
     constraints = _constraints(eom, rows)
     position = {c.name: k for k, c in enumerate(constraints)}
+    owner = {name: i for i, law in enumerate(eom.frictions) for name in law.of}
     items = []
     for c in constraints:
         kind = HOLONOMIC
@@ -272,6 +306,8 @@ def _rows(eom: EquationsOfMotion, rows: Sequence[int] | None) -> str:
             kind = NONHOLONOMIC
         closed = getattr(c, "while_closed", None)
         tail = "" if closed is None else f", {position[closed]}"
+        if c.name in owner:
+            tail = f", {None if closed is None else position[closed]}, {owner[c.name]}"
         items.append(f"Row({c.name!r}, {kind!r}{tail}),")
     return f"({' '.join(items)})"
 

@@ -19,7 +19,7 @@ from ...errors import DerivationError
 Expr = Any
 ARGUMENTS = (
     *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "h", "e", "energy"),
-    *("vdot", "lam", "Q", "w"),
+    *("vdot", "lam", "Q", "w", "static", "kinetic", "load", "normal"),
 )
 
 TABLE = "table_of_"

@@ -18,6 +18,7 @@ import sympy as sp
 
 from ...errors import DerivationError
 from ...model.model import Constraint, Holonomic
+from .. import shorter
 from ..equations import TIME, EquationsOfMotion
 
 Expr = Any
@@ -114,7 +115,7 @@ def _total(expression: Expr, rates: dict[Expr, Expr]) -> Expr:
 def _tidy(expression: Expr) -> Expr:
     if expression.count_ops() > SMALL:
         return expression
-    return sp.factor_terms(sp.trigsimp(sp.expand(expression)))
+    return sp.factor_terms(shorter.trigonometric(shorter.expanded(expression)))
 
 
 def _relations(eom: EquationsOfMotion) -> tuple[dict[Expr, Expr], tuple[Expr, ...] | None]:

@@ -17,13 +17,12 @@ from typing import Any
 import sympy as sp
 from sympy.polys.polyerrors import PolynomialError
 
+from .. import shorter
 from ..equations import EquationsOfMotion
 
 Expr = Any  # SymPy carries no types
 Pivots = tuple[int, ...]
 TRIALS = 100  # choices of pivot columns that are compared
-SMALL = 80  # operations below which an expression is simplified
-MEDIUM = 400  # operations below which common factors are looked for
 
 
 def accelerations(eom: EquationsOfMotion) -> tuple[Expr, ...]:
@@ -117,20 +116,20 @@ def _group_columns(G: Expr, coordinates: list[int], rows: list[int]) -> list[dic
 
 def _determinant(A: Expr) -> Expr:
     d = A.det(method="berkowitz") if A.rows else sp.S.One
-    return sp.simplify(d) if d.count_ops() <= SMALL else d
+    return shorter.simplified(d)
 
 
 def _primitive(column: list[Expr]) -> list[Expr]:
     """The column without a factor that all its entries share."""
     filled = [e for e in column if e != 0]
-    if any(e.has(sp.Float) or e.count_ops() > MEDIUM for e in filled):
+    if any(e.has(sp.Float) for e in filled) or not shorter.bounded(sp.Add(*filled)):
         return column
     try:
         factor = sp.gcd_list(filled)
         column = [sp.cancel(e / factor) for e in column]
     except PolynomialError:  # Piecewise and the like: keep the minors
         return column
-    return [sp.simplify(e) if e.count_ops() <= SMALL else e for e in column]
+    return [shorter.simplified(e) for e in column]
 
 
 def _at_random(A: Expr) -> Expr:
@@ -176,19 +175,15 @@ def _pivots(A: Expr, numbers: Expr) -> Pivots:
 
 def _reduced(equation: Expr, eom: EquationsOfMotion) -> Expr:
     """An equation = 0 without denominators' and other common factors, in a short form."""
-    if equation.count_ops() > MEDIUM:
+    if shorter.terms(equation) > shorter.TERMS:
         return equation
     equation = sp.expand(equation)
-    if equation.has(sp.Function) and equation.count_ops() <= 2 * SMALL:
-        equation = sp.expand(sp.trigsimp(equation))
-    if equation.has(sp.Float):
+    if equation.has(sp.Function):
+        equation = shorter.expanded(shorter.trigonometric(equation))
+    try:
+        factors = shorter.factors(equation)
+    except PolynomialError:
         factors = [(e, 1) for e in sp.Mul.make_args(sp.factor_terms(equation))]
-    else:
-        try:
-            above = sp.fraction(sp.together(equation))[0]
-            factors = sp.factor_list(above)[1]
-        except PolynomialError:
-            factors = [(e, 1) for e in sp.Mul.make_args(sp.factor_terms(equation))]
     for symbols in (set(accelerations(eom)), {*eom.q, *eom.v, *eom.u}):
         kept = [e**power for e, power in factors if e.free_symbols & symbols]
         if kept:

@@ -5,10 +5,11 @@
 #include "system.h"
 
 void system_active(const System *s, const int *closed, int *active) {
-    for (int k = 0; k < s->m; k++) active[k] = s->rows[k].kind != CONTACT;
+    for (int k = 0; k < s->m; k++)
+        active[k] = s->rows[k].kind != CONTACT && s->rows[k].friction == 0;
     for (int i = 0; i < s->contacts; i++) active[s->contact[i]] = closed[i] != 0;
     for (int k = 0; k < s->m; k++) {
         int contact = s->rows[k].while_closed;
-        if (s->rows[k].kind != CONTACT && contact >= 0) active[k] = active[contact];
+        if (s->rows[k].kind != CONTACT && contact >= 0 && s->rows[k].friction == 0) active[k] = active[contact];
     }
 }

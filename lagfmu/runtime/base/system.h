@@ -18,7 +18,17 @@ typedef struct {
     const char *name;
     Kind kind;
     int while_closed; /* row of the contact that must be closed for this one to act; -1: always acts */
+    int friction;     /* the number, from 1, of the friction by which alone it holds; 0: it holds */
 } Row;
+
+/* Coulomb friction: |lambda| of one or two rows is at most a part of N = load + sum_k c_k lambda_k, over
+ * the rows press[first .. first + normals - 1].  gated: these are contacts alone, and there is no load, so
+ * that while they are open nothing presses. */
+typedef struct {
+    const char *name;
+    int rows, row[2];
+    int first, normals, gated;
+} Friction;
 
 typedef struct System System;
 
@@ -101,9 +111,18 @@ struct System {
                           const double *p, double dt, const double *ds, const double *dsdot,
                           const double *du, double *dq, double *dv);
     const System *full;
+
+    /* Frictions; 0 and NULL without. */
+    int frictions, presses;
+    const Friction *friction;  /* (frictions) */
+    const int *press;          /* (presses) rows whose multipliers make up the normal forces */
+    /* static and kinetic coefficient (2 frictions), load (frictions) [N], c (presses) of the normal forces */
+    void (*coulomb)(double t, const double *q, const double *v, const double *u, const double *p,
+                    double *coefficients, double *load, double *pressing);
 };
 
-/* 1 where a row acts while the contacts stand as in `closed` (one entry a contact). */
+/* 1 where a row acts while the contacts stand as in `closed` (one entry a contact); 0 for rows that hold by
+ * friction alone, which friction.c adds where they stick. */
 void system_active(const System *s, const int *closed, int *active);
 
 #endif

@@ -15,8 +15,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "indicators.h"
 #include "jumps.h"
 #include "leg.h"
+#include "magnitudes.h"
 #include "parts.h"
 
 static const double GAIN = 3;     /* of the stabilization, in units of the motion's natural rate */
@@ -49,9 +51,12 @@ void exchange_set_states(Instance *x, const double *states) {
 Status exchange_nominals(Instance *x, double *nominals) {
     const int n = x->solver.system->n;
     if (instance_start(x) != OK) return FAILED;
+    double *still = x->solver.work_advance, *scale = still + 2 * n;
+    memset(still, 0, 2 * (size_t)n * sizeof *still);
+    magnitudes_shared(&x->solver, still, scale);
     for (int j = 0; j < n; j++) {
-        nominals[2 * j] = x->solver.state.scale[j];
-        nominals[2 * j + 1] = x->solver.state.scale[n + j];
+        nominals[2 * j] = scale[j];
+        nominals[2 * j + 1] = scale[n + j];
     }
     for (int j = 0; j < 2 * n; j++)
         if (!(nominals[j] > 0)) nominals[j] = 1;
@@ -137,6 +142,12 @@ Status exchange_indicators(Instance *x, double *indicators) {
         if (system->floors[k])
             indicators[system->contacts + k] =
                 range_inside(jumps_range(s, k), indicators[system->contacts + k]);
+    if (system->frictions > 0) {
+        const int first = indicators_first_of_frictions(system);
+        PARTS.slides->indicators(s, indicators + first);
+        for (int i = 0; i < 2 * system->frictions; i++)
+            indicators[first + i] += indicators_range(s, first + i).slack;
+    }
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
         indicators[c] = s->state.closed[c] ? b->lambda[k] : b->f[k] + s->state.gap[c];
@@ -151,11 +162,12 @@ static Status drift(Instance *x, double *worst) {
     const System *system = s->system;
     *worst = 0;
     if (evaluate(x) != OK) return FAILED;
+    const int *active = b->sliding != NULL ? b->sliding->acting(b, s->active) : s->active;
     if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int k = 0; k < system->m; k++) {
         double size = 0, speed = 0;
-        if (!s->active[k]) continue;
+        if (!active[k]) continue;
         for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++) {
             const int j = system->entry_column[e];
             size += fabs(b->G[e]) * s->state.size[j];
@@ -187,6 +199,13 @@ static Status find_happened(Instance *x, int *any) {
                              (mechanism_slip(b, k, s->state.v) < 0 || x->pull[c] > 0);
         *any |= x->happened[c];
     }
+    if (s->system->frictions == 0) return OK;
+    const int first = indicators_first_of_frictions(s->system);
+    PARTS.slides->indicators(s, s->work_slides);
+    for (int i = 0; i < 2 * s->system->frictions; i++) {
+        x->happened[first + i] = s->work_slides[i] < -indicators_range(s, first + i).slack;
+        *any |= x->happened[first + i];
+    }
     return OK;
 }
 
@@ -203,6 +222,12 @@ Status exchange_step_done(Instance *x, int *event) {
         if (!s->state.closed[c] && s->stepped.f[s->system->contact[c]] > s->state.gap[c])
             s->state.armed[c] = 1;
     if (find_happened(x, &any) != OK) return FAILED;
+    if (!any && s->system->frictions > 0) {
+        double *y = s->work_advance;
+        memcpy(y, s->state.q, (size_t)s->system->n * sizeof *y);
+        memcpy(y + s->system->n, s->state.v, (size_t)s->system->n * sizeof *y);
+        if (PARTS.slides->turn(s, s->state.now.t, y) != OK) return FAILED;
+    }
     *event = *event || any || worst > LIMIT;
     return OK;
 }
@@ -232,7 +257,7 @@ Status exchange_event(Instance *x, int *moved) {
     x->observed = x->evaluated = 0;
     if (settle_jumps(x, &jumped) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
-    if (any || (jumped && s->system->contacts > 0)) {
+    if (any || (jumped && s->system->contacts + s->system->frictions > 0)) {
         *moved = 1;
         x->evaluated = 0;
         if (PARTS.landing_lift(s, x->happened, x->pull) != OK) return FAILED;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "indicators.h"
 #include "leg.h"
 #include "magnitudes.h"
 #include "outputs.h"
@@ -31,7 +32,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
-        x->happened = arena_ints(&scratch, system->contacts);
+        x->happened = arena_ints(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
         x->places = arena_doubles(&scratch, system->lookup_count);
@@ -106,6 +107,11 @@ static int ready(const Instance *x, const Variable *v, double *value) {
         case AT_CONTACT: *value = s->state.closed[v->index]; return 1;
         case AT_COUNT: *value = s->state.count[v->index]; return 1;
         case AT_DEPARTURE_TIME: *value = s->state.departure_time[v->index]; return 1;
+        case AT_SLIP_COUNT: *value = s->state.slip_count[v->index]; return 1;
+        case AT_SLIP_TIME: *value = s->state.slip_time[v->index]; return 1;
+        case AT_SLIP_Q: *value = s->state.slip_q[v->contact * s->system->n + v->index]; return 1;
+        case AT_SLIP_V: *value = s->state.slip_v[v->contact * s->system->n + v->index]; return 1;
+        case AT_LOST: *value = s->state.now.lost; return 1;
         default: return 0;
     }
 }
@@ -137,6 +143,10 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
         case AT_KINETIC: *value = o->energy[0]; break;
         case AT_POTENTIAL: *value = o->energy[1]; break;
         case AT_TOTAL: *value = o->energy[0] + o->energy[1]; break;
+        case AT_STICKS: *value = o->sticks[v->index]; break;
+        case AT_SLIP: *value = o->slip[v->index]; break;
+        case AT_MARGIN: *value = o->margin[v->index]; break;
+        case AT_POWER: *value = o->power[v->index]; break;
         case AT_OUTPUT: *value = o->own[v->index]; break;
         case AT_DEPARTURE_Q:
             *value = departed(x, v->contact, v->index, o->departure_q, state->departure_q);

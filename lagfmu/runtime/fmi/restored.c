@@ -135,6 +135,9 @@ static Status times(Instance *x) {
         {"integrator's time", now->t_integrator, -DBL_MAX, DBL_MAX},
         {"integrator's time", now->t_old, -DBL_MAX, now->t_integrator},
         {"time of the event", now->event_time, -DBL_MAX, DBL_MAX},
+        {"energy dissipated", now->lost, -DBL_MAX, DBL_MAX},
+        {"energy dissipated", now->lost_old, -DBL_MAX, DBL_MAX},
+        {"energy dissipated", now->lost_ahead, -DBL_MAX, DBL_MAX},
     };
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (numbers(x, list, sizeof list / sizeof *list) != OK) return FAILED;
@@ -143,6 +146,23 @@ static Status times(Instance *x) {
     if (now->ahead && now->event_count > 0 &&
         !(now->event_time >= now->t_old && now->event_time <= now->t_integrator))
         return no_state(x, "time of the event", now->event_time);
+    return OK;
+}
+
+/* How frictions stand: a mode, a sign and, once it has been found, a unit vector. */
+static Status slides(Instance *x) {
+    const State *a = &x->solver.state;
+    for (int k = 0; k < x->solver.system->frictions; k++) {
+        const Slide *slide = &a->slide[k];
+        const double length = hypot(slide->direction[0], slide->direction[1]);
+        const Ints flags[] = {{"modes", &slide->sticks, 1, 1}};
+        const Number list[] = {
+            {"slip velocity of rounding", slide->noise, 0, DBL_MAX},
+            {"direction of slip", length, x->started ? 1 - 1e-9 : 0, 1 + 1e-9},
+        };
+        if (x->started && fabs(slide->sign) != 1) return no_state(x, "sign", slide->sign);
+        if (ints(x, flags, 1) != OK || numbers(x, list, 2) != OK) return FAILED;
+    }
     return OK;
 }
 
@@ -165,6 +185,9 @@ static Status arrays(Instance *x) {
         {"departures", a->departure_time, contacts, -DBL_MAX},
         {"departures", a->departure_q, contacts * n, -DBL_MAX},
         {"departures", a->departure_v, contacts * n, -DBL_MAX},
+        {"starts of slipping", a->slip_time, system->frictions, -DBL_MAX},
+        {"starts of slipping", a->slip_q, system->frictions * n, -DBL_MAX},
+        {"starts of slipping", a->slip_v, system->frictions * n, -DBL_MAX},
         {"indicators", a->indicator, watched, -DBL_MAX},
         {"step ahead", i->y, ny, -DBL_MAX},
         {"step ahead", i->y_old, ny, -DBL_MAX},
@@ -182,10 +205,13 @@ static Status arrays(Instance *x) {
     const Ints flags[] = {
         {"rank of the constraints", a->basis, system->m, 1},
         {"modes", a->closed, contacts, 1}, {"modes", a->armed, contacts, 1},
-        {"events", a->left, watched, 1},   {"counts", a->count, contacts, MOST},
-        {"inputs", x->set, inputs, 1},
+        {"counts", a->count, contacts, MOST},
+        {"inputs", x->set, inputs, 1},     {"counts", a->slip_count, system->frictions, MOST},
     };
     if (doubles(x, list, sizeof list / sizeof *list) != OK) return FAILED;
+    if (slides(x) != OK) return FAILED;
+    for (int k = 0; k < watched; k++) /* 1 upwards, -1 downwards */
+        if (a->left[k] < -1 || a->left[k] > 1) return no_state(x, "events", a->left[k]);
     return ints(x, flags, sizeof flags / sizeof *flags);
 }
 

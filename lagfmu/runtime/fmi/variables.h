@@ -24,7 +24,12 @@ typedef enum {
     AT_OUTPUT,         /* own output index */
     AT_CONTACT, AT_COUNT, AT_DEPARTURE_TIME, /* contact index */
     AT_DEPARTURE_Q, AT_DEPARTURE_V,          /* full coordinate index, of `contact` */
-    AT_STEPS
+    AT_STEPS,
+    AT_STICKS, AT_MARGIN, AT_POWER,          /* friction index */
+    AT_SLIP,                                 /* twice the friction's index, and one more for its second row */
+    AT_SLIP_COUNT, AT_SLIP_TIME,             /* friction index */
+    AT_SLIP_Q, AT_SLIP_V,                    /* coordinate index, of friction `contact` */
+    AT_LOST                                  /* energy dissipated */
 } Place;
 
 typedef struct {

@@ -7,7 +7,8 @@
 
 #include "digits.h"
 
-void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why) {
+void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
+                      const Sliding *sliding) {
     b->system = s;
     b->why = why;
     b->dependent = 0;
@@ -23,6 +24,8 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why) {
     b->trial = arena_doubles(arena, s->n);
     b->fixed = arena_ints(arena, s->m);
     linear_layout(&b->linear, arena, s, why);
+    b->sliding = s->frictions > 0 ? sliding : NULL;
+    if (b->sliding != NULL) b->sliding->layout(b, arena);
 }
 
 static int all_finite(int count, const double *x) {
@@ -69,6 +72,7 @@ Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f) 
 
 Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                         const int *active) {
+    if (b->sliding != NULL) return b->sliding->motion(b, at, q, v, active);
     evaluate(b, at, q, v);
     if (linear_factor(&b->linear, b->M, b->G, active) == OK &&
         linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) == OK)

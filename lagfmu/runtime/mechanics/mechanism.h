@@ -11,7 +11,24 @@
 
 #include <math.h>
 
+struct Frictions;
+typedef struct Mechanism Mechanism;
+
+/* A time [s] with the inputs and parameters then. */
 typedef struct {
+    double t;
+    const double *u, *p;
+} Instant;
+
+/* What friction adds (friction.h). */
+typedef struct {
+    void (*layout)(Mechanism *b, Arena *arena);
+    /* (m) `active` with the rows that stick by friction */
+    const int *(*acting)(Mechanism *b, const int *active);
+    Status (*motion)(Mechanism *b, Instant at, const double *q, const double *v, const int *active);
+} Sliding;
+
+struct Mechanism {
     const System *system;
     Linear linear;
     double *M, *F, *G, *nu, *gamma; /* values at the state that was evaluated last */
@@ -21,15 +38,13 @@ typedef struct {
     int *fixed;                     /* (m) scratch of project(): position constraints that act */
     int dependent;                  /* 1: rows that act depend on each other, on the constraints */
     Why *why;
-} Mechanism;
+    const Sliding *sliding;     /* NULL without frictions */
+    struct Frictions *friction; /* what `sliding` works with */
+};
 
-/* A time [s] with the inputs and parameters then. */
-typedef struct {
-    double t;
-    const double *u, *p;
-} Instant;
-
-void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why);
+/* `sliding`: what a system with frictions needs, not used without. */
+void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
+                      const Sliding *sliding);
 
 /* sum_j G_kj x_j for the row k of the G that was evaluated last. */
 static inline double mechanism_row(const Mechanism *b, int k, const double *x) {

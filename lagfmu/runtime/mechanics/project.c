@@ -116,6 +116,7 @@ Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const i
                          const double *offset, const double *size) {
     const System *s = b->system;
     int acting = 0, fixed = 0, moved = 0;
+    if (b->sliding != NULL) active = b->sliding->acting(b, active);
     for (int k = 0; k < s->m; k++) {
         b->fixed[k] = active[k] && s->rows[k].kind != NONHOLONOMIC;
         acting |= active[k];

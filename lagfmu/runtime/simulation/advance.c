@@ -32,7 +32,7 @@ static int runs_ahead(const Solver *s) {
     if (s->system->inputs > 0 || method_of(s)->fixed) return 0;
     for (int c = 0; c < s->system->contacts; c++)
         if (!s->state.closed[c]) return 0;
-    return 1;
+    return s->system->frictions == 0 || !PARTS.slides->turns(s);
 }
 
 static void restart(Solver *s, double t, const double *y, double h) {
@@ -72,7 +72,20 @@ static Status set_out(Solver *s) {
     restart(s, x->now.t, y, x->now.step);
     x->now.ahead = 1;
     x->now.event_count = 0;
+    x->now.lost_old = x->now.lost_ahead = x->now.lost;
     return indicators_at(s, x->now.t, y, x->indicator);
+}
+
+/* What frictions do in the step just taken: their directions at its end, their work. */
+static Status slide_on(Solver *s, const double *y1) {
+    Numbers *now = &s->state.now;
+    const Integrator *i = &s->integrator;
+    double lost;
+    now->lost_old = now->lost_ahead;
+    if (now->event_count > 0) return OK; /* the work is done as far as the event: meet() */
+    if (PARTS.slides->work(s, i->t_old, i->t, &lost) != OK) return FAILED;
+    now->lost_ahead += lost;
+    return PARTS.slides->turn(s, i->t, y1);
 }
 
 /* One step, projected and searched for events; `bound`: not to be passed. */
@@ -86,6 +99,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     if (leg_project(s, i->t, y1) != OK) return FAILED;
     if (leg_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
     if (watch && PARTS.events_find(s, y1) != OK) return FAILED;
+    if (s->system->frictions > 0 && slide_on(s, y1) != OK) return FAILED;
     integrator_move(i, y1);
     s->state.now.steps += 1;
     if (s->state.now.choice.implicit) stiffness_implicit_step(&s->state.now.choice, i);
@@ -96,6 +110,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
 static void take_back(Solver *s, double t, double h) {
     const Integrator *i = &s->integrator;
     double *y = s->work_advance;
+    if (i->t > t) s->state.now.lost_ahead = s->state.now.lost_old;
     memcpy(y, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y);
     restart(s, t, y, h);
     s->state.now.event_count = 0;
@@ -143,6 +158,18 @@ static void put(Solver *s, double t, const double *y) {
     s->state.now.t = t;
 }
 
+/* What frictions have dissipated at t, within the step just taken. */
+static Status lose(Solver *s, double t) {
+    Numbers *now = &s->state.now;
+    const Integrator *i = &s->integrator;
+    double lost;
+    now->lost = now->lost_ahead;
+    if (i->t == t && now->event_count == 0) return OK;
+    if (PARTS.slides->work(s, i->t_old, t, &lost) != OK) return FAILED;
+    now->lost = now->lost_old + lost;
+    return OK;
+}
+
 /* The communication point is reached, or passed. */
 static Status arrive(Solver *s, double t_end) {
     Integrator *i = &s->integrator;
@@ -153,6 +180,7 @@ static Status arrive(Solver *s, double t_end) {
         if (leg_project(s, t_end, between) != OK) return FAILED;
         y = between;
     }
+    if (s->system->frictions > 0 && lose(s, t_end) != OK) return FAILED;
     put(s, t_end, y);
     s->state.now.step = i->h_next;
     if (!runs_ahead(s)) s->state.now.ahead = 0;
@@ -164,6 +192,7 @@ static Status meet(Solver *s) {
     Integrator *i = &s->integrator;
     const double t = s->state.now.event_time;
     double *y = s->work_advance;
+    if (s->system->frictions > 0 && lose(s, t) != OK) return FAILED;
     if (leg_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     put(s, t, y);
     s->state.now.step = i->t - i->t_old;
@@ -174,7 +203,7 @@ static Status meet(Solver *s) {
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
     jumps_pass(s, s->state.left + s->system->contacts);
-    return s->system->contacts == 0 ? OK : PARTS.switch_modes(s, s->state.left);
+    return s->system->contacts + s->system->frictions == 0 ? OK : PARTS.switch_modes(s, s->state.left);
 }
 
 /* FAILED if the step just taken shows that t_end is too far off for steps of its kind. */
@@ -246,6 +275,7 @@ Status solver_advance(Solver *s, double t_end) {
     now->tiny = 0;
     resume(s);
     if (follow_inputs(s) != OK) return FAILED;
+    if (s->system->frictions > 0 && PARTS.slides->renew(s) != OK) return FAILED;
     if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
     while (now->t < t_end) {
         int met;

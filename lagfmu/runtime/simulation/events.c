@@ -68,7 +68,8 @@ static Status locate(Sought *x, double lo, double hi, double *time, int *found) 
 }
 
 static int is_armed(const Solver *s, int i) {
-    return i >= s->system->contacts || s->state.closed[i] || s->state.armed[i];
+    if (i < s->system->contacts) return s->state.closed[i] || s->state.armed[i];
+    return !indicators_range(s, i).rises;
 }
 
 /* The first time among the looks at which indicator i leaves its range, if it does. */
@@ -123,7 +124,7 @@ Status events_find(Solver *s, const double *y1) {
     const int width = indicators_count(s->system);
     double *y = s->work_events, *values = y + i->ny;
     Looks looks = {0, values + width, values + width + MOST_LOOKS + width};
-    Sought x = {s, i->t_old, i->y_old, 0, {0, 0, 0}, y, values};
+    Sought x = {s, i->t_old, i->y_old, 0, {0, 0, 0, 0}, y, values};
     s->state.now.event_count = 0;
     if (looks_take(s, y1, y, &looks) != OK) return FAILED;
     for (int k = 0; k < width; k++) {

@@ -16,6 +16,7 @@
 #include "digits.h"
 
 enum { ROUNDS = 1000 }; /* of impacts at one instant, after which the rest is one plastic impact */
+static const double ROUNDING = 1e-14; /* of the terms of a speed: one that is none; rest does not jam */
 static const double PULL = 1e-9; /* of the largest impulse: a negative one that is rounding */
 
 /* What an impact starts from, and its workspace.  Rows are numbered as in the system, contacts by their
@@ -213,7 +214,9 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
     for (int c = 0; c < contacts; c++)
         if (entering[c]) x.contact[x.k++] = c;
     for (int j = 0; j < m; j++) {
+        const double terms = mechanism_row_size(x.b, j, v) + fabs(x.b->nu[j]);
         x.slip[j] = mechanism_slip(x.b, j, v);
+        if (fabs(x.slip[j]) <= ROUNDING * terms) x.slip[j] = 0;
         x.zero[j] = 0;
     }
     system->restitution(s->p, x.e);

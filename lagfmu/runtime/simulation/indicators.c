@@ -2,21 +2,25 @@
  *
  *   contact, closed   lambda >= 0
  *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch
- *   jump              h on the side of its level */
+ *   jump              h on the side of its level
+ *   friction          see slides.c */
 #include "indicators.h"
 
 #include <math.h>
 
 #include "jumps.h"
 #include "leg.h"
+#include "parts.h"
 
-int indicators_count(const System *s) { return s->contacts + s->jumps; }
+int indicators_count(const System *s) { return s->contacts + s->jumps + 2 * s->frictions; }
+
+int indicators_first_of_frictions(const System *s) { return s->contacts + s->jumps; }
 
 static Status of_contacts(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
     const Instant at = leg_instant(s, t);
     Mechanism *b = &s->stepped;
-    int any = 0;
+    int any = system->frictions > 0;
     for (int c = 0; c < system->contacts; c++) any |= s->state.closed[c];
     if (mechanism_residual(b, at, y, b->f) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++) values[c] = b->f[system->contact[c]];
@@ -25,12 +29,14 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
         return FAILED;
     for (int c = 0; c < system->contacts; c++)
         if (s->state.closed[c]) values[c] = b->lambda[system->contact[c]];
+    if (system->frictions > 0)
+        PARTS.slides->indicators(s, values + indicators_first_of_frictions(system));
     return OK;
 }
 
 Status indicators_at(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
-    if (system->contacts > 0 && of_contacts(s, t, y, values) != OK) return FAILED;
+    if (system->contacts + system->frictions > 0 && of_contacts(s, t, y, values) != OK) return FAILED;
     if (system->jumps == 0) return OK;
     const Instant at = leg_instant(s, t);
     system->surfaces(t, y, at.u, at.p, values + system->contacts);
@@ -38,6 +44,9 @@ Status indicators_at(Solver *s, double t, const double *y, double *values) {
 }
 
 Range indicators_range(const Solver *s, int indicator) {
-    if (indicator >= s->system->contacts) return jumps_range(s, indicator - s->system->contacts);
-    return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator]};
+    const System *system = s->system;
+    const int of_friction = indicator - indicators_first_of_frictions(system);
+    if (of_friction >= 0) return PARTS.slides->range(s, of_friction);
+    if (indicator >= system->contacts) return jumps_range(s, indicator - system->contacts);
+    return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator], 0};
 }

@@ -3,6 +3,8 @@
  *
  *   0 .. contacts - 1   of contact c: lambda while it is closed, f while it is open
  *   then                of jump k of the forces: h, on the side of its level (jumps.h)
+ *   then two a friction (slides.h): the reserve of its cone while it sticks, the slip velocity along its
+ *                       direction while it slips; its normal force while it slips on what is no contact
  *
  * A further kind takes the numbers after these: its count, its values and its range stand in indicators.c,
  * what it does at an event in advance.c (meet). */
@@ -15,10 +17,14 @@
  * that at which it passes the limit itself if it has been inside by more than `slack` before (is armed). */
 typedef struct {
     double low, high, slack;
+    int rises; /* 1: it begins on the limit, and has to be seen inside first */
 } Range;
 
 /* How many are watched. */
 int indicators_count(const System *s);
+
+/* The number of the first that belongs to a friction. */
+int indicators_first_of_frictions(const System *s);
 
 /* All values at (t, y), in the present modes. */
 Status indicators_at(Solver *s, double t, const double *y, double *values);

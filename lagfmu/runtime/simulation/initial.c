@@ -153,6 +153,9 @@ static Status find_modes(const Start *x) {
     if (s->contacts > 0 && PARTS.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
                                                 touching, NULL) == FAILED)
         return afar_refused(x->s);
+    if (s->frictions > 0 &&
+        PARTS.slides->begin(x->s, x->at, state->closed, touching) == FAILED)
+        return afar_refused(x->s);
     system_active(s, state->closed, x->s->active);
     if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,
                           state->size) == FAILED)

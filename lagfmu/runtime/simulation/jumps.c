@@ -62,6 +62,6 @@ void jumps_pass(Solver *s, const int *way) {
 
 Range jumps_range(const Solver *s, int k) {
     const double level = s->state.level[k];
-    if (s->system->floors[k]) return (Range){level - 0.5, level + 0.5, 0};
-    return (Range){level >= 0 ? 0 : -HUGE_VAL, level <= 0 ? 0 : HUGE_VAL, 0};
+    if (s->system->floors[k]) return (Range){level - 0.5, level + 0.5, 0, 0};
+    return (Range){level >= 0 ? 0 : -HUGE_VAL, level <= 0 ? 0 : HUGE_VAL, 0, 0};
 }

@@ -2,6 +2,8 @@
  * (Hairer & Wanner II, sect. VII.2: index reduction with projection). */
 #include "leg.h"
 
+#include "magnitudes.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -40,8 +42,12 @@ Instant leg_instant(Solver *s, double t) {
 static Status rate(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
-    if (mechanism_motion(&s->stepped, leg_instant(s, t), y, y + n, leg_rows(s)) != OK)
-        return FAILED;
+    const Instant at = leg_instant(s, t);
+    const Status status = s->system->frictions > 0
+                              ? mechanism_motion_near(&s->stepped, at, y, y + n, s->active,
+                                                      s->state.offset, s->state.size)
+                              : mechanism_motion(&s->stepped, at, y, y + n, leg_rows(s));
+    if (status != OK) return FAILED;
     for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
         dydt[j] = y[n + j];
         dydt[n + j] = s->stepped.vdot[j];
@@ -51,16 +57,18 @@ static Status rate(void *context, double t, const double *y, double *dydt) {
 
 static Status jacobian(void *context, double t, const double *y, double *J, double *dfdt) {
     Solver *s = context;
+    if (s->system->frictions > 0) return PARTS.slides->jacobian(s, t, y, J, dfdt);
     return sensitivity_jacobian(&s->sensitivity, &s->stepped, leg_instant(s, t), leg_rows(s), y, J,
                                 dfdt);
 }
 
-static Control control(const Solver *s, double longest) {
+static Control control(const Solver *s, const Integrator *i, double longest) {
     const Settings *set = &s->settings;
     const double fewest = set->method == RATTLE ? FEWEST_STEPS_RATTLE : FEWEST_STEPS_RK4;
     const double fixed = set->step > 0 ? set->step : 1 / (fewest * s->state.now.rate);
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
-    return (Control){SAFETY * set->tolerance, s->state.scale, longest < HUGE_VAL ? longest : 0,
+    if (!s->integrator.method->fixed) magnitudes_shared(s, i->y, s->scale);
+    return (Control){SAFETY * set->tolerance, s->scale, longest < HUGE_VAL ? longest : 0,
                      fixed};
 }
 
@@ -94,7 +102,7 @@ static Status accept(Solver *s, Integrator *i) {
 }
 
 Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
-    const Control c = control(s, longest);
+    const Control c = control(s, i, longest);
     if (s->settings.method == RATTLE) {
         const Instant at = leg_instant(s, i->t);
         return PARTS.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,

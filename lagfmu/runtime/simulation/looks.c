@@ -147,8 +147,8 @@ Status looks_take(Solver *s, const double *y1, double *y, Looks *looks) {
     looks->t[looks->count] = i->t;
     if (indicators_at(s, i->t, y1, looks->values + looks->count * width) != OK) return FAILED;
     looks->count += 1;
-    for (int c = 0; c < contacts; c++) {
-        if (!s->state.closed[c]) continue;
+    for (int c = 0; c < width; c++) {
+        if (c < contacts ? !s->state.closed[c] : c < indicators_first_of_frictions(s->system)) continue;
         double *seen = looks->values + (MOST_LOOKS + width) * width; /* one row of scratch */
         for (int k = 0, found = 0; k + 2 < looks->count && !found; k++)
             if (look_into_dip(s, looks, k, c, y, seen, &found) != OK) return FAILED;

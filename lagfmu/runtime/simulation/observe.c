@@ -79,12 +79,26 @@ static Status observe_residuals(const Solver *s, Instant at, Mechanism *b, Obser
     const System *system = b->system;
     if (mechanism_residual(b, at, o->q, o->residual) == FAILED) return FAILED;
     for (int k = 0; k < system->m; k++) {
-        if (system->rows[k].kind == NONHOLONOMIC)
+        if (system->rows[k].kind == NONHOLONOMIC || system->rows[k].friction != 0)
             o->residual[k] = mechanism_slip(b, k, o->v);
         else
             o->residual[k] -= level(s, k);
     }
     return OK;
+}
+
+/* What frictions do, of the latest motion. */
+static void observe_frictions(const Solver *s, Observed *o) {
+    const struct Frictions *f = s->stepped.friction;
+    for (int i = 0; i < s->system->frictions; i++) {
+        const int slips = !f->slide[i].sticks;
+        const double *force = f->tangential + 2 * i, *slip = f->slip + 2 * i;
+        o->sticks[i] = f->loaded[i] && !slips;
+        o->slip[2 * i] = slip[0];
+        o->slip[2 * i + 1] = slip[1];
+        o->margin[i] = f->mu[2 * i] * f->normal[i] - hypot(force[0], force[1]);
+        o->power[i] = slips ? force[0] * slip[0] + force[1] * slip[1] : 0;
+    }
 }
 
 /* Accelerations, lambda, Q and residuals. */
@@ -99,6 +113,7 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
                                        : mechanism_motion(b, at, o->q, o->v, active);
     if (status == FAILED) return FAILED;
     observe_forces(b, o);
+    if (s->system->frictions > 0) observe_frictions(s, o);
     return observe_residuals(s, at, b, o);
 }
 

@@ -15,4 +15,5 @@ const Parts PARTS = {
     .landing_lift = landing_lift,
     .switch_modes = switch_modes,
     .switch_released = switch_released,
+    .slides = &SLIDES,
 };

@@ -10,6 +10,7 @@
 #include "impact.h"
 #include "landing.h"
 #include "rattle.h"
+#include "slides.h"
 #include "switch.h"
 
 typedef struct {
@@ -28,6 +29,8 @@ typedef struct {
     Status (*landing_lift)(Solver *s, const int *happened, const double *pull);
     Status (*switch_modes)(Solver *s, const int *happened);
     Status (*switch_released)(Solver *s, double span);
+    /* What constraints that hold by friction need; NULL where there are none. */
+    const Slides *slides;
 } Parts;
 
 extern const Parts PARTS;

@@ -25,6 +25,11 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->departure_time = arena_doubles(saved, contacts);
     x->departure_q = arena_doubles(saved, contacts * n);
     x->departure_v = arena_doubles(saved, contacts * n);
+    x->slide = arena_take(saved, (size_t)s->frictions, sizeof *x->slide);
+    x->slip_count = arena_ints(saved, s->frictions);
+    x->slip_time = arena_doubles(saved, s->frictions);
+    x->slip_q = arena_doubles(saved, s->frictions * n);
+    x->slip_v = arena_doubles(saved, s->frictions * n);
     x->indicator = arena_doubles(saved, indicators);
     integrator_layout(i, saved, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
     x->y = i->y;
@@ -45,14 +50,17 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
     integrator_layout(&s->probe, scratch, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
-    mechanism_layout(&s->stepped, scratch, system, &s->why);
+    mechanism_layout(&s->stepped, scratch, system, &s->why,
+                     PARTS.slides != NULL ? PARTS.slides->sliding : NULL);
+    if (s->stepped.friction != NULL) s->stepped.friction->slide = s->state.slide;
     sensitivity_layout(&s->sensitivity, scratch, system);
     s->active_full = NULL;
     if (system->embed != NULL && system->full->dynamics != NULL) {
-        mechanism_layout(&s->full, scratch, system->full, &s->why);
+        mechanism_layout(&s->full, scratch, system->full, &s->why, NULL);
         s->active_full = arena_ints(scratch, system->full->m);
     }
     s->active = arena_ints(scratch, m);
+    s->scale = arena_doubles(scratch, 2 * n);
     s->u = arena_doubles(scratch, system->inputs + system->jumps);
     s->work_jumps = arena_doubles(scratch, system->jumps > 0 ? 2 * system->jumps + n : 0);
     s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);
@@ -62,8 +70,12 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_advance = arena_doubles(scratch, 4 * n);
     s->work_events =
         arena_doubles(scratch, indicators == 0 ? 0 : 2 * n + indicators + looks_doubles(indicators));
+    const int frictions = system->frictions, some = frictions > 0;
+    s->trial_slides = arena_take(scratch, (size_t)frictions, sizeof *s->trial_slides);
+    s->work_slides = arena_doubles(scratch, some * (2 * frictions + 5 * n));
+    s->iwork_slides = arena_ints(scratch, some * (4 * frictions + contacts));
     s->iwork_events = arena_ints(scratch, 6 * contacts);
-    s->work_switch = arena_doubles(scratch, contacts == 0 ? 0 : m);
+    s->work_switch = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m);
     s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(n, m, contacts));
     s->iwork_impact = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));
 }
@@ -93,4 +105,8 @@ void observed_layout(Observed *o, Arena *arena, const System *system) {
     o->sddot = arena_doubles(arena, stepped);
     o->departure_q = arena_doubles(arena, system->contacts * n);
     o->departure_v = arena_doubles(arena, system->contacts * n);
+    o->slip = arena_doubles(arena, 2 * system->frictions);
+    o->margin = arena_doubles(arena, system->frictions);
+    o->power = arena_doubles(arena, system->frictions);
+    o->sticks = arena_ints(arena, system->frictions);
 }

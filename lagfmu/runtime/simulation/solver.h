@@ -17,6 +17,7 @@ typedef struct {
     Mechanism stepped, full;   /* full: of an embedding; otherwise unused */
     Integrator integrator, probe; /* probe: integrates again from the last accepted point */
     int *active;               /* (m) rows that act in the present modes */
+    double *scale;             /* (2 n) of errors, in the present step */
     double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
     /* scratch, nothing of which is kept from one call to the next: */
@@ -28,6 +29,9 @@ typedef struct {
     double *work_jumps;        /* (2 jumps + n) of jumps.c */
     double *work_advance;      /* (4 n) of advance.c */
     double *work_events;       /* (2 n + indicators and all looks) of events.c */
+    Slide *trial_slides;       /* (frictions) of slides.c, with */
+    double *work_slides;       /* (2 frictions + 5 n) */
+    int *iwork_slides;         /* (4 frictions + contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and switch.c */
     double *work_switch;       /* (m) of switch.c */
     double *work_impact;       /* of impact.c, see there */
@@ -68,6 +72,8 @@ typedef struct {
     double *own, *other;           /* (output_count) the model's own; where these are not finite */
     double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
     double *departure_q, *departure_v; /* (contacts * n) in full coordinates */
+    double *slip, *margin, *power; /* (2 frictions), (frictions), (frictions) */
+    int *sticks;                   /* (frictions) */
 } Observed;
 
 void observed_layout(Observed *o, Arena *arena, const System *system);

@@ -4,6 +4,7 @@
 #define LAGFMU_STATE_H
 
 #include "arena.h"
+#include "friction.h"
 #include "integrator.h"
 #include "stiffness.h"
 #include "system.h"
@@ -46,6 +47,8 @@ typedef struct {
     double t_old, t_integrator, h_next, error_old; /* of the integrator, when it is ahead */
     int fresh;
     Choice choice;       /* of the method `auto` */
+    double lost;         /* [J] that frictions and impacts have dissipated, ... */
+    double lost_old, lost_ahead; /* ... and so far where the integrator began its step, and stands */
 } Numbers;
 
 /* ... and its arrays, which lie in one block. */
@@ -63,6 +66,10 @@ typedef struct {
     int *count;               /* (contacts) departures so far */
     double *departure_time;   /* (contacts) [s] of the latest */
     double *departure_q, *departure_v; /* (contacts * n) state then */
+    Slide *slide;             /* (frictions) how they stand */
+    int *slip_count;          /* (frictions) starts of slipping so far */
+    double *slip_time;        /* (frictions) [s] of the latest */
+    double *slip_q, *slip_v;  /* (frictions * n) state then */
     double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
     double *y, *f, *y_old, *f_old, *dense; /* the integrator's own, shared with it */
     char *block;              /* all of the arrays above */

@@ -8,7 +8,9 @@
 
 #include "contacts.h"
 #include "impact.h"
+#include "indicators.h"
 #include "leg.h"
+#include "parts.h"
 
 static const double SLOW = 1e-9; /* speed of a gap, relative to the motion's own, that counts as none */
 
@@ -125,11 +127,17 @@ Status switch_modes(Solver *s, const int *happened) {
     const System *system = s->system;
     const int contacts = system->contacts;
     const Instant at = leg_instant(s, s->state.now.t);
+    const int rubs = system->frictions > 0;
+    double *arriving = rubs ? s->work_slides + 2 * system->frictions + 4 * system->n : NULL;
+    if (rubs) memcpy(arriving, s->state.v, (size_t)system->n * sizeof *arriving);
     int *flags = s->iwork_events;
     Flags x = {flags, flags + contacts, flags + 2 * contacts, flags + 3 * contacts,
                flags + 4 * contacts};
     if (find_near(s, at, happened, &x) != OK || strike(s, at, happened, &x) != OK) return FAILED;
     if (settle(s, at, &x) != OK || set_levels(s, at, x.closed) != OK) return FAILED;
+    if (rubs && PARTS.slides->change(s, at, happened + indicators_first_of_frictions(system), arriving,
+                                     x.closed, x.touching, x.leaving) != OK)
+        return FAILED;
     system_active(system, x.closed, s->active);
     if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
                           s->state.size) != OK)

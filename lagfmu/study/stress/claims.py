@@ -117,7 +117,7 @@ class Statement:
         `growth` is max(1, N) at each row; `undisturbed` are the rows before the first impact, where
         also that may be judged which speaks of the start; `floors` as in Compiled.at.
         """
-        chosen = applies(self.claim, run.rows)
+        chosen = applies(self.claim, run.rows, run.values)
         if not self.instantaneous:
             chosen = chosen & undisturbed
         actual = self.actual.at(chosen, run)

@@ -119,13 +119,23 @@ def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
 
 
 def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
-    """The magnitude that an error is relative to, at the least: of coordinates, velocities, energy."""
+    """The magnitude that an error is relative to, at the least: of coordinates, velocities, energy.
+
+    A coordinate is known to the rounding of the value that it was given at the start, however small the
+    one is onto which that was projected; the energy to the work of Q over that rounding.
+    """
     found = {}
+    rounding = {q: EPS * abs(run.values.get(q, 0.0)) for q in facts.coordinates}
     if "energy.potential" in facts.variables:
         parts = np.abs(run.rows["energy.kinetic"]) + np.abs(run.rows["energy.potential"])
-        found["energy.total"] = float(parts.max())
+        work = sum(
+            rounding[q] * float(np.abs(run.rows[f"Q.{q}"]).max())
+            for q in facts.coordinates
+            if f"Q.{q}" in facts.variables
+        )
+        found["energy.total"] = max(float(parts.max()), work)
     for q in facts.coordinates:
-        found[q] = facts.same_unit(q, run.values)
+        found[q] = max(facts.same_unit(q, run.values), rounding[q])
         rate = f"der({q})"
         peers = [f"der({p})" for p in facts.coordinates]
         found[rate] = max(

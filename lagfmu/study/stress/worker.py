@@ -14,12 +14,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from . import inputs, parameters, starts, states, stepping
+from . import impacts, inputs, parameters, starts, states, stepping
 from .bench import Bench
 from .facts import Facts
 from .probe import Probe, attempt, verdict
 
-FAMILIES = (parameters, starts, stepping, inputs, states)
+FAMILIES = (parameters, starts, impacts, stepping, inputs, states)
 
 
 def probes(facts: Facts, quick: bool) -> list[Probe]:

@@ -110,7 +110,7 @@ def refer(
         opinion = _opinion(importer, converged, given, wide * h, end)
     checked: float | None = None
     for name, claim, expected in _in_time(claims, importer, given, run):
-        where = applies(claim, run) & np.isfinite(expected)
+        where = applies(claim, run, _numbers(importer, given)) & np.isfinite(expected)
         if name not in right or not where.any():
             continue
         miss = float(np.abs(right[name] - expected)[where].max()) / scale[name]
@@ -163,16 +163,21 @@ def _replaced(run: Trajectory, right: Mapping[str, NDArray[np.float64]]) -> Traj
     return copy
 
 
-def _in_time(
-    claims: Sequence[Claim], importer: Importer, given: Mapping[str, Any], run: Trajectory
-) -> list[tuple[str, Claim, NDArray[np.float64]]]:
-    """(output, claim, expected values) for the closed forms that need time and start values only."""
+def _numbers(importer: Importer, given: Mapping[str, Any]) -> dict[str, float]:
+    """The values of parameters, inputs and given start values by name."""
     values = {
         v.name: float(v.start)
         for v in importer.description.modelVariables
         if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
     }
-    values |= {k: float(v) for k, v in given.items() if not isinstance(v, str)}
+    return values | {k: float(v) for k, v in given.items() if not isinstance(v, str)}
+
+
+def _in_time(
+    claims: Sequence[Claim], importer: Importer, given: Mapping[str, Any], run: Trajectory
+) -> list[tuple[str, Claim, NDArray[np.float64]]]:
+    """(output, claim, expected values) for the closed forms that need time and start values only."""
+    values = _numbers(importer, given)
     names = run.dtype.names or ()
     constant = {n for n in values if n not in names} | {"time"}
 

@@ -1,0 +1,223 @@
+"""What is wrong with the frictions of a model, in words.
+
+A friction limits the multipliers of one or two constraints, each a force in newtons, by a normal force that
+is linear in multipliers of other constraints.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+from sympy.physics.mechanics import dynamicsymbols
+
+from ..errors import UnitError
+from .parts import NAME, Contact, Expr, Friction, ModelFields, name_of
+from .reactions import multiplier, reactions_in
+from .units import ONE, Unit, check_dimension, parse_unit, plain
+
+MOST_ROWS = 2  # tangential directions of a surface
+NEWTON = parse_unit("N", "a force")
+
+
+def split(constraints: Iterable[object]) -> tuple[tuple[object, ...], tuple[Friction, ...]]:
+    """The constraints that have rows of their own, and the frictions among them."""
+    items = tuple(constraints)
+    rest = tuple(c for c in items if not isinstance(c, Friction))
+    return rest, tuple(c for c in items if isinstance(c, Friction))
+
+
+def check_kinds(model: ModelFields, problems: list[str]) -> None:
+    """Fields that cannot be read at all: names, lists of names, expressions."""
+    seen: set[str] = set()
+    for f in model.frictions:
+        if not isinstance(f, Friction):
+            problems.append(
+                f"frictions hold {f!r}, expected Friction(...): put it in `constraints`"
+            )
+            continue
+        if not isinstance(f.name, str) or not NAME.match(f.name):
+            problems.append(
+                f"friction name {f.name!r} is no FMI name: use letters a-z, A-Z, digits and _, not "
+                "beginning with a digit"
+            )
+        if f.name in seen:
+            problems.append(f"two frictions are called {f.name!r}: rename one")
+        seen.add(f.name)
+        named = isinstance(f.of, Sequence) and not isinstance(f.of, str)
+        if not named or not f.of or not all(isinstance(name, str) for name in f.of):
+            problems.append(
+                f"friction {f.name!r}: of = {f.of!r}, expected a list of constraint names, e.g. "
+                "of=['rolling']"
+            )
+        for what, value in (("normal", f.normal), ("static", f.static), ("kinetic", f.sliding)):
+            is_text = isinstance(value, str)
+            if is_text or not isinstance(sp.sympify(value, strict=False), sp.Expr):
+                problems.append(
+                    f"friction {f.name!r}: {what} = {value!r} is no expression: write a number, "
+                    "or an expression of parameters (normal: of multiplier(NAME))"
+                )
+        if not isinstance(f.description, str):
+            problems.append(
+                f"description of friction {f.name!r} is {f.description!r}, expected a text"
+            )
+
+
+def check_frictions(
+    model: ModelFields, units: Mapping[Expr, Unit], reactions: Mapping[Expr, Unit]
+) -> list[str]:
+    """Everything that is wrong with frictions whose fields can be read."""
+    problems: list[str] = []
+    owner: dict[str, str] = {}
+    for f in model.frictions:
+        _check_rows(model, f, owner, reactions, problems)
+    for f in model.frictions:
+        _check_normal(model, f, owner, units, reactions, problems)
+        _check_coefficients(model, f, units, problems)
+    if model.frictions and model.embedding is not None:
+        problems.append(
+            "friction with an embedding: the normal force is needed in every mode, and the embedding "
+            "eliminates it: leave the embedding out, and let constraints tie the coordinates"
+        )
+    return problems
+
+
+def _check_rows(
+    model: ModelFields,
+    f: Friction,
+    owner: dict[str, str],
+    reactions: Mapping[Expr, Unit],
+    problems: list[str],
+) -> None:
+    known = {c.name: c for c in model.constraints}
+    if len(f.of) > MOST_ROWS:
+        problems.append(
+            f"friction {f.name!r}: of = {list(f.of)!r} names {len(f.of)} constraints, expected one or "
+            "two, the directions in which a surface can slip: make more frictions"
+        )
+    for name in f.of:
+        c = known.get(name)
+        if c is None:
+            problems.append(
+                f"friction {f.name!r}: of = {list(f.of)!r} names {name!r}, which is no constraint of "
+                f"this model (constraints: {', '.join(known) or 'none'}): correct the name"
+            )
+            continue
+        if isinstance(c, Contact):
+            problems.append(
+                f"friction {f.name!r}: of = {list(f.of)!r} names the contact {name!r}, expected what "
+                "holds along the surface: a Nonholonomic slip velocity, and the contact in `normal`"
+            )
+            continue
+        if name in owner:
+            problems.append(
+                f"the constraint {name!r} belongs to the frictions {owner[name]!r} and {f.name!r}: "
+                "take it out of one"
+            )
+        owner[name] = f.name
+        unit = reactions.get(multiplier(name))
+        if unit is not None and not unit.same_dimension(NEWTON):
+            problems.append(
+                f"friction {f.name!r}: the multiplier of {name!r} is in {unit.name}, expected N: write "
+                "the constraint as a length or a velocity at the surface, e.g. x - R*theta in m or "
+                "x.diff() - R*theta.diff() in m/s"
+            )
+        gate = getattr(c, "while_closed", None)
+        if gate is not None and multiplier(gate) not in sp.sympify(f.normal).free_symbols:
+            problems.append(
+                f"friction {f.name!r}: {name!r} acts while {gate!r} is closed, but its normal force "
+                f"{plain(sp.sympify(f.normal))} is not of that contact: use "
+                f"normal=multiplier({gate!r}), or leave while_closed out"
+            )
+
+
+def _check_normal(
+    model: ModelFields,
+    f: Friction,
+    owner: Mapping[str, str],
+    units: Mapping[Expr, Unit],
+    reactions: Mapping[Expr, Unit],
+    problems: list[str],
+) -> None:
+    normal = sp.sympify(f.normal)
+    what = f"normal of friction {f.name!r}"
+    rows = {multiplier(c.name): c.name for c in model.constraints}
+    before = len(problems)
+    for symbol in reactions_in(normal):
+        if symbol not in rows:
+            problems.append(
+                f"{what}: {symbol} is no multiplier of this model's constraints "
+                f"({', '.join(rows.values())}): use multiplier(NAME)"
+            )
+        elif rows[symbol] in owner:
+            problems.append(
+                f"{what}: {symbol} is itself limited by the friction {owner[rows[symbol]]!r}, expected "
+                "multipliers of surfaces and joints"
+            )
+    present = [s for s in reactions_in(normal) if s in rows]
+    if any(sp.simplify(normal.diff(a, b)) != 0 for a in present for b in present):
+        problems.append(
+            f"{what}: {plain(normal)} is not linear in the multipliers, expected a sum of multipliers "
+            "times numbers: a joint whose force has two components needs a friction for each"
+        )
+    _check_symbols(model, what, normal, set(present), problems)
+    if len(problems) == before:
+        problems += _dimension(normal, NEWTON, {**units, **reactions}, what)
+
+
+def _check_coefficients(
+    model: ModelFields, f: Friction, units: Mapping[Expr, Unit], problems: list[str]
+) -> None:
+    values = {p.symbol: float(p.value) for p in model.parameters}
+    numbers = {}
+    for kind, mu in (("static", sp.sympify(f.static)), ("kinetic", sp.sympify(f.sliding))):
+        if kind == "kinetic" and f.kinetic is None:
+            continue
+        what = f"{kind} of friction {f.name!r}"
+        before = len(problems)
+        _check_symbols(model, what, mu, set(), problems)
+        if len(problems) == before:
+            problems += _dimension(mu, ONE, units, what)
+        if len(problems) > before:
+            continue
+        value = sp.sympify(mu.xreplace(values))
+        if value.is_number:
+            numbers[kind] = float(value) if value.is_real else math.nan
+            if not 0 <= numbers[kind] < math.inf:
+                problems.append(f"{what} is {plain(value)}, expected a number of at least 0")
+    if "kinetic" in numbers and numbers["kinetic"] > numbers.get("static", math.inf):
+        problems.append(
+            f"friction {f.name!r}: kinetic = {numbers['kinetic']!r} is above static = "
+            f"{numbers['static']!r}, so that it could neither stick nor slip: exchange them"
+        )
+
+
+def _dimension(
+    expression: Expr, expected: Unit, units: Mapping[Expr, Unit], what: str
+) -> list[str]:
+    try:
+        return list(check_dimension(expression, expected, units, what))
+    except UnitError as error:
+        return [str(error)]
+
+
+def _check_symbols(
+    model: ModelFields, what: str, expression: Expr, also: set[Expr], problems: list[str]
+) -> None:
+    t = dynamicsymbols._t
+    known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t} | also
+    known |= {s for q in model.coordinates for s in (q, q.diff(t))}
+    found = {s for s in expression.free_symbols if s != t}
+    found |= expression.atoms(AppliedUndef) | expression.atoms(sp.Derivative)
+    inner = {a for d in expression.atoms(sp.Derivative) for a in d.atoms(AppliedUndef)}
+    for s in sorted(found - known - inner, key=str):
+        name = name_of(s) if not isinstance(s, sp.Derivative) else plain(s)
+        if what.startswith("normal") and str(s).startswith(("lambda.", "Q.")):
+            continue  # told already
+        problems.append(
+            f"{what}: {name} is neither coordinate, parameter nor input"
+            + (", and no multiplier(NAME)" if what.startswith("normal") else "")
+            + ": declare it, e.g. as a Parameter with value and unit"
+        )

@@ -1,0 +1,273 @@
+/* friction.c -- the equations of sliding,
+ *
+ *   M vdot = F - sum_f mu_f N_f d_f + G^T lambda ,  G vdot = gamma ,   d_f = G_t^T s/|s| ,
+ *
+ * with N = sign (load + c lambda) of the same instant, are linear: with (x0, lambda0) for F alone and
+ * (x_f, lambda_f) for d_f alone, from the ladder of linear.c, lambda = lambda0 - sum_f mu_f N_f lambda_f and
+ *
+ *   (1 + A) N = sign (load + c lambda0) ,   A_fg = sign_f mu_g c_f lambda_g .
+ *
+ * 1 + A is G_n M^-1 (G_n^T - sign mu G_t^T s/|s|) over G_n M^-1 G_n^T; where it is not positive there is no
+ * acceleration, or there are several (Painleve 1895; Genot & Brogliato 1999): refused by name. */
+#include "friction.h"
+
+#include <string.h>
+
+#include "digits.h"
+
+static const double SAFE = 1e-9; /* 1 + A below this counts as not positive */
+
+static void layout(Mechanism *b, Arena *arena) {
+    const System *s = b->system;
+    const int n = s->n, m = s->m, count = s->frictions;
+    struct Frictions *f = arena_take(arena, 1, sizeof *f), counted;
+    if (f == NULL) f = &counted; /* the pass that only counts */
+    f->slide = NULL;
+    f->acting = arena_ints(arena, m);
+    f->loaded = arena_ints(arena, count);
+    f->mu = arena_doubles(arena, 2 * count);
+    f->load = arena_doubles(arena, count);
+    f->c = arena_doubles(arena, s->presses);
+    f->normal = arena_doubles(arena, count);
+    f->slip = arena_doubles(arena, 2 * count);
+    f->tangential = arena_doubles(arena, 2 * count);
+    f->towards = arena_doubles(arena, 2 * count);
+    f->reserve = arena_doubles(arena, count);
+    f->sliding = arena_ints(arena, count);
+    f->d = arena_doubles(arena, n);
+    f->zero = arena_doubles(arena, m);
+    f->first = arena_doubles(arena, m);
+    f->right = arena_doubles(arena, count);
+    f->answer = arena_doubles(arena, count * n);
+    f->pushed = arena_doubles(arena, count * m);
+    f->A = arena_doubles(arena, count * count);
+    f->minor = arena_doubles(arena, count * count);
+    f->share = arena_take(arena, share_doubles(s), sizeof(double));
+    for (int k = 0; k < m && f->zero != NULL; k++) f->zero[k] = 0;
+    b->friction = f == &counted ? NULL : f;
+}
+
+void friction_slip(const Mechanism *b, int i, const double *v, double s[2]) {
+    const Friction *law = &b->system->friction[i];
+    s[1] = 0;
+    for (int r = 0; r < law->rows; r++) s[r] = mechanism_slip(b, law->row[r], v);
+}
+
+double friction_normal(const Mechanism *b, int i, const double *lambda) {
+    const Friction *law = &b->system->friction[i];
+    double sum = b->friction->load[i];
+    for (int k = law->first; k < law->first + law->normals; k++)
+        sum += b->friction->c[k] * lambda[b->system->press[k]];
+    return sum;
+}
+
+void friction_heading(const Slide *slide, const double s[2], double e[2]) {
+    const double length = hypot(s[0], s[1]);
+    e[0] = slide->direction[0];
+    e[1] = slide->direction[1];
+    if (!(length > slide->noise) || (s[1] == 0 && e[1] == 0)) return;
+    const double sense = s[0] * e[0] + s[1] * e[1] >= 0 ? 1 : -1;
+    e[0] = sense * s[0] / length;
+    e[1] = sense * s[1] / length;
+}
+
+/* f->loaded for contacts and constraints that act as in `active`. */
+static void find_loaded(Mechanism *b, const int *active) {
+    const System *s = b->system;
+    for (int i = 0; i < s->frictions; i++) {
+        const Friction *law = &s->friction[i];
+        int on = !law->gated;
+        for (int k = law->first; k < law->first + law->normals; k++) on |= active[s->press[k]];
+        b->friction->loaded[i] = on;
+    }
+}
+
+static const int *acting(Mechanism *b, const int *active) {
+    const System *s = b->system;
+    struct Frictions *f = b->friction;
+    find_loaded(b, active);
+    memcpy(f->acting, active, (size_t)s->m * sizeof *active);
+    for (int i = 0; i < s->frictions; i++)
+        for (int r = 0; r < s->friction[i].rows; r++)
+            f->acting[s->friction[i].row[r]] = f->loaded[i] && f->slide[i].sticks;
+    return f->acting;
+}
+
+/* Coefficients at the state. */
+static Status find_law(Mechanism *b, Instant at, const double *q, const double *v) {
+    const System *s = b->system;
+    struct Frictions *f = b->friction;
+    s->coulomb(at.t, q, v, at.u, at.p, f->mu, f->load, f->c);
+    for (int i = 0; i < s->frictions; i++) {
+        if (0 <= f->mu[2 * i + 1] && f->mu[2 * i + 1] <= f->mu[2 * i] && f->mu[2 * i] < HUGE_VAL)
+            continue;
+        return fail(b->why,
+                    "friction '%s' has the coefficients static = %s and kinetic = %s at t = %s s, "
+                    "expected 0 <= kinetic <= static",
+                    s->friction[i].name, digits(f->mu[2 * i]).text, digits(f->mu[2 * i + 1]).text,
+                    digits(at.t).text);
+    }
+    return OK;
+}
+
+Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value) {
+    fail(b->why, "friction ");
+    for (int i = 0; i < count; i++)
+        why_append(b->why, "%s'%s'", i > 0 ? ", " : "", b->system->friction[which[i]].name);
+    why_append(b->why,
+               ": sliding has no acceleration, or several, at t = %s s (Painleve's paradox: the normal "
+               "force would drive itself, 1 + A = %.3g, expected above 0): use a smaller coefficient of "
+               "friction, or let the bodies deform (a spring in the contact)",
+               digits(t).text, value);
+    return FAILED;
+}
+
+/* Gauss's elimination with row exchanges of A x = right, (size, size); the determinant. */
+static double eliminate(int size, double *A, double *right) {
+    double determinant = 1;
+    for (int k = 0; k < size; k++) {
+        int top = k;
+        for (int i = k + 1; i < size; i++)
+            if (fabs(A[i * size + k]) > fabs(A[top * size + k])) top = i;
+        if (A[top * size + k] == 0) return 0;
+        if (top != k) {
+            for (int j = 0; j < size; j++) {
+                const double held = A[k * size + j];
+                A[k * size + j] = A[top * size + j];
+                A[top * size + j] = held;
+            }
+            const double held = right[k];
+            right[k] = right[top];
+            right[top] = held;
+            determinant = -determinant;
+        }
+        determinant *= A[k * size + k];
+        for (int i = k + 1; i < size; i++) {
+            const double part = A[i * size + k] / A[k * size + k];
+            for (int j = k; j < size; j++) A[i * size + j] -= part * A[k * size + j];
+            right[i] -= part * right[k];
+        }
+    }
+    for (int k = size - 1; k >= 0; k--) {
+        for (int j = k + 1; j < size; j++) right[k] -= A[k * size + j] * right[j];
+        right[k] /= A[k * size + k];
+    }
+    return determinant;
+}
+
+/* d = G_t^T e of friction i. */
+static void find_push(Mechanism *b, int i) {
+    const System *s = b->system;
+    struct Frictions *f = b->friction;
+    for (int j = 0; j < s->n; j++) f->d[j] = 0;
+    for (int r = 0; r < s->friction[i].rows; r++) {
+        const int k = s->friction[i].row[r];
+        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
+            f->d[s->entry_column[e]] += b->G[e] * f->towards[2 * i + r];
+    }
+}
+
+/* The normal forces of those that slip, and what they add to vdot and lambda. */
+static Status slide(Mechanism *b, double t, int count) {
+    const System *s = b->system;
+    struct Frictions *f = b->friction;
+    const int n = s->n, m = s->m;
+    for (int g = 0; g < count; g++) {
+        find_push(b, f->sliding[g]);
+        if (linear_solve(&b->linear, f->d, f->zero, f->answer + g * n, f->pushed + g * m) != OK)
+            return FAILED;
+    }
+    for (int h = 0; h < count; h++) {
+        const int i = f->sliding[h];
+        f->right[h] = f->slide[i].sign * friction_normal(b, i, b->lambda);
+        for (int g = 0; g < count; g++) {
+            const double own = friction_normal(b, i, f->pushed + g * m) - f->load[i];
+            f->A[h * count + g] = f->slide[i].sign * f->mu[2 * f->sliding[g] + 1] * own;
+        }
+        const double own = f->A[h * count + h];
+        const double least = s->friction[i].gated ? 1 + own : 1 - fabs(own);
+        if (!(least > SAFE)) return friction_paradox(b, t, &i, 1, least);
+        f->A[h * count + h] += 1;
+    }
+    const double determinant = eliminate(count, f->A, f->right);
+    if (!(determinant > SAFE)) return friction_paradox(b, t, f->sliding, count, determinant);
+    for (int g = 0; g < count; g++) {
+        const int i = f->sliding[g];
+        const double strength = f->mu[2 * i + 1] * f->right[g];
+        f->normal[i] = f->right[g];
+        for (int j = 0; j < n; j++) b->vdot[j] -= strength * f->answer[g * n + j];
+        for (int k = 0; k < m; k++) b->lambda[k] -= strength * f->pushed[g * m + k];
+    }
+    for (int g = 0; g < count; g++) {
+        const int i = f->sliding[g];
+        for (int r = 0; r < s->friction[i].rows; r++)
+            b->lambda[s->friction[i].row[r]] =
+                -f->mu[2 * i + 1] * f->normal[i] * f->towards[2 * i + r];
+    }
+    return OK;
+}
+
+static double tangential(const Mechanism *b, int i, const double *lambda, double force[2]) {
+    const Friction *law = &b->system->friction[i];
+    force[1] = 0;
+    for (int r = 0; r < law->rows; r++) force[r] = lambda[law->row[r]];
+    return hypot(force[0], force[1]);
+}
+
+/* Are the multipliers that a friction which sticks depends on the only ones? */
+static int is_unique(const Mechanism *b, int i) {
+    const Friction *law = &b->system->friction[i];
+    int all = 1;
+    for (int r = 0; r < law->rows; r++) all &= b->linear.unique[law->row[r]];
+    for (int k = law->first; k < law->first + law->normals; k++)
+        all &= b->linear.unique[b->system->press[k]];
+    return all;
+}
+
+/* Normal force and reserve of those that stick. */
+static void hold(Mechanism *b) {
+    const System *s = b->system;
+    struct Frictions *f = b->friction;
+    const double *best = b->lambda;
+    int unique = 1;
+    for (int i = 0; i < s->frictions; i++)
+        if (f->loaded[i] && f->slide[i].sticks) unique &= is_unique(b, i);
+    if (!unique) {
+        share_best(b, f->first);
+        best = f->first;
+    }
+    for (int i = 0; i < s->frictions; i++) {
+        double force[2];
+        f->reserve[i] = 0;
+        if (!f->loaded[i] || !f->slide[i].sticks) continue;
+        f->normal[i] = fabs(friction_normal(b, i, b->lambda));
+        const double held = f->mu[2 * i] * fabs(friction_normal(b, i, best));
+        const double asked = tangential(b, i, best, force);
+        if (held + asked > 0) f->reserve[i] = (held - asked) / (held + asked);
+    }
+}
+
+static Status motion(Mechanism *b, Instant at, const double *q, const double *v,
+                     const int *active) {
+    const System *s = b->system;
+    struct Frictions *f = b->friction;
+    int sliding = 0, sticking = 0;
+    if (mechanism_evaluate(b, at, q, v) != OK || find_law(b, at, q, v) != OK) return FAILED;
+    if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
+    if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) != OK) return FAILED;
+    for (int i = 0; i < s->frictions; i++) {
+        f->normal[i] = f->reserve[i] = 0;
+        friction_slip(b, i, v, f->slip + 2 * i);
+        if (!f->loaded[i]) continue;
+        sticking |= f->slide[i].sticks;
+        if (f->slide[i].sticks) continue;
+        friction_heading(&f->slide[i], f->slip + 2 * i, f->towards + 2 * i);
+        f->sliding[sliding++] = i;
+    }
+    if (sliding > 0 && slide(b, at.t, sliding) != OK) return FAILED;
+    if (sticking) hold(b);
+    for (int i = 0; i < s->frictions; i++) tangential(b, i, b->lambda, f->tangential + 2 * i);
+    return OK;
+}
+
+const Sliding SLIDING = {layout, acting, motion};

@@ -1,0 +1,63 @@
+/* friction.h -- Coulomb friction in given modes: rows that stick act, rows that slip push against the slip.
+ *
+ *   sticks   G_t v = nu_t ,  |lambda_t| <= mu_s N
+ *   slips    lambda_t = -mu_k N s/|s| ,  s = G_t v - nu_t      (Pfeiffer & Glocker 1996, ch. 5)
+ *
+ * Which of them stick is decided in slides.c. */
+#ifndef LAGFMU_FRICTION_H
+#define LAGFMU_FRICTION_H
+
+#include "mechanism.h"
+
+/* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
+ * slip velocity where that is zero or was last known; slip velocities up to `noise` [m/s] are rounding. */
+typedef struct {
+    int sticks;
+    double sign, direction[2], noise;
+} Slide;
+
+/* What frictions do at the state of the latest motion; two entries a friction where a row is meant, the
+ * second 0 where there is only one. */
+struct Frictions {
+    const Slide *slide;  /* (frictions) the modes that hold */
+    int *acting;         /* (m) rows that act, those that stick by friction among them */
+    int *loaded;         /* (frictions) 1: something presses */
+    double *mu;          /* (2 frictions) static, kinetic */
+    double *load;        /* (frictions) [N] */
+    double *c;           /* (presses) */
+    double *normal;      /* (frictions) [N]: with its sign while it slips, its magnitude while it sticks */
+    double *slip;        /* (2 frictions) [m/s] */
+    double *tangential;  /* (2 frictions) multipliers */
+    double *towards;     /* (2 frictions) direction of slip */
+    double *reserve;     /* (frictions) mu_s N - |lambda_t| over their sum, of the best share */
+    /* scratch: */
+    int *sliding;        /* (frictions) those that slip */
+    double *d, *zero, *first, *right; /* (n), (m), (m), (frictions) */
+    double *answer;      /* (frictions n) accelerations, to each d alone */
+    double *pushed;      /* (frictions m) multipliers, to each d alone */
+    double *A, *minor;   /* (frictions^2) */
+    double *share;       /* of share.c */
+};
+
+/* What a Mechanism with frictions does besides (parts.h); NULL in an FMU without. */
+extern const Sliding SLIDING;
+
+/* G_t v - nu_t of friction i at the state that was evaluated last. */
+void friction_slip(const Mechanism *b, int i, const double *v, double s[2]);
+
+/* load + c lambda of friction i. */
+double friction_normal(const Mechanism *b, int i, const double *lambda);
+
+/* The unit vector of the slip velocity s; beyond a stop it goes on as before, so that the equations of a
+ * leg stay smooth there. */
+void friction_heading(const Slide *slide, const double s[2], double e[2]);
+
+/* The refusal of a sliding problem that has no acceleration, or several (Painleve). */
+Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value);
+
+/* share.c -- redundant sticking: of the multipliers that hold the same motion, b->lambda becomes the one of
+ * least norm within the cones, or the nearest to it; `best` (m): those of the largest least reserve. */
+size_t share_doubles(const System *s);
+void share_best(Mechanism *b, double *best);
+
+#endif

@@ -1,0 +1,40 @@
+/* slides.h -- which frictions stick and which slip, and what is watched until that changes.
+ *
+ * At s = 0 a friction sticks if the sticking solution lies within its cone, |lambda_t| <= mu_s N.  If not, it
+ * slips in the direction in which it begins to move under the force of that very slip: s/|s| = s'/|s'| with
+ * s' = G_t vdot - gamma_t of the equations of sliding (Pfeiffer & Glocker 1996, chs. 5 and 6).
+ *
+ * All of it is reached by one pointer (parts.h), NULL in an FMU without frictions. */
+#ifndef LAGFMU_SLIDES_H
+#define LAGFMU_SLIDES_H
+
+#include "friction.h"
+#include "indicators.h"
+#include "solver.h"
+
+typedef struct {
+    const Sliding *sliding;
+    /* At the start, with the contacts as they would be without frictions: all modes together. */
+    Status (*begin)(Solver *s, Instant at, int *closed, const int *touching);
+    /* At an event, `left` being the frictions' indicators: modes, levels, starts of slipping, what impacts
+     * have dissipated since the velocities were `arriving` (n; NULL: nothing). */
+    Status (*change)(Solver *s, Instant at, const int *left, const double *arriving, int *closed,
+                     const int *touching, const int *leaving);
+    /* Frictions that stuck, and of which an input has moved the surface away, slip. */
+    Status (*renew)(Solver *s);
+    /* Two indicators a friction, of the latest motion, and their ranges. */
+    void (*indicators)(const Solver *s, double *values);
+    Range (*range)(const Solver *s, int which);
+    /* 1: a direction of slip changes within a step, as two rows slip. */
+    int (*turns)(const Solver *s);
+    /* Directions of slip at the end of a step (t, y). */
+    Status (*turn)(Solver *s, double t, const double *y);
+    /* - int sum lambda_t . s dt [J] from t0 to t1, by the integrator's dense output. */
+    Status (*work)(Solver *s, double t0, double t1, double *work);
+    /* d(y')/dy and dy'/dt by differences. */
+    Status (*jacobian)(Solver *s, double t, const double *y, double *J, double *dfdt);
+} Slides;
+
+extern const Slides SLIDES;
+
+#endif

@@ -1,0 +1,25 @@
+"""What happens where frictions stick and slip; an FMU without frictions holds none of it."""
+
+from .slides import (
+    begun,
+    dissipated,
+    indicators,
+    observed,
+    ranges,
+    renewed,
+    settle,
+    switched_slides,
+    turned,
+)
+
+__all__ = [
+    "begun",
+    "dissipated",
+    "indicators",
+    "observed",
+    "ranges",
+    "renewed",
+    "settle",
+    "switched_slides",
+    "turned",
+]

@@ -1,0 +1,118 @@
+"""Redundant sticking: which of the multipliers that hold the same motion lies within the cones.
+
+Where rows depend on each other lambda is one of lambda + Z y, with Z the null space of G^T.  A friction
+sticks as long as *some* y has |lambda_t| <= mu N in every cone.  The least reserve over all cones,
+min (mu N - |lambda_t|), is a concave function of y: its maximum is found by the ellipsoid method (Shor
+1977; Boyd & Vandenberghe 2008), for one y by bisection.  What is reported is the lambda of least norm if
+that is within the cones, else the nearest on the way to the maximum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .system import Matrix, System, Vector
+
+DEPENDENT = 1e-9  # of a row's own norm, left over by the others, that counts as nothing
+WIDE = 1e2  # times the forces at work: how far is looked
+ROUNDS = 60  # bisections, and ellipsoids for each pair of unknowns
+
+
+def best_share(
+    system: System,
+    G: Matrix,
+    rows: Sequence[int],
+    lam: Vector,
+    C: Matrix,
+    load: Vector,
+    static: Vector,
+    stuck: Sequence[int],
+) -> tuple[Vector, Vector]:
+    """The multipliers (m) to report, and those of the largest reserve."""
+    Z = null_space(G, rows)
+    if not len(Z):
+        return lam, lam
+
+    def worst(y: Vector) -> tuple[float, Vector]:
+        """The least reserve, and its slope in y."""
+        least, slope = np.inf, np.zeros(len(Z))
+        there = lam + y @ Z
+        for i in stuck:
+            mine = list(system.frictions[i].rows)
+            N, t = load[i] + C[i] @ there, there[mine]
+            force = float(np.linalg.norm(t))
+            value = static[i] * abs(N) - force
+            if value < least:
+                least = value
+                slope = static[i] * (np.sign(N) or 1.0) * (Z @ C[i])
+                if force > 0:
+                    slope = slope - Z[:, mine] @ (t / force)
+        return least, slope
+
+    wide = WIDE * max(float(np.abs(lam).max()), float(np.abs(load).max(initial=0.0)))
+    best = _highest(worst, len(Z), wide)
+    low, high = 0.0, 1.0
+    if worst(0 * best)[0] < 0:
+        for _ in range(ROUNDS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if worst(middle * best)[0] < 0 else (low, middle)
+        low = high
+    return lam + (low * best) @ Z, lam + best @ Z
+
+
+def null_space(G: Matrix, rows: Sequence[int]) -> Matrix:
+    """Z (dependent rows, m), orthonormal: Z G = 0, by elimination of each row by those before it."""
+    basis: list[Vector] = []  # orthonormal combinations of rows
+    made: list[Vector] = []  # and of what they are made
+    found: list[Vector] = []
+    m = len(G)
+    for k in rows:
+        norm = float(np.linalg.norm(G[k]))
+        rest, of = G[k].copy(), np.zeros(m)
+        of[k] = 1.0
+        for _ in range(2):  # twice is enough (Kahan)
+            for b, c in zip(basis, made, strict=True):
+                part = float(b @ rest)
+                rest, of = rest - part * b, of - part * c
+        left = float(np.linalg.norm(rest))
+        if left > DEPENDENT * norm:
+            basis.append(rest / left)
+            made.append(of / left)
+        else:
+            found.append(of)
+    for i, z in enumerate(found):
+        for other in found[:i]:
+            z = z - (other @ z) * other
+        found[i] = z / np.linalg.norm(z)
+    return np.array(found).reshape(len(found), m)
+
+
+def _highest(worst: object, count: int, wide: float) -> Vector:
+    """y of the largest least reserve within `wide`."""
+    assert callable(worst)
+    y = np.zeros(count)
+    best, top = y, worst(y)[0]
+    if count == 1:
+        low, high = -wide, wide
+        for _ in range(2 * ROUNDS):
+            y = np.array([(low + high) / 2])
+            value, slope = worst(y)
+            if value > top:
+                best, top = y, value
+            low, high = (float(y[0]), high) if slope[0] > 0 else (low, float(y[0]))
+        return best
+    P = np.eye(count) * wide**2
+    n = float(count)
+    for _ in range(ROUNDS * count * count):
+        value, slope = worst(y)
+        if value > top:
+            best, top = y, value
+        size = float(slope @ P @ slope)
+        if not size > 0:
+            break
+        g = P @ slope / np.sqrt(size)
+        y = y + g / (n + 1)
+        P = n**2 / (n**2 - 1) * (P - 2 / (n + 1) * np.outer(g, g))
+    return best

@@ -1,0 +1,74 @@
+"""Ball thrown without spin along the lane: it slides, then rolls (Coriolis 1835).
+
+x [m] along the lane, z [m] above it, phi [rad] the turn.  lambda.touch [N] is the friction along x.
+It rolls after 2 v0/(7 mu g), at (5/7) v0.
+"""
+
+from sympy import Min, Rational, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import (
+    ClosedForm,
+    Conserved,
+    Contact,
+    Friction,
+    Model,
+    Nonholonomic,
+    Output,
+    Parameter,
+    Scene,
+    initial,
+    multiplier,
+    output,
+)
+
+t = dynamicsymbols._t
+x, z, phi = dynamicsymbols("x z phi")
+m, R, g, mu = symbols("m R g mu", positive=True)
+
+model = Model(
+    name="Bowling",
+    lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2
+    + Rational(1, 5) * m * R**2 * phi.diff() ** 2
+    - m * g * z,
+    coordinates={x: "m", z: "m", phi: "rad"},
+    constraints=[
+        Contact("lane", z, "the ball lies on the lane"),
+        Nonholonomic("touch", x.diff() - R * phi.diff(), "the point of contact rests"),
+        Friction("grip", of=["touch"], normal=multiplier("lane"), static=mu),
+    ],
+    parameters=[
+        Parameter(m, 7.0, "kg", "mass of the ball", min=0),
+        Parameter(R, 0.108, "m", "radius of the ball", min=0),
+        Parameter(g, 9.81, "m/s^2", "acceleration of gravity", min=0),
+        Parameter(mu, 0.12, "1", "coefficient of friction", min=0),
+    ],
+    outputs=[
+        Output("slide.power", multiplier("touch") * x.diff(), "W", "work of friction on the way")
+    ],
+    start={x: 0.0, x.diff(): 8.0},
+    description="Ball thrown without spin that slides, then rolls",
+    descriptions={x: "distance along the lane", z: "height above it", phi: "rotation"},
+)
+
+scenes = [Scene("Bowling", stop_time=3.0, step_size=0.01)]
+
+v0 = initial(x.diff()) - R * initial(phi.diff())  # of the slip, taken to be positive
+end = 2 * v0 / (7 * mu * g)
+slid = Min(t, end)
+speed = initial(x.diff()) - mu * g * slid
+
+closed_forms = [
+    ClosedForm(
+        "x", initial(x) + initial(x.diff()) * slid - mu * g * slid**2 / 2 + speed * (t - slid)
+    ),
+    ClosedForm("der(x)", speed),
+    ClosedForm("R phi'", initial(phi.diff()) * R + 5 * mu * g * slid / 2, actual=R * phi.diff()),
+    ClosedForm(
+        "heat",
+        mu * m * g * (v0 * slid - 7 * mu * g * slid**2 / 4),
+        actual=output("energy.dissipated"),
+    ),
+    ClosedForm("lambda.lane", m * g),
+    Conserved("energy and heat", output("energy.total") + output("energy.dissipated")),
+]

@@ -1,0 +1,302 @@
+"""Coulomb friction: what sticks, what slips, when, and what becomes of the energy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from instance import instance
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import (
+    Contact,
+    Friction,
+    Holonomic,
+    Model,
+    Nonholonomic,
+    Parameter,
+    Scene,
+    multiplier,
+    simulate,
+)
+from lagfmu.errors import ModelError
+from lagfmu.fmu.claims import claims_of
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
+from lagfmu.verification.verify import check_claim
+
+MODELS = Path(__file__).parent.parent / "models"
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+g = 9.81  # m/s^2
+FILES = {
+    "FrictionOscillator": "friction_oscillator",
+    "Belt": "belt",
+    "InclineFriction": "incline_friction",
+    "Bowling": "bowling",
+    "RoughHemisphere": "rough_hemisphere",
+}
+Build = Callable[..., Path]
+
+
+@pytest.fixture(scope="module")
+def rubbing(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """rubbing(NAME): path of the native FMU of a model with friction, built once."""
+    made: dict[tuple[str, str], Path] = {}
+
+    def get(name: str, target: str = "native") -> Path:
+        if (name, target) not in made:
+            file = load(MODELS / f"{FILES[name]}.py")
+            folder = tmp_path_factory.mktemp(target)
+            prepared = prepare(file.model, file.scenes[0])
+            made[name, target] = write(prepared, folder, file.closed_forms, target=target)
+        return made[name, target]
+
+    return get
+
+
+def built(model: Model, folder: Path) -> Path:
+    return write(prepare(model, Scene(model.name)), folder, (), target="native")
+
+
+def misses(name: str, result: Any, values: dict[str, float], tolerance: float) -> dict[str, float]:
+    """The closed forms of a model's file that a run reached, with their errors over what is allowed."""
+    file = load(MODELS / f"{FILES[name]}.py")
+    known = {str(p.symbol): p.value for p in file.model.parameters} | values
+    found = {}
+    for claim in claims_of(file.scenes[0], file.closed_forms):
+        check = check_claim(claim, result, known, tolerance)
+        if check.points:
+            found[claim.name] = check.error / check.allowed
+    return found
+
+
+RUNS: dict[str, list[dict[str, float]]] = {
+    "FrictionOscillator": [{}, {"x": -0.3, "k": 40.0, "mu_k": 0.1, "mu_s": 0.1}, {"x": 0.02}],
+    "Belt": [{}, {"speed": 0.5, "der(x)": 0.5, "mu_s": 0.8, "k": 50.0}],
+    "InclineFriction": [
+        {},
+        {"alpha": np.arctan(3 * 0.4) * 1.001},
+        {"alpha": np.arctan(3 * 0.4) * 0.999},
+        {"alpha": np.arctan(3.5 * 0.4) * 1.001, "kappa": 0.4},
+        {"alpha": np.arctan(3.5 * 0.4) * 0.999, "kappa": 0.4},
+        {"alpha": 0.2, "der(y)": 1.5},
+        {"alpha": 0.2, "der(theta)": 20.0},
+        {"alpha": 0.2, "der(y)": -1.0, "der(theta)": 3.0, "kappa": 1.0},
+    ],
+    "Bowling": [{}, {"der(x)": 3.0, "der(phi)": -20.0, "mu": 0.3}],
+    "RoughHemisphere": [{}, {"theta": 0.2}, {"theta": 0.4, "mu_k": 0.3}, {"der(theta)": 0.9}],
+}
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-11])
+@pytest.mark.parametrize("name", sorted(RUNS))
+def test_each_motion_is_that_of_its_closed_forms(
+    rubbing: Build, name: str, tolerance: float
+) -> None:
+    """Sticking, slipping, turning round, leaving: in long steps, at several parameters and starts."""
+    reached: set[str] = set()
+    for values in RUNS[name]:
+        result = simulate(rubbing(name), tolerance=tolerance, start_values=values, step_size=0.0437)
+        found = misses(name, result, values, max(tolerance, 1e-11))
+        assert all(miss < 1 for miss in found.values()), (values, found)
+        reached |= found.keys()
+    file = load(MODELS / f"{FILES[name]}.py")
+    assert reached == {c.name for c in claims_of(file.scenes[0], file.closed_forms)}
+
+
+@pytest.mark.parametrize("name", sorted(RUNS))
+def test_multiplier_stays_within_the_cone(rubbing: Build, name: str) -> None:
+    """|lambda| <= mu_s N while it sticks; lambda = -mu_k N s/|s| and power <= 0 while it slips."""
+    file = load(MODELS / f"{FILES[name]}.py")
+    law = file.model.frictions[0]
+    row, normal = law.of[0], str(next(iter(law.normal.free_symbols)))
+    for values in RUNS[name]:
+        result = simulate(rubbing(name), start_values=values, step_size=0.0131)
+        known = {str(p.symbol): p.value for p in file.model.parameters} | values
+        mu_s, mu_k = known[str(law.static)], known[str(law.sliding)]
+        lam, N, slip = result[f"lambda.{row}"], result[normal], result[f"slip.{row}"]
+        sticks = result["sticks.grip"]
+        scale = 1e-12 * float(np.abs(N).max())
+        assert (np.abs(lam[sticks]) <= mu_s * N[sticks] + scale).all()
+        sliding = ~sticks & (np.abs(slip) > 1e-9)
+        assert lam[sliding] == pytest.approx(-mu_k * N[sliding] * np.sign(slip[sliding]), abs=scale)
+        assert (result["power.grip"] <= 0).all()
+        assert (np.diff(result["energy.dissipated"]) >= -1e-13).all()
+        assert result["margin.grip"] == pytest.approx(mu_s * N - np.abs(lam), abs=scale)
+
+
+def test_time_of_each_slip_is_located_to_rounding(rubbing: Build) -> None:
+    """Stick-slip on the belt: the fourth slip begins after the first ride and three periods, within ten
+    tolerances of the time that has passed."""
+    m, k, v, mu_s, mu_k = 1.0, 100.0, 0.2, 0.5, 0.3
+    d, omega = (mu_s - mu_k) * m * g / k, np.sqrt(k / m)
+    period = 2 * d / v + 2 / omega * (np.pi - np.arctan(d * omega / v))
+    for tolerance in (1e-8, 1e-10, 1e-12):
+        result = simulate(rubbing("Belt"), stop_time=3.0, step_size=0.5, tolerance=tolerance)
+        count = int(result["slipping.grip.count"][-1])
+        expected = mu_s * m * g / k / v + (count - 1) * period
+        assert count >= 3
+        assert abs(result["slipping.grip.time"][-1] - expected) < 10 * tolerance * expected
+
+
+@pytest.mark.parametrize("name", ["Belt", "FrictionOscillator", "RoughHemisphere"])
+def test_events_do_not_depend_on_the_communication_step(rubbing: Build, name: str) -> None:
+    """Short steps, long steps: the same end, the same starts of slipping."""
+    ends = [
+        simulate(rubbing(name), stop_time=2.0, step_size=h, tolerance=1e-11)[-1]
+        for h in (2.0, 0.1, 0.003)
+    ]
+    for end in ends[1:]:
+        for column in ends[0].dtype.names:
+            if column != "solver.steps":
+                a, b = float(end[column]), float(ends[0][column])
+                assert a == pytest.approx(b, rel=1e-8, abs=1e-8), column
+
+
+@pytest.mark.parametrize("name", ["Belt", "FrictionOscillator", "RoughHemisphere", "Bowling"])
+def test_rollback_across_every_transition_gives_the_same_bits(rubbing: Build, name: str) -> None:
+    """A step that is taken, undone and taken again: all outputs are equal to the bit, saved or serialized."""
+    with instance(rubbing(name)) as one:
+        one.start()
+        outputs = [n for n, v in one.variables.items() if v.causality == "output"]
+        for count in range(60):
+            before = one.fmu.getFMUState()
+            bytes_before = one.fmu.serializeFMUState(before)
+            one.fmu.doStep(count * 0.05, 0.05)
+            first = [one.get(n) for n in outputs]
+            one.fmu.setFMUState(before)
+            one.fmu.doStep(count * 0.05, 0.02)
+            one.fmu.setFMUState(one.fmu.deSerializeFMUstate(bytes_before))
+            one.fmu.doStep(count * 0.05, 0.05)
+            assert [one.get(n) for n in outputs] == first
+            one.fmu.freeFMUState(before)
+
+
+@pytest.mark.parametrize("name", ["Belt", "RoughHemisphere"])
+def test_both_targets_tell_the_same_motion(rubbing: Build, name: str) -> None:
+    """All outputs of the native and of the python FMU, at 20 instants, through every transition."""
+    run = {"tolerance": 1e-9, "stop_time": 2.0, "step_size": 0.1}
+    ours, theirs = (simulate(rubbing(name, target), **run) for target in ("native", "python"))
+    assert ours.dtype.names == theirs.dtype.names
+    for column in ours.dtype.names:
+        if column != "solver.steps":
+            a, b = (np.asarray(x[column], dtype=float) for x in (ours, theirs))
+            assert a == pytest.approx(b, rel=1e-6, abs=1e-6 * max(1e-3, np.abs(b).max())), column
+
+
+# ------------------------------------------------------------------ what is refused
+
+x, y, u = dynamicsymbols("x y u")
+m, mu = symbols("m mu", positive=True)
+G = symbols("g", positive=True)
+
+
+def block(*constraints: Any, **more: Any) -> Model:
+    """A block on a table, pushed by nothing."""
+    return Model(
+        name="Block",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * G * y,
+        coordinates={x: "m", y: "m"},
+        constraints=[
+            Contact("table", y),
+            Nonholonomic("rest", x.diff()),
+            *constraints,
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(G, 9.81, "m/s^2"),
+            Parameter(mu, 0.3, "1"),
+        ],
+        **more,
+    )
+
+
+N = multiplier("table")
+WRONG = {
+    "of names what is not there": (
+        [Friction("grip", of=["rset"], normal=N, static=mu)],
+        r"names 'rset', which is no constraint of this model \(constraints: table, rest\)",
+    ),
+    "of is no list": ([Friction("grip", of="rest", normal=N, static=mu)], "expected a list"),
+    "of is a contact": (
+        [Friction("grip", of=["table"], normal=N, static=mu)],
+        "names the contact 'table'",
+    ),
+    "normal names what is not there": (
+        [Friction("grip", of=["rest"], normal=multiplier("tabel"), static=mu)],
+        "lambda.tabel is no multiplier of this model's constraints",
+    ),
+    "normal is not linear": (
+        [Friction("grip", of=["rest"], normal=N**2 / (m * G), static=mu)],
+        "is not linear in the multipliers",
+    ),
+    "normal is no force": (
+        [Friction("grip", of=["rest"], normal=N * m, static=mu)],
+        "expected N",
+    ),
+    "normal is limited itself": (
+        [Friction("grip", of=["rest"], normal=multiplier("rest"), static=mu)],
+        "is itself limited by the friction 'grip'",
+    ),
+    "mu is negative": (
+        [Friction("grip", of=["rest"], normal=N, static=-0.1)],
+        "static of friction 'grip' is -0.1",
+    ),
+    "mu is not a number": (
+        [Friction("grip", of=["rest"], normal=N, static=float("nan"))],
+        "expected a number of at least 0",
+    ),
+    "mu has a unit": (
+        [Friction("grip", of=["rest"], normal=N, static=mu * m)],
+        "static of friction 'grip'.*expected 1",
+    ),
+    "kinetic above static": (
+        [Friction("grip", of=["rest"], normal=N, static=0.2, kinetic=0.3)],
+        "kinetic = 0.3 is above static = 0.2",
+    ),
+    "multiplier is no force": (
+        [
+            Holonomic("circle", x**2),
+            Friction("grip", of=["circle"], normal=N, static=mu),
+        ],
+        "the multiplier of 'circle' is in N/m, expected N",
+    ),
+    "one row in two frictions": (
+        [
+            Friction("grip", of=["rest"], normal=N, static=mu),
+            Friction("other", of=["rest"], normal=N, static=mu),
+        ],
+        "belongs to the frictions 'grip' and 'other'",
+    ),
+    "an unknown symbol": (
+        [Friction("grip", of=["rest"], normal=N, static=symbols("nu"))],
+        "nu is neither coordinate, parameter nor input",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", sorted(WRONG))
+def test_a_friction_that_makes_no_sense_is_refused_with_the_remedy(case: str) -> None:
+    """The message names the friction, what was found and what was expected."""
+    constraints, words = WRONG[case]
+    with pytest.raises(ModelError, match=words):
+        block(*constraints)
+
+
+def test_the_minimal_formulation_is_refused_by_name() -> None:
+    """It eliminates the normal force, which the cone needs."""
+    model = block(Friction("grip", of=["rest"], normal=N, static=mu))
+    with pytest.raises(ModelError, match="'minimal' with friction"):
+        prepare(model, Scene("Block", formulation="minimal"))
+
+
+def test_a_multiplier_in_a_force_is_told_of_friction() -> None:
+    """A force that is limited by another is a Friction, not an expression."""
+    with pytest.raises(ModelError, match="is a Friction in `constraints`"):
+        block(forces={x: -mu * N})

@@ -1,0 +1,84 @@
+"""`lagfmu stress` at contacts that are struck together: what is right passes, a wrong law is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from impact_models import corner, cradle, rod, table, wedge
+
+import lagfmu.fmu.native
+from lagfmu import Scene
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.model.model import Model
+from lagfmu.prepare.prepare import prepare
+from lagfmu.study.stress import impacts
+from lagfmu.study.stress.bench import Bench
+from lagfmu.study.stress.geometry import lay_geometry, twin
+from lagfmu.study.stress.probe import RIGHT, WRONG, Row, attempt, verdict
+
+pytestmark = [
+    pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
+    pytest.mark.filterwarnings("ignore:.*follows? from the others"),
+]
+
+
+def probed(model: Model, folder: Path) -> dict[str, Row]:
+    """Every row of the family."""
+    scene = Scene(model.name, stop_time=2.0)
+    one = prepare(model, scene)
+    path = write(one, folder, [], target="native")
+    lay_geometry(path, one)
+    turned = replace(model, constraints=tuple(reversed(model.constraints)))
+    write(prepare(turned, scene), folder / "reversed", [], target="native").replace(twin(path))
+    with Bench(path, quick=False) as bench:
+        found = [
+            verdict(p, attempt(p, bench), 0.0) for p in impacts.probes(bench.facts, bench.quick)
+        ]
+    return {row.probe: row for row in found}
+
+
+@pytest.mark.parametrize(
+    ("model", "sets"),
+    [(rod(), 3), (table(), 9), (wedge(value=0.5), 3), (cradle(4), 4), (corner(tilt=0.3), 3)],
+    ids=["rod", "table", "wedge", "cradle", "corner"],
+)
+def test_impacts_together_are_right(model, sets, tmp_path):
+    """Each set of contacts that can close together keeps Newton's law, the energy, the order and the
+    symmetry: a table has 9 of them, since three legs on the floor have the fourth on it."""
+    rows = probed(model, tmp_path)
+    assert len(rows) == sets
+    assert {row.verdict for row in rows.values()} == {RIGHT}
+    assert all(row.checks >= 12 for row in rows.values())
+
+
+ONE_BY_ONE = "if (entering[c] && x.k == 0) x.contact[x.k++] = c;"
+MUTANTS: dict[str, tuple[str, str]] = {
+    "one after another": ("if (entering[c]) x.contact[x.k++] = c;", ONE_BY_ONE),
+    "the same e twice": (
+        "(1 + x->e[row]) * x->slip[row];",
+        "(1 + 1.1 * x->e[row]) * x->slip[row];",
+    ),
+    "a contact that pulls": (
+        "x->active[row] = pass == 0 ? x->w[i] == 0 : x->z[i] > 0;",
+        "x->active[row] = 1;",
+    ),
+}
+
+
+@pytest.mark.parametrize("mutant", MUTANTS)
+def test_a_wrong_law_of_impacts_is_found(mutant, tmp_path, monkeypatch):
+    """Contacts taken one after another, a rebound too fast by a tenth of e, contacts that pull: each is
+    wrong in some row."""
+    files: Callable[[], dict[str, Any]] = lagfmu.fmu.native.runtime_files
+    old, new = (text.encode() for text in MUTANTS[mutant])
+    changed = files()
+    assert changed["impact.c"].count(old) == 1
+    changed["impact.c"] = changed["impact.c"].replace(old, new)
+    monkeypatch.setattr(lagfmu.fmu.native, "runtime_files", lambda: changed)
+    rows = probed(rod(inertia=4.0, theta=0.2), tmp_path) | probed(corner(tilt=0.3), tmp_path)
+    assert any(row.verdict == WRONG for row in rows.values())
