@@ -20,6 +20,7 @@ from .archive import pack
 from .claims import pack_closed_forms
 from .compiler import HOST
 
+SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
 TARGETS = ("python", "native")
 PAGE = "documentation/index.html"
 LIVE = "documentation/play.html"  # beside it, which has a link to it
@@ -91,10 +92,20 @@ def put(path: Path, more: Mapping[str, bytes]) -> None:
 
 
 def _as_built(prepared: Prepared, target: str) -> Prepared:
-    """A python FMU has no model exchange."""
-    if target == "native":
-        return prepared
-    return replace(prepared, table=prepared.table.without_local_derivatives())
+    """With the nominal values of states; a python FMU has no model exchange."""
+    table = prepared.table.with_nominals(_nominals(prepared))
+    return replace(
+        prepared, table=table if target == "native" else table.without_local_derivatives()
+    )
+
+
+def _nominals(prepared: Prepared) -> dict[str, float]:
+    """The sizes of coordinates at the described start, and times the natural rate those of velocities."""
+    state = prepared.structure.start.state
+    states = prepared.whole.states  # a coordinate, its velocity, the next coordinate, ...
+    sizes = dict(zip(states[::2], state.size, strict=True))
+    rates = {v: size * state.rate for v, size in zip(states[1::2], state.size, strict=True)}
+    return {n: float(f"{x:.1e}") for n, x in (sizes | rates).items() if x > SMALLEST_NOMINAL}
 
 
 def write_whole(path: Path, content: bytes) -> None:

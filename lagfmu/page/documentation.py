@@ -153,6 +153,7 @@ def _group(v: Variable) -> str:
     if v.name.startswith("solver."):
         return "Solver"
     by_role = {"parameter": "Parameters", "input": "Inputs", "start": "Motion"}
+    by_role["estimate"] = "Inputs"
     return by_role.get(v.role) or HEADS.get(v.name.split(".")[0], "Motion")
 
 
