@@ -134,6 +134,7 @@ class Bench:
             "share": [f"Q.{e}" for e in entries],
             "departure_q": [f"departure.{e}" for e in each],
             "departure_v": [f"departure.{e}" for e in rates],
+            "own": [own.name for own in full.outputs],
         }
         if self.system is not full:
             names |= _motion_names(system.coordinates, "s", "sdot", "sddot")
