@@ -60,6 +60,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
         s->active_full = arena_ints(scratch, system->full->m);
     }
     s->active = arena_ints(scratch, m);
+    s->scale = arena_doubles(scratch, 2 * n);
     s->u = arena_doubles(scratch, system->inputs + system->jumps);
     s->work_jumps = arena_doubles(scratch, system->jumps > 0 ? 2 * system->jumps + n : 0);
     s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);

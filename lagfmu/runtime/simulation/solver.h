@@ -17,6 +17,7 @@ typedef struct {
     Mechanism stepped, full;   /* full: of an embedding; otherwise unused */
     Integrator integrator, probe; /* probe: integrates again from the last accepted point */
     int *active;               /* (m) rows that act in the present modes */
+    double *scale;             /* (2 n) of errors, in the present step */
     double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
     /* scratch, nothing of which is kept from one call to the next: */
