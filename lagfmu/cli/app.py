@@ -29,6 +29,7 @@ from ..model.formula import with_outputs
 from ..model.goal import parse
 from ..model.library import known, new
 from ..model.scene import Scene
+from ..page.text import show as show_prepared
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
@@ -51,7 +52,6 @@ from .options import (
     Outputs,
     narrowed,
 )
-from .show import show as show_prepared
 from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
