@@ -16,6 +16,8 @@ from rich.console import Console
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, find_compiler, host
 from .fmu.write import put, put_figures, write
+from .live.playable import playable
+from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
 from .model.file import load
 from .model.goal import parse
@@ -48,6 +50,7 @@ def build_fmu(
     platforms: Sequence[str] = (HOST,),
     check: bool = True,
     reference: bool = False,
+    page: bool = False,
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
@@ -59,12 +62,15 @@ def build_fmu(
     is simulated only if it has a binary for this machine.  With `reference` it carries the results of its
     default experiment at a tolerance of 1e-12 (FMI-LS-REF).
 
+    With `page` its documentation holds the page in which it runs (documentation/play.html), which needs
+    ziglang.
+
     Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
     VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
     scene, choice = settled(model, scene or Scene(model.name), closed_forms, target)
     prepared = prepare(model, scene)
-    built = package(prepared, out, closed_forms, target, platforms, choice, check, reference)
+    built = package(prepared, out, closed_forms, target, platforms, choice, check, reference, page)
     found = built.verification
     if found is not None and not found.passed:
         failed = "; ".join(str(c) for c in found.checks if not c.passed)
@@ -134,13 +140,15 @@ def package(
     choice: str = "",
     check: bool = True,
     reference: bool = False,
+    page: bool = False,
 ) -> Built:
     """What `prepare` made as an FMU: built once, verified once, its figures put in."""
-    path = write(prepared, out, closed_forms, target, platforms, choice)
+    live = render(playable(prepared)) if page else ""
+    path = write(prepared, out, closed_forms, target, platforms, choice, live)
     runs_here = target == "python" or host() in chosen(platforms)
     found = verify_fmu(path) if check and runs_here else None
     if found is not None:
-        put_figures(path, prepared, found.rows(), target, choice)
+        put_figures(path, prepared, found.rows(), target, choice, page)
     if reference and runs_here:
         put(path, layered(path, found))
     return Built(path, found)

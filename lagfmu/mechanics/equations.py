@@ -133,6 +133,12 @@ class EquationsOfMotion(Displayed):
         return tuple(by_symbol[s] for s in self.p)
 
     @cached_property
+    def estimated(self) -> frozenset[Expr]:
+        """The prescribed motions whose rates, up to the third, are taken from communication points."""
+        found = {i.symbol for i in self.model.inputs if i.rates == "estimated"}
+        return frozenset(self.symbols[s] for s in found) & set(self.u)
+
+    @cached_property
     def lookups(self) -> list[tuple[Spline, Expr]]:
         """The tables that end somewhere, each with an argument of the state by which it is looked up."""
         if not any(s.ends != "periodic" for s in self.model.splines):
@@ -347,8 +353,10 @@ def _inputs(model: Model, table: dict[Expr, Expr]) -> tuple[tuple[Expr, ...], di
         u.append(table.get(i.symbol, i.symbol))
         if i in model.prescribed:
             first, second = table[i.symbol.diff(TIME)], table[i.symbol.diff(TIME, 2)]
+            rates |= {u[-1]: first, first: second}
             u += [first, second]
-            rates |= {u[-3]: first, first: second}
+            if i.rates == "estimated":
+                u.append(sp.Symbol(f"der({name_of(i.symbol)},3)", real=True))
     return tuple(u), rates
 
 

@@ -63,7 +63,7 @@ class Model(ModelFields, Displayed):
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
     numbers in SI.  `descriptions` may explain coordinates.  `outputs` are quantities besides those
     that every FMU reports, `picture` how it looks.  A `Friction` is written among `constraints` and kept in
-    `frictions`.
+    `frictions`.  `author`, `version`, `license` and `copyright` are told to importers.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """

@@ -82,7 +82,8 @@ class System:
     surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
     is a whole number; `driven`: length of u, the inputs and the levels of jumps behind them.
 
-    `outputs` are those of the model's own.  `energies` is None where they are not read.  The full
+    `estimated` are those of `prescribed` that are followed by a third derivative.  `outputs` are those of
+    the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
     `restitution` are None too.
     """
@@ -107,6 +108,7 @@ class System:
     frictions: tuple[Friction, ...] = ()
     coulomb: Callable[..., Any] | None = None
     lookups: Lookups | None = None
+    estimated: tuple[int, ...] = ()
     surfaces: Callable[..., Any] | None = None
     floors: tuple[bool, ...] = ()
     driven: int = 0
@@ -184,6 +186,11 @@ class System:
         for k in self.prescribed:
             w[k] = u[k] + elapsed * (u[k + 1] + elapsed * u[k + 2] / 2)
             w[k + 1] = u[k + 1] + elapsed * u[k + 2]
+        for k in self.estimated:
+            third = elapsed * u[k + 3]
+            w[k] += elapsed * elapsed * third / 6
+            w[k + 1] += elapsed * third / 2
+            w[k + 2] += third
         return w
 
 

@@ -189,8 +189,8 @@ def is_ours(path: Path) -> bool:
 
 
 def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
-    """A text is a value for a String variable only."""
-    texts = {v.name for v in description.modelVariables if v.type == "String"}
+    """A text is a value for an Enumeration only."""
+    texts = {v.name for v in description.modelVariables if v.type == "Enumeration"}
     wrong = [f"{k} = {v!r}" for k, v in given.items() if isinstance(v, str) and k not in texts]
     if wrong:
         raise SimulationError(f"{', '.join(wrong)}: expected a number")
@@ -215,9 +215,10 @@ def claims_in(path: Path) -> list[Claim]:
             v = variables.get(name)
             if v is None:
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
-            elif (v.type == "Boolean") != name.startswith(
-                ("contact.", "sticks.")
-            ) or v.type == "String":
+            elif (v.type == "Boolean") != name.startswith(("contact.", "sticks.")) or v.type in (
+                "String",
+                "Enumeration",
+            ):
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))

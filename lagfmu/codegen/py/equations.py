@@ -179,6 +179,7 @@ def _system(
         f"    energies={'energies' if energies else None},\n"
         f"    restitution={f'{prefix}restitution' if rebounds else None},\n"
         f"    prescribed={_prescribed(eom)!r},\n"
+        f"{_estimated(eom)}"
         f"    like={_like(eom)!r},\n"
         f"    extent={_extent(eom)!r},\n"
         f"    folded={tuple(eom.folded(unit) for unit in _units(eom))!r},\n"
@@ -318,6 +319,11 @@ def _strings(symbols: Sequence[Expr]) -> str:
 
 def _pattern(indices: Sequence[tuple[int, int]]) -> str:
     return repr((tuple(i for i, _ in indices), tuple(j for _, j in indices)))
+
+
+def _estimated(eom: EquationsOfMotion) -> str:
+    found = tuple(k for k, s in enumerate(eom.u) if s in eom.estimated)
+    return f"    estimated={found!r},\n" if found else ""
 
 
 def _prescribed(eom: EquationsOfMotion) -> tuple[int, ...]:

@@ -47,6 +47,8 @@ struct System {
     const int *row_start;     /* (m + 1) where each row of G begins among its entries */
     int prescribed_count;
     const int *prescribed;    /* positions in u where a prescribed motion begins: u, der(u), der(u,2) */
+    int estimated_count;
+    const int *estimated;     /* positions of those that der(u,3) follows: their rates are estimated */
     const int *dimension;        /* (n) coordinates of one physical dimension have one number */
     const double *folded;        /* (n) the largest magnitude of the dimension among parameters that are
                                   * numbers in the code; NULL: there are none */

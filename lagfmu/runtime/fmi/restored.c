@@ -215,6 +215,20 @@ static Status arrays(Instance *x) {
     return ints(x, flags, sizeof flags / sizeof *flags);
 }
 
+/* The points that rates are estimated from go back in time. */
+static Status pasts(Instance *x) {
+    for (int i = 0; i < x->solver.system->estimated_count; i++) {
+        const Past *past = &x->past[i];
+        if (past->count < 0 || past->count > RATES_KEPT || !(fabs(past->rate) <= DBL_MAX))
+            return no_state(x, "past of an input", past->count);
+        for (int k = 0; k < past->count; k++)
+            if (!(fabs(past->u[k]) <= DBL_MAX && fabs(past->t[k]) <= DBL_MAX) ||
+                (k > 0 && !(past->t[k] < past->t[k - 1])))
+                return no_state(x, "past of an input", past->t[k]);
+    }
+    return OK;
+}
+
 /* What the importer has set is inside of the bounds that the description states. */
 static Status bounds(Instance *x) {
     for (int k = 0; k < VARIABLE_COUNT; k++) {
@@ -237,5 +251,6 @@ Status instance_restored(Instance *x) {
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (x->running && !x->started) return no_state(x, "mode", x->running);
     if (settings(x) != OK || choice(x) != OK || times(x) != OK) return FAILED;
+    if (pasts(x) != OK) return FAILED;
     return arrays(x) == OK ? bounds(x) : FAILED;
 }
