@@ -119,7 +119,8 @@ class Tables:
             **{
                 name: p + name if name in functions else "NULL"
                 for name in (
-                    *("dynamics", "residual", "surfaces", "energies", "restitution", "tangent"),
+                    *("dynamics", "residual", "surfaces", "bounds"),
+                    *("energies", "restitution", "tangent"),
                 )
             },
             "embed": "embed" if p else "NULL",
