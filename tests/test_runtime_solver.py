@@ -38,7 +38,7 @@ from lagfmu.solver.precedence import GIVEN, OMITTED, SET
 from lagfmu.solver.state import Settings
 
 EPS = np.finfo(float).eps
-ABOVE = {"fmi2.c", "instance.c", "exchange.c"}  # what stands on the solver
+ABOVE = {"fmi2.c", "batch.c", "instance.c", "exchange.c", "restored.c"}  # what stands on the solver
 SOURCES = sorted(name for name in RUNTIME_FILES if name.endswith(".c") and name not in ABOVE)
 BENCH = Path(__file__).with_name("solver_bench.c")
 

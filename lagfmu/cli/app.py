@@ -24,18 +24,23 @@ from ..fmu.native import takes_long
 from ..fmu.write import write_whole
 from ..interface.variables import VariableTable
 from ..live.command import write_page
+from ..live.playable import told_by
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
+from ..model.library import known, new
 from ..model.scene import Scene
+from ..page.text import show as show_prepared
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
 from ..verification.crosscheck import as_csv, write_crosscheck
+from ..verification.plot import plot
 from ..verification.reference import read_table
 from ..verification.report import exit_code
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification
+from .film import film
 from .options import (
     AddOutput,
     Contacts,
@@ -49,8 +54,6 @@ from .options import (
     Outputs,
     narrowed,
 )
-from .plot import plot
-from .show import show as show_prepared
 from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
@@ -159,6 +162,10 @@ def build(
             "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
         ),
     ] = None,
+    page_: Annotated[
+        bool,
+        typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
+    ] = False,
     outputs: Outputs = None,
     fixed: Fixed = None,
     inputs: Inputs = None,
@@ -196,7 +203,15 @@ def build(
                 if name is None and any(v is not None for v in narrowing):
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
                 built = package(
-                    prepared, out / kind, file.closed_forms, kind, places, choice, check, reference
+                    prepared,
+                    out / kind,
+                    file.closed_forms,
+                    kind,
+                    places,
+                    choice,
+                    check,
+                    reference,
+                    page_,
                 )
             path, found = built.path, built.verification
             console.print(
@@ -230,6 +245,20 @@ def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
     if target is Target.native and takes_long(platforms):
         return " (the runtime is compiled first: for Windows the C library too, about a minute)"
     return ""
+
+
+@app.command(name="new")
+def new_command(
+    file: Annotated[Path, typer.Argument(help="The Python file to write.")],
+    source: Annotated[
+        str | None, typer.Option("--from", help=f"Copy a model: {', '.join(known())}.")
+    ] = None,
+) -> None:
+    """Write a commented model to start from."""
+    with _plainly():
+        path = new(file, source)
+        console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
+        console.print(f"next: lagfmu show {escape(str(path))}", soft_wrap=True, highlight=False)
 
 
 @app.command()
@@ -340,6 +369,10 @@ def simulate_command(
         typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
+    animate: Annotated[
+        Path | None,
+        typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
+    ] = None,
     inputs: InputFile = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -377,6 +410,10 @@ def simulate_command(
                 f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
                 soft_wrap=True,
             )
+        if animate is not None:
+            with console.status(f"drawing {name}"):
+                film(told_by(source), result, given, animate, name)
+            console.print(f"[green]wrote[/] {escape(str(animate))}", soft_wrap=True)
 
 
 @app.command()

@@ -189,7 +189,7 @@ def _variable(
         typed["max"] = number(v.maximum)
     if v.nominal is not None:
         typed["nominal"] = number(v.nominal)
-    if v.start is not None:
+    if v.start is not None and v.initial != "calculated":
         typed["start"] = _start(v.start)
     if v.derivative_of is not None and is_derivative:  # importers count states by this attribute
         typed["derivative"] = str(index[v.derivative_of])

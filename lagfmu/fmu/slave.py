@@ -26,6 +26,7 @@ from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
+from ..solver.rates import Past, estimated, half_connected, restored_past
 from ..solver.restored import restored, restored_settings
 from ..solver.state import SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
@@ -83,7 +84,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         self.outputs = [k for k, v in enumerate(self.variables) if v[2] in ("output", "start")]
         roles = [v[2] for v in self.variables]
         self.parameters = [k for k, role in enumerate(roles) if role == "parameter"]
-        self.inputs = [k for k, role in enumerate(roles) if role == "input"]
+        self.inputs = [k for k, role in enumerate(roles) if role in ("input", "estimate")]
+        self.past = Past()
+        self.fresh: set[int] = set()  # what was set since the latest communication point
         self.reference = {name: k for k, name in enumerate(self.names)}
         self.start_time, self.stop_time, self.tolerance = 0.0, math.inf, 0.0
         self.running = False
@@ -136,10 +139,11 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         after the step belongs to the time at its end.
         """
         before, values = self.state, list(self.values)
+        past, fresh = self.past, set(self.fresh)
         try:
             before = self._checked(current_time, step_size)
-            u = self._values(self.inputs)
-            self._warn_of_jumps(u)
+            u = self._driven(before.t)
+            self._warn_of_rates(u, before.span)
             self.state = advance(
                 self.system, self.settings, before, u, self.p, current_time + step_size
             )
@@ -150,6 +154,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             self._outputs()
         except StepFailureError as error:
             self.state, self.values, self.observed = before, values, None
+            self.past, self.fresh = past, fresh
             self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
             return False
         self._warn_of_tables()
@@ -181,17 +186,34 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             )
         return state
 
-    def _warn_of_jumps(self, u: Sequence[float]) -> None:
-        """Once: a prescribed motion moves, but its derivatives are left at zero."""
-        for k in self.system.prescribed:
-            still = u[k + 1] == 0 and u[k + 2] == 0
-            if self.expected and u[k] != self.expected[k] and still and not self.warned:
-                name = self.names[self.inputs[k]]
-                self._warn(
-                    f"input {name} moves while der({name}) = der({name},2) = 0: it jumps at each "
-                    "communication point; connect its derivatives as well"
-                )
-                self.warned = True
+    def _driven(self, t: float) -> list[float]:
+        """The inputs, with the rates of those whose rates are estimated."""
+        u = self._values(self.inputs)
+        if self.system.estimated:
+            fresh = [self.inputs[k] in self.fresh for k in self.system.estimated]
+            u, self.past = estimated(self.system, self.past, t, u, fresh)
+            for k, value in zip(self.inputs, u, strict=True):
+                self.values[k] = value
+        self.fresh.clear()
+        return u
+
+    def _warn_of_rates(self, u: Sequence[float], h: float) -> None:
+        """Once, at the first step that shows it: not all three inputs of a motion are connected."""
+        if self.warned or not self.expected or not h > 0:
+            return
+        bad = [
+            self.names[self.inputs[k]]
+            for k in self.system.prescribed
+            if k not in self.system.estimated
+            and half_connected(u[k : k + 3], self.expected[k : k + 3], h)
+        ]
+        if bad:
+            self._warn(
+                f"prescribed motion {', '.join(bad)} has moved over the last {h:.3g} s otherwise than its "
+                "rates der() and der(,2) say, so that the forces of constraint are wrong: connect all "
+                'three inputs, or build the FMU with Input(..., rates="estimated")'
+            )
+            self.warned = True
 
     def _warn_of_tables(self) -> None:
         """Once for each: a table is looked up beyond its ends."""
@@ -274,7 +296,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         """The variable, if it may be set to the value now: a fixed parameter only to what it is."""
         variable = self._variable(vr, kind)
         name, role = variable[0], variable[2]
-        if role == "output":
+        if role in ("output", "estimate"):
             raise Refused(f"{name!r} is calculated and cannot be set")
         if self.running and role != "input" and not self._is_same(vr, value):
             raise Refused(f"{name!r} can only be set before the end of the initialization")
@@ -290,6 +312,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             return
         for vr, value in zip(vrs, values, strict=True):
             self.values[vr] = value
+        self.fresh.update(vrs)
         self.observed = None
         if not self.running:
             self.state = None
@@ -378,6 +401,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             "experiment": [self.start_time, self.stop_time, self.tolerance],
             "settings": None if settings is None else asdict(settings),
             "state": None if self.state is None else self.state.to_json(),
+            "past": [list(self.past.points), sorted(self.fresh)],
         }
 
     @guarded
@@ -388,8 +412,11 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             raise Refused("the saved state belongs to another FMU, or to another version of this")
         try:
             kept = self._checked_state(state)
+            restored_past(self.system, state.get("past"))
         except (ValueError, TypeError, KeyError) as error:
             raise Refused(f"the saved state is none of this FMU's: {error}") from None
+        self.past, fresh = restored_past(self.system, state.get("past"))
+        self.fresh = set(fresh)
         self.values, self.running, experiment, settings, self.state = kept
         self.start_time, self.stop_time, self.tolerance = experiment
         if settings is not None:

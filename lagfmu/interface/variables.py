@@ -30,7 +30,7 @@ class Variable:
 
     name: str
     kind: str
-    role: str
+    role: str  # or estimate: the FMU itself, from an input's values
     causality: str
     variability: str
     initial: str | None

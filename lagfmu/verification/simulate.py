@@ -26,7 +26,9 @@ from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import observe
+from ..solver.rates import Past, estimated
 from ..solver.state import SMALLEST_TOLERANCE, Settings
+from .result import Result
 
 STARTS = re.compile(
     r"start value .* misses the constraints|has no start value"
@@ -44,8 +46,8 @@ def simulate(
     inputs: Trajectory | None = None,
     scene: Scene | None = None,
     besides: Sequence[str] = (),
-) -> Trajectory:
-    """Outputs at every communication point, as a structured array with the FMU's variable names.
+) -> Result:
+    """Outputs at every communication point, as a structured array with the FMU's variable names and units.
 
     `target` is a Model (integrated in this process, in `scene`) or the path of an FMU (simulated by
     fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
@@ -66,8 +68,15 @@ def simulate(
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared):
-        return _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
-    return _simulate_fmu(Path(target), stop_time, step_size, tolerance, values, inputs, besides)
+        table = _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
+        every = target.table.variables
+        units = {v.name: v.unit.name for v in every if v.unit is not None}
+        return Result(table, units, target.scene.name)
+    path = Path(target)
+    table = _simulate_fmu(path, stop_time, step_size, tolerance, values, inputs, besides)
+    description = read_description(path)
+    units = {v.name: v.unit for v in description.modelVariables if v.unit}
+    return Result(table, units, description.modelName)
 
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
@@ -99,6 +108,7 @@ def _simulate_model(
     besides: Sequence[str],
 ) -> Trajectory:
     scene, table, system = prepared.scene, prepared.table, prepared.system
+    fixed = ("output", "estimate")
     known: dict[str, Any] = {v.name: v.start for v in table.variables if v.role != "output"}
     limits = {
         v.name: _Settable(
@@ -109,7 +119,7 @@ def _simulate_model(
             {m: NUMBERS[m] for m in v.items if m in IN_PYTHON},
         )
         for v in table.variables
-        if v.role != "output"
+        if v.role not in fixed
     }
     _check_values(scene.name, limits, values)
     known |= values
@@ -124,7 +134,7 @@ def _simulate_model(
         known["solver.maximum_steps"],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
-    drives = [v for v in table.variables if v.role == "input"]
+    drives = [v for v in table.variables if v.role in ("input", "estimate")]
     signals: Any = inputs
 
     def drive(t: float) -> list[float]:
@@ -137,6 +147,8 @@ def _simulate_model(
         _check_values(scene.name, limits, {v.name: x for v, x in zip(drives, u, strict=True)})
         return u
 
+    fed = () if inputs is None else signals.dtype.names
+    past = Past()
     times = communication_points(stop_time or scene.stop_time, step_size or scene.step_size)
     columns: list[tuple[str, Any]] = [("time", np.float64)]
     kinds: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
@@ -152,7 +164,11 @@ def _simulate_model(
         state = begun.state
         for k, t in enumerate(times):
             if k:
-                u = drive(state.t)  # held over the step, as an importer of the FMU does
+                given = drive(state.t)  # held over the step, as an importer of the FMU does
+                for i, d in enumerate(drives):
+                    u[i] = u[i] if d.role == "estimate" or d.name not in fed else given[i]
+                was_set = [drives[i].name in fed for i in system.estimated]
+                u, past = estimated(system, past, state.t, u, was_set)
                 moved = advance(system, settings, state, u, p, float(t))
                 u = system.inputs_at(u, moved.t - state.t)
                 state = moved

@@ -22,7 +22,7 @@ NO_RUNGS = """
 const Dependent *const DEPENDENT = NULL;
 """
 BEHIND_EVENTS, BEHIND_CONTACTS = (
-    ("looks.c", "root.c"),
+    ("clearance.c", "interval.c", "looks.c", "root.c"),
     ("complementarity.c",),
 )  # what only those need
 AT_CONSTRAINTS = (

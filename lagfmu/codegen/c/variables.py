@@ -127,7 +127,7 @@ def _row(v: Variable, place: Place, states: dict[str, int]) -> str:
     fields = [
         string(v.name),
         f"TYPE_{'INTEGER' if v.kind == 'Enumeration' else v.kind.upper()}",
-        f"ROLE_{v.role.upper()}",
+        f"ROLE_{'OUTPUT' if v.role == 'estimate' else v.role.upper()}",
         f"AT_{where}",
         str(index),
         str(contact),
