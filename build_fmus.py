@@ -44,7 +44,7 @@ def build_one(
     begun = time.perf_counter()
     scene, choice = settled(file.model, scene, file.closed_forms, target)
     prepared = prepare(file.model, scene)
-    built = package(prepared, out, file.closed_forms, target, platforms, choice)
+    built = package(prepared, out, file.closed_forms, target, platforms, choice, reference=True)
     spent = time.perf_counter() - begun
     found = built.verification or verify(built.path)
     runs = [found, *(verify(built.path) for _ in range(RUNS - 1))]

@@ -82,3 +82,52 @@ def pinned_rod(start: Mapping[Any, float]) -> Model:
         ],
         start=start,
     )
+
+
+def straight_line(turned: float) -> Model:
+    """Peaucellier's linkage: arms of 3 m from the origin O to B and C, a rhombus P B Q C of 1.5 m, and P on a
+    circle of 1 m through O: Q moves straight, across the line from O to the circle's centre.  The frame is
+    `turned` by an angle [rad]; gravity pulls along that straight."""
+    coordinates = dynamicsymbols("xp yp xb yb xc yc xq yq")
+    c, s = float(cos(turned)), float(sin(turned))
+    points = [  # in the linkage's own frame
+        (x * c - y * s, x * s + y * c) for x, y in zip(*[iter(coordinates)] * 2, strict=True)
+    ]
+    p, b, q_c, q = points
+    m, g, length = symbols("m g r", positive=True)
+    kinetic = sum(m * x.diff(TIME) ** 2 / 2 for x in coordinates)
+    lean = 0.3  # rad, of P seen from the origin
+    near = 2 * float(cos(lean))
+    far = (3.0**2 - 1.5**2) / near
+    along, across = (near + far) / 2, (9 - ((near + far) / 2) ** 2) ** 0.5
+    ray, normal = (float(cos(lean)), float(sin(lean))), (-float(sin(lean)), float(cos(lean)))
+
+    def at(u: float, w: float) -> tuple[float, float]:
+        return (u * ray[0] + w * normal[0], u * ray[1] + w * normal[1])
+
+    places = [at(near, 0), at(along, across), at(along, -across), at(far, 0)]
+    start: dict[Any, float] = {}
+    for k, (x, y) in enumerate(places):
+        start |= {coordinates[2 * k]: x * c + y * s, coordinates[2 * k + 1]: -x * s + y * c}
+    centre, origin = (length, 0), (0, 0)
+    bars = [
+        ("circle", p, centre, 1),
+        ("arm1", b, origin, 3),
+        ("arm2", q_c, origin, 3),
+        *((f"side{k}", u, w, 1.5) for k, (u, w) in enumerate(((p, b), (p, q_c), (q, b), (q, q_c)))),
+    ]
+    return Model(
+        name="StraightLine",
+        lagrangian=kinetic - m * g * sum(point[1] for point in points),
+        coordinates=dict.fromkeys(coordinates, "m"),
+        constraints=[
+            Holonomic(name, (u[0] - w[0]) ** 2 + (u[1] - w[1]) ** 2 - (k * length) ** 2)
+            for name, u, w, k in bars
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(length, 1.0, "m"),
+        ],
+        start=start,
+    )

@@ -39,7 +39,6 @@ class CVariable(ctypes.Structure):
         ("contact", ctypes.c_int),
         ("state", ctypes.c_int),
         ("start", ctypes.c_double),
-        ("text", ctypes.c_char_p),
         ("min", ctypes.c_double),
         ("max", ctypes.c_double),
         ("positive", ctypes.c_int),
@@ -91,12 +90,10 @@ def test_every_variable_is_there_in_order(table: Any, name: str) -> None:
     assert len(rows) == len(p.table.variables)
     for row, v in zip(rows, p.table.variables, strict=True):
         assert row.name.decode() == v.name
-        assert (TYPES[row.type], ROLES[row.role]) == (v.kind, v.role)
-        if isinstance(v.start, str):
-            assert row.text.decode() == v.start
-        else:
-            assert row.text is None
-            assert row.start == (0.0 if v.start is None else v.start)
+        kind = "Integer" if v.kind == "Enumeration" else v.kind
+        assert (TYPES[row.type], ROLES[row.role]) == (kind, v.role)
+        start = NUMBERS[v.start] if isinstance(v.start, str) else v.start
+        assert row.start == (0.0 if start is None else start)
         assert row.min == (-math.inf if v.minimum is None else v.minimum)
         assert row.max == (math.inf if v.maximum is None else v.maximum)
         assert bool(row.positive) == v.positive

@@ -279,6 +279,43 @@ def test_contacts_driven_against_each_other_are_refused_by_name():
         impact(Instant(system, 0.5, [], []), zero, zero, [0, 1])
 
 
+def test_rounding_of_a_fast_motion_does_not_jam_a_slow_impact():
+    """A particle runs at 1e3 m/s between two walls that it touches, Gv being rounding; elsewhere another one
+    strikes with 1e-6 m/s: it rebounds, and the first runs on."""
+    a = 0.3
+    along, across = np.array([np.cos(a), np.sin(a), 0]), np.array([-np.sin(a), np.cos(a), 0])
+    third = np.array([0.0, 0.0, 1.0])
+    A = np.array([across, -1.1 * across, third])
+    at = Instant(linear_system(np.eye(3), A, [0.0, 0.0, 0.5]), 0.0, [], [])
+    seen = set()
+    for k in range(50):
+        v = (1e3 + k) * along - 1e-6 * third
+        seen.add(tuple(np.sign(A[:2] @ v)))
+        found = impact(at, v, v, range(3))
+        np.testing.assert_allclose(found.v, v + 1.5e-6 * third, rtol=1e-14, atol=1e-12)
+    assert (-1, -1) in seen  # roundings that drive it into both walls
+
+
+def test_a_ball_bounces_from_a_table_that_rises(run):
+    """Relative to a table that rises with V = 2 m/s a ball falls with w and rebounds with e w; seen from the
+    ground it gains speed: v+ = V + e (V - v-)."""
+    z = dynamicsymbols("z")
+    V = symbols("V", positive=True)
+    model = Model(
+        name="Riser",
+        lagrangian=m * z.diff() ** 2 / 2,
+        coordinates={z: "m"},
+        constraints=[Contact("table", z - V * dynamicsymbols._t, restitution=e)],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(V, 2.0, "m/s"), restitution(0.5)],
+        start={z: 1.0, z.diff(): -3.0},
+    )
+    result = run(model, 1.0, 0.1)
+    after = result["time"] > 0.2
+    np.testing.assert_allclose(result["der(z)"][after], 2 + 0.5 * 5, rtol=1e-13)
+    tau = result["time"][after] - 0.2
+    np.testing.assert_allclose(result["z"][after], 0.4 + 4.5 * tau, rtol=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(30))
 def test_complementarity_is_met_with_dependent_rows(seed):
     """z >= 0, w = A z + b >= 0, z w = 0 for A of less than full rank; w does not depend on the order."""

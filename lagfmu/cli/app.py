@@ -22,17 +22,26 @@ from ..errors import LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
+from ..fmu.write import write_whole
 from ..interface.variables import VariableTable
 from ..live.command import write_page
+from ..live.playable import told_by
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
+from ..model.library import known, new
 from ..model.scene import Scene
+from ..page.text import show as show_prepared
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
+from ..verification.crosscheck import as_csv, write_crosscheck
+from ..verification.plot import plot
+from ..verification.reference import read_table
+from ..verification.report import exit_code
 from ..verification.simulate import read_description, simulate
-from ..verification.verify import Verification, verify
+from ..verification.verify import Verification
+from .film import film
 from .options import (
     AddOutput,
     Contacts,
@@ -46,12 +55,11 @@ from .options import (
     Outputs,
     narrowed,
 )
-from .plot import plot
-from .show import show as show_prepared
 from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
 from .tradeoff import chosen_for, compare
+from .verify import examine, write_reports
 
 app = typer.Typer(
     help="Lagrange's equations with multipliers, from SymPy to FMUs that report forces of constraint.",
@@ -97,6 +105,9 @@ Tolerance = Annotated[
 ]
 StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
 StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
+InputFile = Annotated[
+    Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
+]
 
 
 @contextlib.contextmanager
@@ -110,10 +121,8 @@ def _plainly() -> Iterator[None]:
             errors.print(
                 f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
             )
-            raise typer.Exit(1) from None
-        except (
-            OSError
-        ) as error:  # of temporary files; what the user names is told by its own errors
+            raise typer.Exit(getattr(error, "code", 1)) from None
+        except OSError as error:  # of temporary files; for what the user names see its own errors
             where = error.filename or tempfile.gettempdir()
             errors.print(
                 f"[bold red]error:[/] {escape(f'{where}: {error.strerror or error}')}: is the disk full? "
@@ -141,6 +150,9 @@ def build(
         list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
     ] = None,
     check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
+    reference: Annotated[
+        bool, typer.Option("--reference", help="Put reference results inside (FMI-LS-REF).")
+    ] = False,
     target: Annotated[
         Target, typer.Option(help="python: needs Python where it runs. native: compiled C.")
     ] = Target.python,
@@ -160,6 +172,10 @@ def build(
             "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
         ),
     ] = None,
+    page_: Annotated[
+        bool,
+        typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
+    ] = False,
     outputs: Outputs = None,
     fixed: Fixed = None,
     inputs: Inputs = None,
@@ -197,7 +213,15 @@ def build(
                 if name is None and any(v is not None for v in narrowing):
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
                 built = package(
-                    prepared, out / kind, file.closed_forms, kind, places, choice, check
+                    prepared,
+                    out / kind,
+                    file.closed_forms,
+                    kind,
+                    places,
+                    choice,
+                    check,
+                    reference,
+                    page_,
                 )
             path, found = built.path, built.verification
             console.print(
@@ -233,6 +257,20 @@ def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
     return ""
 
 
+@app.command(name="new")
+def new_command(
+    file: Annotated[Path, typer.Argument(help="The Python file to write.")],
+    source: Annotated[
+        str | None, typer.Option("--from", help=f"Copy a model: {', '.join(known())}.")
+    ] = None,
+) -> None:
+    """Write a commented model to start from."""
+    with _plainly():
+        path = new(file, source)
+        console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
+        console.print(f"next: lagfmu show {escape(str(path))}", soft_wrap=True, highlight=False)
+
+
 @app.command()
 def show(
     model: ModelPath,
@@ -262,18 +300,67 @@ def show(
 
 @app.command(name="verify")
 def verify_command(
-    fmu: FmuPath,
+    fmus: Annotated[list[Path], typer.Argument(metavar="FILE.fmu...", help="FMUs.")],
     set_: Settings = None,
     stop_time: StopTime = None,
     step_size: StepSize = None,
     tolerance: Tolerance = None,
+    inputs: InputFile = None,
+    reference: Annotated[
+        Path | None, typer.Option(help="CSV of a run that this one is held against besides.")
+    ] = None,
+    rtol: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="RTOL|NAME=RTOL",
+            help="Allowed part of a reference column's largest value (default 1e-6); repeatable.",
+        ),
+    ] = None,
+    atol: Annotated[float, typer.Option(help="Allowed besides, in the column's unit.")] = 0.0,
+    json: Annotated[Path | None, typer.Option(help="Write everything as JSON.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")] = None,
 ) -> None:
-    """Simulate an FMU through fmpy and hold it against the closed forms that it carries."""
+    """Simulate FMUs through fmpy and hold them against the closed forms that they carry.
+
+    Exit codes: 0 all hold, 1 a statement fails, 2 wrong usage, 3 an FMU could not be run.
+    """
     with _plainly():
-        found = verify(fmu, _assignments(set_), stop_time, step_size, tolerance)
-        _print(found)
-    if not found.passed:
-        raise typer.Exit(1)
+        done = examine(
+            fmus,
+            _assignments(set_),
+            stop_time,
+            step_size,
+            tolerance,
+            inputs,
+            reference,
+            rtol or (),
+            atol,
+        )
+        write_reports(done, json, junit)
+        for one in done:
+            if one.found is not None:
+                _print(one.found)
+            else:
+                errors.print(
+                    f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
+                )
+    raise typer.Exit(exit_code(done))
+
+
+@app.command(name="reference")
+def reference_command(
+    fmu: FmuPath,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder (default: NAME).")] = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    inputs: InputFile = None,
+) -> None:
+    """Write reference results of an FMU for other tools: the files of the FMI cross-check."""
+    with _plainly():
+        signals = None if inputs is None else read_table(inputs)
+        folder = out or Path(fmu.stem)
+        for path in write_crosscheck(fmu, folder, stop_time, step_size, signals):
+            console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
 
 
 @app.command(name="simulate")
@@ -292,6 +379,11 @@ def simulate_command(
         typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
+    animate: Annotated[
+        Path | None,
+        typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
+    ] = None,
+    inputs: InputFile = None,
     add_output: AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest."""
@@ -315,7 +407,10 @@ def simulate_command(
         besides = _besides(variable or (), known)
         given = _assignments(set_)
         with console.status(f"simulating {name}"):
-            result = simulate(source, stop_time, step_size, tolerance, given, besides=besides)
+            signals = None if inputs is None else read_table(inputs)
+            result = simulate(
+                source, stop_time, step_size, tolerance, given, signals, besides=besides
+            )
         _print_last(name, result, units, variable or ())
         if csv is not None:
             _save(csv, result)
@@ -325,6 +420,10 @@ def simulate_command(
                 f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
                 soft_wrap=True,
             )
+        if animate is not None:
+            with console.status(f"drawing {name}"):
+                film(told_by(source), result, given, animate, name)
+            console.print(f"[green]wrote[/] {escape(str(animate))}", soft_wrap=True)
 
 
 @app.command()
@@ -459,9 +558,7 @@ def sweep(
     stop_time: StopTime = None,
     step_size: StepSize = None,
     tolerance: Tolerance = None,
-    inputs: Annotated[
-        Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
-    ] = None,
+    inputs: InputFile = None,
     scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
     out: Annotated[
         Path | None,
@@ -580,13 +677,8 @@ def _print_last(
 
 
 def _save(path: Path, result: Any) -> None:
-    import fmpy.util
-
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fmpy.util.write_csv(str(path), result)
-    except OSError as error:
-        raise SimulationError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+    """All columns; names are quoted, because that of an acceleration holds a comma."""
+    write_whole(path, as_csv(result, [n for n in result.dtype.names if n != "time"]).encode())
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from ..errors import LagfmuError, SimulationError
 from ..study.sweep.design import axis, distribution, from_file
 from ..study.sweep.plot import plot
 from ..study.sweep.sweep import sweep
+from ..verification.reference import read_table
 
 SHOWN = 5  # reasons in the summary
 NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
@@ -90,7 +91,7 @@ def run_sweep(
                 stop_time=stop_time,
                 step_size=step_size,
                 tolerance=tolerance,
-                inputs=None if inputs is None else _signals(inputs),
+                inputs=None if inputs is None else read_table(inputs),
                 scene=scene,
                 out=out,
                 on=on,
@@ -111,16 +112,6 @@ def run_sweep(
         console.print(f"[green]wrote[/] {escape(str(out))}", soft_wrap=True)
     if figure is not None:
         console.print(f"[green]wrote[/] {escape(str(plot(found, figure)))}", soft_wrap=True)
-
-
-def _signals(path: Path) -> Any:
-    """A CSV file with a column `time` and one an input.  Raises SimulationError."""
-    from fmpy.util import read_csv
-
-    try:
-        return read_csv(str(path))
-    except Exception as error:
-        raise SimulationError(f"{str(path)!r} cannot be read: {error}") from None
 
 
 def _print(console: Console, found: Any) -> None:

@@ -23,6 +23,11 @@ from .shapes import unusable_surfaces
 from .spline import Spline, splines_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
+RATES = (
+    "given",
+    "estimated",
+)  # of a prescribed motion: inputs too, or from the communication points
+
 
 def problems_of(model: ModelFields) -> list[str]:
     """All problems of a model whose containers are right (`modelkinds.check_containers`)."""
@@ -75,6 +80,16 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
     for i in model.inputs:
         _finite(f"start of input {name_of(i.symbol)!r}", i.start, problems)
         _finite(f"rate of input {name_of(i.symbol)!r}", i.rate, problems)
+        if i.rates not in RATES:
+            problems.append(
+                f"rates of input {name_of(i.symbol)!r} is {i.rates!r}, expected one of "
+                f"{', '.join(map(repr, RATES))}"
+            )
+        elif i.rates != "given" and i not in model.prescribed:
+            problems.append(
+                f"rates of input {name_of(i.symbol)!r} is {i.rates!r}, but only an input that stands in "
+                "a constraint (a prescribed motion) has rates: leave it out"
+            )
         if _number(i.rate) and i.rate != 0 and i not in model.prescribed:
             problems.append(
                 f"rate of input {name_of(i.symbol)!r} is {i.rate!r}, but only an input that stands in a "

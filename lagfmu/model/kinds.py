@@ -134,6 +134,8 @@ def _no_number(expression: Expr) -> str:
 def _check_texts(model: ModelFields, problems: list[str]) -> None:
     """Descriptions are texts of characters that XML can hold."""
     texts: list[tuple[str, object]] = [("the model", model.description)]
+    about = ("author", "version", "license", "copyright")
+    texts += [(f"the model's {what}", getattr(model, what)) for what in about]
     texts += [(f"parameter {name_of(p.symbol)!r}", p.description) for p in model.parameters]
     texts += [(f"input {name_of(i.symbol)!r}", i.description) for i in model.inputs]
     texts += [(f"constraint {c.name!r}", c.description) for c in model.constraints]

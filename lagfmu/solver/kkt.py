@@ -20,7 +20,12 @@ def kkt(M: Matrix, b: Vector, G: Matrix, c: Vector, least: float = 0.0) -> Solut
     K[:n, n:] = G.T
     K[n:, :n] = G
     d = np.ones(n + m)
-    A = K.copy()
+    mass = M.diagonal() > 0  # to masses of 1: no unit of mass counts beside the constraints
+    d[:n][mass] = 2.0 ** -np.round(np.log2(M.diagonal()[mass]) / 2)
+    if m:
+        row = (np.abs(G) * d[:n]).max(axis=1)
+        d[n:] = 2.0 ** -np.round(np.log2(np.where(row > 0, row, 1.0)))
+    A = K * d * d[:, None]
     for _ in range(20):  # symmetric equilibration (Ruiz 2001)
         largest = np.abs(A).max(axis=1)
         if not (largest > 0).all():

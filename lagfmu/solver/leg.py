@@ -16,7 +16,8 @@ import numpy as np
 
 from .failure import StepFailureError, plain
 from .instant import Instant, Motion
-from .methods import stepper
+from .magnitudes import alike, shared
+from .methods import share, stepper
 from .motion import distance, independent, motion, project
 from .state import Settings, State
 from .stiffness import Choice
@@ -48,6 +49,7 @@ class Leg:
         self.offset = np.array(self.state.offset)
         self.scale = np.array(self.state.scale)
         self.size = np.array(self.state.size)
+        self.tied = alike(self.system)
         self.cause = ""
         self.auto = self.settings.method == "auto"
         if self.auto:
@@ -146,11 +148,12 @@ class Leg:
             first_step = 1 / (FEWEST_STEPS * self.state.rate)
         elif self.settings.method == "rk4":
             first_step = self.settings.step
-        slope = (self.rate, self.jacobian)
-        return stepper(self.settings, slope, t, y, t_bound, self.scale, first_step)
+        slope, scale = (self.rate, self.jacobian), shared(self.tied, self.scale, y)
+        return stepper(self.settings, slope, t, y, t_bound, scale, first_step)
 
     def step(self, solver: Any) -> None:
         """One accepted step, or the reason why there is none."""
+        share(solver, self.settings, shared(self.tied, self.scale, solver.y))
         try:
             message = solver.step()
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:

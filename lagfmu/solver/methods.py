@@ -17,6 +17,12 @@ from .system import Matrix, Vector
 RELATIVE_FLOOR = 100 * np.finfo(float).eps  # SciPy's own
 
 
+def share(integrator: Any, settings: Settings, scale: Vector) -> None:
+    """The scale (2 n) of errors in the step to come; a fixed step has none."""
+    if hasattr(integrator, "atol"):
+        integrator.atol = settings.tolerance / 2 * scale
+
+
 def stepper(
     settings: Settings,
     slope: tuple[Callable[[float, Vector], Vector], Callable[[float, Vector], Matrix]],

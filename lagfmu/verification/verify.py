@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import sympy as sp
@@ -57,7 +57,10 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """The checks of one FMU, `claims` of them closed forms, and what the run cost."""
+    """The checks of one FMU, `claims` of them closed forms, and what the run cost.
+
+    `uncovered` are the outputs of which no closed form and no reference says anything.
+    """
 
     name: str
     checks: tuple[Check, ...]
@@ -65,6 +68,7 @@ class Verification:
     seconds: float
     steps: int
     claims: int
+    uncovered: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -101,12 +105,17 @@ def verify(
     stop_time: float | None = None,
     step_size: float | None = None,
     tolerance: float | None = None,
+    inputs: Trajectory | None = None,
+    reference: Compared | None = None,
 ) -> Verification:
     """Simulate the FMU through fmpy and evaluate its closed forms on what it returns.
 
     Also checks what FMU checkers do not: that every output is finite, and that the start values in
     modelDescription.xml are those that the binary starts with.  Parameters and start values may be
     changed; the closed forms follow.
+
+    `inputs` drives the FMU, as in simulate(); a `reference` (reference.Reference) is a table of another run
+    that this one is held against besides; with one, an FMU of another tool will do.
 
     An FMU that was built for an accuracy is held to that, as long as its solver settings are left alone.
 
@@ -115,13 +124,15 @@ def verify(
     """
     path = Path(fmu)
     description = read_description(path)
-    claims = claims_in(path)
+    claims = claims_in(path) if reference is None or is_ours(path) else []
     _check_texts(description, start_values or {})
     problems = validate_fmu(str(path))
     begun = time.perf_counter()
     read = {v.name for v in description.modelVariables if v.causality in ("local", "input")}
     besides = sorted(read & set().union(*(claim.variables for claim in claims)))
-    result = simulate(path, stop_time, step_size, tolerance, start_values, besides=besides)
+    if reference is not None and stop_time is None:
+        stop_time = float(reference.table["time"][-1]) or None
+    result = simulate(path, stop_time, step_size, tolerance, start_values, inputs, besides=besides)
     seconds = time.perf_counter() - begun
     experiment = description.defaultExperiment
     used = tolerance or float(getattr(experiment, "tolerance", None) or 1e-8)
@@ -139,14 +150,47 @@ def verify(
     ]
     as_built = tolerance is None and not any(k.startswith("solver.") for k in start_values or ())
     checks += [check_claim(claim, result, values, used, as_built) for claim in claims]
+    if reference is not None:
+        checks += reference.checks(result)
     span = float(result["time"][-1] - result["time"][0])
     steps = int(result["solver.steps"][-1]) if "solver.steps" in (result.dtype.names or ()) else 0
-    return Verification(description.modelName, tuple(checks), span, seconds, steps, len(claims))
+    said = set().union(*(claim.variables for claim in claims))
+    said |= set(reference.table.dtype.names or ()) if reference is not None else set()
+    outputs = [v.name for v in description.modelVariables if v.causality == "output"]
+    return Verification(
+        description.modelName,
+        tuple(checks),
+        span,
+        seconds,
+        steps,
+        len(claims),
+        tuple(n for n in outputs if n not in said),
+    )
+
+
+class Compared(Protocol):
+    """A table of another run, and how to hold one against it."""
+
+    @property
+    def table(self) -> Trajectory:
+        """`time` [s], one column an output."""
+
+    def checks(self, result: Trajectory) -> list[Check]:
+        """One statement a column."""
+
+
+def is_ours(path: Path) -> bool:
+    """Whether a file carries closed forms of lagfmu."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return RECORD in archive.namelist()
+    except (zipfile.BadZipFile, OSError):
+        return False
 
 
 def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
-    """A text is a value for a String variable only."""
-    texts = {v.name for v in description.modelVariables if v.type == "String"}
+    """A text is a value for an Enumeration only."""
+    texts = {v.name for v in description.modelVariables if v.type == "Enumeration"}
     wrong = [f"{k} = {v!r}" for k, v in given.items() if isinstance(v, str) and k not in texts]
     if wrong:
         raise SimulationError(f"{', '.join(wrong)}: expected a number")
@@ -171,9 +215,10 @@ def claims_in(path: Path) -> list[Claim]:
             v = variables.get(name)
             if v is None:
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
-            elif (v.type == "Boolean") != name.startswith(
-                ("contact.", "sticks.")
-            ) or v.type == "String":
+            elif (v.type == "Boolean") != name.startswith(("contact.", "sticks.")) or v.type in (
+                "String",
+                "Enumeration",
+            ):
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))

@@ -18,6 +18,7 @@
 #include "indicators.h"
 #include "jumps.h"
 #include "leg.h"
+#include "magnitudes.h"
 #include "parts.h"
 
 static const double GAIN = 3;     /* of the stabilization, in units of the motion's natural rate */
@@ -50,9 +51,12 @@ void exchange_set_states(Instance *x, const double *states) {
 Status exchange_nominals(Instance *x, double *nominals) {
     const int n = x->solver.system->n;
     if (instance_start(x) != OK) return FAILED;
+    double *still = x->solver.work_advance, *scale = still + 2 * n;
+    memset(still, 0, 2 * (size_t)n * sizeof *still);
+    magnitudes_shared(&x->solver, still, scale);
     for (int j = 0; j < n; j++) {
-        nominals[2 * j] = x->solver.state.scale[j];
-        nominals[2 * j + 1] = x->solver.state.scale[n + j];
+        nominals[2 * j] = scale[j];
+        nominals[2 * j + 1] = scale[n + j];
     }
     for (int j = 0; j < 2 * n; j++)
         if (!(nominals[j] > 0)) nominals[j] = 1;

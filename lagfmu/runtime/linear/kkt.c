@@ -3,8 +3,8 @@
  *   [ M  G^T ] [   x     ]   [ b ]
  *   [ G   0  ] [ -lambda ] = [ c ] ,
  *
- * its rows and columns scaled alike by powers of two until the largest element of each is near 1
- * (Ruiz, A scaling algorithm to equilibrate both rows and columns norms, 2001), then LU with
+ * its rows and columns scaled alike by powers of two, first to masses of 1 (no unit of mass counts beside
+ * the constraints), then until the largest element of each is near 1 (Ruiz, A scaling algorithm to equilibrate both rows and columns norms, 2001), then LU with
  * partial pivoting and refinement with residuals in doubled precision (Higham, Accuracy and
  * Stability of Numerical Algorithms, sect. 12.1).  Right for extreme ratios of masses and for a
  * coordinate without mass of its own. */
@@ -67,11 +67,29 @@ int kkt_matrix(const Linear *l, const double *scale, const int *place, double *A
     return size;
 }
 
+static double power_of_two(double size) { return size > 0 ? ldexp(1, -(int)rint(log2(size))) : 1; }
+
+/* d: coordinates in the metric of their own masses, where they have one, so that no unit of mass counts
+ * beside the constraints; then constraints to elements near 1. */
+static void scale_first(const Linear *l, const int *place, double *d, int size) {
+    const System *s = l->system;
+    for (int i = 0; i < size; i++) d[i] = i < s->n ? 1 : 0;
+    for (int a = 0; a < s->masses; a++)
+        if (s->mass_row[a] == s->mass_column[a] && l->M[a] > 0)
+            d[s->mass_row[a]] = power_of_two(sqrt(l->M[a]));
+    for (int a = 0; a < s->entries; a++)
+        if (l->active[s->entry_row[a]]) {
+            double *largest = &d[place[s->entry_row[a]]];
+            *largest = fmax(*largest, fabs(l->G[a]) * d[s->entry_column[a]]);
+        }
+    for (int i = s->n; i < size; i++) d[i] = power_of_two(d[i]);
+}
+
 /* Powers of two that bring the largest element of every row near 1; 0 if a row is zero. */
 static int equilibrate(const Linear *l, const Kkt *k) {
     const System *s = l->system;
     double *d = k->scale, *largest = k->z;
-    for (int i = 0; i < k->size; i++) d[i] = 1;
+    scale_first(l, k->place, d, k->size);
     for (int step = 0; step < 20; step++) {
         for (int i = 0; i < k->size; i++) largest[i] = 0;
         for (int a = 0; a < s->masses; a++) {

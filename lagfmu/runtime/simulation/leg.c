@@ -2,6 +2,8 @@
  * (Hairer & Wanner II, sect. VII.2: index reduction with projection). */
 #include "leg.h"
 
+#include "magnitudes.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -60,12 +62,13 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
                                 dfdt);
 }
 
-static Control control(const Solver *s, double longest) {
+static Control control(const Solver *s, const Integrator *i, double longest) {
     const Settings *set = &s->settings;
     const double fewest = set->method == RATTLE ? FEWEST_STEPS_RATTLE : FEWEST_STEPS_RK4;
     const double fixed = set->step > 0 ? set->step : 1 / (fewest * s->state.now.rate);
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
-    return (Control){SAFETY * set->tolerance, s->state.scale, longest < HUGE_VAL ? longest : 0,
+    if (!s->integrator.method->fixed) magnitudes_shared(s, i->y, s->scale);
+    return (Control){SAFETY * set->tolerance, s->scale, longest < HUGE_VAL ? longest : 0,
                      fixed};
 }
 
@@ -99,7 +102,7 @@ static Status accept(Solver *s, Integrator *i) {
 }
 
 Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
-    const Control c = control(s, longest);
+    const Control c = control(s, i, longest);
     if (s->settings.method == RATTLE) {
         const Instant at = leg_instant(s, i->t);
         return PARTS.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,

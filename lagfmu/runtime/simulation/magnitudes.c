@@ -68,6 +68,51 @@ void magnitudes_sizes(Solver *s, const double *q) {
         if (system->dimension[j] == system->angles) size[j] = turn;
 }
 
+static void share(double *shared, int j, double value) { shared[j] = larger(shared[j], value); }
+
+/* What coordinate i has, for others. */
+static double own_magnitude(const Solver *s, const double *y, int i) {
+    return larger(s->state.scale[i], fabs(y[i]));
+}
+
+/* Among the coordinates of row k that have the dimension of its entry e: each gets the largest. */
+static void share_row(const Solver *s, const double *y, int k, int e, double *shared) {
+    const System *system = s->system;
+    const int n = system->n, first = system->entry_column[e];
+    double q = 0, v = 0;
+    for (int d = system->row_start[k]; d < system->row_start[k + 1]; d++) {
+        const int i = system->entry_column[d];
+        if (system->dimension[i] != system->dimension[first]) continue;
+        if (d < e) return; /* they have it already */
+        q = larger(q, own_magnitude(s, y, i));
+        v = larger(v, own_magnitude(s, y, n + i));
+    }
+    for (int d = e; d < system->row_start[k + 1]; d++) {
+        const int i = system->entry_column[d];
+        if (system->dimension[i] != system->dimension[first]) continue;
+        share(shared, i, q);
+        share(shared, n + i, v);
+    }
+}
+
+void magnitudes_shared(const Solver *s, const double *y, double *shared) {
+    const System *system = s->system;
+    const int n = system->n;
+    memcpy(shared, s->state.scale, 2 * (size_t)n * sizeof *shared);
+    for (int k = 0; k < system->m; k++)
+        for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++)
+            share_row(s, y, k, e, shared);
+    for (int e = 0; e < system->masses; e++) {
+        const int i = system->mass_row[e], j = system->mass_column[e];
+        if (i == j || system->dimension[i] != system->dimension[j]) continue;
+        if (system->dimension[i] == system->angles) continue;
+        share(shared, i, own_magnitude(s, y, j));
+        share(shared, j, own_magnitude(s, y, i));
+        share(shared, n + i, own_magnitude(s, y, n + j));
+        share(shared, n + j, own_magnitude(s, y, n + i));
+    }
+}
+
 int magnitudes_incomplete(const Solver *s) {
     int incomplete = !(s->state.now.rate > 0);
     for (int j = 0; j < s->system->n; j++) incomplete |= !(s->state.size[j] > 0);

@@ -18,6 +18,11 @@ void magnitudes_sizes(Solver *s, const double *q);
  * is rounding of theirs.  Of the masses that were evaluated last. */
 void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *shared);
 
+/* shared (2 n): state.scale, no smaller than the scales and magnitudes in y (2 n) of the coordinates that each
+ * one can turn into by another choice of axes: those of its dimension with which a constraint or the mass
+ * matrix ties it; angles with which a constraint does.  So the steps are the same in whatever frame. */
+void magnitudes_shared(const Solver *s, const double *y, double *shared);
+
 /* 1 while a size, or the rate, is not known. */
 int magnitudes_incomplete(const Solver *s);
 

@@ -1,0 +1,100 @@
+"""Reference results: a run held against a table of another one.
+
+A value is right if |value - reference| <= atol + rtol * max |reference| of its column, at every time of the
+reference.  Between communication points a Real is interpolated linearly, what is discrete keeps its value.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SimulationError, VerificationError
+from .simulate import Trajectory
+from .verify import Check
+
+TRUTH = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A table (`time` [s], one column an output) and what is allowed; `own`: relative, of single columns."""
+
+    table: Trajectory
+    rtol: float = 1e-6
+    atol: float = 0.0
+    own: Mapping[str, float] = field(default_factory=dict)
+
+    def checks(self, result: Trajectory) -> list[Check]:
+        """One statement a column.  Raises VerificationError for columns that the FMU does not have."""
+        names = [n for n in self.table.dtype.names or () if n != "time"]
+        known = result.dtype.names or ()
+        unknown = [n for n in (*names, *self.own) if n not in known]
+        if unknown:
+            raise VerificationError(
+                f"reference: {', '.join(map(repr, unknown))} is no output of the FMU, expected some of "
+                f"{', '.join(n for n in known if n != 'time')}"
+            )
+        return [self._check(name, result) for name in names]
+
+    def _check(self, name: str, result: Trajectory) -> Check:
+        times = self.table["time"]
+        chosen = (times >= result["time"][0]) & (times <= result["time"][-1] * (1 + 1e-12))
+        allowed = self.own.get(name, self.rtol)
+        if not chosen.any():
+            return Check(f"reference: {name}", 0.0, allowed, 0)
+        expected = self.table[name][chosen].astype(float)
+        actual = at(result, name, times[chosen])
+        scale = float(np.abs(expected).max())
+        beyond = np.maximum(np.abs(actual - expected) - self.atol, 0.0)
+        error = float(beyond.max()) / (scale or 1.0)
+        return Check(f"reference: {name}", error, allowed, int(chosen.sum()))
+
+
+def at(result: Trajectory, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A column of a run at other times [s]."""
+    column = result[name]
+    if column.dtype.kind == "f":
+        return np.asarray(np.interp(times, result["time"], column))
+    place = np.searchsorted(result["time"], times * (1 + 1e-12), side="right") - 1
+    return np.asarray(column[np.clip(place, 0, len(column) - 1)], dtype=float)
+
+
+def read_table(path: Path) -> Trajectory:
+    """A CSV file with a column `time` [s].  Raises SimulationError with what is wrong with it."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            head, *rows = [row for row in csv.reader(file, skipinitialspace=True) if row]
+    except OSError as error:
+        raise SimulationError(f"{str(path)!r} cannot be read: {error.strerror or error}") from None
+    except (ValueError, csv.Error):
+        raise SimulationError(
+            f"{str(path)!r} is no table: expected names, and rows of numbers"
+        ) from None
+    names = [n.strip() for n in head]
+    table = np.zeros(len(rows), dtype=[(n, float) for n in dict.fromkeys(names)])
+    for k, row in enumerate(rows):
+        try:
+            for name, cell in zip(names, row, strict=True):
+                table[name][k] = float(TRUTH.get(cell.strip(), cell))
+        except ValueError:
+            raise SimulationError(
+                f"{str(path)!r} is no table of numbers: row {k + 1} is {','.join(row)!r}"
+            ) from None
+    if "time" not in names:
+        raise SimulationError(
+            f"{str(path)!r}: there is no column 'time', found {', '.join(names) or 'nothing'}"
+        )
+    if not rows:
+        raise SimulationError(f"{str(path)!r} has no rows")
+    bad = [n for n in names if not np.isfinite(table[n]).all()]
+    if bad:
+        raise SimulationError(f"{str(path)!r}: {', '.join(bad)} holds what is no finite number")
+    if not (np.diff(table["time"]) >= 0).all():
+        raise SimulationError(f"{str(path)!r}: the times are not sorted, expected rising seconds")
+    return table
