@@ -28,11 +28,14 @@ from ..live.playable import told_by
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
+from ..model.library import known, new
 from ..model.scene import Scene
+from ..page.text import show as show_prepared
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
 from ..verification.crosscheck import as_csv, write_crosscheck
+from ..verification.plot import plot
 from ..verification.reference import read_table
 from ..verification.report import exit_code
 from ..verification.simulate import read_description, simulate
@@ -51,8 +54,6 @@ from .options import (
     Outputs,
     narrowed,
 )
-from .plot import plot
-from .show import show as show_prepared
 from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
@@ -244,6 +245,20 @@ def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
     if target is Target.native and takes_long(platforms):
         return " (the runtime is compiled first: for Windows the C library too, about a minute)"
     return ""
+
+
+@app.command(name="new")
+def new_command(
+    file: Annotated[Path, typer.Argument(help="The Python file to write.")],
+    source: Annotated[
+        str | None, typer.Option("--from", help=f"Copy a model: {', '.join(known())}.")
+    ] = None,
+) -> None:
+    """Write a commented model to start from."""
+    with _plainly():
+        path = new(file, source)
+        console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
+        console.print(f"next: lagfmu show {escape(str(path))}", soft_wrap=True, highlight=False)
 
 
 @app.command()
