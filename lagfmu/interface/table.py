@@ -508,7 +508,7 @@ class _Builder:
                         self.output(f"{head}.{name}", text, self.units[s], (), discrete=True)
                     )
         if self.eom.frictions:
-            text = "energy that frictions and impacts have turned into heat since the start"
+            text = "energy that frictions and impacts dissipated so far (Model Exchange: impacts)"
             variables.append(self.output("energy.dissipated", text, ENERGY, ()))
         return variables
 
