@@ -53,6 +53,7 @@ from .options import (
     Methods,
     Name,
     Outputs,
+    RealsOnly,
     narrowed,
 )
 from .stress import LIMIT
@@ -184,6 +185,7 @@ def build(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    reals_only: RealsOnly = None,
     name: Name = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -191,7 +193,8 @@ def build(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    narrowing = (outputs, fixed, inputs, contacts, methods, method)
+    needs |= {"reals_only": reals_only}
+    narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -283,6 +286,7 @@ def show(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    reals_only: RealsOnly = None,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
@@ -292,6 +296,7 @@ def show(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
+    needs |= {"reals_only": reals_only}
     with _plainly():
         file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
