@@ -23,6 +23,7 @@ import lagfmu
 from lagfmu.codegen.c.equations import model_source
 from lagfmu.fmu.compiler import FLAGS, find_compiler, host
 from lagfmu.mechanics.equations import EquationsOfMotion
+from lagfmu.methods import NUMBERS
 from lagfmu.prepare.prepare import Prepared, prepare
 
 HERE = Path(__file__).parent
@@ -258,7 +259,7 @@ class Ours:
         mode: str = "run",
     ) -> list[Any]:
         """The command line of host.c."""
-        chosen = f"{self.references['solver.method']}={method}" if method else "-"
+        chosen = f"{self.references['solver.method']}={NUMBERS[method]}" if method else "-"
         return [
             *(self.host, mode, self.library, self.guid, self.resources, tolerance, STOP, step),
             *(BUDGET, communication, self.references["solver.steps"], chosen),

@@ -23,6 +23,7 @@ from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Model, Parameter, Scene, build_fmu
+from lagfmu.methods import NUMBERS
 from lagfmu.model.file import load
 
 METHODS = ("dop853", "radau5", "auto")
@@ -97,8 +98,10 @@ def run(
     one.setupExperiment(tolerance=tolerance)
     one.enterInitializationMode()
     for name, value in values.items():
-        give = one.setString if isinstance(value, str) else one.setReal
-        give([reference[name]], [value])
+        if isinstance(value, str):
+            one.setInteger([reference[name]], [NUMBERS[value]])
+        else:
+            one.setReal([reference[name]], [value])
     one.exitInitializationMode()
     wall, seen = 0.0, []
     for n in range(POINTS):

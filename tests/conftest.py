@@ -12,7 +12,7 @@ from fmi2 import Library
 
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
-from lagfmu.live.playable import of_fmu
+from lagfmu.live.playable import playable as playable_of
 from lagfmu.live.render import Playable, render
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import Prepared, prepare
@@ -126,7 +126,7 @@ def playable(native_fmu: Fmu) -> Callable[[str], Playable]:
 
     def get(name: str) -> Playable:
         if name not in made:
-            made[name] = of_fmu(native_fmu(name))
+            made[name] = playable_of(native_fmu(name))
         return made[name]
 
     return get

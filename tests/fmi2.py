@@ -12,6 +12,7 @@ from typing import Any
 import fmpy
 
 from lagfmu.fmu.compiler import host
+from lagfmu.methods import NUMBERS
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 EXCHANGE, CO_SIMULATION = 0, 1
@@ -225,14 +226,12 @@ class Single:
     def set_call(self, name: str, value: float) -> tuple[Any, ...]:
         return self.references([name]), c_size_t(1), byref(c_double(value))
 
+    def method_call(self, name: str, number: int) -> tuple[Any, ...]:
+        return self.references([name]), c_size_t(1), (c_int * 1)(number)
+
     def set(self, name: str, value: float | str) -> None:
         if isinstance(value, str):
-            self.does(
-                "SetString",
-                self.references([name]),
-                c_size_t(1),
-                (c_char_p * 1)(value.encode()),
-            )
+            self.does("SetInteger", *self.method_call(name, NUMBERS[value]))
         else:
             self.does("SetReal", *self.set_call(name, value))
 

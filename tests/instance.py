@@ -11,6 +11,8 @@ from typing import Any
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 
+from lagfmu.verification.simulate import items_of
+
 
 class Instance:
     """An FMU by names: `get`, `set`, `step`; `log` holds (status, category, message)."""
@@ -57,14 +59,16 @@ class Instance:
 
     def set(self, name: str, value: Any) -> None:
         v = self.variables[name]
-        if v.type == "String":
-            self.fmu.setString([v.valueReference], [value])
+        if v.type == "Enumeration":
+            number = next((k for m, k in items_of(v).items() if m == value), value)
+            self.fmu.setInteger([v.valueReference], [number])
         else:
             self.fmu.setReal([v.valueReference], [value])
 
     def get(self, name: str) -> Any:
         v = self.variables[name]
-        getter = getattr(self.fmu, f"get{v.type}")
+        kind = "Integer" if v.type == "Enumeration" else v.type
+        getter = getattr(self.fmu, f"get{kind}")
         return getter([v.valueReference])[0]
 
     def outputs(self) -> dict[str, Any]:

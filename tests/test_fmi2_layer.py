@@ -19,6 +19,7 @@ import pytest
 from fmi2 import DISCARD, ERROR, EXCHANGE, Library
 
 from lagfmu.fmu.compiler import find_compiler
+from lagfmu.methods import NUMBERS
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
@@ -196,9 +197,11 @@ def test_values_that_cannot_be_are_refused(pendulum):
     ):
         text = one.refuses("SetReal", *one.set_call(name, value))
         assert all(part in text for part in parts), text
-    method = one.references(["solver.method"]), c_size_t(1)
-    assert "'euler'" in one.refuses("SetString", *method, (c_char_p * 1)(b"euler"))
-    assert "dop853" in one.refuses("SetString", *method, (c_char_p * 1)(None))
+    for number in (0, 9, -1):
+        text = one.refuses("SetInteger", *one.method_call("solver.method", number))
+        assert f"'solver.method' = {number}, expected one of 1 (auto), 2 (dop853)" in text
+    text = one.refuses("SetString", one.references(["m"]), c_size_t(1), (c_char_p * 1)(b"a"))
+    assert "is no String" in text
     assert "999 is no Real" in one.refuses(
         "SetReal", (c_uint * 1)(999), c_size_t(1), (c_double * 1)()
     )
@@ -209,9 +212,25 @@ def test_values_that_cannot_be_are_refused(pendulum):
     assert "'g' = inf" in one.refuses("SetReal", *pair)
     one.start()
     assert one.reals(["m", "g"]) == [1.0, 9.81]
-    for name in ("m", "x"):
-        text = one.refuses("SetReal", *one.set_call(name, 1.0))
+    for name, value in (("m", 1.0 + 1e-15), ("x", one.get("x"))):
+        text = one.refuses("SetReal", *one.set_call(name, value))
         assert "before the end of the initialization" in text
+    one.free()
+
+
+def test_a_fixed_parameter_takes_the_bits_that_it_has(pendulum):
+    """Importers set parameters again before each step: m = 1, dop853, tolerance 0; nothing changes."""
+    one = pendulum().start({"solver.method": "dop853"})
+    one.step(0.1)
+    before = one.outputs()
+    for name, value in (("m", 1.0), ("solver.tolerance", 0.0), ("g", 9.81)):
+        one.does("SetReal", *one.set_call(name, value))
+    one.set("solver.method", "dop853")
+    assert one.outputs() == before
+    text = one.refuses("SetInteger", *one.method_call("solver.method", NUMBERS["rk4"]))
+    assert "before the end of the initialization" in text
+    text = one.refuses("SetReal", *one.set_call("solver.tolerance", -0.0))
+    assert "before the end of the initialization" in text
     one.free()
 
 
@@ -219,11 +238,11 @@ def test_rattle_is_refused_where_it_is_none(library):
     """M(q), friction or an elimination: the symmetric method needs M constant and positions only."""
     for name, fits in (("PendulumCartesian", True), ("Hemisphere", False), ("KnifeEdge", False)):
         one = library(name)()
-        arguments = one.references(["solver.method"]), c_size_t(1), (c_char_p * 1)(b"rattle")
+        arguments = one.method_call("solver.method", NUMBERS["rattle"])
         if fits:
-            one.does("SetString", *arguments)
+            one.does("SetInteger", *arguments)
         else:
-            assert "constant mass matrix" in one.refuses("SetString", *arguments)
+            assert "constant mass matrix" in one.refuses("SetInteger", *arguments)
         one.free()
 
 

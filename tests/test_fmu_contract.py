@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import re
 import subprocess
@@ -111,6 +112,7 @@ def test_names_are_those_of_the_design(name, xml, prepared):
             expected |= {f"contact.{c}", f"departure.{c}.time", f"departure.{c}.count"}
             expected |= {f"departure.{c}.{s}" for s in q}
             expected |= {f"departure.{c}.velocity.{s}" for s in q}
+    expected |= {o.name for o in model.outputs}
     expected |= {f"energy.{e}" for e in ("kinetic", "potential", "total")}
     expected |= {
         f"solver.{s}"
@@ -198,10 +200,11 @@ def test_experiment_log_categories_and_capabilities_are_stated(name, xml, prepar
 
 
 def test_derivatives_refer_to_their_states(xml):
-    """der(theta) is the derivative of theta, der(theta,2) of der(theta)."""
+    """der(theta) is the derivative of theta, der(theta,2) of der(theta): of states alone, for importers
+    (OMSimulator) count the states by this attribute."""
     names = list(variables(xml))
     for variable, (_, _, typed) in variables(xml).items():
-        if variable.startswith("der("):
+        if variable in listed(xml, "Derivatives"):
             inner, _, order = variable[4:-1].partition(",")
             of = f"der({inner})" if order == "2" else inner
             assert names[int(typed["derivative"]) - 1] == of
@@ -214,6 +217,71 @@ def test_derivatives_refer_to_their_states(xml):
     }
     derivatives = listed(xml, "Derivatives")
     assert {names[int(variables(xml)[d][2]["derivative"]) - 1] for d in derivatives} == states
+
+
+def test_each_method_has_its_number_for_ever(xml, target):
+    """auto 1, dop853 2, rk4 3, radau5 4, rattle 5 (native): saved experiments mean the same by them."""
+    types = {t.get("name"): t for t in xml.find("TypeDefinitions")}
+    items = {i.get("name"): int(i.get("value")) for i in types["Method"].iter("Item")}
+    expected = {"auto": 1, "dop853": 2, "rk4": 3, "radau5": 4, "rattle": 5}
+    if target == "python":
+        del expected["rattle"]
+    assert items == expected
+    _, kind, typed = variables(xml)["solver.method"]
+    assert (kind, typed["declaredType"], typed["start"]) == ("Enumeration", "Method", "1")
+
+
+def test_angles_are_shown_in_degrees(xml):
+    """Every variable in rad, rad/s, rad/s2 has a type with a display unit of 180/pi of it."""
+    types = {t.get("name"): t[0].attrib for t in xml.find("TypeDefinitions")}
+    units = {u.get("name"): u for u in xml.find("UnitDefinitions")}
+    for _, kind, typed in variables(xml).values():
+        if kind == "Real" and typed["unit"].startswith("rad"):
+            known = types[typed["declaredType"]]
+            assert known["unit"] == typed["unit"]
+            (shown,) = units[typed["unit"]].findall("DisplayUnit")
+            assert shown.get("name") == known["displayUnit"] == typed["unit"].replace("rad", "deg")
+            assert float(shown.get("factor")) == pytest.approx(180 / math.pi, rel=1e-15)
+
+
+def test_states_have_nominal_values_and_positive_parameters_a_minimum(name, xml, prepared):
+    """The size of each coordinate that has one, of its velocity size times rate; m > 0 is told as min 0."""
+    state, states = prepared(name).structure.start.state, prepared(name).table.states
+    for j, (q, v) in enumerate(zip(states[::2], states[1::2], strict=True)):
+        if state.size[j] > 0:
+            assert float(variables(xml)[q][2]["nominal"]) == pytest.approx(state.size[j], rel=0.1)
+            speed = state.size[j] * state.rate
+            if speed > 0:
+                assert float(variables(xml)[v][2]["nominal"]) == pytest.approx(speed, rel=0.1)
+    for p in prepared(name).model.parameters:
+        if p.symbol.is_positive:
+            assert float(variables(xml)[name_of(p.symbol)][2]["min"]) >= 0
+
+
+def test_dependencies_say_of_what_kind_they_are(xml):
+    """As many kinds as dependencies; a state among its own is a constant factor, 1."""
+    names = list(variables(xml))
+    for part in ("Outputs", "Derivatives", "InitialUnknowns"):
+        for element in xml.find(f"ModelStructure/{part}"):
+            known = element.get("dependencies").split()
+            kinds = element.get("dependenciesKind", "").split()
+            assert len(kinds) == len(known)
+            for k, kind in zip(known, kinds, strict=True):
+                own = names[int(k) - 1] == names[int(element.get("index")) - 1]
+                assert kind == ("constant" if own else "dependent")
+
+
+def test_the_model_says_who_made_it(tmp_path):
+    """author, version, license and copyright of a Model stand in the description; none are invented."""
+    x, m = dynamicsymbols("x"), symbols("m", positive=True)
+    body = {"coordinates": {x: "m"}, "parameters": [Parameter(m, 1.0, "kg")]}
+    made = {"author": "A. Lagrange", "version": "1788", "license": "CC0", "copyright": "none"}
+    for given in ({}, made):
+        model = Model(name="Free", lagrangian=m * x.diff() ** 2 / 2, **body, **given)
+        fmu = build_fmu(model, tmp_path, target="python", check=False)
+        with zipfile.ZipFile(fmu) as archive:
+            root = ET.fromstring(archive.read("modelDescription.xml"))
+        assert {k: root.get(k) for k in made if root.get(k)} == given
 
 
 def test_the_model_structure_is_complete(xml):

@@ -15,7 +15,7 @@ from conftest import FILES
 from typer.testing import CliRunner
 
 from lagfmu.cli.app import app
-from lagfmu.live.playable import of_fmu
+from lagfmu.live.playable import playable as playable_of
 from lagfmu.live.render import Playable, render
 from lagfmu.verification.simulate import read_description, simulate
 
@@ -129,7 +129,7 @@ def test_what_an_fmu_says_is_text(
                 text = text.replace(b"<math", b"<script>document.title='taken'</script><math", 1)
             new.writestr(name, text)
     out = tmp_path / "evil.html"
-    out.write_text(render(of_fmu(path)), encoding="utf-8")
+    out.write_text(render(playable_of(path)), encoding="utf-8")
     page = Page(browser, out)
     assert page.run()["time"][-1] == 2.0
     assert page.tab.title().startswith("Hemisphere")
@@ -173,3 +173,31 @@ def test_a_page_is_the_same_from_model_and_fmu(
         assert result.exit_code == 0, result.output
         pages.append(out.read_bytes())
     assert pages[0] == pages[1]
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_the_page_travels_in_the_fmu(target: str, tmp_path: Path, browser: Any) -> None:
+    """lagfmu build --page: the page lies beside the documentation, which has a link to it, and the FMU
+    grows by 250 kB at most; without the option it is as it was."""
+    model = str(Path(__file__).parent.parent / "models" / "rolling_sphere.py")
+    options = ["build", model, "--target", target, "--no-check", "--out"]
+    for out, extra in (("with", ["--page"]), ("without", [])):
+        result = CliRunner().invoke(app, [*options, str(tmp_path / out), *extra])
+        assert result.exit_code == 0, result.output
+    contents, sizes = [], []
+    for out in ("with", "without"):
+        path = tmp_path / out / target / "RollingSphere.fmu"
+        sizes.append(path.stat().st_size)
+        with zipfile.ZipFile(path) as archive:
+            contents.append({n: archive.read(n) for n in archive.namelist()})
+    assert sizes[0] - sizes[1] < 250e3
+    live, index = contents[0].pop("documentation/play.html"), "documentation/index.html"
+    assert b'href="play.html"' in contents[0].pop(index)
+    assert b"play.html" not in contents[1].pop(index)
+    assert contents[0] == contents[1]
+    path = tmp_path / "play.html"
+    path.write_bytes(live)
+    page = Page(browser, path)
+    assert page.run()["time"][-1] == 2.0
+    page.close()
+    assert page.problems == []

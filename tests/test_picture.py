@@ -17,7 +17,7 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Arrow, Disk, Holonomic, Line, Model, Parameter, Rod, Scene, output
 from lagfmu import Path as Curve
 from lagfmu.errors import BuildError, ModelError
-from lagfmu.live.playable import of_fmu
+from lagfmu.live.playable import playable as playable_of
 from lagfmu.model.file import load
 from lagfmu.page.picture import as_bytes, direction, pack, picture_of, read_picture, values
 from lagfmu.prepare.prepare import Prepared, prepare
@@ -178,7 +178,7 @@ def test_the_mechanism_is_drawn(
     in the FMU is the model's."""
     picture = picture_of(prepared(name))
     assert picture is not None
-    assert of_fmu(native_fmu(name)).facts["picture"] == picture
+    assert playable_of(native_fmu(name)).facts["picture"] == picture
     page = opened(name)
     page.until("lagfmu.runs")
     for key in ("Home", "PageUp", "End"):
@@ -207,7 +207,7 @@ def test_the_arrow_is_as_long_as_the_force(opened: Callable[..., Page]) -> None:
 
 def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
     """A spherical pendulum: z stays upward on the screen as the view is turned."""
-    from lagfmu.live.playable import of_prepared
+    from lagfmu.live.playable import playable as playable_of
     from lagfmu.live.render import render
 
     z = dynamicsymbols("z")
@@ -227,7 +227,7 @@ def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
         ],
     )
     out = tmp_path / "spherical.html"
-    out.write_text(render(of_prepared(prepare(model, Scene("Spherical")))), encoding="utf-8")
+    out.write_text(render(playable_of(prepare(model, Scene("Spherical")))), encoding="utf-8")
     page = Page(browser, out)
     page.until("lagfmu.runs")
     places = []

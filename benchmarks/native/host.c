@@ -26,7 +26,7 @@ typedef struct {
     fmi2DoStepTYPE *step;
     fmi2GetRealTYPE *real;
     fmi2GetIntegerTYPE *integer;
-    fmi2SetStringTYPE *string;
+    fmi2SetIntegerTYPE *choose;
     fmi2FreeInstanceTYPE *release;
 } Api;
 
@@ -73,18 +73,18 @@ static int load(Api *api, const char *path) {
            look_up(library, "fmi2Reset", &api->reset) | look_up(library, "fmi2DoStep", &api->step) |
            look_up(library, "fmi2GetReal", &api->real) |
            look_up(library, "fmi2GetInteger", &api->integer) |
-           look_up(library, "fmi2SetString", &api->string) |
+           look_up(library, "fmi2SetInteger", &api->choose) |
            look_up(library, "fmi2FreeInstance", &api->release);
 }
 
 static int initialize(Host *h, const Task *task) {
     const Api *api = &h->api;
     int bad = api->reset(h->fmu) != fmi2OK;
-    const char *name = strchr(h->method, '=');
-    if (name != NULL) {
+    const char *number = strchr(h->method, '=');
+    if (number != NULL) {
         const fmi2ValueReference reference = (fmi2ValueReference)strtoul(h->method, NULL, 10);
-        name++;
-        bad |= api->string(h->fmu, &reference, 1, &name) != fmi2OK;
+        const fmi2Integer method = atoi(number + 1);
+        bad |= api->choose(h->fmu, &reference, 1, &method) != fmi2OK;
     }
     bad |= api->setup(h->fmu, fmi2True, task->tolerance, 0, fmi2True, task->stop) != fmi2OK;
     bad |= api->enter(h->fmu) != fmi2OK;

@@ -6,6 +6,7 @@ import contextlib
 import difflib
 import enum
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -24,18 +25,23 @@ from ..fmu.native import takes_long
 from ..fmu.write import write_whole
 from ..interface.variables import VariableTable
 from ..live.command import write_page
+from ..live.playable import told_by
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
+from ..model.library import known, new
 from ..model.scene import Scene
+from ..page.text import show as show_prepared
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
 from ..verification.crosscheck import as_csv, write_crosscheck
+from ..verification.plot import plot
 from ..verification.reference import read_table
 from ..verification.report import exit_code
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification
+from .film import film
 from .options import (
     AddOutput,
     Contacts,
@@ -47,10 +53,9 @@ from .options import (
     Methods,
     Name,
     Outputs,
+    RealsOnly,
     narrowed,
 )
-from .plot import plot
-from .show import show as show_prepared
 from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
@@ -118,6 +123,15 @@ def _plainly() -> Iterator[None]:
                 f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
             )
             raise typer.Exit(getattr(error, "code", 1)) from None
+        except OSError as error:  # of temporary files; for what the user names see its own errors
+            where = error.filename or tempfile.gettempdir()
+            errors.print(
+                f"[bold red]error:[/] {escape(f'{where}: {error.strerror or error}')}: is the disk full? "
+                "The environment variable TMPDIR chooses another folder for temporary files",
+                highlight=False,
+                soft_wrap=True,
+            )
+            raise typer.Exit(1) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
                 errors.print(
@@ -159,6 +173,10 @@ def build(
             "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
         ),
     ] = None,
+    page_: Annotated[
+        bool,
+        typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
+    ] = False,
     outputs: Outputs = None,
     fixed: Fixed = None,
     inputs: Inputs = None,
@@ -167,6 +185,7 @@ def build(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    reals_only: RealsOnly = None,
     name: Name = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -174,7 +193,8 @@ def build(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    narrowing = (outputs, fixed, inputs, contacts, methods, method)
+    needs |= {"reals_only": reals_only}
+    narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -196,7 +216,15 @@ def build(
                 if name is None and any(v is not None for v in narrowing):
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
                 built = package(
-                    prepared, out / kind, file.closed_forms, kind, places, choice, check, reference
+                    prepared,
+                    out / kind,
+                    file.closed_forms,
+                    kind,
+                    places,
+                    choice,
+                    check,
+                    reference,
+                    page_,
                 )
             path, found = built.path, built.verification
             console.print(
@@ -232,6 +260,20 @@ def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
     return ""
 
 
+@app.command(name="new")
+def new_command(
+    file: Annotated[Path, typer.Argument(help="The Python file to write.")],
+    source: Annotated[
+        str | None, typer.Option("--from", help=f"Copy a model: {', '.join(known())}.")
+    ] = None,
+) -> None:
+    """Write a commented model to start from."""
+    with _plainly():
+        path = new(file, source)
+        console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
+        console.print(f"next: lagfmu show {escape(str(path))}", soft_wrap=True, highlight=False)
+
+
 @app.command()
 def show(
     model: ModelPath,
@@ -244,6 +286,7 @@ def show(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    reals_only: RealsOnly = None,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
@@ -253,6 +296,7 @@ def show(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
+    needs |= {"reals_only": reals_only}
     with _plainly():
         file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
@@ -340,6 +384,10 @@ def simulate_command(
         typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
+    animate: Annotated[
+        Path | None,
+        typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
+    ] = None,
     inputs: InputFile = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -377,6 +425,10 @@ def simulate_command(
                 f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
                 soft_wrap=True,
             )
+        if animate is not None:
+            with console.status(f"drawing {name}"):
+                film(told_by(source), result, given, animate, name)
+            console.print(f"[green]wrote[/] {escape(str(animate))}", soft_wrap=True)
 
 
 @app.command()

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import datetime
 import hashlib
+import math
 import os
 import uuid
 from collections.abc import Collection, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
 from ..interface.variables import Value, Variable, VariableTable
+from ..methods import MENU, NUMBERS
+from ..model.model import Model
 from ..model.scene import Scene
 from ..model.units import Unit
 
+DISPLAYED = {  # unit -> type and what it is shown in, times 180/pi
+    "rad": ("Angle", "deg"),
+    "rad/s": ("AngularVelocity", "deg/s"),
+    "rad/s2": ("AngularAcceleration", "deg/s2"),
+}
+METHOD = "Method"
 LOG_CATEGORIES = {
     "logStatusWarning": "start values that were moved, settings that were adjusted",
     "logStatusDiscard": "communication steps that could not be done, and why",
@@ -26,7 +35,7 @@ LOG_CATEGORIES = {
 def model_description(
     table: VariableTable,
     scene: Scene,
-    description: str,
+    model: Model,
     tool: str,
     interfaces: Mapping[str, Mapping[str, str]],
     content: bytes,
@@ -36,8 +45,9 @@ def model_description(
 ) -> bytes:
     """The XML text.  The GUID is made from `content` and the text itself, not from time or chance.
 
-    `interfaces` maps ModelExchange and CoSimulation, in this order, to their attributes; `sources` are
-    the files that a recompilation needs; `reinitialized` the states that an event may change.
+    The author, version, copyright and licence are those that the model gives.  `interfaces` maps
+    ModelExchange and CoSimulation, in this order, to their attributes; `sources` are the files that a
+    recompilation needs; `reinitialized` the states that an event may change.
     """
     root = Element(
         "fmiModelDescription",
@@ -45,7 +55,12 @@ def model_description(
             "fmiVersion": "2.0",
             "modelName": scene.name,
             "guid": "",
-            "description": description,
+            "description": model.description or f"{model.name}: forces of constraint as outputs",
+            **{
+                k: text
+                for k in ("author", "version", "copyright", "license")
+                if (text := getattr(model, k))
+            },
             "generationTool": tool,
             **_generation_date(),
             "variableNamingConvention": "structured",
@@ -59,6 +74,7 @@ def model_description(
             for file in sources:
                 SubElement(listed, "File", {"name": file})
     _units(root, table)
+    _types(root, table)
     categories = SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
         SubElement(categories, "Category", {"name": name, "description": text})
@@ -75,7 +91,7 @@ def model_description(
     index = {v.name: k + 1 for k, v in enumerate(table.variables)}
     variables = SubElement(root, "ModelVariables")
     for k, v in enumerate(table.variables):
-        _variable(variables, k, v, index, v.name in reinitialized)
+        _variable(variables, k, v, index, v.name in reinitialized, v.name in table.derivatives)
     _structure(root, table, index)
     indent(root, "  ")
     digest = hashlib.sha256(content + tostring(root, "utf-8")).hexdigest()
@@ -112,6 +128,32 @@ def _units(root: Element, table: VariableTable) -> None:
     for name, unit in sorted(units.items()):
         element = SubElement(definitions, "Unit", {"name": name})
         SubElement(element, "BaseUnit", {k: str(e) for k, e in unit.base.items()})
+        if name in DISPLAYED:
+            shown = {"name": DISPLAYED[name][1], "factor": number(180 / math.pi)}
+            SubElement(element, "DisplayUnit", shown)
+
+
+def _types(root: Element, table: VariableTable) -> None:
+    """Angles are shown in degrees; the methods have numbers, one each for ever."""
+    definitions = Element("TypeDefinitions")
+    present = {v.unit.name for v in table.variables if v.unit is not None}
+    for unit, (name, shown) in DISPLAYED.items():
+        if unit in present:
+            simple = SubElement(definitions, "SimpleType", {"name": name})
+            SubElement(simple, "Real", {"quantity": name, "unit": unit, "displayUnit": shown})
+    for v in table.variables:
+        if v.kind == "Enumeration":
+            text = "How the equations of motion are integrated"
+            simple = SubElement(definitions, "SimpleType", {"name": METHOD, "description": text})
+            items = SubElement(simple, "Enumeration")
+            for m in MENU:
+                if m.name in v.items:
+                    item = {"name": m.name, "value": str(m.number)}
+                    SubElement(
+                        items, "Item", item | ({"description": m.remark} if m.remark else {})
+                    )
+    if len(definitions):
+        root.append(definitions)
 
 
 def _variable(
@@ -120,6 +162,7 @@ def _variable(
     v: Variable,
     index: Mapping[str, int],
     reinitialized: bool,
+    is_derivative: bool,
 ) -> None:
     attributes = {
         "name": v.name,
@@ -132,15 +175,23 @@ def _variable(
         attributes["initial"] = v.initial
     element = SubElement(parent, "ScalarVariable", attributes)
     typed = {}
+    if v.kind == "Enumeration":
+        typed["declaredType"] = METHOD
+    if v.unit is not None and v.unit.name in DISPLAYED:
+        typed["declaredType"] = DISPLAYED[v.unit.name][0]
     if v.unit is not None:
         typed["unit"] = v.unit.name
-    if v.minimum is not None:
-        typed["min"] = number(v.minimum)
+    if v.minimum is not None or v.positive:
+        typed["min"] = number(v.minimum or 0.0)
+    elif v.kind == "Integer":
+        typed["min"] = "0"
     if v.maximum is not None:
         typed["max"] = number(v.maximum)
-    if v.start is not None:
+    if v.nominal is not None:
+        typed["nominal"] = number(v.nominal)
+    if v.start is not None and v.initial != "calculated":
         typed["start"] = _start(v.start)
-    if v.derivative_of is not None:
+    if v.derivative_of is not None and is_derivative:  # importers count states by this attribute
         typed["derivative"] = str(index[v.derivative_of])
     if reinitialized:
         typed["reinit"] = "true"
@@ -150,6 +201,8 @@ def _variable(
 def _start(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, str):
+        return str(NUMBERS[value])
     return number(value) if isinstance(value, float) else str(value)
 
 
@@ -157,8 +210,11 @@ def _structure(root: Element, table: VariableTable, index: Mapping[str, int]) ->
     structure = SubElement(root, "ModelStructure")
 
     def unknown(parent: Element, name: str, depends: tuple[str, ...]) -> None:
-        known = " ".join(str(i) for i in sorted(index[d] for d in depends))
-        SubElement(parent, "Unknown", {"index": str(index[name]), "dependencies": known})
+        known = sorted((index[d], "constant" if d == name else "dependent") for d in depends)
+        attributes = {"index": str(index[name]), "dependencies": " ".join(str(i) for i, _ in known)}
+        if known:
+            attributes["dependenciesKind"] = " ".join(kind for _, kind in known)
+        SubElement(parent, "Unknown", attributes)
 
     outputs = SubElement(structure, "Outputs")
     for v in table.outputs:

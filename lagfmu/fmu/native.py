@@ -112,10 +112,10 @@ def sources_of(
     description = model_description(
         table,
         scene,
-        eom.model.description or f"{eom.model.name}: forces of constraint as outputs",
+        eom.model,
         f"lagfmu {version()}",
         {
-            "ModelExchange": {**common, **MODEL_EXCHANGE},
+            **({} if system.estimated else {"ModelExchange": {**common, **MODEL_EXCHANGE}}),
             "CoSimulation": {**common, **CO_SIMULATION, **order},
         },
         b"".join(name.encode() + text for name, text in {**runtime, **generated}.items()),

@@ -10,16 +10,17 @@ import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from pythonfmu.builder import FmuBuilder
 
 from ..codegen.py.equations import source
 from ..codegen.py.parts import files_left_out, files_of_its_own
 from ..errors import BuildError
-from ..interface.variables import VariableTable
+from ..interface.variables import Variable, VariableTable
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
-from ..methods import IN_PYTHON
+from ..methods import IN_PYTHON, NUMBERS
 from ..model.scene import Scene
 from ..solver.system import System
 from .archive import pack, version
@@ -64,7 +65,7 @@ class {name}(Fmi2Slave):
     system = SYSTEM
     variables = VARIABLES
     default_tolerance = {tolerance!r}
-    methods = {methods!r}
+    numbers = {numbers!r}
     default_method = {method!r}
     default_step = {step!r}
     identity = {identity!r}
@@ -94,7 +95,7 @@ def build(
     description = model_description(
         table,
         scene,
-        eom.model.description or f"{eom.model.name}: forces of constraint as outputs",
+        eom.model,
         f"lagfmu {version()}",
         {"CoSimulation": {"modelIdentifier": scene.name, **CAPABILITIES}},
         text.encode(),
@@ -125,13 +126,12 @@ def _script(
     package: str,
     methods: Sequence[str],
 ) -> str:
-    rows = "".join(
-        f"    {(v.name, v.kind, v.role, v.start, v.minimum, v.maximum, v.positive, v.given)!r},\n"
-        for v in table.variables
-    )
+    rows = "".join(f"    {_row(v)!r},\n" for v in table.variables)
     equations = source(eom, reduction, scene.formulation or "multipliers")
     words = ["Embedding", "Friction", "Lookups", "Own", "Row", "System"]
     vocabulary = f"from {package}.solver.system import {', '.join(words)}"
+    if "interval." in equations:
+        vocabulary = f"from {package}.solver import interval\n{vocabulary}"
     if "= Cubic(" in equations:
         vocabulary = f"from {package}.solver.cubic import Cubic\n{vocabulary}"
     return SCRIPT.format(
@@ -142,11 +142,19 @@ def _script(
         equations="\n" + equations,
         variables=rows,
         tolerance=scene.tolerance,
-        methods=tuple(methods),
+        numbers={NUMBERS[m]: m for m in methods},
         method=scene.method,
         step=scene.step,
         identity=f"{scene.name} {_digest(equations.encode(), rows.encode(), package.encode())}",
     )
+
+
+def _row(v: Variable) -> tuple[Any, ...]:
+    """A method is an Integer to the FMI functions: its number."""
+    kind, start = v.kind, v.start
+    if isinstance(start, str):
+        kind, start = "Integer", NUMBERS[start]
+    return v.name, kind, v.role, start, v.minimum, v.maximum, v.positive, v.given
 
 
 def _runtime(scene: Scene, system: System, tables: bool) -> dict[str, bytes]:

@@ -14,7 +14,7 @@ import functools
 import json
 import math
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, TypeVar
 
@@ -26,6 +26,7 @@ from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
+from ..solver.rates import Past, estimated, half_connected, restored_past
 from ..solver.restored import restored, restored_settings
 from ..solver.state import SMALLEST_TOLERANCE, Settings, State
 from ..solver.system import System
@@ -63,13 +64,13 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
 
     The generated subclass gives `system`, `variables` (name, kind, role, start, min, max, must it be
     positive, does the model give the start; the position is the value reference), `default_tolerance`, the
-    `methods` that can be chosen, the default method and fixed step, and `identity`.
+    `numbers` of the methods that can be chosen, the default method and fixed step, and `identity`.
     """
 
     system: System
     variables: Sequence[tuple[str, str, str, Any, float | None, float | None, bool, bool]]
     default_tolerance: float
-    methods: Sequence[str]
+    numbers: Mapping[int, str]
     default_method: str
     default_step: float
     identity: str
@@ -83,7 +84,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         self.outputs = [k for k, v in enumerate(self.variables) if v[2] in ("output", "start")]
         roles = [v[2] for v in self.variables]
         self.parameters = [k for k, role in enumerate(roles) if role == "parameter"]
-        self.inputs = [k for k, role in enumerate(roles) if role == "input"]
+        self.inputs = [k for k, role in enumerate(roles) if role in ("input", "estimate")]
+        self.past = Past()
+        self.fresh: set[int] = set()  # what was set since the latest communication point
         self.reference = {name: k for k, name in enumerate(self.names)}
         self.start_time, self.stop_time, self.tolerance = 0.0, math.inf, 0.0
         self.running = False
@@ -136,10 +139,11 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         after the step belongs to the time at its end.
         """
         before, values = self.state, list(self.values)
+        past, fresh = self.past, set(self.fresh)
         try:
             before = self._checked(current_time, step_size)
-            u = self._values(self.inputs)
-            self._warn_of_jumps(u)
+            u = self._driven(before.t)
+            self._warn_of_rates(u, before.span)
             self.state = advance(
                 self.system, self.settings, before, u, self.p, current_time + step_size
             )
@@ -150,6 +154,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             self._outputs()
         except StepFailureError as error:
             self.state, self.values, self.observed = before, values, None
+            self.past, self.fresh = past, fresh
             self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
             return False
         self._warn_of_tables()
@@ -181,17 +186,34 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             )
         return state
 
-    def _warn_of_jumps(self, u: Sequence[float]) -> None:
-        """Once: a prescribed motion moves, but its derivatives are left at zero."""
-        for k in self.system.prescribed:
-            still = u[k + 1] == 0 and u[k + 2] == 0
-            if self.expected and u[k] != self.expected[k] and still and not self.warned:
-                name = self.names[self.inputs[k]]
-                self._warn(
-                    f"input {name} moves while der({name}) = der({name},2) = 0: it jumps at each "
-                    "communication point; connect its derivatives as well"
-                )
-                self.warned = True
+    def _driven(self, t: float) -> list[float]:
+        """The inputs, with the rates of those whose rates are estimated."""
+        u = self._values(self.inputs)
+        if self.system.estimated:
+            fresh = [self.inputs[k] in self.fresh for k in self.system.estimated]
+            u, self.past = estimated(self.system, self.past, t, u, fresh)
+            for k, value in zip(self.inputs, u, strict=True):
+                self.values[k] = value
+        self.fresh.clear()
+        return u
+
+    def _warn_of_rates(self, u: Sequence[float], h: float) -> None:
+        """Once, at the first step that shows it: not all three inputs of a motion are connected."""
+        if self.warned or not self.expected or not h > 0:
+            return
+        bad = [
+            self.names[self.inputs[k]]
+            for k in self.system.prescribed
+            if k not in self.system.estimated
+            and half_connected(u[k : k + 3], self.expected[k : k + 3], h)
+        ]
+        if bad:
+            self._warn(
+                f"prescribed motion {', '.join(bad)} has moved over the last {h:.3g} s otherwise than its "
+                "rates der() and der(,2) say, so that the forces of constraint are wrong: connect all "
+                'three inputs, or build the FMU with Input(..., rates="estimated")'
+            )
+            self.warned = True
 
     def _warn_of_tables(self) -> None:
         """Once for each: a table is looked up beyond its ends."""
@@ -234,7 +256,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set parameters, start values (before the end of initialization) or inputs."""
         for vr, value in zip(vrs, values, strict=True):  # all are checked before one is set
-            name, _, _, _, low, high, positive, _ = self._settable(vr, "Real")
+            name, _, _, _, low, high, positive, _ = self._settable(vr, "Real", value)
             if not math.isfinite(value):
                 raise Refused(f"{name!r} = {value!r}, expected a finite number")
             if (low is not None and value < low) or (high is not None and value > high):
@@ -245,42 +267,52 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
 
     @guarded
     def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """Set `solver.method`."""
+        """No variable is a String."""
         for vr, value in zip(vrs, values, strict=True):
-            name = self._settable(vr, "String")[0]
-            if value not in self.methods:
-                raise Refused(f"{name!r} = {value!r}, expected one of {', '.join(self.methods)}")
-        self._set(vrs, values)
+            self._settable(vr, "String", value)
 
     @guarded
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """No Integer can be set."""
-        for vr in vrs:
-            self._settable(vr, "Integer")
+        """Set `solver.method`, an Enumeration; no other Integer can be set."""
+        for vr, value in zip(vrs, values, strict=True):
+            name = self._settable(vr, "Integer", value)[0]
+            if value not in self.numbers:
+                offered = ", ".join(f"{k} ({method})" for k, method in self.numbers.items())
+                raise Refused(f"{name!r} = {value!r}, expected one of {offered}")
+        self._set(vrs, values)
 
     @guarded
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
         """No Boolean can be set."""
-        for vr in vrs:
-            self._settable(vr, "Boolean")
+        for vr, value in zip(vrs, values, strict=True):
+            self._settable(vr, "Boolean", value)
 
     def _variable(self, vr: int, kind: str) -> Any:
         if not 0 <= vr < len(self.variables) or self.variables[vr][1] != kind:
             raise Refused(f"value reference {vr} is no {kind} variable of this FMU")
         return self.variables[vr]
 
-    def _settable(self, vr: int, kind: str) -> Any:
+    def _settable(self, vr: int, kind: str, value: Any) -> Any:
+        """The variable, if it may be set to the value now: a fixed parameter only to what it is."""
         variable = self._variable(vr, kind)
         name, role = variable[0], variable[2]
-        if role == "output":
+        if role in ("output", "estimate"):
             raise Refused(f"{name!r} is calculated and cannot be set")
-        if self.running and role != "input":
+        if self.running and role != "input" and not self._is_same(vr, value):
             raise Refused(f"{name!r} can only be set before the end of the initialization")
         return variable
 
+    def _is_same(self, vr: int, value: Any) -> bool:
+        """A fixed parameter that is set once more to the bits that it has: some importers do."""
+        fixed = self.variables[vr][2] in ("parameter", "solver")
+        return fixed and float(value).hex() == float(self.values[vr]).hex()
+
     def _set(self, vrs: list[int], values: Sequence[Any]) -> None:
+        if all(self._is_same(vr, value) for vr, value in zip(vrs, values, strict=True)):
+            return
         for vr, value in zip(vrs, values, strict=True):
             self.values[vr] = value
+        self.fresh.update(vrs)
         self.observed = None
         if not self.running:
             self.state = None
@@ -320,7 +352,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                 f"{SMALLEST_TOLERANCE!r} is used"
             )
         self.settings = Settings(
-            method=value.get("solver.method", self.default_method),
+            method=self.numbers.get(value.get("solver.method", 0), self.default_method),
             tolerance=max(tolerance, SMALLEST_TOLERANCE),
             step=value.get("solver.step", self.default_step),
             maximum_step=value["solver.maximum_step"],
@@ -369,6 +401,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             "experiment": [self.start_time, self.stop_time, self.tolerance],
             "settings": None if settings is None else asdict(settings),
             "state": None if self.state is None else self.state.to_json(),
+            "past": [list(self.past.points), sorted(self.fresh)],
         }
 
     @guarded
@@ -379,8 +412,11 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             raise Refused("the saved state belongs to another FMU, or to another version of this")
         try:
             kept = self._checked_state(state)
+            restored_past(self.system, state.get("past"))
         except (ValueError, TypeError, KeyError) as error:
             raise Refused(f"the saved state is none of this FMU's: {error}") from None
+        self.past, fresh = restored_past(self.system, state.get("past"))
+        self.fresh = set(fresh)
         self.values, self.running, experiment, settings, self.state = kept
         self.start_time, self.stop_time, self.tolerance = experiment
         if settings is not None:
@@ -400,7 +436,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         if not (math.isfinite(start) and stop > start and 0 <= tolerance < math.inf):
             raise ValueError(f"its experiment is {state['experiment']!r}")
         settings, kept = state["settings"], state["state"]
-        settings = None if settings is None else restored_settings(settings, self.methods)
+        settings = (
+            None if settings is None else restored_settings(settings, tuple(self.numbers.values()))
+        )
         kept = None if kept is None else restored(self.system, kept)
         if not isinstance(running, bool) or (running and None in (settings, kept)):
             raise ValueError(f"its mode is {running!r}")
@@ -414,7 +452,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             good = good and (low is None or number >= low) and (high is None or number <= high)
             good = good and (not positive or number > 0)
         else:
-            good = value in self.methods if name == "solver.method" else True
+            good = value in self.numbers if name == "solver.method" else True
         if not good:
             raise ValueError(f"its {name} is {value!r}")
 

@@ -20,8 +20,10 @@ from .archive import pack
 from .claims import pack_closed_forms
 from .compiler import HOST
 
+SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
 TARGETS = ("python", "native")
 PAGE = "documentation/index.html"
+LIVE = "documentation/play.html"  # beside it, which has a link to it
 
 
 def write(
@@ -31,12 +33,13 @@ def write(
     target: str = "python",
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
+    live: str = "",
 ) -> Path:
     """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
 
-    `choice` is HTML on how the solver settings were chosen.  For the rest see api.build_fmu.  Warns of
-    each start value that is moved onto the constraints.  Raises ModelError if one in the model's `start`
-    moves by more than 1e-6 of its coordinate's size.
+    `choice` is HTML on how the solver settings were chosen, `live` the page in which the FMU runs.  For
+    the rest see api.build_fmu.  Warns of each start value that is moved onto the constraints.  Raises
+    ModelError if one in the model's `start` moves by more than 1e-6 of its coordinate's size.
     """
     if target not in TARGETS:
         raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
@@ -44,7 +47,7 @@ def write(
     tell(prepared.structure.start.moved)
     prepared = _as_built(prepared, target)
     extra = {
-        PAGE: page(prepared, choice=choice).encode(),
+        PAGE: page(prepared, choice=choice, live=bool(live)).encode(),
         "resources/lagfmu.json": pack_closed_forms(
             prepared.scene,
             closed_forms,
@@ -54,6 +57,8 @@ def write(
             prepared.model.splines,
         ),
     }
+    if live:
+        extra[LIVE] = live.encode()
     picture = picture_of(prepared)
     if picture is not None:
         extra[IN_FMU] = as_bytes(picture)
@@ -73,9 +78,10 @@ def put_figures(
     figures: Sequence[tuple[str, ...]],
     target: str,
     choice: str = "",
+    live: bool = False,
 ) -> None:
     """Put verification results into the page of an FMU that stands at `path`; nothing else changes."""
-    put(path, {PAGE: page(_as_built(prepared, target), figures, choice).encode()})
+    put(path, {PAGE: page(_as_built(prepared, target), figures, choice, live).encode()})
 
 
 def put(path: Path, more: Mapping[str, bytes]) -> None:
@@ -86,10 +92,20 @@ def put(path: Path, more: Mapping[str, bytes]) -> None:
 
 
 def _as_built(prepared: Prepared, target: str) -> Prepared:
-    """A python FMU has no model exchange."""
-    if target == "native":
-        return prepared
-    return replace(prepared, table=prepared.table.without_local_derivatives())
+    """With the nominal values of states; a python FMU has no model exchange."""
+    table = prepared.table.with_nominals(_nominals(prepared))
+    return replace(
+        prepared, table=table if target == "native" else table.without_local_derivatives()
+    )
+
+
+def _nominals(prepared: Prepared) -> dict[str, float]:
+    """The sizes of coordinates at the described start, and times the natural rate those of velocities."""
+    state = prepared.structure.start.state
+    states = prepared.whole.states  # a coordinate, its velocity, the next coordinate, ...
+    sizes = dict(zip(states[::2], state.size, strict=True))
+    rates = {v: size * state.rate for v, size in zip(states[1::2], state.size, strict=True)}
+    return {n: float(f"{x:.1e}") for n, x in (sizes | rates).items() if x > SMALLEST_NOMINAL}
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -5,6 +5,7 @@ Names, order, references, causality, units, start values and dependencies are de
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
@@ -44,6 +45,8 @@ def variable_table(
     """All variables of the FMU.  Raises ModelError if names collide or a unit cannot be written."""
     builder = _Builder(eom, reduction, scene)
     table = builder.table()
+    if scene.reals_only:
+        table = table.as_reals()
     problems = _collisions([v.name for v in table.variables])
     for v in table.variables:
         if v.unit is not None and any(e.denominator != 1 for e in v.unit.exponents):
@@ -83,7 +86,9 @@ class _Builder:
         if reduction is not None:
             self.into = dict(zip((*eom.q, *eom.v), (*reduction.phi, *reduction.vel), strict=True))
         self.state_names = [str(s) for s in (*self.stepped.q, *self.stepped.v)]
-        self.inputs = [str(s) for s in eom.u]
+        hidden = {eom.u[eom.u.index(u) + k]: u for u in eom.estimated for k in (1, 2, 3)}
+        self.into |= hidden  # they follow from the values of the motion itself
+        self.inputs = [str(s) for s in eom.u if s not in hidden]
         self.known = {*self.state_names, *self.inputs}
         self.descriptions = {name_of(s): text for s, text in self.model.descriptions.items()}
         self.movable = self._movable()
@@ -256,7 +261,7 @@ class _Builder:
         ) -> Variable:
             return Variable(
                 name=f"solver.{name}",
-                kind="String" if isinstance(start, str) else "Real",
+                kind="Enumeration" if isinstance(start, str) else "Real",
                 role="solver",
                 causality="parameter",
                 variability="fixed",
@@ -270,6 +275,7 @@ class _Builder:
 
         methods = self.scene.selectable
         choice = setting("method", self.scene.method, None, described(methods))
+        choice = dataclasses.replace(choice, items=tuple(methods))
         step = setting(
             "step", self.scene.step, SECOND, "largest fixed step of rk4; 0: chosen from the start"
         )
@@ -300,27 +306,33 @@ class _Builder:
             name = name_of(i.symbol)
             if name not in self.inputs:
                 continue  # it keeps its start value
-            names = [name]
+            estimated = i.rates == "estimated"
+            names, text = [name], i.description or f"input {name}"
             if i in self.model.prescribed:
                 names += [f"der({name})", f"der({name},2)"]
+            if estimated:
+                names.append(f"der({name},3)")
+            heads = ("", "rate of: ", "second derivative of: ", "third derivative of: ")
+            starts = (float(i.start), float(i.rate), 0.0, 0.0)
+            unit = self.units[name]
             for order, full in enumerate(names):
-                text = i.description or f"input {name}"
+                given = order == 0 or not estimated
+                tail = "" if given else ", estimated from its values at the communication points"
                 variables.append(
                     Variable(
                         name=full,
                         kind="Real",
-                        role="input",
-                        causality="input",
+                        role="input" if given else "estimate",
+                        causality="input" if given else "local",
                         variability="continuous",
-                        initial=None,
-                        description=(text, f"rate of: {text}", f"second derivative of: {text}")[
-                            order
-                        ],
-                        start=(float(i.start), float(i.rate), 0.0)[order],
-                        unit=self.units[full],
-                        derivative_of=names[order - 1] if order else None,
+                        initial=None if given else "calculated",
+                        description=f"{heads[order]}{text}{tail}",
+                        start=starts[order],
+                        unit=unit,
+                        derivative_of=names[order - 1] if order and given else None,
                     )
                 )
+                unit = unit.per_second()
         return variables
 
     def motion(self) -> list[Variable]:
@@ -496,7 +508,7 @@ class _Builder:
                         self.output(f"{head}.{name}", text, self.units[s], (), discrete=True)
                     )
         if self.eom.frictions:
-            text = "energy that frictions and impacts have turned into heat since the start"
+            text = "energy that frictions and impacts dissipated so far (Model Exchange: impacts)"
             variables.append(self.output("energy.dissipated", text, ENERGY, ()))
         return variables
 

@@ -5,11 +5,11 @@ table itself is made in table.py.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from ..methods import described
-from ..model.units import Unit
+from ..model.units import ONE, Unit
 
 Value = float | int | bool | str
 RECORD = re.compile(
@@ -21,16 +21,16 @@ RECORD = re.compile(
 class Variable:
     """One FMI scalar variable.
 
-    `kind` is Real, Integer, Boolean or String; `role` says what may set it: parameter, start, input,
-    solver, or output (nothing).  `depends` are the inputs and states that it is computed from at a
-    communication point, `depends_initially` the inputs and exact start values at the start.
-    `positive`: zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's
-    `start` says it; otherwise it is 0 because nobody did.
+    `kind` is Real, Integer, Boolean or Enumeration (its `items` are methods, `start` one by name); `role`
+    says what may set it: parameter, start, input, solver, or output (nothing).  `depends` are the inputs
+    and states that it is computed from at a communication point, `depends_initially` the inputs and exact
+    start values at the start.  `positive`: zero, though not below the minimum, makes no sense.  `given`:
+    of a start value, the model's `start` says it; otherwise it is 0 because nobody did.
     """
 
     name: str
     kind: str
-    role: str
+    role: str  # or estimate: the FMU itself, from an input's values
     causality: str
     variability: str
     initial: str | None
@@ -42,6 +42,8 @@ class Variable:
     maximum: float | None = None
     positive: bool = False
     given: bool = False
+    items: tuple[str, ...] = ()
+    nominal: float | None = None
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
 
@@ -87,8 +89,29 @@ class VariableTable:
     def offering(self, methods: Collection[str]) -> VariableTable:
         """The same, where `solver.method` can only be one of these."""
         variables = [
-            replace(v, description=described(methods)) if v.name == "solver.method" else v
+            replace(v, description=described(methods), items=tuple(methods))
+            if v.name == "solver.method"
+            else v
             for v in self.variables
+        ]
+        return replace(self, variables=tuple(variables))
+
+    def as_reals(self) -> VariableTable:
+        """The same with Reals for Booleans and Integers; without an Enumeration.
+
+        The position is the value reference, so that this comes before anything refers to one.
+        """
+        variables = [
+            v if v.kind == "Real" else replace(v, kind="Real", unit=ONE, minimum=0.0)
+            for v in self.variables
+            if v.kind != "Enumeration"
+        ]
+        return replace(self, variables=tuple(variables))
+
+    def with_nominals(self, sizes: Mapping[str, float]) -> VariableTable:
+        """The same with nominal values, SI."""
+        variables = [
+            replace(v, nominal=sizes[v.name]) if v.name in sizes else v for v in self.variables
         ]
         return replace(self, variables=tuple(variables))
 

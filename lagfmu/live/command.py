@@ -8,7 +8,7 @@ from ..fmu.write import write_whole
 from ..model.file import load
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
-from .playable import of_fmu, of_prepared
+from .playable import playable
 from .render import Playable, render
 
 FOLDER = Path("dist/page")
@@ -20,14 +20,14 @@ def write_page(target: Path, out: Path | None = None, scene: Scene | None = None
     `out` is the HTML file, by default dist/page/NAME.html.  Raises ModelError, DerivationError,
     VerificationError for a file that is no FMU, and BuildError where nothing can be compiled.
     """
-    playable = _playable(target, scene)
-    path = out or FOLDER / f"{playable.name}.html"
-    write_whole(path, render(playable).encode())
+    made = _playable(target, scene)
+    path = out or FOLDER / f"{made.name}.html"
+    write_whole(path, render(made).encode())
     return path
 
 
 def _playable(target: Path, scene: Scene | None) -> Playable:
     if target.suffix != ".py":
-        return of_fmu(target)
+        return playable(target)
     file = load(target)
-    return of_prepared(prepare(file.model, scene or file.scenes[0]))
+    return playable(prepare(file.model, scene or file.scenes[0]))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import BuildError
 from ..fmu.native import IDENTITY, sources_of
+from ..fmu.write import PAGE
 from ..page.documentation import mathml
 from ..page.picture import IN_FMU, picture_of, read_picture
 from ..page.typeset import typeset
@@ -19,8 +21,42 @@ from .render import Playable
 from .wasm import compile_module
 
 
-def of_prepared(prepared: Prepared) -> Playable:
-    """The page's parts of a model in a scene.  Raises BuildError without ziglang."""
+@dataclass(frozen=True)
+class Told:
+    """What an FMU, or a model that would become one, tells of itself without being run."""
+
+    description: bytes
+    equations: list[Section]
+    picture: dict[str, Any] | None
+    sources: Mapping[str, bytes]
+
+
+def told_by(target: Prepared | Path) -> Told:
+    """What a model in a scene, or the FMU at a path, tells; every text of an FMU is taken as text.
+
+    Raises BuildError for a file that is no FMU.
+    """
+    return _told_by_fmu(target) if isinstance(target, Path) else _told_by_prepared(target)
+
+
+def playable(target: Prepared | Path) -> Playable:
+    """The parts of the page in which the FMU runs.
+
+    Raises BuildError without ziglang, and for an FMU that holds no C sources.
+    """
+    told = told_by(target)
+    if not {"model.c", "variables.c", "fmi2.c"} <= told.sources.keys():
+        raise BuildError(
+            f"{str(target)!r} holds no C sources of lagfmu, which a page is compiled from: build it with "
+            "--target native, or make the page from the model file"
+        )
+    # the page's instance is its own: one GUID for all, so that the same equations are the same bytes
+    sources = {**told.sources, "identity.h": IDENTITY.format(guid="{page}").encode()}
+    found = facts(told.description, told.picture)
+    return Playable(found, told.equations, compile_module(found["name"], sources))
+
+
+def _told_by_prepared(prepared: Prepared) -> Told:
     made = sources_of(
         prepared.coded, prepared.coded_reduction, prepared.scene, prepared.table, prepared.system
     )
@@ -29,14 +65,10 @@ def of_prepared(prepared: Prepared) -> Playable:
         for s in typeset(prepared.equations, prepared.reduction, prepared.formulation)
     ]
     sources = {**made.runtime, **made.generated}
-    return _playable(made.description, sections, sources, picture_of(prepared))
+    return Told(made.description, sections, picture_of(prepared), sources)
 
 
-def of_fmu(path: Path) -> Playable:
-    """The page's parts of an FMU; every text in it is taken as text.
-
-    Raises BuildError for a file that is no FMU, or holds no C sources.
-    """
+def _told_by_fmu(path: Path) -> Told:
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
@@ -45,30 +77,10 @@ def of_fmu(path: Path) -> Playable:
                 for n in names
                 if n.startswith("sources/") and n.endswith((".c", ".h"))
             }
-            description = archive.read("modelDescription.xml")
-            documented = "documentation/index.html"
-            page = archive.read(documented) if documented in names else b""
+            page = archive.read(PAGE) if PAGE in names else b""
             picture = read_picture(archive.read(IN_FMU)) if IN_FMU in names else None
+            return Told(archive.read("modelDescription.xml"), equations_of(page), picture, sources)
     except (zipfile.BadZipFile, KeyError, OSError) as error:
         raise BuildError(
             f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
         ) from None
-    if not {"model.c", "variables.c", "fmi2.c"} <= sources.keys():
-        raise BuildError(
-            f"{str(path)!r} holds no C sources of lagfmu, which a page is compiled from: build it with "
-            "--target native, or make the page from the model file"
-        )
-    return _playable(description, equations_of(page), sources, picture)
-
-
-def _playable(
-    description: bytes,
-    equations: list[Section],
-    sources: Mapping[str, bytes],
-    picture: dict[str, Any] | None,
-) -> Playable:
-    # the page's instance is its own: one GUID for all, so that the same equations are the same bytes
-    sources = {**sources, "identity.h": IDENTITY.format(guid="{page}").encode()}
-    found = facts(description, picture)
-    module = compile_module(found["name"], sources)
-    return Playable(found, equations, module)

@@ -39,11 +39,13 @@ LIBRARY, LIBRARY_STYLE, LICENCE = "uPlot.iife.min.js", "uPlot.min.css", "uPlot.L
 
 @dataclass(frozen=True)
 class Playable:
-    """What a page is made of: facts (facts.py), equations to read, and the compiled module."""
+    """What a page is made of: facts (facts.py), equations to read, and the compiled module; or in its
+    place a run that was recorded (recording.py)."""
 
     facts: dict[str, Any]
     equations: Sequence[Section]
-    module: bytes
+    module: bytes = b""
+    recording: bytes = b""
 
     @property
     def name(self) -> str:
@@ -55,20 +57,24 @@ def render(playable: Playable) -> str:
     """The HTML text; the same for the same parts."""
     application = _script(_joined(APPLICATION))
     library = _script(f"/*\n{_text('vendor', LICENCE)}*/\n{_text('vendor', LIBRARY)}")
-    packed = base64.b64encode(zlib.compress(playable.module, 9)).decode()
     return _template().render(
         name=playable.name,
         description=playable.facts["description"],
         equations=playable.equations,
         picture=playable.facts["picture"] is not None,
         facts=as_json(playable.facts),
-        module=packed,
+        module=_packed(playable.module),
+        recording=_packed(playable.recording),
         style=Markup(_text("vendor", LIBRARY_STYLE) + _text("page.css")),
         library=Markup(library),
         application=Markup(application),
         worker=Markup(_script(_joined(WORKER))),
         hashes=" ".join(f"'sha256-{_hash(text)}'" for text in (library, application)),
     )
+
+
+def _packed(content: bytes) -> str:
+    return base64.b64encode(zlib.compress(content, 9)).decode() if content else ""
 
 
 def _joined(names: Sequence[str]) -> str:

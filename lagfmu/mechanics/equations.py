@@ -22,6 +22,7 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
+from ..model.display import Displayed
 from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
 from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.spline import Spline, SplineBase
@@ -63,7 +64,7 @@ class FrictionLaw:
 
 
 @dataclass(frozen=True)
-class EquationsOfMotion:
+class EquationsOfMotion(Displayed):
     """The equations of one model in plain symbols; n coordinates, m constraints.
 
     q, v (n): coordinates and velocities; u: inputs (with derivatives where they are needed);
@@ -104,6 +105,12 @@ class EquationsOfMotion:
     bare: bool = False
     levels: tuple[Expr, ...] = ()
 
+    def multipliers(self) -> dict[str, Expr]:
+        """Constraint -> lambda as a formula, where the system is small; see formulations/multipliers.py."""
+        from .formulations.multipliers import multipliers
+
+        return multipliers(self)
+
     @property
     def driven(self) -> tuple[Expr, ...]:
         """What the argument u of numeric functions holds: the inputs, then the levels of jumps."""
@@ -124,6 +131,12 @@ class EquationsOfMotion:
         """The parameters in the order of p."""
         by_symbol = {p.symbol: p for p in self.model.parameters}
         return tuple(by_symbol[s] for s in self.p)
+
+    @cached_property
+    def estimated(self) -> frozenset[Expr]:
+        """The prescribed motions whose rates, up to the third, are taken from communication points."""
+        found = {i.symbol for i in self.model.inputs if i.rates == "estimated"}
+        return frozenset(self.symbols[s] for s in found) & set(self.u)
 
     @cached_property
     def lookups(self) -> list[tuple[Spline, Expr]]:
@@ -340,8 +353,10 @@ def _inputs(model: Model, table: dict[Expr, Expr]) -> tuple[tuple[Expr, ...], di
         u.append(table.get(i.symbol, i.symbol))
         if i in model.prescribed:
             first, second = table[i.symbol.diff(TIME)], table[i.symbol.diff(TIME, 2)]
+            rates |= {u[-1]: first, first: second}
             u += [first, second]
-            rates |= {u[-3]: first, first: second}
+            if i.rates == "estimated":
+                u.append(sp.Symbol(f"der({name_of(i.symbol)},3)", real=True))
     return tuple(u), rates
 
 

@@ -35,6 +35,8 @@ def numbers_of(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> dic
         if name not in driven and not i.rate:  # one that moves by itself stays an input
             u = eom.symbols.get(i.symbol, i.symbol)
             rate = eom.rates.get(u)
+            if u in eom.estimated:
+                values[eom.u[eom.u.index(u) + 3]] = 0.0
             values |= {u: float(i.start)} | ({rate: 0.0, eom.rates[rate]: 0.0} if rate else {})
     return {symbol: _number(value) for symbol, value in values.items()}
 

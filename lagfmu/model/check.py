@@ -19,8 +19,14 @@ from .outputs import check_output_units, check_outputs
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
 from .picture import check_picture
 from .reactions import reaction_units, reactions_in
+from .shapes import unusable_surfaces
 from .spline import Spline, splines_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
+
+RATES = (
+    "given",
+    "estimated",
+)  # of a prescribed motion: inputs too, or from the communication points
 
 
 def problems_of(model: ModelFields) -> list[str]:
@@ -35,6 +41,7 @@ def problems_of(model: ModelFields) -> list[str]:
         return problems
     _check_numbers(model, problems)
     _check_symbols(model, problems)
+    problems += unusable_surfaces(model)
     check_outputs(model, problems)
     check_picture(model, problems)
     _check_splines(model, problems)
@@ -73,6 +80,16 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
     for i in model.inputs:
         _finite(f"start of input {name_of(i.symbol)!r}", i.start, problems)
         _finite(f"rate of input {name_of(i.symbol)!r}", i.rate, problems)
+        if i.rates not in RATES:
+            problems.append(
+                f"rates of input {name_of(i.symbol)!r} is {i.rates!r}, expected one of "
+                f"{', '.join(map(repr, RATES))}"
+            )
+        elif i.rates != "given" and i not in model.prescribed:
+            problems.append(
+                f"rates of input {name_of(i.symbol)!r} is {i.rates!r}, but only an input that stands in "
+                "a constraint (a prescribed motion) has rates: leave it out"
+            )
         if _number(i.rate) and i.rate != 0 and i not in model.prescribed:
             problems.append(
                 f"rate of input {name_of(i.symbol)!r} is {i.rate!r}, but only an input that stands in a "
@@ -92,6 +109,13 @@ def _check_start(
     what: str, start: Mapping[Expr, float], states: set[Expr], problems: list[str]
 ) -> None:
     for state, value in start.items():
+        if isinstance(state, str):
+            problems.append(
+                f"{what} has the text {state!r} as a key, expected a coordinate or its velocity: write "
+                f"{state.removeprefix('der(').removesuffix(')')} without quotes"
+                + (", and .diff() behind it" if state.startswith("der(") else "")
+            )
+            continue
         if state not in states:
             problems.append(
                 f"{what} names {plain(state)}, which is neither a coordinate nor the first "
@@ -101,6 +125,8 @@ def _check_start(
 
 
 def _number(value: object) -> bool:
+    if isinstance(value, (bool, sp.logic.boolalg.Boolean)):
+        return False  # float(True) is 1.0
     try:
         return math.isfinite(float(value))  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):

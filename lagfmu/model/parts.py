@@ -42,6 +42,8 @@ class Input:
     A dynamicsymbol that stands in a holonomic constraint or a contact is a prescribed motion: the
     FMU then has the inputs `u`, `der(u)` and `der(u,2)`, because the constraint's second derivative
     needs them.  `start` and `rate` [unit/s] are its value and its velocity until the importer sets them.
+    With `rates` = 'estimated' the FMU has the input `u` alone, and takes the derivatives from its values at
+    the communication points.
     """
 
     symbol: Expr
@@ -49,6 +51,7 @@ class Input:
     start: float = 0.0
     description: str = ""
     rate: float = 0.0
+    rates: str = "given"
 
 
 @dataclass(frozen=True)
@@ -157,6 +160,10 @@ class ModelFields:
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
     frictions: Sequence[Friction] = ()
     outputs: Sequence[Output] = ()
+    author: str = ""
+    version: str = ""
+    license: str = ""
+    copyright: str = ""
     picture: Sequence[Any] = ()  # of the shapes in picture.py
 
     @property

@@ -68,17 +68,24 @@ class Row:
     description: str
 
 
-def page(prepared: Prepared, figures: Sequence[tuple[str, ...]] = (), choice: str = "") -> str:
+def page(
+    prepared: Prepared,
+    figures: Sequence[tuple[str, ...]] = (),
+    choice: str = "",
+    live: bool = False,
+) -> str:
     """The HTML page of an FMU.
 
     `figures` are rows (closed form, largest error, allowed, verdict) of a verification; `choice` is the
-    section on how its solver settings were chosen, in HTML (tradeoff/page.py).
+    section on how its solver settings were chosen, in HTML (tradeoff/page.py).  `live`: the page in
+    which the FMU runs stands beside it.
     """
     model, structure, table = prepared.model, prepared.structure, prepared.table
     acting, whole = prepared.equations.constraints, prepared.whole
     sections = typeset(prepared.equations, prepared.reduction, prepared.formulation)
     return _template().render(
         name=prepared.scene.name,
+        live=live,
         model=model,
         scene=prepared.scene,
         meaning=MEANING[prepared.formulation],
@@ -146,6 +153,7 @@ def _group(v: Variable) -> str:
     if v.name.startswith("solver."):
         return "Solver"
     by_role = {"parameter": "Parameters", "input": "Inputs", "start": "Motion"}
+    by_role["estimate"] = "Inputs"
     return by_role.get(v.role) or HEADS.get(v.name.split(".")[0], "Motion")
 
 

@@ -16,6 +16,7 @@ from .instant import Instant
 from .jumps import levels_at, passed
 from .leg import Leg
 from .magnitudes import complete, is_incomplete
+from .motion import project
 from .state import Settings, State
 from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step, is_due, unjudged_step
 from .system import System, Vector
@@ -52,6 +53,10 @@ def advance(
         at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
         if system.contacts and system.prescribed:
             state = at_contacts.released(at, state, state.span)
+        elif system.estimated:  # whose rates may be others than it went by
+            q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
+            q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
+            state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
         if system.frictions:
             state = at_slides.renewed(at, state)
             at = replace(at, slides=state.slides)

@@ -80,9 +80,12 @@ class System:
     N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`, one after the other.
 
     surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
-    is a whole number; `driven`: length of u, the inputs and the levels of jumps behind them.
+    is a whole number; bounds(t, q, v, u, p) -> how fast f of the contacts and h of the jumps can change in
+    boxes of t, q, v and u (interval.py); `driven`: length of u, the inputs and the
+    levels of jumps behind them.
 
-    `outputs` are those of the model's own.  `energies` is None where they are not read.  The full
+    `estimated` are those of `prescribed` that are followed by a third derivative.  `outputs` are those of
+    the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
     `restitution` are None too.
     """
@@ -107,8 +110,10 @@ class System:
     frictions: tuple[Friction, ...] = ()
     coulomb: Callable[..., Any] | None = None
     lookups: Lookups | None = None
+    estimated: tuple[int, ...] = ()
     surfaces: Callable[..., Any] | None = None
     floors: tuple[bool, ...] = ()
+    bounds: Callable[..., Any] | None = None
     driven: int = 0
 
     @property
@@ -184,6 +189,11 @@ class System:
         for k in self.prescribed:
             w[k] = u[k] + elapsed * (u[k + 1] + elapsed * u[k + 2] / 2)
             w[k + 1] = u[k + 1] + elapsed * u[k + 2]
+        for k in self.estimated:
+            third = elapsed * u[k + 3]
+            w[k] += elapsed * elapsed * third / 6
+            w[k + 1] += elapsed * third / 2
+            w[k + 2] += third
         return w
 
 

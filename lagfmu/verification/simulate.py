@@ -7,7 +7,7 @@ import os
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from ..errors import SimulationError, VerificationError
-from ..methods import IN_PYTHON, unknown
+from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import Prepared, prepare
@@ -26,7 +26,9 @@ from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import observe
+from ..solver.rates import Past, estimated
 from ..solver.state import SMALLEST_TOLERANCE, Settings
+from .result import Result
 
 STARTS = re.compile(
     r"start value .* misses the constraints|has no start value"
@@ -44,8 +46,8 @@ def simulate(
     inputs: Trajectory | None = None,
     scene: Scene | None = None,
     besides: Sequence[str] = (),
-) -> Trajectory:
-    """Outputs at every communication point, as a structured array with the FMU's variable names.
+) -> Result:
+    """Outputs at every communication point, as a structured array with the FMU's variable names and units.
 
     `target` is a Model (integrated in this process, in `scene`) or the path of an FMU (simulated by
     fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
@@ -66,8 +68,15 @@ def simulate(
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared):
-        return _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
-    return _simulate_fmu(Path(target), stop_time, step_size, tolerance, values, inputs, besides)
+        table = _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
+        every = target.table.variables
+        units = {v.name: v.unit.name for v in every if v.unit is not None}
+        return Result(table, units, target.scene.name)
+    path = Path(target)
+    table = _simulate_fmu(path, stop_time, step_size, tolerance, values, inputs, besides)
+    description = read_description(path)
+    units = {v.name: v.unit for v in description.modelVariables if v.unit}
+    return Result(table, units, description.modelName)
 
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
@@ -99,15 +108,24 @@ def _simulate_model(
     besides: Sequence[str],
 ) -> Trajectory:
     scene, table, system = prepared.scene, prepared.table, prepared.system
+    fixed = ("output", "estimate")
     known: dict[str, Any] = {v.name: v.start for v in table.variables if v.role != "output"}
     limits = {
-        v.name: _Settable(v.kind, v.minimum, v.maximum)
+        v.name: _Settable(
+            v.kind,
+            v.minimum,
+            v.maximum,
+            v.positive,
+            {m: NUMBERS[m] for m in v.items if m in IN_PYTHON},
+        )
         for v in table.variables
-        if v.role != "output"
+        if v.role not in fixed
     }
     _check_values(scene.name, limits, values)
     known |= values
     method = known.get("solver.method", scene.method)
+    if not isinstance(method, str):
+        method = next(m for m, k in NUMBERS.items() if k == method)
     settings = Settings(
         method,
         max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
@@ -116,17 +134,21 @@ def _simulate_model(
         known["solver.maximum_steps"],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
-    drives = [v for v in table.variables if v.role == "input"]
+    drives = [v for v in table.variables if v.role in ("input", "estimate")]
     signals: Any = inputs
 
     def drive(t: float) -> list[float]:
-        return [
+        u = [
             float(np.interp(t, signals["time"], signals[v.name]))
             if inputs is not None and v.name in signals.dtype.names
             else float(known[v.name])
             for v in drives
         ]
+        _check_values(scene.name, limits, {v.name: x for v, x in zip(drives, u, strict=True)})
+        return u
 
+    fed = () if inputs is None else signals.dtype.names
+    past = Past()
     times = communication_points(stop_time or scene.stop_time, step_size or scene.step_size)
     columns: list[tuple[str, Any]] = [("time", np.float64)]
     kinds: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
@@ -142,7 +164,11 @@ def _simulate_model(
         state = begun.state
         for k, t in enumerate(times):
             if k:
-                u = drive(state.t)  # held over the step, as an importer of the FMU does
+                given = drive(state.t)  # held over the step, as an importer of the FMU does
+                for i, d in enumerate(drives):
+                    u[i] = u[i] if d.role == "estimate" or d.name not in fed else given[i]
+                was_set = [drives[i].name in fed for i in system.estimated]
+                u, past = estimated(system, past, state.t, u, was_set)
                 moved = advance(system, settings, state, u, p, float(t))
                 u = system.inputs_at(u, moved.t - state.t)
                 state = moved
@@ -156,9 +182,13 @@ def _simulate_model(
 
 @dataclass(frozen=True)
 class _Settable:
+    """What may be set to what; `items` are the numbers of an Enumeration by name."""
+
     kind: str
     minimum: float | None
     maximum: float | None
+    positive: bool = False
+    items: Mapping[str, int] = field(default_factory=dict)
 
 
 def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[str, Any]) -> None:
@@ -170,9 +200,9 @@ def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[
             near = difflib.get_close_matches(name, settable, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             problems.append(f"{name!r} cannot be set, expected one of {', '.join(settable)}{hint}")
-        elif v.kind == "String":
-            if value not in IN_PYTHON:
-                problems.append(f"{name!r} = {value!r}: {unknown(value, IN_PYTHON)}")
+        elif v.kind == "Enumeration":
+            if value not in v.items and value not in v.items.values():
+                problems.append(f"{name!r} = {value!r}: {unknown(value, v.items)}")
         elif not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
             problems.append(f"{name!r} = {value!r}, expected a finite number")
         elif (v.minimum is not None and value < v.minimum) or (
@@ -181,8 +211,17 @@ def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[
             problems.append(
                 f"{name!r} = {value!r} is outside its bounds [{v.minimum}, {v.maximum}]"
             )
+        elif v.positive and not value > 0:
+            problems.append(f"{name!r} = {value!r}, expected a positive number")
     if problems:
         raise SimulationError(f"{what}: " + "; ".join(problems))
+
+
+def items_of(variable: Any) -> dict[str, int]:
+    """Name -> number of the items of fmpy's ScalarVariable, if it is an Enumeration."""
+    if variable.type != "Enumeration" or variable.declaredType is None:
+        return {}
+    return {item.name: int(item.value) for item in variable.declaredType.items}
 
 
 def read_description(path: Path) -> Any:
@@ -229,19 +268,20 @@ def _simulate_fmu(
     stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
     step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
     _check_count(stop, step)
-    _check_values(
-        str(path),
-        {
-            v.name: _Settable(
-                v.type,
-                None if v.min is None else float(v.min),
-                None if v.max is None else float(v.max),
-            )
-            for v in description.modelVariables
-            if v.causality in ("parameter", "input") or v.initial in ("exact", "approx")
-        },
-        values,
-    )
+    settable = {
+        v.name: _Settable(
+            v.type,
+            None if v.min is None else float(v.min),
+            None if v.max is None else float(v.max),
+            items=items_of(v),
+        )
+        for v in description.modelVariables
+        if v.causality in ("parameter", "input") or v.initial in ("exact", "approx")
+    }
+    _check_values(str(path), settable, values)
+    values = {
+        k: settable[k].items.get(v, v) if isinstance(v, str) else v for k, v in values.items()
+    }
     try:
         result: Trajectory = fmpy.simulate_fmu(
             str(path),

@@ -48,6 +48,7 @@ class Tables:
         start = [bisect_left(self.entries, (k,)) for k in range(eom.m + 1)]
         contacts = [k for k, c in enumerate(self.constraints) if isinstance(c, Contact)]
         prescribed = [k for k, s in enumerate(eom.u) if eom.rates.get(s) in eom.rates]
+        estimated = [k for k, s in enumerate(eom.u) if s in eom.estimated]
         dimension, extent, angles = self._dimensions()
         names = [f'"{s}"' for s in eom.q]
         parts = [
@@ -60,6 +61,7 @@ class Tables:
             self._integers("entry_column", [j for _, j in self.entries]),
             self._integers("row_start", start),
             self._integers("prescribed", prescribed),
+            *([self._integers("estimated", estimated)] if estimated else []),
             self._integers("dimension", dimension),
             self._integers("extent_dimension", extent),
         ]
@@ -102,6 +104,11 @@ class Tables:
             },
             "prescribed_count": len(prescribed),
             **{name: p + name for name in ("prescribed", "dimension", "extent_dimension")},
+            **(
+                {"estimated_count": len(estimated), "estimated": f"{p}estimated"}
+                if estimated
+                else {}
+            ),
             "angles": angles,
             "folded": f"{p}folded" if any(folded) else "NULL",
             "formulation": self.formulation.upper(),
@@ -112,7 +119,8 @@ class Tables:
             **{
                 name: p + name if name in functions else "NULL"
                 for name in (
-                    *("dynamics", "residual", "surfaces", "energies", "restitution", "tangent"),
+                    *("dynamics", "residual", "surfaces", "bounds"),
+                    *("energies", "restitution", "tangent"),
                 )
             },
             "embed": "embed" if p else "NULL",
@@ -175,10 +183,9 @@ class Tables:
             elif isinstance(c, Nonholonomic):
                 kind = "NONHOLONOMIC"
             closed = getattr(c, "while_closed", None)
-            tail = f", {owner[c.name]}" if c.name in owner else ""
             gate = -1 if closed is None else position[closed]
-            items.append(f'{{"{c.name}", {kind}, {gate}{tail}}}')
-        return items or ['{"", HOLONOMIC, -1}']
+            items.append(f'{{"{c.name}", {kind}, {gate}, {owner.get(c.name, 0)}}}')
+        return items or ['{"", HOLONOMIC, -1, 0}']
 
     def _frictions(self) -> tuple[list[str], list[int]]:
         """The frictions as Friction in system.h, and the rows that press."""

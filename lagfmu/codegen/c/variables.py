@@ -25,7 +25,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include "state.h"
 #include "variables.h"
 
-/* name, type, role, place, index, contact, state, start, text, min, max, positive, given */
+/* name, type, role, place, index, contact, state, start, min, max, positive, given */
 const Variable VARIABLES[] = {{
 {rows}}};
 
@@ -121,20 +121,18 @@ def _motion(system: System, rates: tuple[str, str, str]) -> dict[str, Place]:
 
 def _row(v: Variable, place: Place, states: dict[str, int]) -> str:
     where, index, contact = place
-    text = string(v.start) if isinstance(v.start, str) else "NULL"
-    start = "0.0" if v.start is None or isinstance(v.start, str) else repr(float(v.start))
+    start = v.start.upper() if isinstance(v.start, str) else repr(float(v.start or 0.0))
     low = "-HUGE_VAL" if v.minimum is None else repr(float(v.minimum))
     high = "HUGE_VAL" if v.maximum is None else repr(float(v.maximum))
     fields = [
         string(v.name),
-        f"TYPE_{v.kind.upper()}",
-        f"ROLE_{v.role.upper()}",
+        f"TYPE_{'INTEGER' if v.kind == 'Enumeration' else v.kind.upper()}",
+        f"ROLE_{'OUTPUT' if v.role == 'estimate' else v.role.upper()}",
         f"AT_{where}",
         str(index),
         str(contact),
         str(states[v.name] if v.role == "start" else NONE),
         start,
-        text,
         low,
         high,
         str(int(v.positive)),

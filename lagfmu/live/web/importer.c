@@ -7,6 +7,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "fmi2.h"
 #include "parts.h"
@@ -79,7 +80,9 @@ EXPORT(page_set) int page_set(int reference, double value) {
 
 EXPORT(page_set_text) int page_set_text(int reference, const char *value) {
     const fmi2ValueReference vr = (fmi2ValueReference)reference;
-    return fmi2SetString(instance, &vr, 1, &value);
+    int method = METHOD_COUNT - 1;
+    while (method > 0 && strcmp(METHOD_NAMES[method], value) != 0) method--;
+    return fmi2SetInteger(instance, &vr, 1, &method);
 }
 
 EXPORT(page_initialize) int page_initialize(void) {

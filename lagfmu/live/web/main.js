@@ -47,7 +47,7 @@ async function run() {
   if (again) run();
   else {
     window.lagfmu.runs = (window.lagfmu.runs || 0) + 1;
-    measureLater();
+    if (!RECORDED) measureLater();
     tellLater();
   }
 }
@@ -108,8 +108,9 @@ function showValues(t) {
 
 /* For those who hear the page. */
 function tell() {
+  if (!trajectory) return;
   const steps = STEPS === undefined ? "" : `, ${trajectory.columns[STEPS].at(-1)} steps`;
-  const took = trajectory ? `, ${shown(trajectory.milliseconds, 2)} ms` : "";
+  const took = trajectory.milliseconds !== null ? `, ${shown(trajectory.milliseconds, 2)} ms` : "";
   const events = trajectory.events.slice(0, 3).map((e) => `${e.text} at ${shown(e.time)} s`);
   const end = `Run to ${shown(trajectory.end)} s${steps}${took}`;
   byId("status").textContent = [end, ...events].join("; ");

@@ -9,6 +9,7 @@
 #ifndef LAGFMU_SYSTEM_H
 #define LAGFMU_SYSTEM_H
 
+#include "interval.h"
 #include "plan.h"
 
 typedef enum { HOLONOMIC, NONHOLONOMIC, CONTACT } Kind;
@@ -47,6 +48,8 @@ struct System {
     const int *row_start;     /* (m + 1) where each row of G begins among its entries */
     int prescribed_count;
     const int *prescribed;    /* positions in u where a prescribed motion begins: u, der(u), der(u,2) */
+    int estimated_count;
+    const int *estimated;     /* positions of those that der(u,3) follows: their rates are estimated */
     const int *dimension;        /* (n) coordinates of one physical dimension have one number */
     const double *folded;        /* (n) the largest magnitude of the dimension among parameters that are
                                   * numbers in the code; NULL: there are none */
@@ -67,6 +70,10 @@ struct System {
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
     /* h (jumps): the surfaces at which the forces jump; NULL where there are none */
     void (*surfaces)(double t, const double *q, const double *u, const double *p, double *h);
+    /* bounds on the rates of f of the contacts, then of h of the jumps, in boxes of t, q, v and u (with the
+     * levels behind the inputs); NULL where there are none of both */
+    void (*bounds)(Interval t, const Interval *q, const Interval *v, const Interval *u,
+                   const double *p, Interval *rate);
     /* kinetic and potential energy [J]; NULL where they are not read */
     void (*energies)(double t, const double *q, const double *v, const double *u, const double *p,
                      double *energy);

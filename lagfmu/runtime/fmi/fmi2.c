@@ -199,6 +199,10 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation)
         return none(functions, instanceName,
                     "fmi2Instantiate: the type is neither Model Exchange nor co-simulation");
+    if (fmuType == fmi2ModelExchange && MODEL_SYSTEM->estimated_count > 0)
+        return none(functions, instanceName,
+                    "fmi2Instantiate: the rates of a prescribed motion are estimated from communication "
+                    "points, which Model Exchange has not: take co-simulation");
 
     const size_t name_size = strlen(instanceName) + 1;
     memset(&draft, 0, sizeof draft);
@@ -361,30 +365,30 @@ fmi2Status fmi2GetBoolean(fmi2Component component, const fmi2ValueReference vr[]
     return get_whole(component, "fmi2GetBoolean", TYPE_BOOLEAN, vr, nvr, value);
 }
 
+/* No variable is a String. */
 fmi2Status fmi2GetString(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
                          fmi2String value[]) {
     Component *c = component;
-    double found = 0;
     if (!allowed(c, ANY_MODE)) return forbidden(c, "fmi2GetString");
     if (nvr > 0 && (vr == NULL || value == NULL)) return missing(c, "fmi2GetString");
-    for (size_t k = 0; k < nvr; k++) {
-        const Variable *v = variable(vr[k], TYPE_STRING);
-        if (v == NULL) return unknown(c, "fmi2GetString", vr[k], TYPE_STRING);
-        const fmi2Status status = read_value(c, "fmi2GetString", v, &found);
-        if (status != fmi2OK) return status;
-        value[k] = METHOD_NAMES[(int)found];
-    }
-    return fmi2OK;
+    return nvr == 0 ? fmi2OK : unknown(c, "fmi2GetString", vr[0], TYPE_STRING);
 }
 
-/* fmi2OK if the variable may be set now. */
-static fmi2Status settable(Component *c, const Variable *v) {
+/* A fixed parameter that is set once more to the bits that it has: some importers do. */
+static int is_same(Component *c, const Variable *v, double value) {
+    const double now = instance_setting(&c->instance, v);
+    return (v->role == ROLE_PARAMETER || v->role == ROLE_SOLVER) &&
+           memcmp(&now, &value, sizeof now) == 0;
+}
+
+/* fmi2OK if the variable may be set to the value now. */
+static fmi2Status settable(Component *c, const Variable *v, double value) {
     Why text;
     if (v->role == ROLE_OUTPUT) {
         (void)fail(&text, "'%s' is calculated and cannot be set", v->name);
         return refuse(c, text.text);
     }
-    if (c->instance.running && v->role != ROLE_INPUT) {
+    if (c->instance.running && v->role != ROLE_INPUT && !is_same(c, v, value)) {
         (void)fail(&text, "'%s' can only be set before the end of the initialization", v->name);
         return refuse(c, text.text);
     }
@@ -415,50 +419,27 @@ fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], s
     for (size_t k = 0; k < nvr; k++) { /* all are checked before one is set */
         const Variable *v = variable(vr[k], TYPE_REAL);
         if (v == NULL) return unknown(c, "fmi2SetReal", vr[k], TYPE_REAL);
-        if (settable(c, v) != fmi2OK || valid(c, v, value[k]) != fmi2OK) return fmi2Error;
+        if (settable(c, v, value[k]) != fmi2OK || valid(c, v, value[k]) != fmi2OK)
+            return fmi2Error;
     }
-    for (size_t k = 0; k < nvr; k++) instance_set(&c->instance, &VARIABLES[vr[k]], value[k]);
+    for (size_t k = 0; k < nvr; k++)
+        if (!is_same(c, &VARIABLES[vr[k]], value[k]))
+            instance_set(&c->instance, &VARIABLES[vr[k]], value[k]);
     return fmi2OK;
 }
 
-/* No Integer and no Boolean can be set; the message says why. */
-static fmi2Status set_nothing(Component *c, const char *function, Type type,
-                              const fmi2ValueReference vr[], size_t nvr, const int value[]) {
-    if (!allowed(c, SETTABLE & ~CONTINUOUS)) return forbidden(c, function);
-    if (nvr > 0 && (vr == NULL || value == NULL)) return missing(c, function);
-    for (size_t k = 0; k < nvr; k++) {
-        const Variable *v = variable(vr[k], type);
-        if (v == NULL) return unknown(c, function, vr[k], type);
-        if (settable(c, v) != fmi2OK) return fmi2Error;
-    }
-    return fmi2OK;
+static int is_offered(int method) {
+    return method > 0 && method < METHOD_COUNT && PARTS.methods[method] != NULL;
 }
 
-fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Integer value[]) {
-    return set_nothing(component, "fmi2SetInteger", TYPE_INTEGER, vr, nvr, value);
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Boolean value[]) {
-    return set_nothing(component, "fmi2SetBoolean", TYPE_BOOLEAN, vr, nvr, value);
-}
-
-static int method_called(const char *name) {
-    for (int k = 0; name != NULL && k < METHOD_COUNT; k++)
-        if (PARTS.methods[k] != NULL && strcmp(name, METHOD_NAMES[k]) == 0) return k;
-    return -1;
-}
-
-static fmi2Status valid_method(Component *c, const Variable *v, const char *value) {
+static fmi2Status valid_method(Component *c, const Variable *v, int method) {
     Why text;
-    const int method = method_called(value);
-    if (method < 0) {
+    if (!is_offered(method)) {
         const char *comma = "";
-        (void)fail(&text, "'%s' = '%s', expected one of ", v->name, value == NULL ? "" : value);
+        (void)fail(&text, "'%s' = %d, expected one of ", v->name, method);
         for (int k = 0; k < METHOD_COUNT; k++) {
-            if (PARTS.methods[k] == NULL) continue;
-            why_append(&text, "%s%s", comma, METHOD_NAMES[k]);
+            if (!is_offered(k)) continue;
+            why_append(&text, "%s%d (%s)", comma, k, METHOD_NAMES[k]);
             comma = ", ";
         }
         return refuse(c, text.text);
@@ -475,19 +456,39 @@ static fmi2Status valid_method(Component *c, const Variable *v, const char *valu
     return fmi2OK;
 }
 
+/* Of the Integers only solver.method can be set, an Enumeration; no Boolean: the message says why. */
+static fmi2Status set_whole(Component *c, const char *function, Type type,
+                            const fmi2ValueReference vr[], size_t nvr, const int value[]) {
+    if (!allowed(c, SETTABLE & ~CONTINUOUS)) return forbidden(c, function);
+    if (nvr > 0 && (vr == NULL || value == NULL)) return missing(c, function);
+    for (size_t k = 0; k < nvr; k++) {
+        const Variable *v = variable(vr[k], type);
+        if (v == NULL) return unknown(c, function, vr[k], type);
+        if (settable(c, v, value[k]) != fmi2OK) return fmi2Error;
+        if (v->place == AT_METHOD && valid_method(c, v, value[k]) != fmi2OK) return fmi2Error;
+    }
+    for (size_t k = 0; k < nvr; k++)
+        if (!is_same(c, &VARIABLES[vr[k]], value[k]))
+            instance_set(&c->instance, &VARIABLES[vr[k]], value[k]);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
+                          const fmi2Integer value[]) {
+    return set_whole(component, "fmi2SetInteger", TYPE_INTEGER, vr, nvr, value);
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
+                          const fmi2Boolean value[]) {
+    return set_whole(component, "fmi2SetBoolean", TYPE_BOOLEAN, vr, nvr, value);
+}
+
 fmi2Status fmi2SetString(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
                          const fmi2String value[]) {
     Component *c = component;
     if (!allowed(c, SETTABLE & ~CONTINUOUS)) return forbidden(c, "fmi2SetString");
     if (nvr > 0 && (vr == NULL || value == NULL)) return missing(c, "fmi2SetString");
-    for (size_t k = 0; k < nvr; k++) {
-        const Variable *v = variable(vr[k], TYPE_STRING);
-        if (v == NULL) return unknown(c, "fmi2SetString", vr[k], TYPE_STRING);
-        if (settable(c, v) != fmi2OK || valid_method(c, v, value[k]) != fmi2OK) return fmi2Error;
-    }
-    for (size_t k = 0; k < nvr; k++)
-        instance_set(&c->instance, &VARIABLES[vr[k]], method_called(value[k]));
-    return fmi2OK;
+    return nvr == 0 ? fmi2OK : unknown(c, "fmi2SetString", vr[0], TYPE_STRING);
 }
 
 /* ------------------------------------------------------------------ saved states */

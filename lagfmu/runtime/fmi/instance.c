@@ -10,6 +10,7 @@
 #include "leg.h"
 #include "magnitudes.h"
 #include "outputs.h"
+#include "rates.h"
 
 static const double SMALLEST_TOLERANCE = 1e-14;
 
@@ -29,6 +30,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->v0 = arena_doubles(&saved, system->n);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
+        x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
@@ -62,7 +64,8 @@ void instance_reset(Instance *x) {
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->started = x->running = x->warned = x->observed = x->evaluated = 0;
     for (int k = 0; k < VARIABLE_COUNT; k++)
-        if (VARIABLES[k].role != ROLE_OUTPUT && VARIABLES[k].type == TYPE_REAL)
+        if (VARIABLES[k].type == TYPE_REAL &&
+            (VARIABLES[k].role != ROLE_OUTPUT || VARIABLES[k].place == AT_INPUT))
             instance_set(x, &VARIABLES[k], VARIABLES[k].start);
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
 }
@@ -202,8 +205,16 @@ void instance_set(Instance *x, const Variable *v, double value) {
     }
 }
 
+static int is_estimated(const System *s, int k) {
+    for (int i = 0; i < s->estimated_count; i++)
+        if (s->estimated[i] == k) return 1;
+    return 0;
+}
+
 /* Where a prescribed motion stands in u: 0, 1 or 2 for u, der(u), der(u,2); -1 for other inputs. */
 static int order_in_motion(const System *s, int k) {
+    for (int i = 0; i < s->estimated_count; i++)
+        if (k == s->estimated[i] + 3) return 3;
     for (int i = 0; i < s->prescribed_count; i++)
         if (k >= s->prescribed[i] && k <= s->prescribed[i] + 2) return k - s->prescribed[i];
     return -1;
@@ -297,23 +308,47 @@ Status instance_observe(Instance *x) {
 
 /* ------------------------------------------------------------------ step */
 
-/* Once: a prescribed motion moves, but its derivatives are left at zero. */
-static void warn_of_jumps(Instance *x) {
+static const char *input_name(int k) {
+    for (int j = 0; j < VARIABLE_COUNT; j++)
+        if (VARIABLES[j].place == AT_INPUT && VARIABLES[j].index == k) return VARIABLES[j].name;
+    return "";
+}
+
+/* The rates of motions that have only values; one that was not set keeps its latest, one that never was
+ * goes on by its rates. */
+static void estimate_rates(Instance *x) {
     const System *s = x->solver.system;
-    const double *u = x->solver.drive.value;
-    for (int i = 0; i < s->prescribed_count && !(x->warned & 1); i++) {
-        const int k = s->prescribed[i];
-        if (u[k] == x->expected[k] || u[k + 1] != 0 || u[k + 2] != 0) continue;
-        const char *name = "";
-        for (int j = 0; j < VARIABLE_COUNT; j++)
-            if (VARIABLES[j].place == AT_INPUT && VARIABLES[j].index == k) name = VARIABLES[j].name;
-        (void)snprintf(x->note, sizeof x->note,
-                       "input %s moves while der(%s) = der(%s,2) = 0: it jumps at each "
-                       "communication point; connect its derivatives as well",
-                       name, name, name);
-        x->tell(x->context, NOTE_WARNING, x->note);
-        x->warned |= 1;
+    double *u = x->solver.drive.value;
+    for (int i = 0; i < s->estimated_count; i++) {
+        const int k = s->estimated[i];
+        Past *past = &x->past[i];
+        if (!x->set[k] && past->count == 0) continue;
+        if (!x->set[k]) u[k] = past->u[0];
+        const int given = !x->set[k + 1] ? 0 : x->set[k + 2] ? 2 : 1;
+        rates_estimate(past, x->solver.state.now.t, u + k, given);
+        solver_inputs_changed(&x->solver);
     }
+}
+
+/* Once, at the first step that shows it: of a prescribed motion not all three inputs are connected. */
+static void warn_of_rates(Instance *x) {
+    const System *s = x->solver.system;
+    const double *u = x->solver.drive.value, h = x->solver.state.now.span;
+    Why names = {""};
+    if ((x->warned & 1) || !(h > 0)) return;
+    for (int i = 0; i < s->prescribed_count; i++) {
+        const int k = s->prescribed[i];
+        if (is_estimated(s, k) || !rates_half_connected(u + k, x->expected + k, h)) continue;
+        why_append(&names, "%s%s", names.text[0] == '\0' ? "" : ", ", input_name(k));
+    }
+    if (names.text[0] == '\0') return;
+    (void)snprintf(x->note, sizeof x->note,
+                   "prescribed motion %.200s has moved over the last %.3g s otherwise than its rates der() "
+                   "and der(,2) say, so that the forces of constraint are wrong: connect all three "
+                   "inputs, or build the FMU with Input(..., rates=\"estimated\")",
+                   names.text, h);
+    x->tell(x->context, NOTE_WARNING, x->note);
+    x->warned |= 1;
 }
 
 /* Once for each: a table is looked up beyond its ends. */
@@ -374,7 +409,8 @@ static void note_contacts(Instance *x) {
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
     instance_save(x, x->backup);
-    if (s->system->prescribed_count > 0) warn_of_jumps(x);
+    if (s->system->estimated_count > 0) estimate_rates(x);
+    if (s->system->prescribed_count > 0) warn_of_rates(x);
     if (s->system->contacts > 0) note_contacts(x);
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;
@@ -478,7 +514,8 @@ Status instance_rates(Instance *x, Direction *d) {
     memcpy(w->dv, vdot, (size_t)system->n * sizeof *w->dv);
     for (int k = 0; k < system->inputs; k++) {
         const int order = order_in_motion(system, k);
-        w->du[k] = order < 0 ? s->drive.first[k] : order < 2 ? s->drive.value[k + 1] : 0;
+        const int last = is_estimated(system, k - order) ? 3 : 2;
+        w->du[k] = order < 0 ? s->drive.first[k] : order < last ? s->drive.value[k + 1] : 0;
     }
     *d = (Direction){1, w->dq, w->dv, w->du};
     return instance_differentiate(x, *d);

@@ -5,6 +5,7 @@
 #ifndef LAGFMU_INSTANCE_H
 #define LAGFMU_INSTANCE_H
 
+#include "rates.h"
 #include "sensitivity.h"
 #include "solver.h"
 #include "variables.h"
@@ -24,6 +25,7 @@ typedef struct {
     int phase;              /* for the caller, saved with the state */
     int started;            /* 1: the consistent start has been found */
     int running;            /* 1: the start is over, only inputs can be set */
+    Past *past;             /* (estimated_count of the system) */
     int warned;             /* 1: a jump of a prescribed motion has been told; 2 << i: lookup i outside */
     double *places;         /* (lookup_count) scratch */
     int observed, evaluated;

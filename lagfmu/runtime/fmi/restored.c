@@ -178,10 +178,12 @@ static Status arrays(Instance *x) {
     const Doubles list[] = {
         {"coordinates", a->q, n, -DBL_MAX},
         {"velocities", a->v, n, -DBL_MAX},
+        {"sides of jumps", a->level, system->jumps, -DBL_MAX},
         {"levels", a->offset, system->m, -DBL_MAX},
         {"scales", a->scale, ny, 0},
         {"sizes", a->size, n, 0},
         {"gaps", a->gap, contacts, 0},
+        {"levels of jumps", a->level, system->jumps, -DBL_MAX},
         {"departures", a->departure_time, contacts, -DBL_MAX},
         {"departures", a->departure_q, contacts * n, -DBL_MAX},
         {"departures", a->departure_v, contacts * n, -DBL_MAX},
@@ -208,11 +210,29 @@ static Status arrays(Instance *x) {
         {"counts", a->count, contacts, MOST},
         {"inputs", x->set, inputs, 1},     {"counts", a->slip_count, system->frictions, MOST},
     };
+    for (int k = 0; x->started && k < system->jumps; k++)
+        if (!(system->floors[k] ? a->level[k] - 0.5 == floor(a->level[k])
+                                : fabs(a->level[k]) == 1 || a->level[k] == 0))
+            return no_state(x, "levels of jumps", a->level[k]);
     if (doubles(x, list, sizeof list / sizeof *list) != OK) return FAILED;
     if (slides(x) != OK) return FAILED;
     for (int k = 0; k < watched; k++) /* 1 upwards, -1 downwards */
         if (a->left[k] < -1 || a->left[k] > 1) return no_state(x, "events", a->left[k]);
     return ints(x, flags, sizeof flags / sizeof *flags);
+}
+
+/* The points that rates are estimated from go back in time. */
+static Status pasts(Instance *x) {
+    for (int i = 0; i < x->solver.system->estimated_count; i++) {
+        const Past *past = &x->past[i];
+        if (past->count < 0 || past->count > RATES_KEPT || !(fabs(past->rate) <= DBL_MAX))
+            return no_state(x, "past of an input", past->count);
+        for (int k = 0; k < past->count; k++)
+            if (!(fabs(past->u[k]) <= DBL_MAX && fabs(past->t[k]) <= DBL_MAX) ||
+                (k > 0 && !(past->t[k] < past->t[k - 1])))
+                return no_state(x, "past of an input", past->t[k]);
+    }
+    return OK;
 }
 
 /* What the importer has set is inside of the bounds that the description states. */
@@ -237,5 +257,6 @@ Status instance_restored(Instance *x) {
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (x->running && !x->started) return no_state(x, "mode", x->running);
     if (settings(x) != OK || choice(x) != OK || times(x) != OK) return FAILED;
+    if (pasts(x) != OK) return FAILED;
     return arrays(x) == OK ? bounds(x) : FAILED;
 }

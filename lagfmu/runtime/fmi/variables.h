@@ -39,8 +39,7 @@ typedef struct {
     Place place;
     int index, contact;
     int state;       /* role START: j for coordinate j of the stepped system, n + j for its velocity; -1 */
-    double start;    /* of what can be set */
-    const char *text; /* start of a String */
+    double start;    /* of what can be set; of AT_METHOD a MethodName */
     double min, max; /* -HUGE_VAL, HUGE_VAL where there is none */
     int positive;    /* zero is refused */
     int given;       /* role START: the model's `start` says it; otherwise nobody did, and it is 0 */

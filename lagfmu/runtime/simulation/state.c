@@ -19,4 +19,11 @@ void drive_at(const System *s, const Drive *drive, double t, double *u) {
         u[k + 1] = value[k + 1] + e * value[k + 2];
         u[k + 2] = value[k + 2];
     }
+    for (int i = 0; i < s->estimated_count; i++) {
+        const int k = s->estimated[i];
+        const double third = e * value[k + 3];
+        u[k] += e * e * third / 6;
+        u[k + 1] += e * third / 2;
+        u[k + 2] += third;
+    }
 }

@@ -111,7 +111,9 @@ def facts_of(path: Path) -> Facts:
     }
     experiment = description.defaultExperiment
     stop = float(getattr(experiment, "stopTime", None) or 1.0)
-    coordinates = tuple(v.name for v in reals if f"der({v.name},2)" in variables)
+    coordinates = tuple(
+        v.name for v in reals if f"der({v.name},2)" in variables and v.causality != "input"
+    )
     moving = {*coordinates, *(f"der({c})" for c in coordinates)}
     return Facts(
         path=path,

@@ -21,6 +21,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
+from ...methods import NUMBERS
 from ...verification.simulate import Trajectory
 from .facts import Facts
 
@@ -120,11 +121,11 @@ class Player:
         return [self.facts.variables[n].valueReference for n in names]
 
     def set(self, values: Values) -> None:
-        """Set variables, Strings and Reals."""
-        texts = {n: v for n, v in values.items() if isinstance(v, str)}
+        """Set variables: Reals, and methods by name."""
+        methods = {n: NUMBERS[v] for n, v in values.items() if isinstance(v, str)}
         reals = {n: float(v) for n, v in values.items() if not isinstance(v, str)}
-        if texts:
-            self.call("setString", self.references(list(texts)), list(texts.values()))
+        if methods:
+            self.call("setInteger", self.references(list(methods)), list(methods.values()))
         if reals:
             self.call("setReal", self.references(list(reals)), list(reals.values()))
 

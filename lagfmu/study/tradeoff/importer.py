@@ -34,6 +34,7 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 
 from ...errors import SimulationError, VerificationError
+from ...methods import NUMBERS
 from ...verification.simulate import Trajectory, communication_points, read_description
 from .setting import Setting
 
@@ -212,7 +213,7 @@ class Importer:
         slave.setupExperiment(tolerance=setting.tolerance or None, startTime=0.0, stopTime=stop)
         for name, value in (setting.values | dict(values)).items():
             if isinstance(value, str):
-                slave.setString(self._references([name]), [value])
+                slave.setInteger(self._references([name]), [NUMBERS[value]])
             else:
                 slave.setReal(self._references([name]), [float(value)])
         slave.enterInitializationMode()

@@ -1,0 +1,94 @@
+"""Films of a run: lagfmu simulate --animate, for FMUs of either target and for model files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import Page
+from PIL import Image
+from typer.testing import CliRunner
+
+from lagfmu.cli import film
+from lagfmu.cli.app import app
+
+Fmu = Callable[[str], Path]
+
+
+def animate(target: Path, out: Path, *options: str) -> Any:
+    return CliRunner().invoke(app, ["simulate", str(target), "--animate", str(out), *options])
+
+
+def places(image: Image.Image, colour: str) -> Any:
+    """Pixels (row, column) of about that colour."""
+    wanted = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)])
+    return np.argwhere(
+        np.abs(np.asarray(image.convert("RGB")).astype(int) - wanted).sum(axis=2) < 60
+    )
+
+
+def test_the_mass_falls_in_the_film(native_fmu: Fmu, tmp_path: Path) -> None:
+    """Atwood's machine: a film of 1 s has 25 frames a second; the heavier mass, on the left, goes down, and
+    the string pulls both upward."""
+    out = tmp_path / "atwood.gif"
+    result = animate(native_fmu("Atwood"), out)
+    assert result.exit_code == 0, result.output
+    with Image.open(out) as image:
+        assert image.n_frames == 26
+        assert image.info["duration"] == 40
+        lowest = []
+        for frame in (0, 20):
+            image.seek(frame)
+            bob = places(image, film.BOB)
+            left = bob[bob[:, 1] < bob[:, 1].mean()]
+            lowest.append(left[:, 0].max())
+            assert len(places(image, film.FORCE)) > 0
+        assert lowest[1] > lowest[0] + 10
+
+
+def test_a_recorded_run_plays_without_the_fmu(
+    python_fmu: Fmu, tmp_path: Path, browser: Any
+) -> None:
+    """A python FMU has no C sources; its run is played all the same, with the departure marked and the
+    value that was set."""
+    out = tmp_path / "run.html"
+    result = animate(python_fmu("Hemisphere"), out, "--set", "theta=0.3", "--set", "m=2")
+    assert result.exit_code == 0, result.output
+    page = Page(browser, out)
+    page.until("lagfmu.runs")
+    run = page.run()
+    assert run["values"]["lambda.surface"][0] == pytest.approx(2 * 9.81 * np.cos(0.3), rel=1e-12)
+    angle = run["values"]["departure.surface.theta"][-1]
+    assert np.cos(angle) == pytest.approx(2 * np.cos(0.3) / 3, rel=1e-7)
+    assert page.tab.locator("#events button").count() == 1
+    assert not page.tab.locator("#dials").is_visible()
+    assert page.tab.locator("#picture .arrow").is_visible()
+    page.close()
+    assert page.problems == []
+    assert all(r.startswith(("file:", "blob:", "data:")) for r in page.requests)
+
+
+def test_what_cannot_be_filmed_is_told(
+    native_fmu: Fmu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another ending, a model without a picture, and .mp4 without ffmpeg: each with the remedy."""
+    fmu = native_fmu("Atwood")
+    assert ".gif, .mp4, .html" in animate(fmu, tmp_path / "film.avi").stderr
+    monkeypatch.setattr(film.shutil, "which", lambda name: None)
+    monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
+    told = animate(fmu, tmp_path / "film.mp4")
+    assert told.exit_code == 1
+    assert "lagfmu[video]" in told.stderr
+    plain = tmp_path / "plain.py"
+    text = (Path(__file__).parent.parent / "models" / "bouncing_ball.py").read_text(
+        encoding="utf-8"
+    )
+    plain.write_text(
+        re.sub(r"    picture=\[.*?\n    \],\n", "", text, flags=re.DOTALL), encoding="utf-8"
+    )
+    assert "picture=[" in animate(plain, tmp_path / "film.gif", "--stop-time", "0.1").stderr
+    assert list(tmp_path.glob("film.*")) == []

@@ -1,0 +1,199 @@
+"""Rates of prescribed motions: told where they are left alone, estimated where the model says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import fmpy
+import fmpy.validation
+import numpy as np
+import pytest
+from conftest import MODELS
+from instance import instance
+
+from lagfmu import build_fmu
+from lagfmu.errors import ModelError
+from lagfmu.model.file import load
+
+W = np.pi / 8.0
+
+
+def motion(t: float) -> tuple[float, float, float]:
+    """A smooth hoist by 4 m in 8 s: l, l', l''."""
+    return (
+        8.0 - 2.0 * (1 - np.cos(W * t)),
+        -2.0 * W * np.sin(W * t),
+        -2.0 * W**2 * np.cos(W * t),
+    )
+
+
+def told(path, h: float, connected: int, still: bool = False) -> list[str]:
+    """The warnings of a run in which the first `connected` of l, l', l'' are set at each point."""
+    with instance(path) as one:
+        one.start({"der(l)": 0.0, "der(x)": 0.0, "der(y)": 0.0})
+        for k in range(round(4.0 / h)):
+            values = motion(0.0 if still else k * h)
+            for name, value in list(zip(("l", "der(l)", "der(l,2)"), values, strict=True))[
+                :connected
+            ]:
+                one.set(name, value)
+            one.step(h)
+        return [text for _, _, text in one.log if "rates" in text]
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+@pytest.mark.parametrize("connected", [1, 2])
+def test_a_motion_that_is_half_connected_is_told(target, connected, native_fmu, python_fmu):
+    """l alone, or l and l' without l'': one warning, that names the input and both remedies."""
+    fmu = native_fmu if target == "native" else python_fmu
+    (text,) = told(fmu("Crane"), 0.1, connected)
+    for part in ("prescribed motion l has moved", "connect all three", 'rates="estimated"'):
+        assert part in text
+
+
+@pytest.mark.parametrize("h", [0.02, 0.1, 0.5, 1.0])
+def test_a_motion_that_is_connected_is_not_told(native_fmu, h):
+    """All three, at fine and coarse steps (a sixteenth of the period), and a rope that is held."""
+    assert told(native_fmu("Crane"), h, 3) == []
+    assert told(native_fmu("Crane"), h, 2, still=True) == []
+
+
+# ---------------------------------------------------------------------------- estimated
+
+
+def crane(rates: str = "estimated"):
+    """The crane of models/, whose winch is given by the rope's length alone."""
+    model = load(MODELS / "crane.py").model
+    inputs = [replace(i, rates=rates) if i.rate else i for i in model.inputs]
+    return replace(model, inputs=inputs)
+
+
+@pytest.fixture(scope="module")
+def estimating(tmp_path_factory):
+    """estimating(target): the crane's FMU with `l` alone."""
+    made = {}
+
+    def get(target):
+        if target not in made:
+            folder = tmp_path_factory.mktemp(target)
+            made[target] = build_fmu(crane(), folder, target=target, check=False)
+        return made[target]
+
+    return get
+
+
+def lifted(path, h: float, stop: float = 4.0, rates: int = 0) -> dict[str, np.ndarray]:
+    """A hoist that begins from rest, by l alone; what is read after each step.  `rates`: derivatives
+    that are given with fmi2SetRealInputDerivatives."""
+    names = ("l", "lambda.rope", "rope.tension", "x", "residual.rope")
+    with instance(path) as one:
+        one.start({"x": 0.0, "y": -8.0, "der(x)": 0.0, "der(y)": 0.0, "F": 500.0} | still(one))
+        rows = []
+        for k in range(round(stop / h)):
+            values = motion(k * h)
+            one.set("l", values[0])
+            for order in range(1, rates + 1):
+                vr = [one.variables["l"].valueReference]
+                one.fmu.setRealInputDerivatives(vr, [order], [values[order]])
+            one.step(h)
+            rows.append([one.get(n) for n in names])
+    return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def still(one) -> dict[str, float]:
+    return {"der(l)": 0.0} if one.variables["der(l)"].causality == "input" else {}
+
+
+def test_the_input_is_the_motion_alone(estimating):
+    """Its rates are no inputs but what the FMU has estimated, and can be read; no model exchange."""
+    found = fmpy.read_model_description(str(estimating("native")))
+    inputs = [v.name for v in found.modelVariables if v.causality == "input"]
+    assert inputs == ["F", "l"]
+    kinds = {v.name: v.causality for v in found.modelVariables}
+    assert [kinds[n] for n in ("der(l)", "der(l,2)", "der(l,3)")] == ["local"] * 3
+    assert found.modelExchange is None
+    assert not fmpy.validation.validate_fmu(str(estimating("native")))
+
+
+@pytest.mark.parametrize("rates", [0, 1, 2])
+def test_estimated_rates_are_of_second_order(estimating, native_fmu, rates):
+    """The error of the tension, of l'' extrapolated over a step, falls with h^2, once there are four
+    points; also by Hermite's polynomial where the importer gives derivatives."""
+    fine = lifted_with_all(native_fmu("Crane"), 1 / 400)
+    errors = []
+    for h in (0.1, 0.05, 0.025):
+        run = lifted(estimating("native"), h, rates=rates)
+        right = fine[round(400 * h) - 1 :: round(400 * h)]
+        late = slice(round(1.0 / h), None)
+        errors.append(np.abs(run["rope.tension"] - right)[late].max() / right.max())
+        assert np.abs(run["residual.rope"]).max() < 1e-10
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] < 2e-4
+    assert (orders > 1.8).all(), (errors, orders)
+
+
+def lifted_with_all(path, h: float) -> np.ndarray:
+    """The tension at the end of each step, with l, l', l'' as they are there."""
+    with instance(path) as one:
+        start = {"x": 0.0, "y": -8.0, "der(x)": 0.0, "der(y)": 0.0, "F": 500.0, "der(l)": 0.0}
+        one.start(start)
+        found = []
+        for k in range(round(4.0 / h) + 1):
+            for name, value in zip(("l", "der(l)", "der(l,2)"), motion(k * h), strict=True):
+                one.set(name, value)
+            if k:
+                found.append(one.get("rope.tension"))
+            one.step(h)
+    return np.array(found)
+
+
+def test_both_targets_estimate_the_same(estimating):
+    """The same polynomial in C and in Python."""
+    runs = [lifted(estimating(target), 0.1, 1.0) for target in ("native", "python")]
+    for name in ("l", "rope.tension", "x"):
+        np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_the_points_belong_to_the_saved_state(estimating, target):
+    """After a rollback, also by bytes and in a fresh instance, the same bits."""
+    with instance(estimating(target)) as one, instance(estimating(target), "fresh") as fresh:
+        one.start()
+        fresh.start()
+        for k in range(5):
+            one.set("l", motion(k * 0.1)[0])
+            one.step(0.1)
+        state = one.fmu.getFMUstate()
+        data = one.fmu.serializeFMUState(state)
+        ends = []
+        for other in (one, one, fresh):
+            other.fmu.setFMUState(state if other is one else other.fmu.deserializeFMUState(data))
+            other.time = 0.5
+            for k in range(5, 8):
+                other.set("l", motion(k * 0.1)[0])
+                other.step(0.1)
+            ends.append(other.outputs())
+        assert ends[0] == ends[1] == ends[2]
+
+
+def test_a_motion_that_is_not_set_stays_where_it_was_set(estimating):
+    """An importer sets what changes: after its last value the rope comes to rest at that length."""
+    with instance(estimating("native")) as one:
+        one.start({"x": 0.0, "y": -8.0, "der(x)": 0.0, "der(y)": 0.0})
+        for k in range(8):
+            if k < 4:
+                one.set("l", 8.0 - 0.01 * k)
+            one.step(0.1)
+        assert one.get("l") == pytest.approx(7.97, abs=1e-12)
+        assert one.get("der(l)") == pytest.approx(0.0, abs=1e-12)
+
+
+def test_rates_are_given_or_estimated():
+    """Another word, and rates of a force, are refused."""
+    with pytest.raises(
+        ModelError, match="rates of input 'l' is 'guessed', expected one of 'given'"
+    ):
+        crane("guessed")
+    model = load(MODELS / "crane.py").model
+    with pytest.raises(ModelError, match="rates of input 'F'"):
+        replace(model, inputs=[replace(i, rates="estimated") for i in model.inputs])
