@@ -1,6 +1,6 @@
 """Lagrange's equations with multipliers, from SymPy to FMUs that report the forces of constraint."""
 
-from .api import build_fmu
+from .api import build_fmu, show, verify
 from .errors import LagfmuError, VerificationError
 from .mechanics.equations import EquationsOfMotion, derive
 from .mechanics.integrability.classify import classify
@@ -22,8 +22,9 @@ from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
 from .study.sweep.sweep import sweep
+from .verification.result import Result
 from .verification.simulate import simulate
-from .verification.verify import Verification, verify
+from .verification.verify import Verification
 
 __all__ = [
     "Arrow",
@@ -44,6 +45,7 @@ __all__ = [
     "Output",
     "Parameter",
     "Path",
+    "Result",
     "Rod",
     "Scene",
     "Spline",
@@ -59,6 +61,7 @@ __all__ = [
     "initial",
     "multiplier",
     "output",
+    "show",
     "simulate",
     "sweep",
     "verify",

@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import io
 import os
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
+from typing import Any
+
+from rich.console import Console
 
 from .errors import VerificationError
-from .fmu.compiler import HOST, chosen, host
+from .fmu.compiler import HOST, chosen, find_compiler, host
 from .fmu.write import put, put_figures, write
 from .live.playable import playable
 from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
+from .model.file import load
 from .model.goal import parse
 from .model.model import Model
 from .model.scene import Scene
+from .page.notebook import html
+from .page.text import show as show_prepared
 from .prepare.prepare import Prepared, prepare
 from .study.tradeoff.choose import choose
 from .study.tradeoff.page import section
 from .verification.crosscheck import layered
-from .verification.verify import Verification, verify
+from .verification.verify import Verification
+from .verification.verify import verify as verify_fmu
 
 
 @dataclass(frozen=True)
@@ -68,6 +78,59 @@ def build_fmu(
     return built.path
 
 
+class Shown:
+    """What `lagfmu show` prints, as text and, in a notebook, as a page."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        self.prepared = prepared
+
+    def __repr__(self) -> str:
+        console = Console(file=io.StringIO(), width=100, color_system=None)
+        show_prepared(self.prepared, console)
+        text: str = console.file.getvalue()  # type: ignore[attr-defined]
+        return text.rstrip()
+
+    def _repr_html_(self) -> str:
+        return html(self.prepared.equations) + f"<pre>{escape(repr(self))}</pre>"
+
+
+def show(model: Model | str | os.PathLike[str], scene: Scene | None = None) -> Shown:
+    """Equations of motion, classes of constraints, degrees of freedom and units, to be printed or displayed.
+
+    `model` may be a model file.  Raises ModelError or DerivationError.
+    """
+    if not isinstance(model, Model):
+        model = load(Path(model)).model
+    return Shown(prepare(model, scene))
+
+
+def verify(
+    target: Model | str | os.PathLike[str],
+    start_values: Mapping[str, Any] | None = None,
+    stop_time: float | None = None,
+    step_size: float | None = None,
+    tolerance: float | None = None,
+    inputs: Any = None,
+    reference: Any = None,
+    *,
+    closed_forms: Sequence[ClosedForm | Conserved] = (),
+    scene: Scene | None = None,
+) -> Verification:
+    """verification.verify.verify() of an FMU; a model, or a model file with its closed forms, is built first
+    (natively where a compiler is at hand)."""
+    options = (start_values, stop_time, step_size, tolerance, inputs, reference)
+    if not isinstance(target, Model):
+        path = Path(target)
+        if path.suffix != ".py":
+            return verify_fmu(path, *options)
+        file = load(path)
+        target, closed_forms = file.model, closed_forms or file.closed_forms
+        scene = scene or file.scenes[0]
+    kind = "native" if find_compiler() is not None else "python"
+    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+        return verify_fmu(write(prepare(target, scene), folder, closed_forms, kind), *options)
+
+
 def package(
     prepared: Prepared,
     out: str | os.PathLike[str],
@@ -83,7 +146,7 @@ def package(
     live = render(playable(prepared)) if page else ""
     path = write(prepared, out, closed_forms, target, platforms, choice, live)
     runs_here = target == "python" or host() in chosen(platforms)
-    found = verify(path) if check and runs_here else None
+    found = verify_fmu(path) if check and runs_here else None
     if found is not None:
         put_figures(path, prepared, found.rows(), target, choice, page)
     if reference and runs_here:

@@ -202,6 +202,7 @@ void *bench_array(Bench *b, const char *name) {
         {"seen.share", b->seen.share}, {"seen.s", b->seen.s}, {"seen.sdot", b->seen.sdot},
         {"seen.sddot", b->seen.sddot}, {"seen.departure_q", b->seen.departure_q},
         {"seen.departure_v", b->seen.departure_v},
+        {"seen.own", b->seen.own},
     };
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         if (strcmp(all[i].name, name) == 0) return all[i].values;

@@ -17,7 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 from lagfmu.cli.app import app
-from lagfmu.cli.plot import panels
+from lagfmu.verification.plot import panels
 
 REPOSITORY = Path(__file__).parent.parent
 MODELS = REPOSITORY / "models"

@@ -14,11 +14,11 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter
-from lagfmu.cli.show import show
 from lagfmu.mechanics.equations import derive
 from lagfmu.mechanics.formulations.nullspace import accelerations
 from lagfmu.model.scene import Scene
 from lagfmu.page.documentation import page
+from lagfmu.page.text import show
 from lagfmu.page.typeset import Notation, name_latex, name_text, typeset
 from lagfmu.prepare.prepare import Prepared, prepare
 

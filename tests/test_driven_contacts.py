@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from instance import instance
-from lagfmu.compiler import find_compiler
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu
+from lagfmu.fmu.compiler import find_compiler
 
 G = 9.81
 y, u = dynamicsymbols("y u")

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
+import shlex
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import typer.main
+from typer.testing import CliRunner
 
 from lagfmu import simulate, verify
+from lagfmu.cli.app import app
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
@@ -18,7 +26,56 @@ from lagfmu.study.stress.bench import Bench
 from lagfmu.study.stress.lagrange import lay_beside
 from lagfmu.study.stress.probe import WRONG, attempt, verdict
 
-README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+REPOSITORY = Path(__file__).parent.parent
+README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+
+
+COMMANDS = [shlex.split(c) for c in re.findall(r"^    lagfmu ([^#\n]*)", README, re.MULTILINE)]
+BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+LONG = ("tradeoff", "stress", "sweep", "page")  # studies: tried in tests of their own
+
+
+def quick(command: list[str]) -> bool:
+    """Whether a command takes seconds."""
+    long = {"all", "--accuracy"} & set(command) or command[0] in LONG
+    return not long and Path(command[1]).suffix in (".py", ".fmu") and command[1] != "model.py"
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_every_command_has_the_options_that_the_readme_gives_it(command):
+    """The command line is read without a complaint, and the model files of the repository exist."""
+    name, *arguments = command
+    typer.main.get_command(app).commands[name].make_context(name, arguments)
+    for word in arguments:
+        if word.startswith(("models/", "tests/")):
+            assert list(REPOSITORY.glob(word)), word
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+def test_the_commands_and_the_examples_run_as_printed(tmp_path, monkeypatch, python_fmu):
+    """In a folder with bead.py and the repository's models, one after the other; then the lines of Python."""
+    (tmp_path / "bead.py").write_text(BLOCKS[0], encoding="utf-8")
+    for folder in ("models", "tests"):
+        (tmp_path / folder).symlink_to(REPOSITORY / folder)
+    monkeypatch.chdir(tmp_path)
+    done = [c for c in COMMANDS if quick(c)]
+    assert len(done) >= 10
+    for command in done:
+        ended = CliRunner().invoke(app, command)
+        assert ended.exit_code == 0, (command, ended.output[-1000:])
+    shutil.copy(python_fmu("Hemisphere"), "dist/python/Hemisphere.fmu")  # as build_fmus.py makes it
+    blocks = [b for b in BLOCKS if "import fmpy" in b or "import EcosSimulation" in b]
+    assert len(blocks) == 2
+    for block in blocks:
+        if "ecospy" in block:
+            if importlib.util.find_spec("ecospy") is None:
+                continue
+            libtbb = f"import sys\nsys.path.insert(0, {str(REPOSITORY / 'tests')!r})\n"
+            block = f"{libtbb}from engines import load\nload('ecos')\n{block}"
+        run = subprocess.run(
+            [sys.executable, "-c", block], capture_output=True, text=True, timeout=200, check=False
+        )
+        assert run.returncode == 0, run.stderr[-2000:]
 
 
 def test_the_bead_keeps_its_energy_and_its_wire(tmp_path):

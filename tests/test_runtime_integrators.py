@@ -261,7 +261,7 @@ static void residual(double t, const double *q, const double *u, const double *p
 }
 static const int diagonal[] = {0, 1}, entry_row[] = {0, 0}, entry_column[] = {0, 1};
 static const int row_start[] = {0, 2};
-static const Row rows[] = {{"rod", HOLONOMIC, -1}};
+static const Row rows[] = {{"rod", HOLONOMIC, -1, 0}};
 static const System pendulum = {
     .n = 2, .m = 1, .masses = 2, .entries = 2, .parameters = 3, .rows = rows,
     .mass_row = diagonal, .mass_column = diagonal, .entry_row = entry_row,

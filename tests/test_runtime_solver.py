@@ -38,8 +38,11 @@ from lagfmu.solver.precedence import GIVEN, OMITTED, SET
 from lagfmu.solver.state import Settings
 
 EPS = np.finfo(float).eps
-ABOVE = {"fmi2.c", "instance.c", "exchange.c"}  # what stands on the solver
-SOURCES = sorted(name for name in RUNTIME_FILES if name.endswith(".c") and name not in ABOVE)
+SOURCES = sorted(  # but what stands on the solver
+    name
+    for name, path in RUNTIME_FILES.items()
+    if name.endswith(".c") and path.parent.name != "fmi"
+)
 BENCH = Path(__file__).with_name("solver_bench.c")
 
 x, y, s, theta = dynamicsymbols("x y s theta")
@@ -131,6 +134,7 @@ class Bench:
             "share": [f"Q.{e}" for e in entries],
             "departure_q": [f"departure.{e}" for e in each],
             "departure_v": [f"departure.{e}" for e in rates],
+            "own": [own.name for own in full.outputs],
         }
         if self.system is not full:
             names |= _motion_names(system.coordinates, "s", "sdot", "sddot")
@@ -183,7 +187,7 @@ def bench(runtime: ctypes.CDLL, folder: Path, prepared: Any) -> Any:
             else:
                 one = prepare(model, Scene(model.name, formulation=formulation))
             text = model_source(one.equations, one.reduction, one.scene.formulation)
-            keep[name] = compile_library(folder, [], text), one
+            keep[name] = compile_library(folder, ["interval.c"], text), one
         library, one = keep[name]
         made.append(Bench(runtime, c_void_p.in_dll(library, "MODEL_SYSTEM"), one))
         return made[-1]

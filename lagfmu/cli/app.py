@@ -28,11 +28,14 @@ from ..live.playable import told_by
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
+from ..model.library import known, new
 from ..model.scene import Scene
+from ..page.text import show as show_prepared
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
 from ..verification.crosscheck import as_csv, write_crosscheck
+from ..verification.plot import plot
 from ..verification.reference import read_table
 from ..verification.report import exit_code
 from ..verification.simulate import read_description, simulate
@@ -49,10 +52,9 @@ from .options import (
     Methods,
     Name,
     Outputs,
+    RealsOnly,
     narrowed,
 )
-from .plot import plot
-from .show import show as show_prepared
 from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
@@ -173,6 +175,7 @@ def build(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    reals_only: RealsOnly = None,
     name: Name = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -180,7 +183,8 @@ def build(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    narrowing = (outputs, fixed, inputs, contacts, methods, method)
+    needs |= {"reals_only": reals_only}
+    narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -246,6 +250,20 @@ def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
     return ""
 
 
+@app.command(name="new")
+def new_command(
+    file: Annotated[Path, typer.Argument(help="The Python file to write.")],
+    source: Annotated[
+        str | None, typer.Option("--from", help=f"Copy a model: {', '.join(known())}.")
+    ] = None,
+) -> None:
+    """Write a commented model to start from."""
+    with _plainly():
+        path = new(file, source)
+        console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
+        console.print(f"next: lagfmu show {escape(str(path))}", soft_wrap=True, highlight=False)
+
+
 @app.command()
 def show(
     model: ModelPath,
@@ -258,6 +276,7 @@ def show(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    reals_only: RealsOnly = None,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
@@ -267,6 +286,7 @@ def show(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
+    needs |= {"reals_only": reals_only}
     with _plainly():
         file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):

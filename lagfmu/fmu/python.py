@@ -130,6 +130,8 @@ def _script(
     equations = source(eom, reduction, scene.formulation or "multipliers")
     words = ["Embedding", "Friction", "Lookups", "Own", "Row", "System"]
     vocabulary = f"from {package}.solver.system import {', '.join(words)}"
+    if "interval." in equations:
+        vocabulary = f"from {package}.solver import interval\n{vocabulary}"
     if "= Cubic(" in equations:
         vocabulary = f"from {package}.solver.cubic import Cubic\n{vocabulary}"
     return SCRIPT.format(

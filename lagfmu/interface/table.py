@@ -45,6 +45,8 @@ def variable_table(
     """All variables of the FMU.  Raises ModelError if names collide or a unit cannot be written."""
     builder = _Builder(eom, reduction, scene)
     table = builder.table()
+    if scene.reals_only:
+        table = table.as_reals()
     problems = _collisions([v.name for v in table.variables])
     for v in table.variables:
         if v.unit is not None and any(e.denominator != 1 for e in v.unit.exponents):
@@ -506,7 +508,7 @@ class _Builder:
                         self.output(f"{head}.{name}", text, self.units[s], (), discrete=True)
                     )
         if self.eom.frictions:
-            text = "energy that frictions and impacts have turned into heat since the start"
+            text = "energy that frictions and impacts dissipated so far (Model Exchange: impacts)"
             variables.append(self.output("energy.dissipated", text, ENERGY, ()))
         return variables
 

@@ -22,6 +22,7 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
+from ..model.display import Displayed
 from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
 from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.spline import Spline, SplineBase
@@ -63,7 +64,7 @@ class FrictionLaw:
 
 
 @dataclass(frozen=True)
-class EquationsOfMotion:
+class EquationsOfMotion(Displayed):
     """The equations of one model in plain symbols; n coordinates, m constraints.
 
     q, v (n): coordinates and velocities; u: inputs (with derivatives where they are needed);
@@ -103,6 +104,12 @@ class EquationsOfMotion:
     numbers: Mapping[Expr, Expr] = field(default_factory=dict)
     bare: bool = False
     levels: tuple[Expr, ...] = ()
+
+    def multipliers(self) -> dict[str, Expr]:
+        """Constraint -> lambda as a formula, where the system is small; see formulations/multipliers.py."""
+        from .formulations.multipliers import multipliers
+
+        return multipliers(self)
 
     @property
     def driven(self) -> tuple[Expr, ...]:

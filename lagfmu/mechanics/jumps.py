@@ -72,6 +72,12 @@ class Jumps:
     surfaces: tuple[Surface, ...] = ()
     levels: tuple[Expr, ...] = ()
 
+    def mapped(self, table: Mapping[Expr, Expr]) -> Jumps:
+        """The same in other symbols."""
+        return replace(
+            self, surfaces=tuple(replace(s, h=s.h.xreplace(dict(table))) for s in self.surfaces)
+        )
+
 
 NONE = Jumps()
 

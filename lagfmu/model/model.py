@@ -13,6 +13,7 @@ from functools import cached_property
 
 from ..errors import ModelError
 from .check import declared_units, problems_of, splines_of
+from .display import Displayed
 from .frictions import split
 from .kinds import check_containers
 from .parts import (
@@ -54,7 +55,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class Model(ModelFields):
+class Model(ModelFields, Displayed):
     """A mechanical system.
 
     Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is

@@ -1,5 +1,6 @@
 """What happens where frictions stick and slip; an FMU without frictions holds none of it."""
 
+from .rubbing import rubbed
 from .slides import (
     begun,
     dissipated,
@@ -19,6 +20,7 @@ __all__ = [
     "observed",
     "ranges",
     "renewed",
+    "rubbed",
     "settle",
     "switched_slides",
     "turned",

@@ -34,9 +34,7 @@ def first_event(
     armed: list[bool],
 ) -> tuple[Event | None, Vector]:
     """The earliest event within the step just taken, if there is one, and the indicators at its end."""
-    times, values = looks(leg, solver, t0, y0, before)
-    times.append(solver.t)
-    values.append(indicators(leg, solver.t, y1))
+    times, values = looks(leg, solver, t0, y0, y1, before)
     for c, closed in enumerate(leg.state.closed):
         if closed:
             look_into_dips(leg, solver, times, values, c)

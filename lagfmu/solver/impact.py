@@ -12,7 +12,7 @@ Lambda^T (s+ + s-) / 2 = sum (1 - e_k) Lambda_k s_k- / 2 <= 0.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,12 +50,21 @@ class Struck:
     contacts: tuple[int, ...]
 
 
+Rub = Callable[[Instant, Vector, Vector, Struck, Impulse], Impulse]
+
+
 def impact(
-    at: Instant, q: Vector, v: Vector, contacts: Collection[int], plastic: bool = False
+    at: Instant,
+    q: Vector,
+    v: Vector,
+    contacts: Collection[int],
+    plastic: bool = False,
+    rub: Rub | None = None,
 ) -> Impulse:
     """One impact on `contacts` (positions in `system.contacts`), approached or at rest, together.
 
-    `plastic`: e = 0.  Raises StepFailureError if no velocities satisfy the contacts.
+    `plastic`: e = 0; `rub` adds friction (rubbing.py).  Raises StepFailureError if no velocities satisfy the
+    contacts.
     """
     system = at.system
     M, _, G, nu, _ = at.evaluate(q, v)
@@ -64,14 +73,15 @@ def impact(
     slip = G @ v - nu
     slip[np.abs(slip) <= ROUNDING * (np.abs(G) @ np.abs(v) + np.abs(nu))] = 0.0
     now = Struck(system, at.t, M, G, v, slip, e, tuple(sorted(contacts)))
-    return _bounded(now, _newton(now))
+    found = _bounded(now, _newton(now))
+    return found if rub is None else rub(at, q, v, now, found)
 
 
 def _newton(now: Struck) -> Impulse:
     """The law.  A row that acts with a contact does so unless the others lift the contact off."""
     system, holding = now.system, set(now.contacts)
     while True:
-        base = _base(system, holding)
+        base = base_rows(system, holding)
         A, b = _reduced(now, base)
         found = complementary(A, b)
         if found is None and now.e.any():  # rows that act with a contact leave no room to rebound
@@ -93,10 +103,11 @@ def _newton(now: Struck) -> Impulse:
 def _with(system: System, contact: int) -> list[int]:
     """The rows that act with a contact."""
     k = system.contacts[contact]
-    return [j for j, row in enumerate(system.rows) if row.while_closed == k]
+    rows = enumerate(system.rows)
+    return [j for j, row in rows if row.while_closed == k and row.friction is None]
 
 
-def _base(system: System, holding: Collection[int]) -> list[int]:
+def base_rows(system: System, holding: Collection[int]) -> list[int]:
     """Rows that act with both signs."""
     return sorted([*system.permanent, *(j for c in holding for j in _with(system, c))])
 
@@ -142,10 +153,17 @@ def _gain(now: Struck, result: Impulse) -> float:
 def _bounded(now: Struck, newton: Impulse) -> Impulse:
     """Where rows that act with a contact make Newton's law raise the energy: between the plastic impact,
     which never does, and Newton's, the one that keeps it.  The energy is quadratic on the way."""
-    gain = _gain(now, newton)
-    if gain <= 0 or not any(_with(now.system, c) for c in now.contacts):
+    if not any(_with(now.system, c) for c in now.contacts):
         return newton
-    plastic = _newton(replace(now, e=np.zeros(now.system.m)))
+    return bounded(now, newton, lambda: _newton(replace(now, e=np.zeros(now.system.m))))
+
+
+def bounded(now: Struck, newton: Impulse, without: Callable[[], Impulse]) -> Impulse:
+    """The impact between `without` rebound, which never raises the energy, and Newton's that keeps it."""
+    gain = _gain(now, newton)
+    if gain <= 0:
+        return newton
+    plastic = without()
     lost = -_gain(now, plastic)
     if lost <= 0:
         return plastic
@@ -162,7 +180,12 @@ def _between(plastic: Impulse, newton: Impulse, part: float) -> Impulse:
 
 
 def impacts(
-    at: Instant, q: Vector, v: Vector, touching: Collection[int], slow: Vector
+    at: Instant,
+    q: Vector,
+    v: Vector,
+    touching: Collection[int],
+    slow: Vector,
+    rub: Rub | None = None,
 ) -> tuple[Vector, frozenset[int]]:
     """All impacts of an instant: velocities (n) after them, and the contacts that were struck.
 
@@ -178,7 +201,7 @@ def impacts(
             break
         plastic = count == ROUNDS - 1
         entering = [c for c, s in speed.items() if s <= limit[c] or plastic]
-        found = impact(at, q, v, entering, plastic)
+        found = impact(at, q, v, entering, plastic, rub)
         v = found.v
         struck |= {c for c in entering if found.Lambda[at.system.contacts[c]] > 0}
     return v, frozenset(struck)

@@ -1,8 +1,8 @@
-"""Where in a step a contact may open or close unseen, more is looked at.
+"""Where in a step an event may pass unseen, more is looked at.
 
-A quarter of the step at most; while a contact is open, no further than half of the way to it at the
-present speed, |f| / (|G| |v|), so that no obstacle is stepped across; first where a rebound is highest,
-so that no bounce is; and where a multiplier may dip below zero between two looks.
+First at the quarters of the step, and where a rebound is highest; then in the middle between two looks as
+long as f of an open contact, or h of a force that jumps, can have left its range and come back
+(clearance.py); and where a multiplier may dip below zero between two looks.
 """
 
 from __future__ import annotations
@@ -10,42 +10,47 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
+from .clearance import BRACKETS, CLEAR, between
 from .indicators import indicators
 from .leg import Leg
 from .system import Vector
 
-LARGEST_LOOK, SMALLEST_LOOK = 1 / 4, 1 / 200  # parts of a step in which events are looked for
+QUARTERS, SMALLEST_LOOK, MOST_LOOKS = (
+    4,
+    2.0**-30,
+    512,
+)  # looks at first; part of a step; looks in all
 DIPS, SHALLOW = 3, 0.1  # parabolas drawn, and how low, of the looks, they must go to be looked into
 
 
 def looks(
-    leg: Leg, solver: Any, t0: float, y0: Vector, before: Vector
+    leg: Leg, solver: Any, t0: float, y0: Vector, y1: Vector, before: Vector
 ) -> tuple[list[float], list[Vector]]:
-    """Times within the step at which the indicators are looked at, and their values, y0's first."""
-    h, dense = solver.t - t0, solver.dense_output()
+    """Times within the step at which the indicators are looked at, and their values.
+
+    `before`: at its start (t0, y0); y1: the projected state at its end.
+    """
+    h, dense = float(solver.t - t0), solver.dense_output()
     highest = t0 + _top_of_rebound(leg, t0, y0, before)
-    rows = [k for k, c in zip(leg.system.contacts, leg.state.closed, strict=True) if not c]
-    times, values, y = [t0], [before], y0
-    while True:
-        stride = h * LARGEST_LOOK
-        if rows:
-            q, v = leg.split(y)
-            _, _, G, nu, _ = leg.at(times[-1]).evaluate(q, v)
-            f = np.abs(values[-1][: len(leg.state.closed)][[not c for c in leg.state.closed]])
-            speed = np.abs(G[rows]) @ np.abs(v) + np.abs(nu[rows])
-            ahead = 0.5 * f / np.where(speed > 0, speed, np.inf)
-            near = float(ahead[speed > 0].min(initial=stride))
-            stride = min(stride, max(near, h * SMALLEST_LOOK))
-        t = times[-1] + stride
-        if times[-1] < highest:
-            t = min(t, highest)
-        if t >= solver.t - h * SMALLEST_LOOK or t <= times[-1]:
-            return times, values
-        times.append(t)
-        y = dense(t)
-        values.append(indicators(leg, t, y))
+    inner = {t0 + k * h / QUARTERS for k in range(1, QUARTERS)} | {highest}
+    times = [t0, *sorted(t for t in inner if t0 < t < solver.t), float(solver.t)]
+    values = [before]
+    values += [indicators(leg, t, dense(t)) for t in times[1:-1]]
+    values.append(indicators(leg, solver.t, y1))
+    k = 0
+    while leg.system.bounds is not None and k + 1 < len(times):
+        a, b = times[k], times[k + 1]
+        middle = a + (b - a) / 2
+        found = between(leg, dense, a, b, values[k], values[k + 1], h)
+        if found == BRACKETS:
+            break
+        more = len(times) < MOST_LOOKS and b - a > SMALLEST_LOOK * h and a < middle < b
+        if found == CLEAR or not more:
+            k += 1
+        else:
+            times.insert(k + 1, middle)
+            values.insert(k + 1, indicators(leg, middle, dense(middle)))
+    return times, values
 
 
 def _top_of_rebound(leg: Leg, t: float, y: Vector, values: Vector) -> float:

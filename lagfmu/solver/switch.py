@@ -81,7 +81,7 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list
     slow = _slow(at, q, v, state)
     struck: Collection[int] = ()
     if landing:
-        v, struck = impacts(at, q, v, near, slow)
+        v, struck = impacts(at, q, v, near, slow, at_slides.rubbed if system.frictions else None)
     modes = _settled(at, q, v, state, closed, near, leaving - set(struck), {*struck, *landing})
     offset = _levels(at, q, state, modes)
     if system.frictions:

@@ -80,7 +80,9 @@ class System:
     N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`, one after the other.
 
     surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
-    is a whole number; `driven`: length of u, the inputs and the levels of jumps behind them.
+    is a whole number; bounds(t, q, v, u, p) -> how fast f of the contacts and h of the jumps can change in
+    boxes of t, q, v and u (interval.py); `driven`: length of u, the inputs and the
+    levels of jumps behind them.
 
     `estimated` are those of `prescribed` that are followed by a third derivative.  `outputs` are those of
     the model's own.  `energies` is None where they are not read.  The full
@@ -111,6 +113,7 @@ class System:
     estimated: tuple[int, ...] = ()
     surfaces: Callable[..., Any] | None = None
     floors: tuple[bool, ...] = ()
+    bounds: Callable[..., Any] | None = None
     driven: int = 0
 
     @property

@@ -28,6 +28,7 @@ from ..solver.initial import start
 from ..solver.observe import observe
 from ..solver.rates import Past, estimated
 from ..solver.state import SMALLEST_TOLERANCE, Settings
+from .result import Result
 
 STARTS = re.compile(
     r"start value .* misses the constraints|has no start value"
@@ -45,8 +46,8 @@ def simulate(
     inputs: Trajectory | None = None,
     scene: Scene | None = None,
     besides: Sequence[str] = (),
-) -> Trajectory:
-    """Outputs at every communication point, as a structured array with the FMU's variable names.
+) -> Result:
+    """Outputs at every communication point, as a structured array with the FMU's variable names and units.
 
     `target` is a Model (integrated in this process, in `scene`) or the path of an FMU (simulated by
     fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
@@ -67,8 +68,15 @@ def simulate(
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared):
-        return _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
-    return _simulate_fmu(Path(target), stop_time, step_size, tolerance, values, inputs, besides)
+        table = _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
+        every = target.table.variables
+        units = {v.name: v.unit.name for v in every if v.unit is not None}
+        return Result(table, units, target.scene.name)
+    path = Path(target)
+    table = _simulate_fmu(path, stop_time, step_size, tolerance, values, inputs, besides)
+    description = read_description(path)
+    units = {v.name: v.unit for v in description.modelVariables if v.unit}
+    return Result(table, units, description.modelName)
 
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ non-zeros, both sorted by row, then column.  Equations and patterns only; no sol
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from textwrap import wrap
@@ -18,6 +19,7 @@ from ...mechanics.equations import TIME, EquationsOfMotion, FrictionLaw
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
+from .. import bounds
 from .function import FILL, Result, function
 from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
@@ -327,18 +329,40 @@ class _System:
                 words.state,
                 {"places": _results([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])},
             )
-        if self.jumps.surfaces:
-            table = _real([*eom.q, *eom.v, *eom.u, *eom.p, TIME])
-            h = [s.h.xreplace(table) for s in self.jumps.surfaces]
+        jumps = self.jumps.mapped(_real([*eom.q, *eom.v, *eom.u, *eom.p, TIME]))
+        if jumps.surfaces:
+            h = [s.h for s in jumps.surfaces]
             found["surfaces"] = define(
                 "surfaces",
                 "h of each jump of the forces: where it passes 0, or a whole number.",
                 words.still,
                 {"h": _results(h, [str(s) for s in eom.levels])},
             )
+        changing = bounds.rates(eom, self.constraints, jumps) if not eom.bare else []
+        if changing:
+            found["bounds"] = self._bounds(changing)
         if eom.outputs and not self.prefix:
             found |= self._outputs()
         return found
+
+    def _bounds(self, changing: Sequence[Expr]) -> str:
+        """Bounds on the rates of the indicators, in interval arithmetic."""
+        eom = self.eom
+        groups = {"q": eom.q, "v": eom.v, "u": eom.u}
+        places = {s: f"{a}[{j}]" for a, group in groups.items() for j, s in enumerate(group)}
+        places |= {p: f"interval_of(p[{k}])" for k, p in enumerate(eom.p)}
+        places[self.words.t[0]] = "t"
+        lines, values = bounds.body(changing, places, bounds.C)
+        text = [f"    const Interval {line};\n" for line in lines]
+        text += [f"    rate[{k}] = {value};\n" for k, value in enumerate(values)]
+        whole = "".join(text)
+        silence = [a for a in "tqvup" if not re.search(rf"\b{a}\b", whole)]
+        head = (
+            "/* Bounds on how fast the indicators of events change: f of contacts, h of jumps. */\n"
+            f"static void {self.prefix}bounds(Interval t, const Interval *q, const Interval *v, "
+            "const Interval *u,\n                   const double *p, Interval *rate) {\n"
+        )
+        return head + "".join(f"    (void){a};\n" for a in silence) + whole + "}\n"
 
     def _outputs(self) -> dict[str, str]:
         """The model's own outputs, and their changes."""

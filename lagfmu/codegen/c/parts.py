@@ -15,14 +15,14 @@ AT_CONTACTS = {
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }
-FRICTION = ("friction.c", "share.c", "slides.c")  # behind SLIDES
+FRICTION = ("friction.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
 NO_RUNGS = """
 #include "dependent.h"
 
 const Dependent *const DEPENDENT = NULL;
 """
 BEHIND_EVENTS, BEHIND_CONTACTS = (
-    ("looks.c", "root.c"),
+    ("clearance.c", "interval.c", "looks.c", "root.c"),
     ("complementarity.c",),
 )  # what only those need
 AT_CONSTRAINTS = (

@@ -119,7 +119,8 @@ class Tables:
             **{
                 name: p + name if name in functions else "NULL"
                 for name in (
-                    *("dynamics", "residual", "surfaces", "energies", "restitution", "tangent"),
+                    *("dynamics", "residual", "surfaces", "bounds"),
+                    *("energies", "restitution", "tangent"),
                 )
             },
             "embed": "embed" if p else "NULL",
@@ -182,10 +183,9 @@ class Tables:
             elif isinstance(c, Nonholonomic):
                 kind = "NONHOLONOMIC"
             closed = getattr(c, "while_closed", None)
-            tail = f", {owner[c.name]}" if c.name in owner else ""
             gate = -1 if closed is None else position[closed]
-            items.append(f'{{"{c.name}", {kind}, {gate}{tail}}}')
-        return items or ['{"", HOLONOMIC, -1}']
+            items.append(f'{{"{c.name}", {kind}, {gate}, {owner.get(c.name, 0)}}}')
+        return items or ['{"", HOLONOMIC, -1, 0}']
 
     def _frictions(self) -> tuple[list[str], list[int]]:
         """The frictions as Friction in system.h, and the rows that press."""

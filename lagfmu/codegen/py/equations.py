@@ -15,6 +15,7 @@ from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact, Nonholonomic
 from ...solver.cubic import Cubic
 from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
+from .. import bounds
 from .function import function, identifiers, table_name
 
 Expr = Any
@@ -74,16 +75,18 @@ def _tables(eom: EquationsOfMotion, text: str) -> str:
 def _imported(text: str) -> str:
     """The text under an import of the functions of `math` that it calls."""
     called = sorted(
-        name for name in set(re.findall(r"\b([a-z]\w*)\(", text)) if hasattr(math, name)
+        name for name in set(re.findall(r"(?<!\.)\b([a-z]\w*)\(", text)) if hasattr(math, name)
     )
     return (f"from math import {', '.join(called)}\n\n\n" if called else "") + text
 
 
 def compile_system(text: str) -> System:
     """Run generated source in memory and take its SYSTEM."""
+    from ...solver import interval
     from ...solver import system as vocabulary
 
     scope: dict[str, Any] = {
+        "interval": interval,
         "System": vocabulary.System,
         "Own": vocabulary.Own,
         "Lookups": vocabulary.Lookups,
@@ -158,6 +161,9 @@ def _system(
     if jumps.surfaces:
         text, found = "h of each jump: where it passes 0, or a whole number.", jumps.surfaces
         parts.append(function(f"{prefix}surfaces", text, still, {"h": [s.h for s in found]}, names))
+    changing = bounds.rates(eom, _constraints(eom, rows), jumps)
+    if changing:
+        parts.append(_bounds(prefix, eom, changing))
     own = _outputs(eom) if rows is None else []
     parts += [text for _, text in own]
     looked_up = ""
@@ -188,10 +194,26 @@ def _system(
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
         f"{_surfaces(prefix, jumps, len(eom.driven))}"
+        + (f"    bounds={prefix}bounds,\n" if changing else "")
         + (f"    frictions={_frictions(eom)},\n    coulomb=coulomb,\n" if eom.frictions else "")
         + f"{_listed(own)}{looked_up})\n"
     )
     return "\n\n".join(parts)
+
+
+def _bounds(prefix: str, eom: EquationsOfMotion, changing: Sequence[Expr]) -> str:
+    """Bounds on the rates of the indicators, in interval arithmetic."""
+    groups = {"q": eom.q, "v": eom.v, "u": eom.u}
+    places = {s: f"{a}[{j}]" for a, group in groups.items() for j, s in enumerate(group)}
+    places |= {p: f"interval.of(p[{k}])" for k, p in enumerate(eom.p)}
+    places[TIME] = "t"
+    lines, values = bounds.body(changing, places, bounds.PYTHON)
+    text = "".join(f"    {line}\n" for line in lines)
+    return (
+        f"def {prefix}bounds(t, q, v, u, p):\n"
+        '    """How fast the indicators of events can change: f of contacts, h of jumps."""\n'
+        f"{text}    return [{', '.join(values)}]\n"
+    )
 
 
 def _coulomb(eom: EquationsOfMotion, state: Any, names: dict[Expr, str]) -> str:

@@ -10,9 +10,9 @@ from ...model.scene import Scene
 from ...solver.indicators import is_watched
 from ...solver.system import System
 
-FRICTION = ("friction.py", "share.py", "slides.py")
+FRICTION = ("friction.py", "rubbing.py", "share.py", "slides.py")
 CONTACTS = ("complementarity.py", "contacts.py", "impact.py", "switch.py")
-EVENTS = ("events.py", "looks.py")
+EVENTS = ("clearance.py", "events.py", "looks.py")
 CONSTRAINTS = ("nullspace.py", "orthogonal.py")
 CLASSES = {
     "dop853": ("from .dop853 import Dop853", "Dop853"),

@@ -26,6 +26,7 @@ from sympy import Integral as Integral_
 from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
+from ...model.display import Displayed
 from .coefficients import Chart, pfaffian
 from .echelon import rref
 from .frobenius import curvature, derived_flag, exact, obstruction
@@ -60,7 +61,7 @@ class Integral:
 
 
 @dataclass(frozen=True)
-class Classification:
+class Classification(Displayed):
     """The answer, with the proof of it.
 
     `rank` and `holonomic_rank` are generic ranks of one-forms in (q, t): of the set, and of the

@@ -9,6 +9,7 @@
 #ifndef LAGFMU_SYSTEM_H
 #define LAGFMU_SYSTEM_H
 
+#include "interval.h"
 #include "plan.h"
 
 typedef enum { HOLONOMIC, NONHOLONOMIC, CONTACT } Kind;
@@ -69,6 +70,10 @@ struct System {
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
     /* h (jumps): the surfaces at which the forces jump; NULL where there are none */
     void (*surfaces)(double t, const double *q, const double *u, const double *p, double *h);
+    /* bounds on the rates of f of the contacts, then of h of the jumps, in boxes of t, q, v and u (with the
+     * levels behind the inputs); NULL where there are none of both */
+    void (*bounds)(Interval t, const Interval *q, const Interval *v, const Interval *u,
+                   const double *p, Interval *rate);
     /* kinetic and potential energy [J]; NULL where they are not read */
     void (*energies)(double t, const double *q, const double *v, const double *u, const double *p,
                      double *energy);

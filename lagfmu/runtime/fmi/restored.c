@@ -182,6 +182,7 @@ static Status arrays(Instance *x) {
         {"scales", a->scale, ny, 0},
         {"sizes", a->size, n, 0},
         {"gaps", a->gap, contacts, 0},
+        {"levels of jumps", a->level, system->jumps, -DBL_MAX},
         {"departures", a->departure_time, contacts, -DBL_MAX},
         {"departures", a->departure_q, contacts * n, -DBL_MAX},
         {"departures", a->departure_v, contacts * n, -DBL_MAX},
@@ -208,6 +209,10 @@ static Status arrays(Instance *x) {
         {"counts", a->count, contacts, MOST},
         {"inputs", x->set, inputs, 1},     {"counts", a->slip_count, system->frictions, MOST},
     };
+    for (int k = 0; x->started && k < system->jumps; k++)
+        if (!(system->floors[k] ? a->level[k] - 0.5 == floor(a->level[k])
+                                : fabs(a->level[k]) == 1 || a->level[k] == 0))
+            return no_state(x, "levels of jumps", a->level[k]);
     if (doubles(x, list, sizeof list / sizeof *list) != OK) return FAILED;
     if (slides(x) != OK) return FAILED;
     for (int k = 0; k < watched; k++) /* 1 upwards, -1 downwards */

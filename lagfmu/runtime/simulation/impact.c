@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "parts.h"
 
 enum { ROUNDS = 1000 }; /* of impacts at one instant, after which the rest is one plastic impact */
 static const double ROUNDING = 1e-14; /* of the terms of a speed: one that is none; rest does not jam */
@@ -32,11 +33,6 @@ typedef struct {
     int *iwork;
 } Struck;
 
-/* The velocities' change and the impulses. */
-typedef struct {
-    double *dv, *Lambda; /* (n), (m) */
-} Impulse;
-
 static int row_of(const Struck *x, int i) { return x->s->system->contact[x->contact[i]]; }
 
 /* Rows that act with both signs: those that always do, and those of the contacts in `holding`. */
@@ -48,7 +44,8 @@ static void set_base(Struck *x) {
 
 static int acts_with(const System *system, int contact) {
     for (int j = 0; j < system->m; j++)
-        if (system->rows[j].while_closed == system->contact[contact]) return 1;
+        if (system->rows[j].while_closed == system->contact[contact] && system->rows[j].friction == 0)
+            return 1;
     return 0;
 }
 
@@ -166,16 +163,11 @@ static double gain(const Struck *x, const Impulse *plastic, const Impulse *newto
     return sum;
 }
 
-/* Where rows that act with a contact make Newton's law raise the energy: between the plastic impact, which
- * never does, and Newton's, the one that keeps it.  The energy is quadratic on the way. */
-static Status bound(Struck *x, double time, const Impulse *found, const Impulse *plastic) {
+/* Between the plastic impact, which never raises the energy, and Newton's, which does: the one that keeps it.
+ * The energy is quadratic on the way. */
+static void blend(const Struck *x, const Impulse *found, const Impulse *plastic) {
     const System *system = x->s->system;
     const double gained = gain(x, found, found, 1);
-    int any = 0;
-    for (int i = 0; i < x->k; i++) any |= acts_with(system, x->contact[i]);
-    if (!any || !(gained > 0)) return OK;
-    memset(x->e, 0, (size_t)system->m * sizeof *x->e);
-    if (newton(x, time, plastic) != OK) return FAILED;
     const double lost = -gain(x, plastic, found, 0);
     double part = 0;
     if (lost > 0) {
@@ -189,7 +181,40 @@ static Status bound(Struck *x, double time, const Impulse *found, const Impulse 
         found->dv[j] = plastic->dv[j] + part * (found->dv[j] - plastic->dv[j]);
     for (int j = 0; j < system->m; j++)
         found->Lambda[j] = plastic->Lambda[j] + part * (found->Lambda[j] - plastic->Lambda[j]);
+}
+
+/* Where rows that act with a contact make Newton's law raise the energy. */
+static Status bound(Struck *x, double time, const Impulse *found, const Impulse *plastic) {
+    const System *system = x->s->system;
+    int any = 0;
+    for (int i = 0; i < x->k; i++) any |= acts_with(system, x->contact[i]);
+    if (!any || !(gain(x, found, found, 1) > 0)) return OK;
+    memset(x->e, 0, (size_t)system->m * sizeof *x->e);
+    if (newton(x, time, plastic) != OK) return FAILED;
+    blend(x, found, plastic);
     return OK;
+}
+
+static void set_restitution(Struck *x, int plastic) {
+    x->s->system->restitution(x->s->p, x->e);
+    if (plastic) memset(x->e, 0, (size_t)x->s->system->m * sizeof *x->e);
+}
+
+/* The law without friction, and then with it where it can be found. */
+static Status strike(Struck *x, Instant at, const double *q, const double *v, const int *entering,
+                     int is_plastic, const Impulse *found, const Impulse *plastic) {
+    int done = 0;
+    if (x->s->system->frictions > 0) {
+        set_restitution(x, is_plastic);
+        if (PARTS.slides->rub(x->s, at, q, v, entering, x->slip, x->e, *plastic, *found, &done) != OK)
+            return FAILED;
+    }
+    if (done) {
+        if (gain(x, found, found, 1) > 0) blend(x, found, plastic);
+        return OK;
+    }
+    set_restitution(x, is_plastic);
+    return newton(x, at.t, found) != OK ? FAILED : bound(x, at.t, found, plastic);
 }
 
 Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
@@ -219,9 +244,7 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
         if (fabs(x.slip[j]) <= ROUNDING * terms) x.slip[j] = 0;
         x.zero[j] = 0;
     }
-    system->restitution(s->p, x.e);
-    if (plastic) memset(x.e, 0, (size_t)m * sizeof *x.e);
-    if (newton(&x, at.t, &found) != OK || bound(&x, at.t, &found, &soft) != OK) return FAILED;
+    if (strike(&x, at, q, v, entering, plastic, &found, &soft) != OK) return FAILED;
     for (int j = 0; j < n; j++) v[j] += found.dv[j];
     return OK;
 }

@@ -1,45 +1,21 @@
-/* looks.c -- where in a step a contact may open or close unseen, more is looked at.
+/* looks.c -- where in a step an event may pass unseen, more is looked at.
  *
- * A quarter of the step at most; while a contact is open, no further than half of the way to it at the
- * present speed, |f| / (|G| |v|), so that no obstacle is stepped across; first where a rebound is
- * highest, so that no bounce is; and where a multiplier may dip below zero between two looks. */
+ * First at the quarters of the step, and where a rebound is highest; then in the middle between two looks
+ * as long as f of an open contact, or h of a force that jumps, can have left its range and come back
+ * (clearance.c); and where a multiplier may dip below zero between two looks. */
 #include "looks.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "clearance.h"
 #include "indicators.h"
 #include "leg.h"
 
 enum { DIPS = 3 };                            /* parabolas drawn through a dip, ... */
 static const double SHALLOW = 0.1;            /* ... and how low they must go to be looked into */
-static const double LARGEST_LOOK = 1.0 / 4;   /* parts of a step */
-static const double SMALLEST_LOOK = 1.0 / 200;
-
-static int is_open(const Solver *s) {
-    for (int c = 0; c < s->system->contacts; c++)
-        if (!s->state.closed[c]) return 1;
-    return 0;
-}
-
-/* How far to look on from (t, y), where the indicators are `values`. */
-static Status stride(Solver *s, double t, const double *y, const double *values, double h,
-                     double *ahead) {
-    const System *system = s->system;
-    const Mechanism *b = &s->stepped;
-    *ahead = h * LARGEST_LOOK;
-    if (!is_open(s)) return OK;
-    if (mechanism_evaluate(&s->stepped, leg_instant(s, t), y, y + system->n) != OK) return FAILED;
-    double near = *ahead;
-    for (int c = 0; c < system->contacts; c++) {
-        const int k = system->contact[c];
-        if (s->state.closed[c]) continue;
-        const double speed = fabs(b->nu[k]) + mechanism_row_size(b, k, y + system->n);
-        if (speed > 0) near = fmin(near, 0.5 * fabs(values[c]) / speed);
-    }
-    *ahead = fmin(*ahead, fmax(near, h * SMALLEST_LOOK));
-    return OK;
-}
+enum { QUARTERS = 4 };
+static const double SMALLEST_LOOK = 1.0 / (1 << 30); /* of a step */
 
 /* The time [s] in which an open contact that has just been left parts most, f' / (-f''). */
 static Status top_of_rebound(Solver *s, double t, const double *y, const double *values,
@@ -122,31 +98,53 @@ static Status look_into_dip(Solver *s, Looks *looks, int i, int contact, double 
     return OK;
 }
 
+/* One more look at time t, put in its place behind look k. */
+static Status look(Solver *s, Looks *looks, int k, double t, double *y) {
+    const Integrator *i = &s->integrator;
+    const int width = indicators_count(s->system);
+    double *seen = looks->values + (MOST_LOOKS + width) * width; /* one row of scratch */
+    i->method->dense(i, t, y);
+    if (indicators_at(s, t, y, seen) != OK) return FAILED;
+    insert(looks, k + 1, width, t, seen);
+    return OK;
+}
+
+/* Looks between looks until nothing can have passed unseen up to the first event. */
+static Status refine(Solver *s, Looks *looks, double *y) {
+    const double step = s->integrator.t - s->integrator.t_old;
+    for (int k = 0; s->system->bounds != NULL && k + 1 < looks->count;) {
+        const double a = looks->t[k], b = looks->t[k + 1], middle = a + (b - a) / 2;
+        const Clearance clearance = clearance_between(s, looks, k, y);
+        const int more = looks->count < MOST_LOOKS - 1 && b - a > SMALLEST_LOOK * step &&
+                         middle > a && middle < b;
+        if (clearance == BRACKETS) return OK;
+        if (clearance == CLEAR || !more)
+            k += 1;
+        else if (look(s, looks, k, middle, y) != OK)
+            return FAILED;
+    }
+    return OK;
+}
+
 Status looks_take(Solver *s, const double *y1, double *y, Looks *looks) {
     const Integrator *i = &s->integrator;
     const int contacts = s->system->contacts, width = indicators_count(s->system);
     const double h = i->t - i->t_old;
     double highest;
-    memcpy(y, i->y_old, (size_t)i->ny * sizeof *y);
     memcpy(looks->values, s->state.indicator, (size_t)width * sizeof *looks->values);
     looks->t[0] = i->t_old;
-    if (top_of_rebound(s, i->t_old, y, looks->values, &highest) != OK) return FAILED;
+    if (top_of_rebound(s, i->t_old, i->y_old, looks->values, &highest) != OK) return FAILED;
+    looks->t[1] = i->t;
+    if (indicators_at(s, i->t, y1, looks->values + width) != OK) return FAILED;
+    looks->count = 2;
+    for (int k = 1; k < QUARTERS; k++)
+        if (look(s, looks, looks->count - 2, i->t_old + k * h / QUARTERS, y) != OK) return FAILED;
     highest += i->t_old;
-    for (looks->count = 1;; looks->count++) {
-        const double t = looks->t[looks->count - 1];
-        double *values = looks->values + looks->count * width;
-        double ahead;
-        if (stride(s, t, y, values - width, h, &ahead) != OK) return FAILED;
-        double next = t + ahead;
-        if (t < highest) next = fmin(next, highest);
-        if (next >= i->t - h * SMALLEST_LOOK || next <= t || looks->count == MOST_LOOKS - 1) break;
-        i->method->dense(i, next, y);
-        if (indicators_at(s, next, y, values) != OK) return FAILED;
-        looks->t[looks->count] = next;
-    }
-    looks->t[looks->count] = i->t;
-    if (indicators_at(s, i->t, y1, looks->values + looks->count * width) != OK) return FAILED;
-    looks->count += 1;
+    for (int k = 0; k + 1 < looks->count; k++)
+        if (looks->t[k] < highest && highest < looks->t[k + 1] &&
+            look(s, looks, k, highest, y) != OK)
+            return FAILED;
+    if (refine(s, looks, y) != OK) return FAILED;
     for (int c = 0; c < width; c++) {
         if (c < contacts ? !s->state.closed[c] : c < indicators_first_of_frictions(s->system)) continue;
         double *seen = looks->values + (MOST_LOOKS + width) * width; /* one row of scratch */

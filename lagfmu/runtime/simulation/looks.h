@@ -4,7 +4,7 @@
 
 #include "solver.h"
 
-enum { MOST_LOOKS = 256 }; /* and one more for each indicator */
+enum { MOST_LOOKS = 512 }; /* and one more for each indicator */
 
 /* Times t[0] < ... < t[count - 1] and the indicators then, a row of values for each look. */
 typedef struct {
@@ -18,7 +18,7 @@ static inline int looks_doubles(int indicators) {
 }
 
 /* Fills `looks` for the step of s->integrator (dense output prepared), from state.indicator at its start
- * to the projected y1 at its end.  y (2 n): scratch. */
+ * to the projected y1 at its end.  y (6 n): scratch. */
 Status looks_take(Solver *s, const double *y1, double *y, Looks *looks);
 
 #endif

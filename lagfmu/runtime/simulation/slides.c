@@ -552,4 +552,4 @@ static Status jacobian(Solver *s, double t, const double *y, double *J, double *
     return OK;
 }
 
-const Slides SLIDES = {&SLIDING, begin, change, renew, indicators, range, turns, turn, work, jacobian};
+const Slides SLIDES = {&SLIDING, rubbing_doubles, rubbing_ints, begin, change, renew, indicators, range, turns, turn, work, jacobian, rubbing};

@@ -9,11 +9,13 @@
 #define LAGFMU_SLIDES_H
 
 #include "friction.h"
+#include "impact.h"
 #include "indicators.h"
 #include "solver.h"
 
 typedef struct {
     const Sliding *sliding;
+    size_t (*doubles)(const System *s), (*ints)(const System *s); /* workspace of `rub` */
     /* At the start, with the contacts as they would be without frictions: all modes together. */
     Status (*begin)(Solver *s, Instant at, int *closed, const int *touching);
     /* At an event, `left` being the frictions' indicators: modes, levels, starts of slipping, what impacts
@@ -33,7 +35,17 @@ typedef struct {
     Status (*work)(Solver *s, double t0, double t1, double *work);
     /* d(y')/dy and dy'/dt by differences. */
     Status (*jacobian)(Solver *s, double t, const double *y, double *J, double *dfdt);
+    /* An impact with friction, and one without rebound; done: 0 where no contact that is struck presses a
+     * friction, or none was found (rubbing.c). */
+    Status (*rub)(Solver *s, Instant at, const double *q, const double *v, const int *entering,
+                  const double *slip, double *e, Impulse plastic, Impulse found, int *done);
 } Slides;
+
+/* Workspace of rubbing.c, and its function. */
+size_t rubbing_doubles(const System *s);
+size_t rubbing_ints(const System *s);
+Status rubbing(Solver *s, Instant at, const double *q, const double *v, const int *entering,
+               const double *slip, double *e, Impulse plastic, Impulse found, int *done);
 
 extern const Slides SLIDES;
 

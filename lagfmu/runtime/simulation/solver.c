@@ -2,6 +2,7 @@
 #include "solver.h"
 
 #include "impact.h"
+#include "clearance.h"
 #include "indicators.h"
 #include "looks.h"
 #include "parts.h"
@@ -69,8 +70,11 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
     s->work_advance = arena_doubles(scratch, 4 * n);
     s->work_events =
-        arena_doubles(scratch, indicators == 0 ? 0 : 2 * n + indicators + looks_doubles(indicators));
+        arena_doubles(scratch, indicators == 0 ? 0 : 6 * n + indicators + looks_doubles(indicators));
+    s->work_clearance = arena_doubles(scratch, clearance_doubles(system));
     const int frictions = system->frictions, some = frictions > 0;
+    s->work_rub = arena_take(scratch, some ? PARTS.slides->doubles(system) : 0, sizeof(double));
+    s->iwork_rub = arena_take(scratch, some ? PARTS.slides->ints(system) : 0, sizeof(int));
     s->trial_slides = arena_take(scratch, (size_t)frictions, sizeof *s->trial_slides);
     s->work_slides = arena_doubles(scratch, some * (2 * frictions + 5 * n));
     s->iwork_slides = arena_ints(scratch, some * (4 * frictions + contacts));

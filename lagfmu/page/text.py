@@ -13,10 +13,10 @@ from rich.text import Text
 from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.integrability.classify import Classification, classify
 from ..model.model import Contact, Nonholonomic, name_of
-from ..page.documentation import shown
-from ..page.savings import Savings, savings
-from ..page.typeset import Notation, typeset
 from ..solver.precedence import OMITTED
+from .documentation import shown
+from .savings import Savings, savings
+from .typeset import Notation, typeset
 
 if TYPE_CHECKING:
     from ..prepare.prepare import Prepared

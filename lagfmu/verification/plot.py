@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BuildError
-from ..verification.simulate import Trajectory
+from .simulate import Trajectory
 
 COLOURS = ("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72", "#6940a5", "#64473a")
 DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # once the colours are used up
@@ -34,13 +34,7 @@ def plot(
 
     Raises BuildError if a name is unknown or the file cannot be written.
     """
-    known = list(result.dtype.names or ())
-    chosen = list(names) or default_names(known)
-    unknown = [n for n in chosen if n not in known]
-    if unknown or not chosen:
-        raise BuildError(
-            f"cannot plot {', '.join(unknown) or 'nothing'}: expected names among {', '.join(known)}"
-        )
+    chosen = _chosen(result, names)
     path = Path(out)
     with panels(result, units, chosen) as (figure, _):
         if title:
@@ -54,15 +48,34 @@ def plot(
     return path
 
 
+def figure_of(
+    result: Trajectory, units: Mapping[str, str], names: Sequence[str] = (), title: str = ""
+) -> Any:
+    """The same as a matplotlib Figure.  Raises BuildError if a name is unknown."""
+    with panels(result, units, _chosen(result, names)) as (figure, _):
+        if title:
+            figure.suptitle(title, fontsize=12)
+    return figure
+
+
+def _chosen(result: Trajectory, names: Sequence[str]) -> list[str]:
+    known = list(result.dtype.names or ())
+    chosen = list(names) or default_names(known)
+    unknown = [n for n in chosen if n not in known]
+    if unknown or not chosen:
+        raise BuildError(
+            f"cannot plot {', '.join(unknown) or 'nothing'}: expected names among {', '.join(known)}"
+        )
+    return chosen
+
+
 @contextlib.contextmanager
 def panels(
     result: Trajectory, units: Mapping[str, str], chosen: Sequence[str]
 ) -> Iterator[tuple[Any, list[Any]]]:
-    """The figure and its panels, one a unit, multipliers first; it is gone afterwards."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    """The figure and its panels, one a unit, multipliers first, while the style of it holds."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
 
     known = list(result.dtype.names or ())
     members_of: dict[tuple[bool, str], list[str]] = {}
@@ -76,15 +89,9 @@ def panels(
         "axes.grid": True,
         "grid.alpha": 0.3,
     }
-    with plt.rc_context(style):
-        figure, axes = plt.subplots(
-            len(members_of),
-            1,
-            sharex=True,
-            squeeze=False,
-            figsize=(7.5, 1.2 + 2.1 * len(members_of)),
-            layout="constrained",
-        )
+    with mpl.rc_context(style):
+        figure = Figure(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
+        axes = figure.subplots(len(members_of), 1, sharex=True, squeeze=False)
         for axis, ((_, unit), members) in zip(axes[:, 0], members_of.items(), strict=True):
             for k, n in enumerate(members):
                 turn, colour = divmod(k, len(COLOURS))
@@ -108,10 +115,7 @@ def panels(
                 ncols=1 + (len(members) - 1) // PER_COLUMN,
             )
         axes[-1, 0].set_xlabel("time in s")
-        try:
-            yield figure, list(axes[:, 0])
-        finally:
-            plt.close(figure)
+        yield figure, list(axes[:, 0])
 
 
 def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:

@@ -1,0 +1,40 @@
+/* interval.h -- interval arithmetic, to rounding: what an expression can be while its arguments stay between
+ * low and high (R. E. Moore, Interval Analysis, 1966, chs. 2 and 3).
+ *
+ * A result without bounds is (-infinity, infinity); of what is not known at all both ends are no number. */
+#ifndef LAGFMU_INTERVAL_H
+#define LAGFMU_INTERVAL_H
+
+typedef struct {
+    double low, high;
+} Interval;
+
+static inline Interval interval_of(double x) { return (Interval){x, x}; }
+Interval interval_unknown(void);
+Interval interval_add(Interval a, Interval b);
+Interval interval_mul(Interval a, Interval b);
+Interval interval_power(Interval a, int n);
+Interval interval_hull(Interval a, Interval b);
+Interval interval_choose(Interval h, Interval a, Interval b); /* a where h > 0, b where h < 0 */
+Interval interval_exp(Interval a);
+Interval interval_log(Interval a);
+Interval interval_sqrt(Interval a); /* of what is not negative in a */
+Interval interval_sin(Interval a);
+Interval interval_cos(Interval a);
+Interval interval_tan(Interval a);
+Interval interval_asin(Interval a);
+Interval interval_acos(Interval a);
+Interval interval_atan(Interval a);
+Interval interval_atan2(Interval a, Interval b);
+Interval interval_sinh(Interval a);
+Interval interval_cosh(Interval a);
+Interval interval_tanh(Interval a);
+Interval interval_asinh(Interval a);
+Interval interval_smaller(Interval a, Interval b);
+Interval interval_larger(Interval a, Interval b);
+Interval interval_magnitude(Interval a);
+Interval interval_sign(Interval a);
+Interval interval_heaviside(Interval a);
+Interval interval_floor(Interval a);
+
+#endif

@@ -1,0 +1,102 @@
+/* clearance.c -- can an indicator have left its range between two looks?
+ *
+ * Its rate f' = G v - nu is evaluated in interval arithmetic (interval.h) for the boxes of t, q, v and u
+ * between the looks: with l <= f' <= h,
+ *
+ *   f(t) >= max(f_a + l (t - a), f_b - h (b - t)) ,
+ *
+ * whose lowest point is where the two lines meet (Piyavskii 1972).  It rises to the true minimum with the
+ * square of b - a.  The boxes hold the dense output at both ends and in the middle and as much more as that
+ * deviates from a straight line: the motion is smooth over a step, which f need not be. */
+#include "clearance.h"
+
+#include <math.h>
+
+#include "indicators.h"
+#include "leg.h"
+
+static const double COARSE = 1.0 / 32; /* of a step: as near as is looked where nothing is known of a rate */
+static const double FINE = 1.0 / 64;   /* of a step: near enough to take the one event that is seen */
+
+static Interval box(double a, double middle, double b) {
+    const double bend = fabs(a - 2 * middle + b);
+    return (Interval){fmin(fmin(a, b), middle) - bend, fmax(fmax(a, b), middle) + bend};
+}
+
+/* Bounds on the rates (indicators) between the times a and b. */
+static const Interval *bound_rates(Solver *s, double a, double b, double *y) {
+    const System *system = s->system;
+    const Integrator *i = &s->integrator;
+    const int n = system->n, inputs = system->inputs, driven = inputs + system->jumps;
+    const double t[3] = {a, a + (b - a) / 2, b};
+    double *u = s->work_clearance;
+    Interval *q = (Interval *)(void *)(u + 3 * driven), *w = q + 2 * n, *rate = w + driven;
+    for (int k = 0; k < 3; k++) {
+        i->method->dense(i, t[k], y + k * 2 * n);
+        if (inputs > 0) drive_at(system, &s->drive, t[k], u + k * driven);
+    }
+    for (int j = 0; j < 2 * n; j++) q[j] = box(y[j], y[2 * n + j], y[4 * n + j]);
+    for (int j = 0; j < inputs; j++) w[j] = box(u[j], u[driven + j], u[2 * driven + j]);
+    for (int j = inputs; j < driven; j++) w[j] = interval_of(s->state.level[j - inputs]);
+    system->bounds((Interval){a, b}, q, q + n, w, s->p, rate);
+    return rate;
+}
+
+/* The lowest that f can be on an interval of length h. */
+static double lowest(double f_a, double f_b, Interval rate, double h) {
+    if (rate.low >= 0) return f_a;
+    if (rate.high <= 0) return f_b;
+    const double meet = (f_a - f_b + rate.high * h) / (rate.high - rate.low);
+    if (!(fabs(meet) < HUGE_VAL)) return -HUGE_VAL;
+    return fmin(fmin(f_a, f_b), f_a + rate.low * fmin(fmax(meet, 0), h));
+}
+
+/* An input that is no motion may move by derivatives that the equations do not know. */
+static int inputs_move(const Solver *s) {
+    for (int k = 0; k < s->system->inputs; k++)
+        if (s->drive.first[k] != 0 || s->drive.second[k] != 0) return 1;
+    return 0;
+}
+
+static int is_bounded(const Solver *s, int i) {
+    return i < s->system->contacts ? !s->state.closed[i]
+                                   : i < s->system->contacts + s->system->jumps;
+}
+
+static int is_inside(const Solver *s, int i, double value) {
+    const Range r = indicators_range(s, i);
+    return !(range_inside(r, value) < -r.slack);
+}
+
+Clearance clearance_between(Solver *s, const Looks *looks, int k, double *y) {
+    const int width = indicators_count(s->system);
+    const double *at_a = looks->values + k * width, *at_b = at_a + width;
+    const double a = looks->t[k], b = looks->t[k + 1], h = b - a;
+    const double step = s->integrator.t - s->integrator.t_old;
+    const int moving = inputs_move(s);
+    const Interval *rates = NULL;
+    Clearance found = CLEAR;
+    for (int i = 0; i < width; i++)
+        if (is_inside(s, i, at_a[i]) && !is_inside(s, i, at_b[i])) found = BRACKETS;
+    for (int i = 0; i < width; i++) {
+        const Range r = indicators_range(s, i);
+        if (!is_bounded(s, i) || !is_inside(s, i, at_a[i])) continue;
+        if (rates == NULL) rates = bound_rates(s, a, b, y);
+        Interval rate = rates[i];
+        if (moving && i >= s->system->contacts) rate = interval_unknown();
+        if (isnan(rate.low)) {
+            if (h > COARSE * step) return UNKNOWN;
+            continue;
+        }
+        const Interval fall = {-rate.high, -rate.low};
+        if (!is_inside(s, i, at_b[i])) {
+            if (h > FINE * step && rate.low < 0 && rate.high > 0) return UNKNOWN;
+        } else if ((r.low > -HUGE_VAL &&
+                    lowest(at_a[i] - r.low, at_b[i] - r.low, rate, h) < -r.slack) ||
+                   (r.high < HUGE_VAL &&
+                    lowest(r.high - at_a[i], r.high - at_b[i], fall, h) < -r.slack)) {
+            return UNKNOWN;
+        }
+    }
+    return found;
+}

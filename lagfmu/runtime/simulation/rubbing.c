@@ -1,0 +1,182 @@
+/* rubbing.c -- impacts with friction: Coulomb's cone on the impulses of contacts that are struck.
+ *
+ *   0 <= Lambda_n  _|_  s_n+ + e s_n- >= 0 ,   |Lambda_t| <= mu_k N ,  N = sum c Lambda_n ,
+ *   Lambda_t = -mu_k N s_t+/|s_t+|  where s_t+ is not 0
+ *
+ * Moreau's law (Moreau 1988; Glocker, Set-Valued Force Laws, 2001), solved by projected sweeps over the rows
+ * (Jourdan, Alart & Jean 1998).  Without rebound (e = 0) it never raises the energy; Newton's rebound with
+ * friction can (Kane & Levinson 1985).  Between the two, both within the convex cones, the impact is taken
+ * that keeps it. */
+#include <math.h>
+#include <string.h>
+
+#include "slides.h"
+
+enum { SWEEPS = 20000 };
+static const double CLOSE = 1e-15; /* of the largest impulse: what a sweep may still change */
+static const double ROUGH = 1e-9;  /* beyond which the sweeps have not arrived */
+
+/* The contacts' rows, then those of the frictions that they press. */
+typedef struct {
+    Solver *s;
+    Mechanism *b;
+    int *rows, count, contacts; /* rows, of which the first are contacts */
+    int *pressed;               /* (frictions) */
+    double *A, *free, *z, *before; /* (count^2), (count): s- as the base rows leave it, impulses */
+    double *slip, *zero, *right;   /* (m) */
+    double *force, *dv;            /* (n) */
+} Rub;
+
+size_t rubbing_doubles(const System *s) {
+    const size_t rows = (size_t)(s->contacts + 2 * s->frictions), m = (size_t)s->m, n = (size_t)s->n;
+    return rows * rows + 3 * rows + 4 * m + 3 * n;
+}
+
+size_t rubbing_ints(const System *s) {
+    return (size_t)(s->contacts + 2 * s->frictions + s->frictions + s->m);
+}
+
+/* G_k^T times a number, added to the force. */
+static void add_row(const Rub *x, int k, double part) {
+    const System *s = x->s->system;
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
+        x->force[s->entry_column[e]] += part * x->b->G[e];
+}
+
+/* Rows that press, frictions that are pressed; 0 if there are none. */
+static int find_rows(Rub *x, const int *entering) {
+    const System *s = x->s->system;
+    x->count = 0;
+    for (int c = 0; c < s->contacts; c++)
+        if (entering[c]) x->rows[x->count++] = s->contact[c];
+    x->contacts = x->count;
+    for (int i = 0; i < s->frictions; i++) {
+        const Friction *law = &s->friction[i];
+        x->pressed[i] = 0;
+        for (int k = law->first; law->gated && k < law->first + law->normals; k++)
+            for (int r = 0; r < x->contacts; r++) x->pressed[i] |= x->rows[r] == s->press[k];
+        for (int r = 0; r < law->rows && x->pressed[i]; r++) x->rows[x->count++] = law->row[r];
+    }
+    return x->count > x->contacts;
+}
+
+/* Factors the rows that act with both signs; A and the free slip velocities of the others. */
+static Status reduce(Rub *x, const int *entering, int *active, double *Lambda) {
+    const System *s = x->s->system;
+    Linear *l = &x->b->linear;
+    system_active(s, entering, active);
+    for (int c = 0; c < s->contacts; c++) active[s->contact[c]] = 0;
+    if (linear_factor(l, x->b->M, x->b->G, active) != OK) return FAILED;
+    for (int k = 0; k < s->m; k++) {
+        x->right[k] = -x->slip[k];
+        x->zero[k] = 0;
+    }
+    if (linear_nearest(l, x->right, x->dv) != OK) return FAILED;
+    for (int i = 0; i < x->count; i++)
+        x->free[i] = x->slip[x->rows[i]] + mechanism_row(x->b, x->rows[i], x->dv);
+    for (int i = 0; i < x->count; i++) {
+        memset(x->force, 0, (size_t)s->n * sizeof *x->force);
+        add_row(x, x->rows[i], 1);
+        if (linear_solve(l, x->force, x->zero, x->dv, Lambda) != OK) return FAILED;
+        for (int j = 0; j < x->count; j++)
+            x->A[j * x->count + i] = mechanism_row(x->b, x->rows[j], x->dv);
+    }
+    for (int i = 0; i < x->count; i++)
+        for (int j = 0; j < i; j++)
+            x->A[i * x->count + j] = x->A[j * x->count + i] =
+                (x->A[i * x->count + j] + x->A[j * x->count + i]) / 2;
+    return OK;
+}
+
+/* A z + free + e s- of row i. */
+static double slip_after(const Rub *x, int i, const double *e) {
+    double sum = x->free[i] + (i < x->contacts ? e[x->rows[i]] * x->slip[x->rows[i]] : 0);
+    for (int j = 0; j < x->count; j++) sum += x->A[i * x->count + j] * x->z[j];
+    return sum;
+}
+
+/* One friction: its impulses moved against the slip, and back into the cone. */
+static void rub(Rub *x, int i, int first, const double *e) {
+    const System *s = x->s->system;
+    const Friction *law = &s->friction[i];
+    const struct Frictions *f = x->b->friction;
+    double normal = 0, most = 0, length = 0, moved[2] = {0, 0};
+    for (int k = law->first; k < law->first + law->normals; k++)
+        for (int r = 0; r < x->contacts; r++)
+            if (x->rows[r] == s->press[k]) normal += f->c[k] * x->z[r];
+    for (int r = 0; r < law->rows; r++)
+        most = fmax(most, x->A[(first + r) * x->count + first + r]);
+    if (!(most > 0)) return;
+    for (int r = 0; r < law->rows; r++) moved[r] = x->z[first + r] - slip_after(x, first + r, e) / most;
+    length = hypot(moved[0], moved[1]);
+    const double radius = f->mu[2 * i + 1] * fmax(normal, 0);
+    const double part = length > radius ? radius / length : 1;
+    for (int r = 0; r < law->rows; r++) x->z[first + r] = part * moved[r];
+}
+
+/* The impulses; 0 if the sweeps do not arrive. */
+static int sweep(Rub *x, const double *e) {
+    const System *s = x->s->system;
+    double change = HUGE_VAL, most = 0;
+    memset(x->z, 0, (size_t)x->count * sizeof *x->z);
+    for (int round = 0; round < SWEEPS; round++) {
+        memcpy(x->before, x->z, (size_t)x->count * sizeof *x->z);
+        for (int i = 0; i < x->contacts; i++) {
+            const double own = x->A[i * x->count + i];
+            if (own > 0) x->z[i] = fmax(0, x->z[i] - slip_after(x, i, e) / own);
+        }
+        for (int i = 0, first = x->contacts; i < s->frictions; i++) {
+            if (!x->pressed[i]) continue;
+            rub(x, i, first, e);
+            first += s->friction[i].rows;
+        }
+        change = most = 0;
+        for (int i = 0; i < x->count; i++) {
+            change = fmax(change, fabs(x->z[i] - x->before[i]));
+            most = fmax(most, fabs(x->z[i]));
+        }
+        if (change <= CLOSE * most) break;
+    }
+    return change <= ROUGH * most;
+}
+
+/* Velocities and all impulses that go with z. */
+static Status finish(Rub *x, double *dv, double *Lambda) {
+    const System *s = x->s->system;
+    memset(x->force, 0, (size_t)s->n * sizeof *x->force);
+    for (int i = 0; i < x->count; i++) add_row(x, x->rows[i], x->z[i]);
+    for (int k = 0; k < s->m; k++) x->right[k] = -x->slip[k];
+    x->b->linear.nearest = 1;
+    const Status status = linear_solve(&x->b->linear, x->force, x->right, dv, Lambda);
+    x->b->linear.nearest = 0;
+    for (int i = 0; i < x->count; i++) Lambda[x->rows[i]] = x->z[i];
+    return status;
+}
+
+Status rubbing(Solver *s, Instant at, const double *q, const double *v, const int *entering,
+               const double *slip, double *e, Impulse plastic, Impulse found, int *done) {
+    const System *system = s->system;
+    const int rows = system->contacts + 2 * system->frictions, m = system->m;
+    Rub x = {.s = s, .b = &s->stepped, .rows = s->iwork_rub, .A = s->work_rub};
+    int *active;
+    x.pressed = x.rows + rows;
+    active = x.pressed + system->frictions;
+    x.free = x.A + rows * rows;
+    x.z = x.free + rows;
+    x.before = x.z + rows;
+    x.slip = x.before + rows;
+    x.zero = x.slip + m;
+    x.right = x.zero + m;
+    x.force = x.right + m;
+    x.dv = x.force + system->n;
+    memcpy(x.slip, slip, (size_t)m * sizeof *slip);
+    *done = 0;
+    if (!find_rows(&x, entering)) return OK;
+    system->coulomb(at.t, q, v, at.u, at.p, x.b->friction->mu, x.b->friction->load, x.b->friction->c);
+    if (reduce(&x, entering, active, plastic.Lambda) != OK) return FAILED;
+    if (!sweep(&x, e)) return OK;
+    if (finish(&x, found.dv, found.Lambda) != OK) return FAILED;
+    memset(e, 0, (size_t)m * sizeof *e);
+    *done = sweep(&x, e);
+    return *done ? finish(&x, plastic.dv, plastic.Lambda) : OK;
+}

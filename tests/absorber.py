@@ -1,0 +1,7 @@
+"""The absorber of coupled_model.py as a model file: `lagfmu build tests/absorber.py`."""
+
+from coupled_model import SCENES
+from coupled_model import absorber as model
+
+scenes = [SCENES["absorber"]]
+__all__ = ["model", "scenes"]
