@@ -6,6 +6,7 @@ import contextlib
 import difflib
 import enum
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -123,6 +124,15 @@ def _plainly() -> Iterator[None]:
                 f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
             )
             raise typer.Exit(getattr(error, "code", 1)) from None
+        except OSError as error:  # of temporary files; for what the user names see its own errors
+            where = error.filename or tempfile.gettempdir()
+            errors.print(
+                f"[bold red]error:[/] {escape(f'{where}: {error.strerror or error}')}: is the disk full? "
+                "The environment variable TMPDIR chooses another folder for temporary files",
+                highlight=False,
+                soft_wrap=True,
+            )
+            raise typer.Exit(1) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
                 errors.print(
