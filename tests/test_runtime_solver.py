@@ -187,7 +187,7 @@ def bench(runtime: ctypes.CDLL, folder: Path, prepared: Any) -> Any:
             else:
                 one = prepare(model, Scene(model.name, formulation=formulation))
             text = model_source(one.equations, one.reduction, one.scene.formulation)
-            keep[name] = compile_library(folder, [], text), one
+            keep[name] = compile_library(folder, ["interval.c"], text), one
         library, one = keep[name]
         made.append(Bench(runtime, c_void_p.in_dll(library, "MODEL_SYSTEM"), one))
         return made[-1]
