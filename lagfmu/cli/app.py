@@ -6,6 +6,7 @@ import contextlib
 import difflib
 import enum
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +18,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ..api import package
-from ..errors import LagfmuError, SimulationError, VerificationError
+from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
@@ -31,6 +32,7 @@ from ..model.goal import parse
 from ..model.library import known, new
 from ..model.scene import Scene
 from ..page.text import show as show_prepared
+from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
@@ -122,6 +124,15 @@ def _plainly() -> Iterator[None]:
                 f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
             )
             raise typer.Exit(getattr(error, "code", 1)) from None
+        except OSError as error:  # of temporary files; for what the user names see its own errors
+            where = error.filename or tempfile.gettempdir()
+            errors.print(
+                f"[bold red]error:[/] {escape(f'{where}: {error.strerror or error}')}: is the disk full? "
+                "The environment variable TMPDIR chooses another folder for temporary files",
+                highlight=False,
+                soft_wrap=True,
+            )
+            raise typer.Exit(1) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
                 errors.print(
@@ -290,7 +301,12 @@ def show(
     with _plainly():
         file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
-            show_prepared(prepare(file.model, s), console)
+            try:
+                prepared = prepare(file.model, s)
+            except CannotStartError as error:
+                show_what_is_known(error.known, console)
+                raise
+            show_prepared(prepared, console)
 
 
 @app.command(name="verify")
