@@ -10,7 +10,21 @@ and the winch takes up the rope with the power -tension l'.
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Holonomic, Input, Model, Output, Parameter, Scene, multiplier, output
+from lagfmu import (
+    Arrow,
+    ClosedForm,
+    Disk,
+    Holonomic,
+    Input,
+    Line,
+    Model,
+    Output,
+    Parameter,
+    Rod,
+    Scene,
+    multiplier,
+    output,
+)
 
 t = dynamicsymbols._t
 s, x, y, F, l = dynamicsymbols("s x y F l")  # noqa: E741 - the literature's letter
@@ -55,6 +69,13 @@ model = Model(
         Output("winch.power", -tension * l.diff(), "W", "power of the winch"),
         Output("load.sway", x - s, "m", "load, to the right of the trolley"),
         Output("trolley.power", F * s.diff(), "W", "power of the trolley's drive"),
+    ],
+    picture=[
+        Line((-10, 0), (20, 0)),
+        Rod((s - 1, 0), (s + 1, 0)),
+        Line((s, 0), (x, y)),
+        Disk((x, y), trace=True),
+        Arrow("rope", at=(x, y)),
     ],
 )
 
