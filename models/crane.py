@@ -49,14 +49,14 @@ model = Model(
     ],
     inputs=[
         Input(F, "N", 0.0, "drive of the trolley, to the right"),
-        Input(l, "m", 8.0, "length of the rope", rate=-0.25),
+        Input(l, "m", 7.8125, "length of the rope", rate=-0.1953125),
     ],
     start={
         s: 0.0,
-        x: 2.24,  # 2.24^2 + 7.68^2 = 8^2
-        y: -7.68,
-        x.diff(): -0.07,  # along the rope: l' (x, y)/l
-        y.diff(): 0.24,
+        x: 2.1875,  # (x, y) = l (7, -24)/25, exact in binary
+        y: -7.5,
+        x.diff(): -0.0546875,  # along the rope: l' (x, y)/l
+        y.diff(): 0.1875,
     },
     description="Overhead crane that hoists its load",
     descriptions={

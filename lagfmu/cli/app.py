@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ..api import package
-from ..errors import LagfmuError, SimulationError, VerificationError
+from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
@@ -32,6 +32,7 @@ from ..model.goal import parse
 from ..model.library import known, new
 from ..model.scene import Scene
 from ..page.text import show as show_prepared
+from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
@@ -300,7 +301,12 @@ def show(
     with _plainly():
         file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
-            show_prepared(prepare(file.model, s), console)
+            try:
+                prepared = prepare(file.model, s)
+            except CannotStartError as error:
+                show_what_is_known(error.known, console)
+                raise
+            show_prepared(prepared, console)
 
 
 @app.command(name="verify")
