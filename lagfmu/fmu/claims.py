@@ -137,7 +137,8 @@ def pack_closed_forms(
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
     closed, `tables` those that the model looks up, besides those of the claims.  Claims that need a
-    variable which the scene leaves out are left out too.  Raises ModelError if a claim uses what no FMU of the model has.
+    variable which the scene leaves out are left out too.  Raises ModelError if a claim uses what no FMU of
+    the model has.
     """
     claims = [
         claim
