@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 
 class LagfmuError(Exception):
@@ -18,6 +19,14 @@ class ModelError(LagfmuError):
         lines = "\n".join(f"  - {problem}" for problem in self.problems)
         count = "1 problem" if len(self.problems) == 1 else f"{len(self.problems)} problems"
         super().__init__(f"model {name!r} has {count}:\n{lines}")
+
+
+class CannotStartError(ModelError):
+    """A model whose equations stand and whose start does not; `known` is what can be shown of it."""
+
+    def __init__(self, name: str, problems: Sequence[str], known: Any) -> None:
+        super().__init__(name, problems)
+        self.known = known
 
 
 class TableError(LagfmuError):

@@ -8,14 +8,18 @@ from sympy import atan, cos, pi, sign, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Contact,
+    Disk,
     Friction,
+    Line,
     Model,
     Nonholonomic,
     Output,
     Parameter,
     Scene,
+    Spring,
     initial,
     multiplier,
     output,
@@ -25,6 +29,15 @@ t = dynamicsymbols._t
 x, z = dynamicsymbols("x z")
 m, k, g, speed = symbols("m k g speed", positive=True)
 mu_s, mu_k = symbols("mu_s mu_k", nonnegative=True)
+
+BLOCK, WALL = 0.05, 0.5  # m, half of the drawn block, and how far the spring's wall is
+
+
+def box(x, z):
+    """The corners of the drawn block about the middle of its lower side, the first again at the end."""
+    corners = ((-1, 0), (1, 0), (1, 2), (-1, 2), (-1, 0))
+    return [(x + BLOCK * i, z + BLOCK * j) for i, j in corners]
+
 
 model = Model(
     name="Belt",
@@ -51,6 +64,17 @@ model = Model(
     start={x: 0.0, x.diff(): 0.2},
     description="Block on a spring that a moving belt drags along",
     descriptions={x: "extension of the spring", z: "height above the belt"},
+    picture=[
+        Line((-WALL, -2 * BLOCK), (-WALL, 4 * BLOCK)),
+        Line((-WALL, 0), (WALL, 0)),
+        Line((-WALL, -2 * BLOCK), (WALL, -2 * BLOCK)),
+        Disk((-WALL, -BLOCK), radius=BLOCK, angle=-speed * t / BLOCK),
+        Disk((WALL, -BLOCK), radius=BLOCK, angle=-speed * t / BLOCK),
+        Line(*box(x, z)),
+        Spring((-WALL, BLOCK), (x - BLOCK, z + BLOCK)),
+        Arrow("belt", at=(x, z)),
+        Arrow("ride", at=(x, z)),
+    ],
 )
 
 scenes = [Scene("Belt", stop_time=3.0, step_size=0.01)]

@@ -8,10 +8,13 @@ from sympy import Min, Rational, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Contact,
+    Disk,
     Friction,
+    Ground,
     Model,
     Nonholonomic,
     Output,
@@ -49,6 +52,12 @@ model = Model(
     start={x: 0.0, x.diff(): 8.0},
     description="Ball thrown without spin that slides, then rolls",
     descriptions={x: "distance along the lane", z: "height above it", phi: "rotation"},
+    picture=[  # beside the ball, as it goes along
+        Ground((-6 * R, 0), (6 * R, 0)),
+        Disk((0, z + R), radius=R, angle=-phi),
+        Arrow("lane", at=(0, z)),
+        Arrow("touch", at=(0, z), along=(1, 0)),
+    ],
 )
 
 scenes = [Scene("Bowling", stop_time=3.0, step_size=0.01)]

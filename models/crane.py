@@ -10,7 +10,21 @@ and the winch takes up the rope with the power -tension l'.
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Holonomic, Input, Model, Output, Parameter, Scene, multiplier, output
+from lagfmu import (
+    Arrow,
+    ClosedForm,
+    Disk,
+    Holonomic,
+    Input,
+    Line,
+    Model,
+    Output,
+    Parameter,
+    Rod,
+    Scene,
+    multiplier,
+    output,
+)
 
 t = dynamicsymbols._t
 s, x, y, F, l = dynamicsymbols("s x y F l")  # noqa: E741 - the literature's letter
@@ -35,14 +49,14 @@ model = Model(
     ],
     inputs=[
         Input(F, "N", 0.0, "drive of the trolley, to the right"),
-        Input(l, "m", 8.0, "length of the rope", rate=-0.25),
+        Input(l, "m", 7.8125, "length of the rope", rate=-0.1953125),
     ],
     start={
         s: 0.0,
-        x: 2.24,  # 2.24^2 + 7.68^2 = 8^2
-        y: -7.68,
-        x.diff(): -0.07,  # along the rope: l' (x, y)/l
-        y.diff(): 0.24,
+        x: 2.1875,  # (x, y) = l (7, -24)/25, exact in binary
+        y: -7.5,
+        x.diff(): -0.0546875,  # along the rope: l' (x, y)/l
+        y.diff(): 0.1875,
     },
     description="Overhead crane that hoists its load",
     descriptions={
@@ -55,6 +69,13 @@ model = Model(
         Output("winch.power", -tension * l.diff(), "W", "power of the winch"),
         Output("load.sway", x - s, "m", "load, to the right of the trolley"),
         Output("trolley.power", F * s.diff(), "W", "power of the trolley's drive"),
+    ],
+    picture=[
+        Line((-10, 0), (20, 0)),
+        Rod((s - 1, 0), (s + 1, 0)),
+        Line((s, 0), (x, y)),
+        Disk((x, y), trace=True),
+        Arrow("rope", at=(x, y)),
     ],
 )
 

@@ -8,15 +8,19 @@ from sympy import Abs, Max, Min, ceiling, cos, floor, pi, sign, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Friction,
+    Ground,
     Holonomic,
+    Line,
     Model,
     Nonholonomic,
     Output,
     Parameter,
     Scene,
+    Spring,
     initial,
     multiplier,
     output,
@@ -26,6 +30,15 @@ t = dynamicsymbols._t
 x, z = dynamicsymbols("x z")
 m, k, g = symbols("m k g", positive=True)
 mu_s, mu_k = symbols("mu_s mu_k", nonnegative=True)
+
+BLOCK, WALL = 0.05, 0.5  # m, half of the drawn block, and how far the spring's wall is
+
+
+def box(x, z):
+    """The corners of the drawn block about the middle of its lower side, the first again at the end."""
+    corners = ((-1, 0), (1, 0), (1, 2), (-1, 2), (-1, 0))
+    return [(x + BLOCK * i, z + BLOCK * j) for i, j in corners]
+
 
 model = Model(
     name="FrictionOscillator",
@@ -47,6 +60,14 @@ model = Model(
     start={x: 0.2},
     description="Mass on a spring with Coulomb friction",
     descriptions={x: "extension of the spring", z: "height above the floor"},
+    picture=[
+        Ground((-WALL, 0), (WALL, 0)),
+        Ground((-WALL, 4 * BLOCK), (-WALL, 0)),
+        Line(*box(x, z)),
+        Spring((-WALL, BLOCK), (x - BLOCK, z + BLOCK)),
+        Arrow("floor", at=(x, z)),
+        Arrow("rest", at=(x, z)),
+    ],
 )
 
 scenes = [Scene("FrictionOscillator", stop_time=3.0, step_size=0.01)]

@@ -10,14 +10,19 @@ from sympy import Rational, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Contact,
+    Disk,
+    Ground,
     Input,
     Model,
     Output,
     Parameter,
+    Rod,
     Scene,
     Spline,
+    Spring,
     multiplier,
     output,
 )
@@ -42,6 +47,8 @@ push_r = load_r + k * dr + c * dr.diff(t)
 
 T = (M * z.diff() ** 2 + J * theta.diff() ** 2 + m * (zf.diff() ** 2 + zr.diff() ** 2)) / 2
 V = M * g * z + m * g * (zf + zr) + load_f * df + load_r * dr + k * (df**2 + dr**2) / 2
+
+WHEEL, HIGH = 0.3, 0.9  # m, radius of the drawn wheels, and height of the drawn body
 
 model = Model(
     name="HalfCar",
@@ -100,6 +107,21 @@ model = Model(
             "N",
             "force that the slope of the road sets against the drive",
         ),
+    ],
+    picture=[
+        Rod((a, z + a * theta + HIGH), (-b, z - b * theta + HIGH)),
+        Spring((a, zf + WHEEL), (a, z + a * theta + HIGH), coils=5),
+        Spring((-b, zr + WHEEL), (-b, z - b * theta + HIGH), coils=5),
+        Disk((a, zf + WHEEL), radius=WHEEL),
+        Disk((-b, zr + WHEEL), radius=WHEEL),
+        Ground(
+            (a - WHEEL, zf - output("residual.front")), (a + WHEEL, zf - output("residual.front"))
+        ),
+        Ground(
+            (-b - WHEEL, zr - output("residual.rear")), (-b + WHEEL, zr - output("residual.rear"))
+        ),
+        Arrow("front", at=(a, zf)),
+        Arrow("rear", at=(-b, zr)),
     ],
 )
 

@@ -11,10 +11,13 @@ from sympy import Max, Min, cos, sign, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Contact,
+    Disk,
     Friction,
+    Ground,
     Model,
     Nonholonomic,
     Output,
@@ -33,6 +36,15 @@ mu_s, mu_k = symbols("mu_s mu_k", nonnegative=True)
 
 T = M * (y.diff() ** 2 + z.diff() ** 2) / 2 + kappa * M * R**2 * theta.diff() ** 2 / 2
 V = M * g * (z * cos(alpha) - y * sin(alpha))
+
+
+def along(way, height=0):
+    """The point a way down the incline and a height above it."""
+    return (
+        way * cos(alpha) + height * sin(alpha),
+        -way * sin(alpha) + height * cos(alpha),
+    )
+
 
 model = Model(
     name="InclineFriction",
@@ -64,6 +76,12 @@ model = Model(
     start={y: 0.0, theta: 0.0},
     description="Disk on an incline that rolls as long as friction allows",
     descriptions={y: "distance down the incline", z: "distance from it", theta: "rotation"},
+    picture=[
+        Ground(along(0), along(2)),
+        Disk(along(y, z + R), radius=R, angle=-theta),
+        Arrow("incline", at=along(y, z)),
+        Arrow("rolling", at=along(y, z)),
+    ],
 )
 
 scenes = [Scene("InclineFriction", stop_time=1.0, step_size=0.01)]

@@ -5,17 +5,21 @@ positive in the sense of a growing theta.  It slides from rest if tan(theta0) > 
 v^2 = g r cos(theta).
 """
 
-from sympy import cos, exp, sign, sin, symbols
+from sympy import cos, exp, pi, sign, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Contact,
+    Disk,
     Friction,
+    Ground,
     Model,
     Nonholonomic,
     Parameter,
+    Path,
     Scene,
     departure,
     initial,
@@ -27,6 +31,7 @@ t = dynamicsymbols._t
 r, theta = dynamicsymbols("r theta")
 m, g, a = symbols("m g a", positive=True)
 mu_s, mu_k = symbols("mu_s mu_k", nonnegative=True)
+turn = symbols("turn")  # along the drawn surface
 
 model = Model(
     name="RoughHemisphere",
@@ -47,6 +52,13 @@ model = Model(
     start={r: 1.0, theta: 0.4},
     description="Particle that slides down a rough hemisphere and leaves it",
     descriptions={r: "distance from the centre", theta: "angle from the top"},
+    picture=[
+        Ground((-2 * a, 0), (2 * a, 0)),
+        Path((a * sin(turn), a * cos(turn)), turn, -pi / 2, pi / 2),
+        Disk((r * sin(theta), r * cos(theta)), trace=True),
+        Arrow("surface", at=(r * sin(theta), r * cos(theta))),
+        Arrow("hold", at=(r * sin(theta), r * cos(theta))),
+    ],
 )
 
 scenes = [Scene("RoughHemisphere", stop_time=2.0, step_size=0.01)]

@@ -35,6 +35,8 @@ def compile_library(
     """A library of the runtime files `sources` and of the C text `extra`; warnings are errors."""
     key = hashlib.sha256("\0".join([*sources, extra, *flags]).encode()).hexdigest()[:12]
     target = folder / f"runtime_{key}.so"
+    if "interval_" in extra and "interval.c" not in sources:
+        sources = [*sources, "interval.c"]  # which generated bounds are made of
     files = [str(RUNTIME_FILES[name]) for name in sources]
     if extra:
         text = folder / f"extra_{key}.c"

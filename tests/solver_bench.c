@@ -178,6 +178,7 @@ double bench_number(const Bench *b, const char *name) {
     if (strcmp(name, "ahead") == 0) return now->ahead;
     if (strcmp(name, "fresh") == 0) return now->fresh;
     if (strcmp(name, "event_count") == 0) return now->event_count;
+    if (strcmp(name, "rung") == 0) return (double)b->solver.stepped.linear.rung;
     if (strcmp(name, "kinetic") == 0) return b->seen.energy[0];
     return b->seen.energy[1];
 }

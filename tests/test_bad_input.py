@@ -9,14 +9,15 @@ import subprocess
 import sys
 import warnings
 import zipfile
+from pathlib import Path
 
 import fmpy
 import pytest
 from fmpy.fmi1 import FMICallException
 from instance import instance
 from pythonfmu.builder import FmuBuilder
-from sympy import Eq, I, cos, exp, oo, sin, sqrt, symbols
-from sympy.physics.mechanics import dynamicsymbols
+from sympy import Abs, Eq, I, Matrix, Max, Piecewise, cos, exp, oo, sin, sqrt, symbols
+from sympy.physics.mechanics import ReferenceFrame, dynamicsymbols
 
 from lagfmu import (
     Contact,
@@ -109,6 +110,52 @@ def test_an_undeclared_symbol_is_named():
 def test_a_symbol_with_other_assumptions_is_told_from_an_undeclared_one():
     """symbols('g') is not symbols('g', positive=True), though both print as g."""
     says(refusal(lambda: pendulum(lagrangian=K - m * symbols("g") * y)), "g is", "use the same")
+
+
+N = ReferenceFrame("N")
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        (  # no else
+            {"lagrangian": K - m * g * Piecewise((y, y > 0))},
+            ("lagrangian", "Piecewise", "(value, True)"),
+        ),
+        (  # |x| has no second derivative at 0
+            {"constraints": [Holonomic("rod", Abs(x) - L)]},
+            ("constraint 'rod'", "Abs(x)", "kink", "Contact for each side"),
+        ),
+        ({"constraints": [Contact("wall", Max(x, y) - L)]}, ("constraint 'wall'", "Max(x, y)")),
+        (  # its gradient is 2 f grad f
+            {"constraints": [Holonomic("rod", (x**2 + y**2 - L**2) ** 2)]},
+            ("constraint 'rod'", "gradient", "squared"),
+        ),
+        ({"start": {"x": 0.6, y: -0.8}}, ("start", "text 'x'", "write x without quotes")),
+        ({"start": {"der(x)": 0.6, y: -0.8}}, ("text 'der(x)'", "write x without", ".diff()")),
+        (
+            {"constraints": [Holonomic("pin", Matrix([x - L, y]))]},
+            ("constraint 'pin' is a matrix", "each of its components"),
+        ),
+        (
+            {"constraints": [Holonomic("pin", (x - L) * N.x + y * N.y)]},
+            ("constraint 'pin' is a vector", "r.dot(N.x)"),
+        ),
+        (
+            {"parameters": (Parameter(m, True, "kg"), *CONSTANTS[1:])},
+            ("parameter 'm' is True", "finite number"),
+        ),
+    ],
+)
+def test_what_cannot_be_used_is_told_with_what_to_write_instead(changes, parts):
+    """No value somewhere, no second derivative, a gradient that vanishes, a text for a symbol: in words."""
+    says(refusal(lambda: prepare(pendulum(**changes))), *parts)
+
+
+def test_a_kink_that_does_not_move_is_no_kink():
+    """|L| of a parameter is a number; x^2 (y - L) is a product, and vanishes with a gradient at y = L."""
+    for f in (x**2 + y**2 - Abs(L) ** 2, (x**2 + L**2) * (y + L * sqrt(1) * 4 / 5)):
+        prepare(pendulum(constraints=[Holonomic("rod", f)]))
 
 
 @pytest.mark.parametrize("coordinates", [[x, y], {x: "", y: "  "}, {x: None, y: 3}])
@@ -580,6 +627,37 @@ def test_the_line_is_named_however_the_file_is_called(tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(GOOD + "\n1 / 0\n")
     for name in ("mine.py", f"../{tmp_path.name}/mine.py"):
         says(refusal(lambda name=name: load(name), ModelError), name, "line 10 (1 / 0)")
+
+
+def test_scenes_that_differ_by_capitals_alone_are_refused(tmp_path):
+    """Bead.fmu and BEAD.fmu are one file on Windows and macOS."""
+    file = tmp_path / "two.py"
+    file.write_text(GOOD + "from lagfmu import Scene\nscenes = [Scene('Bead'), Scene('BEAD')]\n")
+    says(refusal(lambda: load(file), ModelError), "BEAD, Bead", "capitals", "rename one")
+
+
+def test_a_temporary_folder_that_cannot_be_written_is_told(tmp_path):
+    """The disk of temporary files is full, or not there: one line, and no traceback."""
+    model = Path(__file__).parent.parent / "models" / "pendulum.py"
+    done = subprocess.run(
+        [sys.executable, "-c", NO_ROOM, "build", str(model), "--out", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    says(done.stderr, "No space left on device", "TMPDIR")
+    assert "Traceback" not in done.stderr
+
+
+NO_ROOM = """
+import errno, sys, tempfile
+from lagfmu.cli.app import app
+def full(*arguments, **options):
+    raise OSError(errno.ENOSPC, "No space left on device")
+tempfile.mkdtemp = full
+app(sys.argv[1:])
+"""
 
 
 def test_a_file_that_is_missing_or_no_python_file_is_refused(tmp_path):

@@ -142,7 +142,7 @@ class Case:
     ) -> None:
         self.eom, self.reduction, self.formulation = eom, reduction, formulation
         self.source = model_source(eom, reduction, formulation)
-        self.native = Native(compile_library(folder, (), self.source + CALLS))
+        self.native = Native(compile_library(folder, ("interval.c",), self.source + CALLS))
 
     @cached_property
     def system(self) -> System:

@@ -99,6 +99,39 @@ def test_show_prints_equations_degrees_of_freedom_classes_and_units():
         assert unit.replace(".", "·") in text or unit in text, unit
 
 
+CRANE = """
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+from lagfmu import Holonomic, Input, Model, Parameter
+x, y, L = dynamicsymbols("x y L")
+m, g = symbols("m g", positive=True)
+model = Model(name="Crane", lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+              coordinates={x: "m", y: "m"}, constraints=[Holonomic("rope", x**2 + y**2 - L**2)],
+              inputs=[Input(L, "m")], start={x: 0.5, y: -1.0},
+              parameters=[Parameter(m, 1.0, "kg"), Parameter(g, 9.81, "m/s^2")])
+"""
+
+
+def test_show_lists_parameters_and_inputs_with_their_values():
+    """The cart's friction c = 0.1 N s/m, and the force F that starts at 0 N."""
+    text = lagfmu("show", MODELS / "cart_pendulum.py")
+    assert "c 0.1 N·s/m viscous friction of the cart" in text
+    assert "F 0 N force on the cart" in text
+
+
+def test_show_prints_the_equations_of_a_model_that_cannot_start(tmp_path):
+    """A rope whose length is a motion that starts at 0: no place satisfies it, its equations are shown, and
+    the message says that the motion starts at 0."""
+    file = tmp_path / "crane.py"
+    file.write_text(CRANE)
+    text = lagfmu("show", file, code=1)
+    assert "m y\u0308 + m g = 2 y λ_rope" in text
+    assert "no configuration was found that satisfies it" in text
+    assert "the prescribed motion 'L' starts at 0 m" in text
+    file.write_text(CRANE.replace('Input(L, "m")', 'Input(L, "m", start=1.25**0.5)'))
+    assert "starts at 0" not in lagfmu("show", file)
+
+
 def test_show_takes_one_scene():
     """--scene PendulumAngle; an unknown one is named."""
     assert "PendulumAngle" in lagfmu("show", MODELS / "pendulum.py", "--scene", "PendulumAngle")

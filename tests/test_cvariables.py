@@ -74,7 +74,7 @@ def table(
             p = prepared(name)
             text = variables_source(p.table, p.equations, p.reduction, p.scene, p.system)
             model = model_source(p.equations, p.reduction, p.scene.formulation)
-            library = compile_library(folder, (), model + text, [f"-I{folder}"])
+            library = compile_library(folder, ("interval.c",), model + text, [f"-I{folder}"])
             count = ctypes.c_int.in_dll(library, "VARIABLE_COUNT").value
             rows = (CVariable * count).in_dll(library, "VARIABLES")
             made[name] = (p, library, list(rows))

@@ -1,4 +1,4 @@
-"""The README's own examples do what it says."""
+"""The examples of the README and of docs/ do what these say."""
 
 from __future__ import annotations
 
@@ -28,10 +28,16 @@ from lagfmu.study.stress.probe import WRONG, attempt, verdict
 
 REPOSITORY = Path(__file__).parent.parent
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+PAGES = sorted((REPOSITORY / "docs").glob("*.md"))
+TEXT = "\n".join([README, *(page.read_text(encoding="utf-8") for page in PAGES)])
+TUTORIAL = (REPOSITORY / "docs" / "tutorial.md").read_text(encoding="utf-8")
 
 
-COMMANDS = [shlex.split(c) for c in re.findall(r"^    lagfmu ([^#\n]*)", README, re.MULTILINE)]
-BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+COMMANDS = [
+    shlex.split(c)
+    for c in dict.fromkeys(re.findall(r"^    lagfmu ([^#\n]*?) *(?:#.*)?$", TEXT, re.MULTILINE))
+]
+BLOCKS = list(dict.fromkeys(re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)))
 LONG = ("tradeoff", "stress", "sweep", "page")  # studies: tried in tests of their own
 
 
@@ -112,3 +118,45 @@ def test_the_models_hold_at_every_parameter_and_start(tmp_path):
                 rows = [verdict(p, attempt(p, bench), 0.0) for p in probes]
             assert len(rows) > 30
             assert [r for r in rows if r.verdict == WRONG] == []
+
+
+def test_the_readme_is_read_in_five_minutes():
+    """Fewer than 1,500 words; every page that it points to is there."""
+    assert len(README.split()) < 1500
+    for link in re.findall(r"\]\((docs/[\w.]+)\)", README):
+        assert (REPOSITORY / link).is_file(), link
+
+
+def test_the_tutorial_runs_as_printed(tmp_path):
+    """From the first block to the last, in one Python: lambda = -M g sin(alpha)/3, and the departure."""
+    code = "\n".join(re.findall(r"```python\n(.*?)```", TUTORIAL, re.DOTALL))
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr[-2000:]
+    formula, passed, angles = run.stdout.strip().splitlines()
+    assert formula == "-M*g*sin(alpha)/3"
+    assert passed == "True"
+    left, expected = map(float, angles.split())
+    assert left == pytest.approx(expected, abs=1e-8)
+    assert (tmp_path / "dome.svg").is_file()
+
+
+def test_the_site_builds_strictly(tmp_path):
+    """Every page in the navigation, no broken link, every name of the reference documented."""
+    pytest.importorskip("mkdocs")
+    command = [
+        sys.executable,
+        "-m",
+        "mkdocs",
+        "build",
+        "--strict",
+        "-q",
+        "-d",
+        str(tmp_path / "site"),
+    ]
+    run = subprocess.run(
+        command, cwd=REPOSITORY, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert run.returncode == 0, run.stderr[-2000:]
+    assert (tmp_path / "site" / "tutorial" / "index.html").is_file()

@@ -20,6 +20,7 @@ from linkages import FOUR_BAR, TIME, pinned_rod, rods
 from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compile_library, compiler
 from sympy import sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from test_euler_parameters import top
 
 from lagfmu import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter, Scene
 from lagfmu.codegen.c.equations import model_source
@@ -187,7 +188,7 @@ def bench(runtime: ctypes.CDLL, folder: Path, prepared: Any) -> Any:
             else:
                 one = prepare(model, Scene(model.name, formulation=formulation))
             text = model_source(one.equations, one.reduction, one.scene.formulation)
-            keep[name] = compile_library(folder, [], text), one
+            keep[name] = compile_library(folder, ["interval.c"], text), one
         library, one = keep[name]
         made.append(Bench(runtime, c_void_p.in_dll(library, "MODEL_SYSTEM"), one))
         return made[-1]
@@ -402,6 +403,19 @@ def test_constraints_that_no_velocity_satisfies_are_still_refused(bench):
     system = lower(derive(model))
     with pytest.raises(StartFailureError, match="no velocities satisfy"):
         initial.start(system, Settings(), 0.0, [0, 0], [0, 1], [], [2.0, 1e-3])
+
+
+def test_euler_parameters_take_the_sparse_path(bench):
+    """The mass matrix of a top is singular along p, which |p| = 1 holds: sparse Cholesky, the first rung,
+    solves it, and the multiplier is that of the dense one, p . (M p'' - F) / 2."""
+    one = bench(top(1e-3))
+    seen = check_start(one, *defaults(one.system, one.prepared.table))
+    assert one.number("rung") == 0
+    at = Instant(one.system, 0.0, [], one.p.tolist())
+    q, v = one.state()["q"], one.state()["v"]
+    M, F, _, _, _ = at.evaluate(q, v)
+    vdot = np.array([seen[f"der(p{k},2)"] for k in range(4)])
+    assert seen["lambda.unit"] == pytest.approx(-q @ (F - M @ vdot) / 2, rel=1e-12)
 
 
 def test_where_curves_touch_a_projection_ends_at_rounding(bench):

@@ -12,15 +12,14 @@ import fmpy
 import pytest
 from runtime import INCLUDES, RUNTIME_FILES, compiler
 from test_extremes import isosceles, swing
+from test_jumps import MODELS as JUMPS
 
 from lagfmu import Scene, build_fmu
 from lagfmu.fmu.compiler import find_compiler
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
-    pytest.mark.filterwarnings(
-        "ignore::lagfmu.prepare.prepare.consistency.RedundantConstraintWarning"
-    ),
+    pytest.mark.filterwarnings("ignore::lagfmu.prepare.consistency.RedundantConstraintWarning"),
 ]
 SCENARIO = Path(__file__).parent / "scenario.c"
 SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
@@ -33,6 +32,8 @@ LIVES = {  # steps that reach the event or the singular point in between
     "PendulumNullspace": 0.1,
     "Swing": 0.1,  # one constraint too many
     "Isosceles": 0.37,  # a step that fails
+    "Gate": 0.2,  # forces that jump at two places, no contact
+    "Lifted": 0.2,  # a force that jumps and opens a contact
     "Normal": 0.07,  # a scene: lambda of the hemisphere alone, numbers for m and g
     "Places": 0.1,  # a scene: coordinates that are only read, nothing is solved for lambda
 }
@@ -50,6 +51,8 @@ def unpacked(native_fmu, prepared, tmp_path_factory):
     def get(name: str):
         if name == "Swing":
             path = build_fmu(swing(), folder, target="native", check=False)
+        elif name in JUMPS:
+            path = build_fmu(JUMPS[name](), folder, target="native", check=False)
         elif name == "Isosceles":
             path = build_fmu(
                 isosceles(),

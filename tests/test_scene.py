@@ -485,3 +485,22 @@ def test_a_contact_that_holds_is_a_holonomic_constraint(name: str) -> None:
     assert prepared.system.contacts == ()
     assert len(prepared.system.permanent) == prepared.system.m
     assert "'contact'" not in source(prepared.coded, prepared.coded_reduction, "multipliers")
+
+
+def test_reals_alone_tell_the_same(tmp_path, fmu, target):
+    """With reals_only no variable is a Boolean, Integer or Enumeration: mode 1.0, count 1.0, and every number
+    that of the full FMU; its closed forms hold."""
+    file = load(MODELS / "hemisphere.py")
+    scene = replace(file.scenes[0], name="HemisphereReals", reals_only=True, method="dop853")
+    path = write(prepare(file.model, scene), tmp_path, file.closed_forms, target=target)
+    found = variables(path)
+    assert {v.type for v in found.values()} == {"Real"}
+    assert "solver.method" not in found
+    assert all(v.unit == "1" for n, v in found.items() if n.startswith(("contact.", "unique.")))
+    reals = simulate(path, stop_time=2.0, step_size=0.1)
+    full = simulate(fmu("Hemisphere"), 2.0, 0.1, start_values={"solver.method": "dop853"})
+    for name in full.dtype.names:
+        np.testing.assert_array_equal(reals[name], full[name].astype(float), name)
+    assert reals["contact.surface"][[0, -1]].tolist() == [1.0, 0.0]
+    assert reals["departure.surface.count"][-1] == 1.0
+    assert verify(path).passed

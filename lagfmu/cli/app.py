@@ -6,6 +6,7 @@ import contextlib
 import difflib
 import enum
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +18,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ..api import package
-from ..errors import LagfmuError, SimulationError, VerificationError
+from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
@@ -31,6 +32,7 @@ from ..model.goal import parse
 from ..model.library import known, new
 from ..model.scene import Scene
 from ..page.text import show as show_prepared
+from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
 from ..study.stress.probe import WRONG
 from ..study.tradeoff.page import section
@@ -52,6 +54,7 @@ from .options import (
     Methods,
     Name,
     Outputs,
+    RealsOnly,
     narrowed,
 )
 from .stress import LIMIT
@@ -121,6 +124,15 @@ def _plainly() -> Iterator[None]:
                 f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
             )
             raise typer.Exit(getattr(error, "code", 1)) from None
+        except OSError as error:  # of temporary files; for what the user names see its own errors
+            where = error.filename or tempfile.gettempdir()
+            errors.print(
+                f"[bold red]error:[/] {escape(f'{where}: {error.strerror or error}')}: is the disk full? "
+                "The environment variable TMPDIR chooses another folder for temporary files",
+                highlight=False,
+                soft_wrap=True,
+            )
+            raise typer.Exit(1) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
                 errors.print(
@@ -174,6 +186,7 @@ def build(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    reals_only: RealsOnly = None,
     name: Name = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -181,7 +194,8 @@ def build(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    narrowing = (outputs, fixed, inputs, contacts, methods, method)
+    needs |= {"reals_only": reals_only}
+    narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -273,6 +287,7 @@ def show(
     method: Method = None,
     formulation: Formulation = None,
     derivatives: Derivatives = None,
+    reals_only: RealsOnly = None,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
@@ -282,10 +297,16 @@ def show(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
+    needs |= {"reals_only": reals_only}
     with _plainly():
         file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
-            show_prepared(prepare(file.model, s), console)
+            try:
+                prepared = prepare(file.model, s)
+            except CannotStartError as error:
+                show_what_is_known(error.known, console)
+                raise
+            show_prepared(prepared, console)
 
 
 @app.command(name="verify")

@@ -56,6 +56,14 @@ AddOutput = Annotated[
         rich_help_panel="What the scene needs",
     ),
 ]
+RealsOnly = Annotated[
+    bool | None,
+    typer.Option(
+        "--reals-only",
+        help="Reals for Booleans and counts, and no solver.method: for importers that know Reals alone.",
+        rich_help_panel="What the scene needs",
+    ),
+]
 Name = Annotated[
     str | None,
     typer.Option(help="Another name for the FMU.", rich_help_panel="What the scene needs"),
@@ -72,6 +80,7 @@ def narrowed(
     method: str | None = None,
     formulation: str | None = None,
     derivatives: bool | None = None,
+    reals_only: bool | None = None,
     name: str | None = None,
     accuracy: str | None = None,
 ) -> list[Scene]:
@@ -89,6 +98,7 @@ def narrowed(
     if methods is not None:
         said["methods"] = _split(methods)
     single = {"method": method, "formulation": formulation, "derivatives": derivatives}
+    single |= {"reals_only": reals_only}
     single |= {"name": name, "accuracy": accuracy}
     said |= {k: v for k, v in single.items() if v is not None}
     return [replace(s, **said) for s in scenes]

@@ -45,6 +45,8 @@ def variable_table(
     """All variables of the FMU.  Raises ModelError if names collide or a unit cannot be written."""
     builder = _Builder(eom, reduction, scene)
     table = builder.table()
+    if scene.reals_only:
+        table = table.as_reals()
     problems = _collisions([v.name for v in table.variables])
     for v in table.variables:
         if v.unit is not None and any(e.denominator != 1 for e in v.unit.exponents):

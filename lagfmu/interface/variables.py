@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from ..methods import described
-from ..model.units import Unit
+from ..model.units import ONE, Unit
 
 Value = float | int | bool | str
 RECORD = re.compile(
@@ -93,6 +93,18 @@ class VariableTable:
             if v.name == "solver.method"
             else v
             for v in self.variables
+        ]
+        return replace(self, variables=tuple(variables))
+
+    def as_reals(self) -> VariableTable:
+        """The same with Reals for Booleans and Integers; without an Enumeration.
+
+        The position is the value reference, so that this comes before anything refers to one.
+        """
+        variables = [
+            v if v.kind == "Real" else replace(v, kind="Real", unit=ONE, minimum=0.0)
+            for v in self.variables
+            if v.kind != "Enumeration"
         ]
         return replace(self, variables=tuple(variables))
 

@@ -64,6 +64,7 @@ def _variable(v: Any, named: set[str]) -> dict[str, Any]:
         "group": _group(v, role, named),
         "unit": shown_name(v.unit),
         "start": _number(v),
+        "items": _items(v),
         "min": None if v.min is None else float(v.min),
         "max": None if v.max is None else float(v.max),
         "description": v.description or "",
@@ -88,6 +89,12 @@ def _number(v: Any) -> float | str | None:
     if v.type == "Boolean":
         return float(str(v.start).lower() in ("true", "1"))
     return float(v.start)
+
+
+def _items(v: Any) -> list[dict[str, Any]]:
+    """The names and values of an enumeration."""
+    items = getattr(v.declaredType, "items", None) or []
+    return [{"name": i.name, "value": int(i.value)} for i in items]
 
 
 def _group(v: Any, role: str, named: set[str]) -> str:

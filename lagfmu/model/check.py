@@ -19,6 +19,7 @@ from .outputs import check_output_units, check_outputs
 from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
 from .picture import check_picture
 from .reactions import reaction_units, reactions_in
+from .shapes import unusable_surfaces
 from .spline import Spline, splines_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
@@ -40,6 +41,7 @@ def problems_of(model: ModelFields) -> list[str]:
         return problems
     _check_numbers(model, problems)
     _check_symbols(model, problems)
+    problems += unusable_surfaces(model)
     check_outputs(model, problems)
     check_picture(model, problems)
     _check_splines(model, problems)
@@ -107,6 +109,13 @@ def _check_start(
     what: str, start: Mapping[Expr, float], states: set[Expr], problems: list[str]
 ) -> None:
     for state, value in start.items():
+        if isinstance(state, str):
+            problems.append(
+                f"{what} has the text {state!r} as a key, expected a coordinate or its velocity: write "
+                f"{state.removeprefix('der(').removesuffix(')')} without quotes"
+                + (", and .diff() behind it" if state.startswith("der(") else "")
+            )
+            continue
         if state not in states:
             problems.append(
                 f"{what} names {plain(state)}, which is neither a coordinate nor the first "
@@ -116,6 +125,8 @@ def _check_start(
 
 
 def _number(value: object) -> bool:
+    if isinstance(value, (bool, sp.logic.boolalg.Boolean)):
+        return False  # float(True) is 1.0
     try:
         return math.isfinite(float(value))  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):

@@ -70,6 +70,13 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
         f"scenes hold the name {name!r} twice, so that one FMU would replace the other: rename one"
         for name in sorted({n for n in titles if titles.count(n) > 1})
     ]
+    folded = [title.casefold() for title in dict.fromkeys(titles)]
+    problems += [
+        f"scenes hold names that differ by capitals alone ("
+        f"{', '.join(sorted(t for t in set(titles) if t.casefold() == name))}), so that one FMU would "
+        "replace the other on Windows and macOS: rename one"
+        for name in sorted({n for n in folded if folded.count(n) > 1})
+    ]
     if problems:
         raise ModelError(str(file), problems)
     return ModelFile(file, model, scenes, forms)

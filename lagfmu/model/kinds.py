@@ -29,6 +29,7 @@ from .parts import (
     Parameter,
     name_of,
 )
+from .shapes import of_several_components, unusable
 from .units import plain
 
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0, sect. 2.2
@@ -108,17 +109,21 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
     relations = model.embedding.relations if model.embedding else {}
     expressions += [(f"embedding of {plain(sp.sympify(q))}", e) for q, e in relations.items()]
     for what, expression in expressions:
-        if expression is not None and not _is_expression(expression):
+        several = of_several_components(what, expression)
+        problems += several
+        if not several and expression is not None and not _is_expression(expression):
             problems.append(
                 f"{what}: {expression} is no SymPy expression with a value (it is a "
                 f"{type(expression).__name__}): write sums, products and functions of symbols; "
                 "a constraint is the expression that vanishes"
             )
-        elif expression is not None and sp.sympify(expression).has(*_NO_NUMBERS):
+        elif not several and expression is not None and sp.sympify(expression).has(*_NO_NUMBERS):
             problems.append(
                 f"{what}: {plain(expression)} holds {_no_number(expression)}, expected real and "
                 "finite numbers: correct it"
             )
+        elif not several and expression is not None:
+            problems += unusable(what, sp.sympify(expression))
     _check_texts(model, problems)
 
 

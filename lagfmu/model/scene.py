@@ -41,6 +41,8 @@ class Scene:
     is built.
     `methods`: those that `solver.method` can be set to; None: `method` alone if `outputs` are named,
     else all.
+    `reals_only`: for importers that take every variable for a Real: modes and counts are Reals (1.0 for
+    true), and `solver.method` is left out.
     `derivatives`: whether a native FMU offers directional derivatives; None: unless `outputs` are
     named.
 
@@ -61,6 +63,7 @@ class Scene:
     accuracy: str | None = None
     methods: Sequence[str] | None = None
     derivatives: bool | None = None
+    reals_only: bool = False
 
     def __post_init__(self) -> None:
         problems = []
@@ -124,6 +127,8 @@ class Scene:
     @property
     def selectable(self) -> tuple[str, ...]:
         """The methods that `solver.method` can be set to."""
+        if self.reals_only:
+            return (self.method,)
         if self.methods is not None:
             return tuple(self.methods)
         return METHODS if self.complete else (self.method,)

@@ -19,7 +19,7 @@ from .savings import Savings, savings
 from .typeset import Notation, typeset
 
 if TYPE_CHECKING:
-    from ..prepare.prepare import Prepared
+    from ..prepare.prepare import Derived, Prepared
 
 
 def show(prepared: Prepared, console: Console) -> None:
@@ -27,7 +27,36 @@ def show(prepared: Prepared, console: Console) -> None:
 
     Raises DerivationError if the nonholonomic constraints contradict each other.
     """
-    model, scene, structure = prepared.model, prepared.scene, prepared.structure
+    structure = prepared.structure
+    show_equations(prepared, console)
+
+    if prepared.equations.constraints:
+        _heading(console, "Classes of constraints")
+        _classes(prepared.equations, console)
+
+    _heading(console, "Degrees of freedom")
+    count = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
+    console.print(Text(count))
+    if structure.redundant:
+        names = ", ".join(structure.redundant)
+        console.print(Text(f"  redundant: {names} (λ is shared with least norm, Q is unique)"))
+
+    saved = savings(prepared)
+    if saved is not None:
+        _heading(console, "What the scene leaves out")
+        _savings(saved, console)
+
+    _given(prepared, console)
+    _heading(console, "Units")
+    console.print(_units(prepared))
+    _heading(console, "Start values")
+    _starts(prepared, console)
+    console.print()
+
+
+def show_equations(prepared: Prepared | Derived, console: Console) -> None:
+    """Print the name, the formulation and the equations of a model in a scene, whether it starts or not."""
+    model, scene = prepared.model, prepared.scene
     head = Text(scene.name, style="bold")
     if scene.name != model.name:
         head.append(f"  (model {model.name})", style="not bold dim")
@@ -46,27 +75,29 @@ def show(prepared: Prepared, console: Console) -> None:
             line.append(equation.text)
             console.print(line, soft_wrap=True)
 
-    if prepared.equations.constraints:
-        _heading(console, "Classes of constraints")
-        _classes(prepared.equations, console)
 
-    _heading(console, "Degrees of freedom")
-    count = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
-    console.print(Text(count))
-    if structure.redundant:
-        names = ", ".join(structure.redundant)
-        console.print(Text(f"  redundant: {names} (λ is shared with least norm, Q is unique)"))
-
-    saved = savings(prepared)
-    if saved is not None:
-        _heading(console, "What the scene leaves out")
-        _savings(saved, console)
-
-    _heading(console, "Units")
-    console.print(_units(prepared))
-    _heading(console, "Start values")
-    _starts(prepared, console)
+def show_what_is_known(known: Derived, console: Console) -> None:
+    """Print what can be said of a model that cannot start."""
+    show_equations(known, console)
+    _given(known, console)
     console.print()
+
+
+def _given(prepared: Prepared | Derived, console: Console) -> None:
+    """Parameters and inputs with their values."""
+    for title, role in (("Parameters", "parameter"), ("Inputs", "input")):
+        rows = [v for v in prepared.whole.variables if v.role == role]
+        if not rows:
+            continue
+        _heading(console, title)
+        table = Table(box=None, header_style="dim", padding=(0, 2))
+        for column in ("name", "value" if role == "parameter" else "start", "unit", "description"):
+            table.add_column(column, overflow="fold", no_wrap=column not in ("name", "description"))
+        for v in rows:
+            table.add_row(
+                Text(v.name), f"{v.start:.15g}", shown(v.unit) or "1", Text(v.description)
+            )
+        console.print(table)
 
 
 def _savings(saved: Savings, console: Console) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import random
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..errors import DerivationError, ModelError
 from ..interface.variables import VariableTable
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
+from ..solver.afar import project_from_afar
 from ..solver.failure import OmittedStartError, StepFailureError
 from ..solver.initial import Start, start
 from ..solver.instant import Instant
@@ -26,7 +27,7 @@ from ..solver.jumps import levels_at
 from ..solver.observe import expand, observe
 from ..solver.solution import RANK
 from ..solver.state import Settings
-from ..solver.system import Matrix, System
+from ..solver.system import Matrix, System, Vector
 from .diagnosis import cause_of_failure, negative_energy
 from .starts import ranks
 
@@ -76,10 +77,9 @@ def examine(
             size = np.maximum(np.abs(q), np.abs(q).max(initial=0.0)) + 1e-3
             shift = [0.1 * s * generator.uniform(-1, 1) for s in size]
             try:
-                moved = start(system, Settings(), 0.0, (q + shift).tolist(), v.tolist(), u, p)
+                q = _nearby(system, begun, q + np.array(shift), v, u, p)
             except StepFailureError:
                 continue
-            q, v = np.array(moved.state.q), np.array(moved.state.v)
         levelled = [*u, *levels_at(system, 0.0, q, u, p)]
         full, q, v = expand(system, 0.0, q, v, levelled, p)
         M, _, G, _, _ = Instant(full, 0.0, levelled, p).evaluate(q, v)
@@ -169,20 +169,33 @@ def check_embedding(eom: EquationsOfMotion, reduction: Reduction) -> None:
     )
 
 
+def _nearby(
+    system: System, begun: Start, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
+) -> Vector:
+    """The configuration near q that satisfies the constraints that act at the start."""
+    levelled = [*u, *levels_at(system, 0.0, q, u, p)]
+    at = Instant(system, 0.0, levelled, p)
+    with np.errstate(all="ignore"):
+        rows = system.active(begun.state.closed)
+        return project_from_afar(at, q, v, rows, np.array(begun.state.size))
+
+
 def _rank(full: System, G: Matrix) -> tuple[int, tuple[str, ...]]:
-    """Rank of G with rows scaled to unit norm, and the rows that add nothing to those before them."""
+    """Rank of G with rows scaled to unit norm, and the rows that add nothing to those before them: what is
+    left of each beside the span of those (Gram and Schmidt, twice)."""
     norm = np.linalg.norm(G, axis=1)
     G = G / np.where(norm > 0, norm, 1.0)[:, None]
-    kept: list[int] = []
+    span = np.zeros((0, full.n))
     redundant = []
     for k in range(full.m):
         if full.rows[k].friction is not None:
             continue  # it holds as long as it sticks
-        trial = [*kept, k]
-        if np.linalg.svd(G[trial], compute_uv=False).min(initial=np.inf) > np.sqrt(RANK) and (
-            len(trial) <= full.n
-        ):
-            kept = trial
+        rest = G[k].copy()
+        for _ in range(2):
+            rest -= span.T @ (span @ rest)
+        size = float(np.linalg.norm(rest))
+        if len(span) < full.n and size > np.sqrt(RANK):
+            span = np.vstack([span, rest / size])
         else:
             redundant.append(full.rows[k].name)
-    return len(kept), tuple(redundant)
+    return len(span), tuple(redundant)

@@ -6,18 +6,34 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..codegen.py.equations import lower
-from ..errors import DerivationError, ModelError
+from ..errors import CannotStartError, DerivationError, ModelError
 from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import fold, prune
 from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.formulations.minimal import Reduction, reduce
 from ..mechanics.jumps import with_jumps
-from ..model.model import Contact, Model
+from ..model.model import Contact, Model, name_of
 from ..model.scene import Scene
 from ..model.selection import select
 from ..solver.system import System
 from .consistency import Structure, check_embedding, check_held, examine
+
+
+@dataclass(frozen=True)
+class Derived:
+    """What is known of a model before it is tried whether it can start."""
+
+    model: Model
+    scene: Scene
+    equations: EquationsOfMotion
+    reduction: Reduction | None
+    whole: VariableTable
+
+    @property
+    def formulation(self) -> str:
+        """The formulation that the scene has in the end."""
+        return self.scene.formulation or "multipliers"
 
 
 @dataclass(frozen=True)
@@ -101,7 +117,12 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
     if coded is not equations:  # rank and start before anything was left out of the code
         whole = variable_table(equations, reduction, scene)
         lowered = lower(equations, reduction, scene.formulation or "multipliers")
-    structure = examine(equations, whole, lowered, numbers)
+    try:
+        structure = examine(equations, whole, lowered, numbers)
+    except ModelError as error:
+        known = Derived(model, scene, equations, reduction, whole)
+        problems = [*error.problems, *_resting_motions(equations)]
+        raise CannotStartError(error.name, problems, known) from error
     return Prepared(
         model=model,
         asked=asked,
@@ -115,6 +136,16 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
         system=system,
         structure=structure,
     )
+
+
+def _resting_motions(eom: EquationsOfMotion) -> list[str]:
+    """Prescribed motions that start at 0 because nobody said otherwise: a likely cause."""
+    return [
+        f"the prescribed motion {name_of(i.symbol)!r} starts at 0 {i.unit}, as no start is given: if the "
+        f"constraints need another value, write Input({name_of(i.symbol)}, {i.unit!r}, start=...)"
+        for i in eom.model.prescribed
+        if float(i.start) == 0
+    ]
 
 
 def _asked(

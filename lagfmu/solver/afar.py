@@ -19,6 +19,7 @@ from .precedence import GIVEN, OMITTED, Stage, singular_omissions, stages
 from .system import NONHOLONOMIC, Vector
 
 ITERATIONS = 60
+NEAR = 1e-5  # from this on the angles between dependent rows tell how far off the constraints a state is
 SWEEPS = 3  # of the velocities: the second removes what the first left by rounding
 ARRIVED = 1e3 * EPS  # slip, relative to its terms, at which velocities are on the constraints
 
@@ -87,6 +88,7 @@ def _newton(
             off = float(
                 (np.abs(f[own]) / np.where(unit[own] > 0, unit[own], np.inf)).max(initial=0.0)
             )
+            off = off if off < NEAR else 0.0
             step = stage.nearest(M, G[fixed][own], -f[own], off)
         except StepFailureError:
             break

@@ -22,6 +22,8 @@ from .simulate import Trajectory, read_description, simulate
 
 Expr = Any
 RECORD = "resources/lagfmu.json"
+MODES = ("Boolean", "Real")  # what a mode may be: a Real where an FMU has Reals alone
+NUMBERS = ("Real", "Integer")
 
 
 @dataclass(frozen=True)
@@ -215,10 +217,7 @@ def claims_in(path: Path) -> list[Claim]:
             v = variables.get(name)
             if v is None:
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
-            elif (v.type == "Boolean") != name.startswith(("contact.", "sticks.")) or v.type in (
-                "String",
-                "Enumeration",
-            ):
+            elif v.type not in (MODES if name.startswith(("contact.", "sticks.")) else NUMBERS):
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
@@ -261,6 +260,7 @@ def check_claim(
 
     `as_built`: held to the accuracy that the FMU was built for, if it was built for one.
     """
+    result = _with_modes(result)
     chosen = applies(claim, result, values)
     allowed = claim.allowed(tolerance, as_built)
     count = int(chosen.sum())
@@ -280,6 +280,14 @@ def check_claim(
     if not math.isfinite(error):
         return Check(claim.name, math.inf, allowed, count, "not a finite number")
     return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
+
+
+def _with_modes(result: Trajectory) -> Trajectory:
+    """Modes as Booleans, also of an FMU that has Reals alone (Scene.reals_only)."""
+    names = result.dtype.names or ()
+    modes = {n for n in names if n.startswith(("contact.", "sticks."))}
+    types = [(n, np.bool_ if n in modes else result.dtype[n]) for n in names]
+    return result.astype(types)
 
 
 def applies(claim: Claim, result: Trajectory, values: Mapping[str, float]) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ class Accuracy {
     this.settings = settings;
     this.tried = [];
     this.turn = 0;
-    this.tight = { tolerance: TIGHTEST, method: MENU ? MENU.start : null };
+    this.tight = { tolerance: TIGHTEST, method: DEFAULT_METHOD };
     this.slider = byId("tolerance");
     this.menu = byId("method");
     this.quantity = byId("quantity");

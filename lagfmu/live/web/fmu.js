@@ -5,6 +5,7 @@
 
 const OK = 1; // fmi2OK and fmi2Warning; then come discard, error, fatal, pending
 const STATUS = ["ok", "warning", "discard", "error", "fatal", "pending"];
+const NUMBERS = ["Real", "Integer", "Boolean"];
 const LONGEST = 1e6; // communication points of a run, all of which are kept
 
 /* The FMU refused; `message` is its own reason, `log` all that it said. */
@@ -26,7 +27,7 @@ function problemsOf(variables, settings) {
   const problems = [];
   const kinds = { parameters: ["parameter", "solver"], start: ["start"], inputs: ["input"] };
   for (const [key, roles] of Object.entries(kinds)) {
-    const known = variables.filter((v) => roles.includes(v.role) && v.type !== "String").map((v) => v.name);
+    const known = variables.filter((v) => roles.includes(v.role) && NUMBERS.includes(v.type)).map((v) => v.name);
     for (const [name, value] of Object.entries(settings[key] || {})) {
       if (!known.includes(name)) {
         const listed = known.join(", ") || "none: this FMU has no such variable";
@@ -65,18 +66,8 @@ class Fmu {
       this.columns.map((v) => v.reference)
     );
     this.row = this.c.page_memory(8 * this.columns.length + 8);
-    this.methods = [];
-    for (let k = 0; k < this.c.page_method_count(); k++) {
-      const at = this.c.page_method(k);
-      if (at !== 0) this.methods.push(this.textAt(at));
-    }
-  }
-
-  textAt(address) {
-    const bytes = new Uint8Array(this.c.memory.buffer, address);
-    let end = 0;
-    while (bytes[end] !== 0) end++;
-    return new TextDecoder().decode(bytes.slice(0, end));
+    this.menu = this.byName.get("solver.method");
+    this.methods = this.menu ? this.menu.items.map((item) => item.name) : [];
   }
 
   log() {
@@ -95,15 +86,6 @@ class Fmu {
 
   check(status, what) {
     if (status > OK) throw new Refused(this.log(), what);
-  }
-
-  setText(name, text) {
-    const bytes = new TextEncoder().encode(text);
-    const at = this.c.page_memory(bytes.length + 1);
-    new Uint8Array(this.c.memory.buffer, at, bytes.length).set(bytes);
-    const status = this.c.page_set_text(this.byName.get(name).reference, at);
-    this.c.page_release(at);
-    this.check(status, name);
   }
 
   /* settings: parameters, start, inputs: {name: value}; tolerance or null; method or null; stopTime,
@@ -125,7 +107,10 @@ class Fmu {
         this.check(c.page_set(this.byName.get(name).reference, value), name);
       }
     }
-    if (method !== null && this.byName.has("solver.method")) this.setText("solver.method", method);
+    if (method !== null) {
+      const { value } = this.menu.items.find((item) => item.name === method);
+      this.check(c.page_set(this.menu.reference, value), "solver.method");
+    }
     this.check(c.page_setup(settings.tolerance || 0, settings.stopTime), "fmi2SetupExperiment");
     this.check(c.page_initialize(), "initialization");
     const found = this.stepped(settings.stopTime, settings.stepSize);

@@ -10,7 +10,6 @@
 #include <string.h>
 
 #include "fmi2.h"
-#include "parts.h"
 #include "variables.h"
 
 #define EXPORT(name) __attribute__((export_name(#name)))
@@ -46,13 +45,6 @@ EXPORT(page_memory) void *page_memory(int bytes) { return calloc(1, (size_t)byte
 
 EXPORT(page_release) void page_release(void *memory) { free(memory); }
 
-/* The integrator at place k of the menu, NULL where this FMU leaves it out. */
-EXPORT(page_method) const char *page_method(int k) {
-    return k >= 0 && k < METHOD_COUNT && PARTS.methods[k] != NULL ? METHOD_NAMES[k] : NULL;
-}
-
-EXPORT(page_method_count) int page_method_count(void) { return METHOD_COUNT; }
-
 /* A new instance in place of the last one, and an empty log. */
 EXPORT(page_instantiate) int page_instantiate(void) {
     used = 0;
@@ -66,6 +58,7 @@ EXPORT(page_setup) int page_setup(double tolerance, double stop) {
     return fmi2SetupExperiment(instance, tolerance != 0, tolerance, 0, 1, stop);
 }
 
+/* A number for a Real, Integer, Boolean or Enumeration variable. */
 EXPORT(page_set) int page_set(int reference, double value) {
     const fmi2ValueReference vr = (fmi2ValueReference)reference;
     const int whole = (int)value;
@@ -76,13 +69,6 @@ EXPORT(page_set) int page_set(int reference, double value) {
         case TYPE_BOOLEAN: return fmi2SetBoolean(instance, &vr, 1, &whole);
         default: return fmi2Error;
     }
-}
-
-EXPORT(page_set_text) int page_set_text(int reference, const char *value) {
-    const fmi2ValueReference vr = (fmi2ValueReference)reference;
-    int method = METHOD_COUNT - 1;
-    while (method > 0 && strcmp(METHOD_NAMES[method], value) != 0) method--;
-    return fmi2SetInteger(instance, &vr, 1, &method);
 }
 
 EXPORT(page_initialize) int page_initialize(void) {

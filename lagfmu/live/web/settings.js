@@ -3,8 +3,9 @@
 
 const TIGHTEST = 1e-13;
 const KEYS = { parameter: "parameters", solver: "parameters", start: "start", input: "inputs" };
-const SETTABLE = FACTS.variables.filter((v) => v.role in KEYS && v.type !== "String");
-const MENU = FACTS.variables.find((v) => v.name === "solver.method");
+const SETTABLE = FACTS.variables.filter((v) => v.role in KEYS && ["Real", "Integer", "Boolean"].includes(v.type));
+const MENU = FACTS.variables.find((v) => v.name === "solver.method" && v.items.length);
+const DEFAULT_METHOD = MENU ? MENU.items.find((item) => item.value === MENU.start).name : null;
 
 class Settings {
   constructor() {
@@ -14,7 +15,7 @@ class Settings {
   clear() {
     this.values = new Map(); // of what was changed, by name
     this.tolerance = FACTS.experiment.tolerance;
-    this.method = MENU ? MENU.start : null;
+    this.method = DEFAULT_METHOD;
     this.stopTime = FACTS.experiment.stopTime;
     this.stepSize = FACTS.experiment.stepSize;
   }

@@ -178,6 +178,7 @@ static Status arrays(Instance *x) {
     const Doubles list[] = {
         {"coordinates", a->q, n, -DBL_MAX},
         {"velocities", a->v, n, -DBL_MAX},
+        {"sides of jumps", a->level, system->jumps, -DBL_MAX},
         {"levels", a->offset, system->m, -DBL_MAX},
         {"scales", a->scale, ny, 0},
         {"sizes", a->size, n, 0},

@@ -11,6 +11,7 @@
 #include "dependent.h"
 #include "kkt.h"
 #include "schur.h"
+#include "stiffened.h"
 
 static const double RANK = 1e-12;  /* rows of unit norm that stand out by less are dependent, ... */
 static const double TURNED = 1e2;  /* ... and by less than so many times the distance from the constraints, ... */
@@ -39,6 +40,7 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     l->zero = arena_doubles(arena, n);
     for (int i = 0; i < n && l->zero != NULL; i++) l->zero[i] = 0;
     schur_layout(l, arena);
+    stiffened_layout(l, arena);
     l->dense = NULL;
     l->pivots = NULL;
     l->nearest = 0;
@@ -122,7 +124,9 @@ static Status climb(Linear *l) {
 /* By the plan's lists, or a rung above. */
 static Status factor_lists(Linear *l) {
     l->rung = RUNG_SCHUR;
-    return schur_factor(l) && schur_of(l)->condition * loose(l) <= 1 ? OK : climb(l);
+    int safe = schur_factor(l);
+    if (!safe && !schur_of(l)->definite && stiffened_masses(l)) safe = schur_factor(l);
+    return safe && schur_of(l)->condition * loose(l) <= 1 ? OK : climb(l);
 }
 
 Status linear_factor(Linear *l, const double *M, const double *G, const int *active) {
@@ -130,6 +134,7 @@ Status linear_factor(Linear *l, const double *M, const double *G, const int *act
     l->M = M;
     l->G = G;
     l->active = active;
+    l->stiffened = 0;
     for (int k = 0; k < l->system->m; k++) {
         l->unique[k] = 1;
         all &= active[k];
@@ -157,6 +162,7 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
         if (l->system->solve(l->M, b != NULL ? b : l->zero, l->G, c, x, lambda)) return OK;
         if (factor_lists(l) != OK) return FAILED;
     }
+    if (l->stiffened) b = stiffened_forces(l, b, c);
     Status status = OK;
     if (l->rung != RUNG_SCHUR) {
         status = solve_dense(l, b, c, x, lambda);

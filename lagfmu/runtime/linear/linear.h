@@ -2,7 +2,8 @@
  *
  * Factor once, solve as often as needed.  Sign: +G^T lambda stands on the side of the forces.
  * The ladder (linear.c) takes the first rung that is safe at this state:
- *   1. schur.c       sparse Cholesky of the Schur complement, guarded by its condition estimate
+ *   1. schur.c       sparse Cholesky of the Schur complement, guarded by its condition estimate; where M
+ *                    is singular, with constraints that hold it (stiffened.c)
  *   2. kkt.c         LU of the scaled KKT matrix, with refinement
  *   3. orthogonal.c  complete orthogonal decomposition weighted by M: dependent rows (dependent.h) */
 #ifndef LAGFMU_LINEAR_H
@@ -28,6 +29,9 @@ typedef struct {
     double *sparse;       /* workspace of schur.c */
     double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
     int *pivots;
+    int stiffened;        /* 1: M holds more than masses (stiffened.h) */
+    double *masses, *forces, *sigma; /* (masses), (n), (m) of stiffened.c */
+    int *holds;           /* (m) */
     double off;           /* how far off the constraints the state is, relative to their size; 0: on them */
     int nearest;          /* 1 within linear_nearest() and linear_project() */
 } Linear;

@@ -120,9 +120,11 @@ int schur_masses(Linear *l, int zero_rows) {
     Schur *own = schur_of(l);
     own->condition = own->growth = 1;
     own->doubtful_mass = own->doubtful_row = -1;
+    own->definite = 0;
     if (plan->massless) return 0;
     if (!(plan->diagonal ? invert_diagonal(own, l->M, s->n) : factor_masses(plan, own, l->M)))
         return 0;
+    own->definite = 1;
     own->w = plan->diagonal ? l->G : own->w_own;
     for (int k = 0; k < s->m; k++) {
         own->diagonal[k] = 1;

@@ -29,6 +29,7 @@ typedef struct {
     double *x_low, *lambda_low, *lambda; /* (n), (m), (m) */
     double condition, growth;  /* of M and S, the worse of the two (ldlt.h) */
     Trust trust;
+    int definite;              /* 1: M is safely so */
     int doubtful_mass;         /* coordinate whose pivot in M vanishes, or -1 */
     int doubtful_row;          /* row of G whose pivot in S vanishes, or -1 */
 } Schur;

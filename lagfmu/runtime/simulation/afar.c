@@ -15,6 +15,8 @@
 
 enum { ITERATIONS = 60, HALVINGS = 25 };
 enum { SWEEPS = 3 }; /* of the velocities: the second removes what the first left by rounding */
+static const double NEAR = 1e-5; /* from this on the angles between dependent rows tell how far off the
+                                  * constraints a state is */
 static const double EPS = DBL_EPSILON;
 static const double ARRIVED = 1e3 * DBL_EPSILON; /* slip, relative to its terms, that rounding may leave */
 
@@ -54,7 +56,7 @@ static double find_off(const System *s, const int *rows, const double *f, const 
     double off = 0;
     for (int k = 0; k < s->m; k++)
         if (rows[k] && allowed[k] > 0) off = fmax(off, 1e3 * EPS * fabs(f[k]) / allowed[k]);
-    return off;
+    return off < NEAR ? off : 0;
 }
 
 static Status cannot_be_projected(const Start *x, const int *rows, const double *f,

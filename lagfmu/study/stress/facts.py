@@ -54,6 +54,7 @@ class Facts:
     stop_time: float
     step_size: float
     tolerance: float
+    motions: frozenset[str] = frozenset()  # inputs that are prescribed motions and their rates
     tabulated: bool = False  # numbers with units that no parameter scales
 
     def share(self, constraint: str, coordinate: str) -> str | None:
@@ -133,6 +134,7 @@ def facts_of(path: Path) -> Facts:
         ),
         starts=tuple(_settable(v) for v in reals if v.name in moving and v.start is not None),
         inputs=tuple(_settable(v) for v in reals if v.causality == "input"),
+        motions=_motions([v.name for v in reals if v.causality == "input"]),
         coordinates=coordinates,
         constraints=tuple(v.name[len("lambda.") :] for v in reals if v.name.startswith("lambda.")),
         contacts=tuple(n[len("contact.") :] for n in variables if n.startswith("contact.")),
@@ -145,6 +147,12 @@ def facts_of(path: Path) -> Facts:
         tolerance=float(getattr(experiment, "tolerance", None) or 1e-8),
         tabulated=bool(tables),
     )
+
+
+def _motions(inputs: list[str]) -> frozenset[str]:
+    rates = {n for n in inputs if n.startswith("der(")}
+    moving = {n.removeprefix("der(").removesuffix(")").removesuffix(",2") for n in rates}
+    return frozenset(rates | moving)
 
 
 def beside(path: Path) -> Path:

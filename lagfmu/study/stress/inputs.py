@@ -18,7 +18,7 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
     """The probes of this family: none without inputs."""
     found = []
     for i in facts.inputs:
-        for shape in SHAPES:
+        for shape in SHAPES if i.name not in facts.motions else ():  # a motion does not jump
             for size in (1.0, 1e6) if quick else (1e-9, 1.0, 1e3, 1e6, 1e12):
                 name = f"{i.name} {shape}, {size:g}"
                 found.append(Probe(FAMILY, name, partial(_driven, i.name, shape, size), size > 1))
@@ -32,7 +32,7 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
 def _driven(name: str, shape: str, size: float, bench: Bench) -> Finding:
     stop = bench.facts.stop_time
     times = bench.times(stop, 60)
-    rest = {i.name: i.start for i in bench.facts.inputs}
+    rest = {i.name: i.start for i in bench.facts.inputs if i.name not in bench.facts.motions}
 
     def drive(t: float) -> dict[str, float]:
         k = round(60 * t / stop)

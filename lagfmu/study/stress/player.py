@@ -195,8 +195,9 @@ def play(
             if k:
                 player.step(t - player.time)
             if drive is not None:
-                fed = dict(drive(t))
-                player.set(fed)
+                given = dict(drive(t))
+                player.set(given)
+                fed = (player.inputs() if len(given) < len(fed) else {}) | given
             elif fed:  # a prescribed motion may move by itself
                 fed = player.inputs()
             rows[k]["time"] = t

@@ -94,7 +94,7 @@ def survey(
         for formulation in tried:
             say(f"building {formulation}", 0, 1)
             try:
-                wide = replace(scene, formulation=formulation, methods=METHODS)
+                wide = replace(scene, formulation=formulation, methods=METHODS, reals_only=False)
                 prepared = prepare(model, wide)
                 path = write(prepared, Path(folder, formulation), closed_forms, target=target)
                 importers[formulation] = stack.enter_context(Importer(path))

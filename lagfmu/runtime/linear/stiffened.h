@@ -1,0 +1,16 @@
+/* stiffened.h -- a singular mass matrix made definite by constraints that hold it. */
+#ifndef LAGFMU_STIFFENED_H
+#define LAGFMU_STIFFENED_H
+
+#include "linear.h"
+
+/* Which rows may do that: those whose coordinates the mass matrix couples each with each. */
+void stiffened_layout(Linear *l, Arena *arena);
+
+/* l->M <- M + sum_k sigma_k g_k g_k^T over such rows that act; 0 if there are none. */
+int stiffened_masses(Linear *l);
+
+/* b + sum_k sigma_k g_k c_k (n; lost at the next call), with which x and lambda are those of b and M. */
+const double *stiffened_forces(const Linear *l, const double *b, const double *c);
+
+#endif

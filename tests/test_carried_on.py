@@ -1,0 +1,246 @@
+"""What goes on from one call to the next: polynomials of inputs, the experiment, the order of events; and the
+terms of Lagrange's equations that a plain pendulum does not have."""
+
+from __future__ import annotations
+
+from ctypes import byref, c_double, c_int, c_size_t
+
+import pytest
+import sympy as sp
+from fmi2 import CO_SIMULATION, EXCHANGE, OK, Library
+from sympy import Rational, cos, sin, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu, derive
+from lagfmu.fmu.compiler import find_compiler
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+
+t = dynamicsymbols._t
+x, y, F = dynamicsymbols("x y F")
+m, g, k, c = symbols("m g k c", positive=True)
+
+
+def native(model: Model, folder) -> Library:
+    path = build_fmu(model, folder, Scene(model.name, stop_time=10.0), target="native", check=False)
+    return Library(path, folder / "unpacked")
+
+
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory) -> Library:
+    """m x'' = F."""
+    model = Model(
+        name="Pushed",
+        lagrangian=m * x.diff() ** 2 / 2,
+        forces={x: F},
+        coordinates={x: "m"},
+        inputs=[Input(F, "N")],
+        parameters=[Parameter(m, 2.0, "kg")],
+    )
+    return native(model, tmp_path_factory.mktemp("pushed"))
+
+
+@pytest.fixture(scope="module")
+def ledges(tmp_path_factory) -> Library:
+    """Two balls of e = 0 over ground at 0: both fall freely, and each lands at its own time."""
+    model = Model(
+        name="Ledges",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * (x + y),
+        coordinates={x: "m", y: "m"},
+        constraints=[Contact("first", x), Contact("second", y)],
+        parameters=[Parameter(m, 2.0, "kg"), Parameter(g, 10.0, "m/s^2")],
+        start={x: 1.0, y: 0.2},
+    )
+    return native(model, tmp_path_factory.mktemp("ledges"))
+
+
+def push(one, order: int, value: float) -> None:
+    one.does(
+        "SetRealInputDerivatives",
+        one.references(["F"]),
+        c_size_t(1),
+        byref(c_int(order)),
+        byref(c_double(value)),
+    )
+
+
+def run_of_a_cubic(at: float) -> tuple[float, float]:
+    """x and x' of 2 x'' = 3 + 4 t + 5 t^2/2 from rest."""
+    return (3 * at**2 / 2 + 4 * at**3 / 6 + 5 * at**4 / 24) / 2, (
+        3 * at + 2 * at**2 + 5 * at**3 / 6
+    ) / 2
+
+
+@pytest.mark.parametrize("restored", [False, True])
+def test_an_input_goes_on_by_both_of_its_derivatives(pushed, restored):
+    """F = 3 + 4 t + 5 t^2/2 set once holds over several steps, and through a saved state half-way: the time
+    since it was set belongs to the state."""
+    one = pushed().start(tolerance=1e-12)
+    one.set("F", 3.0)
+    push(one, 1, 4.0)
+    push(one, 2, 5.0)
+    for step in (0.3, 0.25):
+        one.step(step)
+    if restored:
+        data, moment = one.bytes_of(one.saved()), one.time
+        one = pushed().start(tolerance=1e-9)
+        one.step(0.1)
+        one.does("SetFMUstate", one.loaded(data))
+        one.time = moment
+    one.step(0.45)
+    place, speed = run_of_a_cubic(1.0)
+    assert one.get("x") == pytest.approx(place, rel=1e-11)
+    assert one.get("der(x)") == pytest.approx(speed, rel=1e-11)
+    assert one.get("der(x,2)") == pytest.approx((3 + 4 + 2.5) / 2, rel=1e-11)
+
+
+def test_a_force_set_anew_forgets_its_derivatives(pushed):
+    """F = 3 + 4 t, then F = 1 from t = 0.5 on: from there m x'' = 1."""
+    one = pushed().start(tolerance=1e-12)
+    one.set("F", 3.0)
+    push(one, 1, 4.0)
+    one.step(0.5)
+    before = one.get("der(x)")
+    one.set("F", 1.0)
+    one.step(0.5)
+    assert one.get("der(x)") - before == pytest.approx(0.25, rel=1e-11)
+
+
+def test_the_stop_time_belongs_to_the_saved_state(pushed):
+    """A state saved in an experiment that ends at 1 s is not stepped past it, wherever it is restored; one
+    saved in an experiment without an end is."""
+    ends, endless = pushed().start(stop=1.0), pushed().start()
+    with_end, without = ends.bytes_of(ends.saved()), endless.bytes_of(endless.saved())
+    endless.does("SetFMUstate", endless.loaded(with_end))
+    ends.does("SetFMUstate", ends.loaded(without))
+    assert endless.call("DoStep", c_double(0), c_double(1.5), 1) != OK
+    assert "stop time" in endless.log[-1][2]
+    ends.does("DoStep", c_double(0), c_double(1.5), 1)
+
+
+def test_of_several_events_in_a_step_the_earliest_is_met_first(ledges):
+    """x falls 1 m, y 0.2 m, y declared last lands first, at sqrt(0.04) s: in one step over both, neither
+    passes its ground, and each stands on it with lambda = m g."""
+    one = ledges().start(tolerance=1e-10)
+    one.step(0.3)
+    assert one.get("y") == pytest.approx(0, abs=1e-12)
+    assert one.get("x") == pytest.approx(1 - 5 * 0.09, abs=1e-9)
+    assert one.get("der(x)") == pytest.approx(-3, abs=1e-8)
+    one = ledges().start(tolerance=1e-10)
+    one.step(1.0)
+    assert one.reals(["x", "y", "der(x)", "der(y)"]) == pytest.approx([0] * 4, abs=1e-9)
+    assert one.reals(["lambda.first", "lambda.second"]) == pytest.approx([20.0, 20.0], rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", [CO_SIMULATION, EXCHANGE])
+def test_what_was_read_in_initialization_does_not_outlive_what_is_set(pushed, ledges, kind):
+    """lambda and the energy are read, the start is moved, and they are read again: those of the new start."""
+    one = ledges(kind=kind)
+    one.does("SetupExperiment", 1, c_double(1e-9), c_double(0), 0, c_double(0))
+    one.does("EnterInitializationMode")
+    assert one.get("energy.potential") == pytest.approx(2 * 10 * 1.2)
+    one.set("y", 0.7)
+    assert one.get("energy.potential") == pytest.approx(2 * 10 * 1.7)
+    one.set("x", 0.0)
+    assert one.get("lambda.first") == pytest.approx(20.0)
+    one.set("m", 3.0)
+    assert one.get("lambda.first") == pytest.approx(30.0)
+    one.does("ExitInitializationMode")
+    assert one.reals(["x", "y", "lambda.first"]) == pytest.approx([0, 0.7, 30.0])
+
+
+def test_the_pull_of_a_rod_changes_as_its_closed_form_does(library):
+    """lambda = -m (v^2 - g y)/(2 (x^2 + y^2)) of the pendulum (y upwards: + g y in the bracket), also beside
+    the circle: its derivatives by x, y and the velocities."""
+    one = library("PendulumCartesian")().start(tolerance=1e-10)
+    one.step(0.4)
+    names = ["x", "y", "der(x)", "der(y)"]
+    state = dict(zip(sp.symbols("X Y U V"), one.reals(names), strict=True))
+    X, Y, U, V = state
+    mass, gravity = one.get("m"), one.get("g")
+    own = one.get("lambda.rod")
+    formulas = [
+        -mass * (U**2 + V**2 + sign * gravity * Y) / (2 * (X**2 + Y**2)) for sign in (1, -1)
+    ]
+    formula = min(formulas, key=lambda f: abs(float(f.subs(state)) - own))
+    assert float(formula.subs(state)) == pytest.approx(own, rel=1e-9)
+    for name, symbol in zip(names, state, strict=True):
+        (found,) = one.directional(["lambda.rod"], [name], [1.0])
+        assert found == pytest.approx(float(formula.diff(symbol).subs(state)), rel=1e-8, abs=1e-9)
+
+
+# ------------------------------------------------------------------ Lagrange's equations, in symbols
+
+
+def equations(**fields):
+    parameters = [Parameter(s, 1.0, u) for s, u in fields.pop("units").items()]
+    return derive(Model(name="Terms", parameters=parameters, **fields))
+
+
+def test_mass_that_grows_slows_what_moves():
+    """d/dt (m + c t) x' = 0: the momentum is kept, so that (m + c t) x'' = -c x'."""
+    eom = equations(
+        lagrangian=(m + c * t) * x.diff() ** 2 / 2,
+        coordinates={x: "m"},
+        units={m: "kg", c: "kg/s"},
+    )
+    assert sp.simplify(eom.F[0] + c * eom.v[0]) == 0
+    assert sp.simplify(eom.M[0, 0] - (m + c * t)) == 0
+
+
+def test_kinetic_energy_counts_a_coupling_once():
+    """T = m (x' + y')^2/2 = (m x'^2 + 2 m x' y' + m y'^2)/2, whatever part of M is stored."""
+    eom = equations(
+        lagrangian=m * (x.diff() + y.diff()) ** 2 / 2,
+        coordinates={x: "m", y: "m"},
+        units={m: "kg"},
+    )
+    assert sp.expand(eom.kinetic - m * (eom.v[0] + eom.v[1]) ** 2 / 2) == 0
+
+
+def test_coriolis_terms_of_a_coupling_stand_in_both_equations():
+    """L = m x'^2/2 + m y'^2/2 + m cos(x - y) x' y': F_x = -m sin(x - y) y'^2, F_y = m sin(x - y) x'^2."""
+    eom = equations(
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + m * cos(x - y) * x.diff() * y.diff(),
+        coordinates={x: "rad", y: "rad"},
+        units={m: "kg*m^2"},
+    )
+    (qx, qy), (vx, vy) = eom.q, eom.v
+    assert sp.simplify(eom.F[0] + m * sin(qx - qy) * vy**2) == 0
+    assert sp.simplify(eom.F[1] - m * sin(qx - qy) * vx**2) == 0
+
+
+def test_forces_with_a_curl_have_no_potential():
+    """(-k y, k x) does work on the way round; (-k x - k y, -k x) is the gradient of k (x^2/2 + x y)."""
+    fields = {
+        "kinetic_energy": m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        "coordinates": {x: "m", y: "m"},
+        "units": {m: "kg", k: "N/m"},
+    }
+    assert equations(**fields, forces={x: -k * y, y: k * x}).potential is None
+    eom = equations(**fields, forces={x: -k * x - k * y, y: -k * x})
+    (qx, qy) = eom.q
+    assert sp.expand(eom.potential - k * (qx**2 / 2 + qx * qy)) == 0
+
+
+def test_a_force_that_depends_on_the_velocity_stores_nothing():
+    """-k x - c x' has the potential k x^2/2, the damper none."""
+    eom = equations(
+        kinetic_energy=m * x.diff() ** 2 / 2,
+        coordinates={x: "m"},
+        forces={x: -k * x - c * x.diff()},
+        units={m: "kg", k: "N/m", c: "N*s/m"},
+    )
+    assert sp.expand(eom.potential - k * eom.q[0] ** 2 * Rational(1, 2)) == 0
+
+
+def test_a_moving_constraint_accelerates_by_all_of_its_terms():
+    """f = x - y c t^2/2: f'' = x'' - c (t^2 y''/2 + 2 t y' + y), hence gamma = c (2 t y' + y)."""
+    eom = equations(
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("wedge", x - y * c * t**2 / 2)],
+        units={m: "kg", c: "1/s^2"},
+    )
+    assert sp.expand(eom.gamma[0] - c * (2 * t * eom.v[1] + eom.q[1])) == 0
+    assert sp.expand(eom.nu[0] - c * t * eom.q[1]) == 0
