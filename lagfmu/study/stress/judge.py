@@ -184,6 +184,8 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
             name = f"der({q})"
             column = rows[name]
         least = max(facts.same_unit(name, run.values), abs(run.values.get(name, 0.0)))
+        if not facts.rates(constraint):  # the square of a rounding of the usual place is nothing
+            least = max(least, EPS**2 / ROUNDING * facts.usual(q))
         G = np.abs(rows[share] / np.where(acting, lam, 1.0))
         size += np.where(acting, G, G[acting].max()) * np.maximum(
             np.maximum.accumulate(np.abs(column)), least

@@ -121,8 +121,12 @@ class Player:
         return [self.facts.variables[n].valueReference for n in names]
 
     def set(self, values: Values) -> None:
-        """Set variables: Reals, and methods by name."""
-        methods = {n: NUMBERS[v] for n, v in values.items() if isinstance(v, str)}
+        """Set variables: Reals, and methods by name; an unknown name goes in as an unknown number."""
+        methods = {
+            n: NUMBERS.get(v, 1 + max(NUMBERS.values()))
+            for n, v in values.items()
+            if isinstance(v, str)
+        }
         reals = {n: float(v) for n, v in values.items() if not isinstance(v, str)}
         if methods:
             self.call("setInteger", self.references(list(methods)), list(methods.values()))
