@@ -3,8 +3,8 @@
     python benchmarks/friction.py
 
 A disk that rolls to and fro, with friction that never slips and as a plain constraint; a mass on a spring
-that rubs on the floor and comes to rest, with friction and with lambda = -mu N tanh(s/s0), for smaller and smaller
-s0.  Prints ratios of the time that the steps take (medians), and the errors of the place.
+that rubs on the floor and comes to rest, with friction and with lambda = -mu N tanh(s/s0), for smaller
+and smaller s0.  Prints ratios of the time that the steps take (medians), and the errors of the place.
 """
 
 from __future__ import annotations
