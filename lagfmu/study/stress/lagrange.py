@@ -34,9 +34,7 @@ GAP = 4e-10  # of f, whose level a contact that closes within the gap of touchin
 def lay_beside(fmu: Path, prepared: Prepared) -> None:
     """Write the equations to where the judge of the FMU looks for them."""
     forms = lagrange(prepared.model, frozenset(v.name for v in prepared.table.variables))
-    beside(fmu).write_bytes(
-        pack_closed_forms(prepared.scene, forms, prepared.table, tables=prepared.model.splines)
-    )
+    beside(fmu).write_bytes(pack_closed_forms(prepared.scene, forms, prepared.table))
 
 
 def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
