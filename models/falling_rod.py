@@ -10,14 +10,17 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Contact,
     Friction,
+    Ground,
     Model,
     Nonholonomic,
     Output,
     Parameter,
+    Rod,
     Scene,
     initial,
     multiplier,
@@ -28,6 +31,9 @@ t = dynamicsymbols._t
 x, y, theta = dynamicsymbols("x y theta")
 m, g, l = symbols("m g l", positive=True)  # noqa: E741 - half of the length
 mu = symbols("mu", nonnegative=True)
+
+foot = (x - l * cos(theta), y - l * sin(theta))
+head = (x + l * cos(theta), y + l * sin(theta))
 
 model = Model(
     name="FallingRod",
@@ -55,6 +61,13 @@ model = Model(
         y: "height of the middle",
         theta: "angle from the floor",
     },
+    picture=[
+        Ground((-3 * l, 0), (3 * l, 0)),
+        Rod(foot, head),
+        Arrow("floor", at=foot),
+        Arrow("foot", at=foot),
+        Arrow("lying", at=head),
+    ],
 )
 
 scenes = [Scene("FallingRod", stop_time=0.75, step_size=0.01)]

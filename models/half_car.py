@@ -160,6 +160,6 @@ closed_forms += [
         "weight and loads",
         M * z.diff(t, 2) + m * (zf.diff(t, 2) + zr.diff(t, 2)) + (M + 2 * m) * g,
         actual=output("lambda.front") + output("lambda.rear"),
-        scale=M * g,
+        scale=M * g + c * s.diff(),
     ),
 ]

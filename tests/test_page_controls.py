@@ -12,8 +12,9 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 from browser import Page
-from conftest import FILES
+from conftest import FILES, MODELS
 
+from lagfmu.live.command import write_page
 from lagfmu.verification.simulate import simulate
 
 Opened = Callable[..., Page]
@@ -28,8 +29,8 @@ def value(page: Page, name: str) -> float:
     """What the table of all values says of an output at the time that is shown."""
     script = """async (name) => {
         document.getElementById("values-box").open = true;
-        await new Promise(requestAnimationFrame);
         const rows = [...document.querySelectorAll("#values tr")];
+        while (!rows[0].cells[1].textContent) await new Promise(requestAnimationFrame);
         return rows.find((r) => r.cells[0].textContent === name).cells[1].textContent;
     }"""
     return float(page.tab.evaluate(script, name))
@@ -187,3 +188,18 @@ def test_every_control_has_a_name(name: str, opened: Opened) -> None:
     told = page.tab.locator("#charts [role=img]").first.get_attribute("aria-label")
     assert "over time" in str(told)
     page.until("document.getElementById('status').textContent.includes('steps')")
+
+
+def test_slipping_and_sticking_are_marked(tmp_path: Path, browser: Any) -> None:
+    """The block on the belt rides until k x = mu_s m g, x = speed t: it begins to slip at mu_s m g/(k speed)
+    = 0.24525 s; that it sticks again is told, too."""
+    out = write_page(MODELS / "belt.py", tmp_path / "belt.html")
+    page = Page(browser, out)
+    page.until("lagfmu.runs")
+    told = page.tab.locator("#events li").all_inner_texts()
+    first = next(text for text in told if "slipping.grip" in text)
+    assert float(first.split(" s")[0]) == pytest.approx(0.5 * 9.81 / (100 * 0.2), rel=1e-6)
+    assert any("sticks.grip begins" in text for text in told)
+    assert "Friction" in page.tab.locator("#chart-choices").inner_text()
+    page.close()
+    assert page.problems == []

@@ -16,7 +16,7 @@ from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
 from ..model.goal import parse
 from ..model.scene import Scene
-from ..model.spline import Spline
+from ..model.spline import Spline, splines_in
 from .formula import functions_of, read_formula, text_of
 
 Expr = Any
@@ -136,8 +136,9 @@ def pack_closed_forms(
     """JSON with the claims; expressions are indexed symbols, so that any name can be read back.
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
-    closed, `tables` those that the model looks up.  Claims that need a variable which the scene leaves
-    out are left out too.  Raises ModelError if a claim uses what no FMU of the model has.
+    closed, `tables` those that the model looks up, besides those of the claims.  Claims that need a
+    variable which the scene leaves out are left out too.  Raises ModelError if a claim uses what no FMU of
+    the model has.
     """
     claims = [
         claim
@@ -159,6 +160,9 @@ def pack_closed_forms(
                     + (f"; did you mean {near[0]!r}?" if near else "")
                 )
     goal = None if scene.accuracy is None else parse(scene.accuracy)
+    held_against = [getattr(claim, key) for claim in kept for key in EXPRESSIONS]
+    used = splines_in(e for e in held_against if e is not None)
+    tables = sorted({*tables, *used}, key=lambda s: s.name)
     packed, functions = [], functions_of(tables)
     for claim in kept:
         entry: dict[str, Any] = {

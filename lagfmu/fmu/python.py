@@ -28,6 +28,7 @@ from .description import model_description
 
 SHIPPED = (
     "solver",
+    "fmu/entry.py",
     "fmu/references.py",
     "fmu/slave.py",
 )  # what travels in the FMU, besides the generated script
@@ -50,7 +51,7 @@ Nothing but equations and the variable table; the solver is the package {package
 Names are the model's: der_theta is the velocity of theta, lambda stands on the side of the forces.
 """
 
-from {package}.fmu.slave import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
+from {package}.fmu.entry import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
 {vocabulary}
 {equations}
 
@@ -129,7 +130,7 @@ def _script(
     rows = "".join(f"    {_row(v)!r},\n" for v in table.variables)
     equations = source(eom, reduction, scene.formulation or "multipliers")
     words = ["Embedding", "Friction", "Lookups", "Own", "Row", "System"]
-    vocabulary = f"from {package}.solver.system import {', '.join(words)}"
+    vocabulary = f"from {package}.fmu.entry import {', '.join(words)}"
     if "interval." in equations:
         vocabulary = f"from {package}.solver import interval\n{vocabulary}"
     if "= Cubic(" in equations:
