@@ -97,6 +97,7 @@ closed_forms = [
         first + (slips - 1) * (ride + slide),
         actual=output("slipping.grip.time"),
         when=rides_first * slips,
+        until_departure="belt",
     ),
     ClosedForm(
         "x while it slips",
@@ -104,6 +105,7 @@ closed_forms = [
         actual=x,
         scale=x_s,
         when=slips * (1 - riding),
+        until_departure="belt",
     ),
     ClosedForm(
         "x while it rides",
@@ -111,6 +113,7 @@ closed_forms = [
         actual=x,
         scale=x_s,
         when=slips * riding,
+        until_departure="belt",
     ),
     ClosedForm("friction while it rides", k * x, actual=output("lambda.ride"), when=riding),
     ClosedForm(
@@ -118,6 +121,7 @@ closed_forms = [
         mu_k * m * g * sign(speed - x.diff()),
         actual=output("lambda.ride"),
         when=slips * (1 - riding),
+        until_departure="belt",
     ),
-    ClosedForm("lambda.belt", m * g),
+    ClosedForm("lambda.belt", m * g, until_departure="belt"),
 ]

@@ -4,7 +4,7 @@ x [m] along the lane, z [m] above it, phi [rad] the turn.  lambda.touch [N] is t
 It rolls after 2 v0/(7 mu g), at (5/7) v0.
 """
 
-from sympy import Min, Rational, symbols
+from sympy import Abs, Min, Rational, sign, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -62,22 +62,29 @@ model = Model(
 
 scenes = [Scene("Bowling", stop_time=3.0, step_size=0.01)]
 
-v0 = initial(x.diff()) - R * initial(phi.diff())  # of the slip, taken to be positive
-end = 2 * v0 / (7 * mu * g)
+v0 = initial(x.diff()) - R * initial(phi.diff())
+end = 2 * Abs(v0) / (7 * mu * g)
 slid = Min(t, end)
-speed = initial(x.diff()) - mu * g * slid
+push = mu * g * sign(v0)  # of friction against the slip, over m
+speed = initial(x.diff()) - push * slid
+lane = {"until_departure": "lane"}
 
 closed_forms = [
     ClosedForm(
-        "x", initial(x) + initial(x.diff()) * slid - mu * g * slid**2 / 2 + speed * (t - slid)
+        "x",
+        initial(x) + initial(x.diff()) * slid - push * slid**2 / 2 + speed * (t - slid),
+        **lane,
     ),
-    ClosedForm("der(x)", speed),
-    ClosedForm("R phi'", initial(phi.diff()) * R + 5 * mu * g * slid / 2, actual=R * phi.diff()),
+    ClosedForm("der(x)", speed, **lane),
+    ClosedForm(
+        "R phi'", initial(phi.diff()) * R + 5 * push * slid / 2, actual=R * phi.diff(), **lane
+    ),
     ClosedForm(
         "heat",
-        mu * m * g * (v0 * slid - 7 * mu * g * slid**2 / 4),
+        mu * m * g * (Abs(v0) * slid - 7 * mu * g * slid**2 / 4),
         actual=output("energy.dissipated"),
+        **lane,
     ),
-    ClosedForm("lambda.lane", m * g),
+    ClosedForm("lambda.lane", m * g, **lane),
     Conserved("energy and heat", output("energy.total") + output("energy.dissipated")),
 ]

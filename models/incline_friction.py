@@ -107,6 +107,7 @@ closed_forms = [
         -kappa / (1 + kappa) * M * a,
         actual=output("lambda.rolling"),
         scale=normal,
+        until_departure="incline",
         when=rolls,
     ),
     ClosedForm(
@@ -114,10 +115,24 @@ closed_forms = [
         -mu_k * normal * sign(output("slip.rolling")),
         actual=output("lambda.rolling"),
         scale=normal,
+        until_departure="incline",
         when=(1 - rolls) * sign(output("slip.rolling")) ** 2,
     ),
-    ClosedForm("it rolls from rest", 1, actual=rolls, when=(1 - way**2) * Max(0, -holds)),
-    ClosedForm("it slides from rest", 0, actual=rolls, when=(1 - way**2) * Max(0, holds), scale=1),
+    ClosedForm(
+        "it rolls from rest",
+        1,
+        actual=rolls,
+        until_departure="incline",
+        when=(1 - way**2) * Max(0, -holds),
+    ),
+    ClosedForm(
+        "it slides from rest",
+        0,
+        actual=rolls,
+        until_departure="incline",
+        when=(1 - way**2) * Max(0, holds),
+        scale=1,
+    ),
     ClosedForm(
         "y while it rolls",
         initial(y)
@@ -126,15 +141,17 @@ closed_forms = [
         + v1 * tau
         + a / (1 + kappa) * tau**2 / 2,
         actual=y,
+        until_departure="incline",
         when=rolls * Max(0, -holds),
     ),
     ClosedForm(
         "y of a slide from rest",
         initial(y) + initial(y.diff()) * t + (a - mu_k * g * cos(alpha)) * t**2 / 2,
         actual=y,
+        until_departure="incline",
         when=(1 - way**2) * Max(0, holds),
     ),
-    ClosedForm("lambda.incline", normal),
+    ClosedForm("lambda.incline", normal, until_departure="incline"),
     Conserved(
         "energy and heat",
         output("energy.total") + output("energy.dissipated"),

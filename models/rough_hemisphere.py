@@ -5,7 +5,7 @@ positive in the sense of a growing theta.  It slides from rest if tan(theta0) > 
 v^2 = g r cos(theta).
 """
 
-from sympy import cos, exp, pi, sign, sin, symbols
+from sympy import Max, cos, exp, pi, sign, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -78,10 +78,9 @@ def w(angle):
 
 
 slides = 1 - output("sticks.grip")
-down = (
-    sign(sin(initial(theta)) - mu_s * cos(initial(theta))) * slides
-)  # it slides from rest, downwards
-on = output("contact.surface")
+first = 1 - sign(output("slipping.grip.count"))  # it has slid since the start, ...
+upwards = Max(0, -sign(initial(theta.diff())))
+down = first * Max(0, output("slip.hold")) * (1 - upwards)  # ... and downwards
 angle = departure("surface", theta)
 
 closed_forms = [
@@ -119,7 +118,7 @@ closed_forms = [
         cos(angle),
         actual=w(angle),
         at_departure="surface",
-        when=sign(sin(initial(theta)) - mu_s * cos(initial(theta))),
+        when=first * sign(sin(initial(theta)) - mu_s * cos(initial(theta))),
     ),
     Conserved(
         "energy and heat", output("energy.total") + output("energy.dissipated"), scale=m * g * a

@@ -29,6 +29,7 @@ from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import prepare
+from lagfmu.study.stress.lagrange import lagrange
 from lagfmu.verification.verify import check_claim
 
 MODELS = Path(__file__).parent.parent / "models"
@@ -129,6 +130,25 @@ def test_multiplier_stays_within_the_cone(rubbing: Build, name: str) -> None:
         assert (result["power.grip"] <= 0).all()
         assert (np.diff(result["energy.dissipated"]) >= -1e-13).all()
         assert result["margin.grip"] == pytest.approx(mu_s * N - np.abs(lam), abs=scale)
+
+
+@pytest.mark.parametrize("name", sorted(RUNS))
+def test_reported_values_obey_lagranges_and_coulombs_laws_to_rounding(
+    rubbing: Build, name: str
+) -> None:
+    """Each equation of motion, each constraint, the cone and the force of sliding, from the model file alone:
+    relative to its own terms 1e-13, the cone 1e-12."""
+    file = load(MODELS / f"{FILES[name]}.py")
+    prepared = prepare(file.model, file.scenes[0])
+    laws = lagrange(file.model, frozenset(v.name for v in prepared.table.variables))
+    claims = claims_of(file.scenes[0], laws)
+    assert any(c.name == "cone of grip" for c in claims)
+    for values in RUNS[name]:
+        result = simulate(rubbing(name), start_values=values, step_size=0.0137)
+        known = {str(p.symbol): p.value for p in file.model.parameters} | values
+        for claim in claims:
+            check = check_claim(claim, result, known, 1e-300)
+            assert check.error <= check.allowed, claim.name
 
 
 def test_time_of_each_slip_is_located_to_rounding(rubbing: Build) -> None:

@@ -29,8 +29,8 @@ def value(page: Page, name: str) -> float:
     """What the table of all values says of an output at the time that is shown."""
     script = """async (name) => {
         document.getElementById("values-box").open = true;
-        await new Promise(requestAnimationFrame);
         const rows = [...document.querySelectorAll("#values tr")];
+        while (!rows[0].cells[1].textContent) await new Promise(requestAnimationFrame);
         return rows.find((r) => r.cells[0].textContent === name).cells[1].textContent;
     }"""
     return float(page.tab.evaluate(script, name))

@@ -209,6 +209,8 @@ def test_after_the_landing_nothing_is_stiff_any_more(own):
             one.start({"solver.method": method}, tolerance=1e-9)
             one.step(1.0)
             assert one.get("contact.floor")
+            back = [text for _, _, text in one.log if "going on with dop853 again" in text]
+            assert len(back) == (method == "auto")  # the log says so
             landed = one.get("solver.steps")
             one.step(9.0)
             steps[method] = one.get("solver.steps") - landed

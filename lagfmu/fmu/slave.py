@@ -159,9 +159,19 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             return False
         self._warn_of_tables()
         self._report_events(before, self.state)
-        if self.state.choice.product and not before.choice.product:
-            self.log(self.state.choice.message(), Fmi2Status.ok, "logEvents")
+        self._report_method(before, self.state)
         return True
+
+    def _report_method(self, before: State, after: State) -> None:
+        """Why `auto` took radau5, the first time; then each change that a step ends with."""
+        was = before.choice.implicit
+        if after.choice.product and not before.choice.product:
+            self.log(after.choice.message(), Fmi2Status.ok, "logEvents")
+            was = True
+        if was != after.choice.implicit:
+            name = "radau5" if after.choice.implicit else "dop853"
+            text = f"at t = {after.t!r} s: going on with {name} again"
+            self.log(text, Fmi2Status.ok, "logEvents")
 
     def _checked(self, current_time: float, step_size: float) -> State:
         """The state that a step may start from.  Raises StepFailureError."""

@@ -8,21 +8,36 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import lapack
 
+from .schur import mass_factor
 from .solution import Solution
 from .system import Matrix, Vector
 
 
 def kkt(M: Matrix, b: Vector, G: Matrix, c: Vector, least: float = 0.0) -> Solution | None:
-    """None where the matrix is singular to working precision, or its reciprocal condition below `least`."""
+    """None where the matrix is singular to working precision, or its reciprocal condition below `least`.
+
+    Where it is, though it may be the masses alone that are, it is scaled from masses of 1 on: then no unit of
+    mass counts beside the constraints, but masses that differ much cost digits.
+    """
+    found = _kkt(M, b, G, c, least, to_masses=False)
+    if found is None and mass_factor(M) is None:
+        found = _kkt(M, b, G, c, least, to_masses=True)
+    return found
+
+
+def _kkt(
+    M: Matrix, b: Vector, G: Matrix, c: Vector, least: float, to_masses: bool
+) -> Solution | None:
     n, m = len(b), len(c)
     K = np.zeros((n + m, n + m))
     K[:n, :n] = M
     K[:n, n:] = G.T
     K[n:, :n] = G
     d = np.ones(n + m)
-    mass = M.diagonal() > 0  # to masses of 1: no unit of mass counts beside the constraints
-    d[:n][mass] = 2.0 ** -np.round(np.log2(M.diagonal()[mass]) / 2)
-    if m:
+    if to_masses:
+        mass = M.diagonal() > 0
+        d[:n][mass] = 2.0 ** -np.round(np.log2(M.diagonal()[mass]) / 2)
+    if to_masses and m:
         row = (np.abs(G) * d[:n]).max(axis=1)
         d[n:] = 2.0 ** -np.round(np.log2(np.where(row > 0, row, 1.0)))
     A = K * d * d[:, None]

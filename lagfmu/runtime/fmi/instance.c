@@ -406,6 +406,20 @@ static void note_contacts(Instance *x) {
     memcpy(x->count, x->solver.state.count, size);
 }
 
+/* Of `auto`: why radau5 took over, the first time; then each change that a communication step ends with. */
+static void tell_of_method(Instance *x, double product, int implicit) {
+    const Choice *c = &x->solver.state.now.choice;
+    if (product == 0 && c->product > 0) {
+        stiffness_message(c, x->note, sizeof x->note);
+        x->tell(x->context, NOTE_EVENT, x->note);
+        implicit = 1;
+    }
+    if (implicit == c->implicit) return;
+    (void)snprintf(x->note, sizeof x->note, "at t = %s s: going on with %s again",
+                   digits(x->solver.state.now.t).text, c->implicit ? "radau5" : "dop853");
+    x->tell(x->context, NOTE_EVENT, x->note);
+}
+
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
     instance_save(x, x->backup);
@@ -414,6 +428,7 @@ Status instance_step(Instance *x, double t_end) {
     if (s->system->contacts > 0) note_contacts(x);
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;
+    const int implicit = s->state.now.choice.implicit;
     if (solver_advance(s, t_end) != OK) {
         instance_restore(x, x->backup);
         return FAILED;
@@ -421,10 +436,7 @@ Status instance_step(Instance *x, double t_end) {
     move_inputs(x, t_end);
     if (s->system->lookup_count > 0) warn_of_tables(x);
     if (s->system->contacts > 0) report_events(x);
-    if (product == 0 && s->state.now.choice.product > 0) {
-        stiffness_message(&s->state.now.choice, x->note, sizeof x->note);
-        x->tell(x->context, NOTE_EVENT, x->note);
-    }
+    tell_of_method(x, product, implicit);
     return OK;
 }
 

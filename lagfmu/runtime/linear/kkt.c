@@ -3,8 +3,7 @@
  *   [ M  G^T ] [   x     ]   [ b ]
  *   [ G   0  ] [ -lambda ] = [ c ] ,
  *
- * its rows and columns scaled alike by powers of two, first to masses of 1 (no unit of mass counts beside
- * the constraints), then until the largest element of each is near 1 (Ruiz, A scaling algorithm to equilibrate both rows and columns norms, 2001), then LU with
+ * its rows and columns scaled alike by powers of two until the largest element of each is near 1 (Ruiz, A scaling algorithm to equilibrate both rows and columns norms, 2001), then LU with
  * partial pivoting and refinement with residuals in doubled precision (Higham, Accuracy and
  * Stability of Numerical Algorithms, sect. 12.1).  Right for extreme ratios of masses and for a
  * coordinate without mass of its own. */
@@ -15,6 +14,7 @@
 #include "condition.h"
 #include "lu.h"
 #include "residual.h"
+#include "schur.h"
 
 static const double REGULAR = 1e-14; /* reciprocal condition above which K is not singular */
 
@@ -86,10 +86,11 @@ static void scale_first(const Linear *l, const int *place, double *d, int size) 
 }
 
 /* Powers of two that bring the largest element of every row near 1; 0 if a row is zero. */
-static int equilibrate(const Linear *l, const Kkt *k) {
+static int equilibrate(const Linear *l, const Kkt *k, int to_masses) {
     const System *s = l->system;
     double *d = k->scale, *largest = k->z;
-    scale_first(l, k->place, d, k->size);
+    for (int i = 0; i < k->size; i++) d[i] = 1;
+    if (to_masses) scale_first(l, k->place, d, k->size);
     for (int step = 0; step < 20; step++) {
         for (int i = 0; i < k->size; i++) largest[i] = 0;
         for (int a = 0; a < s->masses; a++) {
@@ -122,9 +123,9 @@ static void solve_lu(void *context, double *x) {
     lu_solve(k->size, k->A, k->pivots, x);
 }
 
-int kkt_factor(Linear *l, double least) {
+static int factor(Linear *l, double least, int to_masses) {
     Kkt k = view(l);
-    if (!equilibrate(l, &k)) return 0;
+    if (!equilibrate(l, &k, to_masses)) return 0;
     kkt_matrix(l, k.scale, k.place, k.A);
     double norm = 0;
     for (int i = 0; i < k.size; i++) {
@@ -134,6 +135,12 @@ int kkt_factor(Linear *l, double least) {
     }
     if (lu_factor(k.size, k.A, k.pivots) != 0) return 0;
     return norm * inverse_norm(k.size, solve_lu, &k, k.work) <= 1 / fmax(REGULAR, least);
+}
+
+/* As it is; and where that is singular though it may be the masses alone that are, from masses of 1 on: then
+ * no unit of mass counts beside the constraints, but masses that differ much cost digits. */
+int kkt_factor(Linear *l, double least) {
+    return factor(l, least, 0) || (!schur_of(l)->definite && factor(l, least, 1));
 }
 
 static void substitute(Linear *l, const double *b, const double *c, double *x, double *lambda) {

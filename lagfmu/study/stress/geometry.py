@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...fmu.claims import pack_closed_forms, unpack_closed_forms
 from ...model.closed_form import TIME, ClosedForm
-from ...model.model import Contact, Holonomic, Model, Nonholonomic, name_of
+from ...model.model import Contact, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
 
 Expr = Any
@@ -35,14 +35,18 @@ class Collision:
 
 
 class Geometry:
-    """`contacts`: which constraints are; `rough`: some act only while a contact is closed."""
+    """`contacts`, `bilateral`: which constraints are; the others, `rough`, hold by friction, or while a
+    contact is closed."""
 
     def __init__(self, forms: Mapping[str, Expr]) -> None:
         kinds = [n.split(":") for n in forms if n.startswith("kind:")]
         self.coordinates = [n.split(":")[1] for n in forms if n.startswith("coordinate:")]
         self.names = [name for _, name, _ in kinds]
-        self.contacts = np.array([kind == "contact" for *_, kind in kinds], dtype=bool)
-        self.rough = "rough" in forms
+        self.contacts, self.bilateral, rough = (
+            np.array([k == kind for *_, k in kinds], dtype=bool)
+            for kind in ("contact", "bilateral", "rough")
+        )
+        self.rough = bool(rough.any())
         self.forms = forms
         self.symbols = sorted({s for e in forms.values() for s in e.free_symbols}, key=str)
         self.needs = [str(s) for s in self.symbols]
@@ -101,16 +105,14 @@ def _forms(model: Model, names: set[str]) -> dict[str, Expr]:
         forms[f"coordinate:{name_of(q)}"] = sp.S.One
         for p, w in rates.items():
             forms[f"mass:{name_of(q)}:{name_of(p)}"] = model.energy_expression.diff(v, w)
+    by_friction = {name for law in model.frictions for name in law.of}
     for c in model.constraints:
-        if not isinstance(c, Contact | Holonomic | Nonholonomic):
-            forms["rough"] = sp.S.One
-            continue
         f = sp.sympify(c.expression)
         speed = f if isinstance(c, Nonholonomic) else f.diff(TIME)
-        kind = "contact" if isinstance(c, Contact) else "bilateral"
-        if not isinstance(c, Contact) and c.while_closed is not None:
-            forms["rough"] = sp.S.One
-            continue
+        gated = not isinstance(c, Contact) and c.while_closed is not None
+        kind = "rough" if gated or c.name in by_friction else "bilateral"
+        if isinstance(c, Contact):
+            kind = "contact"
         forms[f"kind:{c.name}:{kind}"] = sp.S.One
         forms[f"gap:{c.name}"] = sp.S.Zero if isinstance(c, Nonholonomic) else f
         forms[f"speed:{c.name}"] = speed

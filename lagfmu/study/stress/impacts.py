@@ -9,7 +9,9 @@ so that they close at one instant; just after it, with M, G, e of the model (geo
   order            the model with its constraints declared in the opposite order has the same v+
   symmetry         a mirror image of the start has the mirror image of v+
 
-within NEAR of the largest speed: forces act a little between the start, the impact and the look at it.
+within NEAR of the largest speed: forces act a little between the start, the impact and the look at it.  With
+friction, or constraints that act while a contact is closed: that no contact is left approached, order and
+symmetry.
 """
 
 from __future__ import annotations
@@ -78,7 +80,7 @@ def _sizes(facts: Facts, geometry: Geometry, known: Values, q: Vector) -> Vector
 
 
 def _acting(geometry: Geometry, chosen: list[int]) -> list[int]:
-    return [*chosen, *np.flatnonzero(~geometry.contacts).tolist()]
+    return [*chosen, *np.flatnonzero(geometry.bilateral).tolist()]
 
 
 def _place(facts: Facts, geometry: Geometry, chosen: list[int]) -> Vector | None:

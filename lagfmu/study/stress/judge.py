@@ -194,7 +194,10 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
 
 
 def acts(facts: Facts, run: Run, constraint: str) -> NDArray[np.bool_]:
-    """A contact acts while it is closed; what goes with a contact has no multiplier otherwise."""
+    """A contact acts while it is closed; what goes with a contact has no multiplier otherwise; what holds
+    by friction is judged by its law (lagrange.py)."""
+    if f"slip.{constraint}" in facts.variables:
+        return np.zeros(len(run.rows), dtype=bool)
     if constraint in facts.contacts:
         return np.asarray(run.rows[f"contact.{constraint}"], dtype=bool)
     if facts.contacts:

@@ -3,6 +3,7 @@
     d/dt dL/dv_j - dL/dq_j = Q_nc,j + Q_j                  for each coordinate
     d^2 f/dt^2 = 0   or   d/dt (sum a_j v_j + a_0) = 0     for each constraint, while it acts
     Q_cj = lambda_c a_cj ,   residual_c = f   or   sum a_j v_j + a_0
+    friction: |lambda| <= mu_s |N| while it sticks, lambda = -mu_k |N| s/|s| while it slips, lambda . s <= 0
     an Output of the model = its expression, of the values that are reported beside it
 
 They hold at each instant, whatever the parameters, the inputs and the tolerance, and together they
@@ -14,6 +15,7 @@ M: relative to  sqrt(M_jj) S  and  S sum_j |a_j| / sqrt(M_jj) ,  S = sum_k |term
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +23,15 @@ import sympy as sp
 
 from ...fmu.claims import pack_closed_forms
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
-from ...model.model import Contact, Model, Nonholonomic, name_of
+from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
 from .claims import magnitude
 from .facts import beside
 
 Expr = Any
 ROUNDING = 1e-13  # relative to those terms; see claims.LEEWAY
+CONE = 1e-12  # of Coulomb's cone
+SLOW = 1e-9  # of its terms: a slip velocity that has no direction yet
 GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps
 
 
@@ -57,8 +61,60 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
     total = sp.Add(*(terms[q] / sp.sqrt(masses[q]) for q in heavy))
     forms += _of_constraints(model, {q: total / sp.sqrt(masses[q]) for q in heavy})
     forms += _of_shares(model, variables)
+    for law in model.frictions:
+        forms += _of_friction(model, law)
     forms += [ClosedForm(o.name, o.expression, rounding=ROUNDING) for o in model.outputs]
     return [form for form in forms if _names(form) <= variables]
+
+
+def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
+    """Coulomb's law, whichever mode the FMU says that it is in."""
+    sticks = output(f"sticks.{law.name}")
+    lam = [output(f"lambda.{name}") for name in law.of]
+    slip = [output(f"slip.{name}") for name in law.of]
+    N, force = sp.Abs(in_variables(sp.sympify(law.normal))), sp.sqrt(sum(x**2 for x in lam))
+    static, kinetic = in_variables(sp.sympify(law.static)), in_variables(sp.sympify(law.sliding))
+    speed, forms, size = sp.sqrt(sum(s**2 for s in slip)), [], sp.Integer(0)
+    for name, s in zip(law.of, slip, strict=True):
+        rate = sp.sympify(model.constraint(name).expression)
+        if not isinstance(model.constraint(name), Nonholonomic):
+            rate = rate.diff(TIME)
+        terms = magnitude(in_variables(rate))
+        size += terms
+        forms.append(ClosedForm(f"slip.{name}", rate, s, scale=terms, rounding=ROUNDING))
+        sticking = ClosedForm(
+            f"{name} while it sticks", sp.Integer(0), s, scale=terms, when=sticks, rounding=ROUNDING
+        )
+        forms.append(sticking)
+    cone, heat = sp.Max(0, force - static * N), sp.Max(0, output(f"power.{law.name}"))
+    slips = (1 - sticks) * sp.Max(0, speed - SLOW * size)
+    forms.append(
+        ClosedForm(
+            f"cone of {law.name}",
+            sp.Integer(0),
+            cone,
+            scale=force + static * N,
+            when=sticks,
+            rounding=CONE,
+        )
+    )
+    forms.append(
+        ClosedForm(
+            f"heat of {law.name}", sp.Integer(0), heat, scale=force * speed, rounding=ROUNDING
+        )
+    )
+    for x, s in zip(lam, slip, strict=True):
+        forms.append(
+            ClosedForm(
+                f"{x} while it slips",
+                -kinetic * N * s / speed,
+                x,
+                scale=kinetic * N,
+                when=slips,
+                rounding=CONE,
+            )
+        )
+    return forms
 
 
 def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
@@ -72,6 +128,8 @@ def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
             if share in variables:
                 found.append(ClosedForm(share, lam * a, output(share), rounding=ROUNDING))
         rounding, residual = ROUNDING if contact is None else GAP, f"residual.{c.name}"
+        if c.name in model.limited and not isinstance(c, Nonholonomic):
+            f = f.diff(TIME)  # what is reported is the missed velocity
         found.append(ClosedForm(residual, f, output(residual), rounding=rounding))
     return found
 
@@ -86,7 +144,10 @@ def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[Close
         for _ in range(1 if isinstance(c, Nonholonomic) else 2):
             rate = rate.diff(TIME)
         contact = c.name if isinstance(c, Contact) else c.while_closed
-        found.append(_form(f"d2/dt2 of {c.name}", rate, sp.Integer(0), scale, contact))
+        form = _form(f"d2/dt2 of {c.name}", rate, sp.Integer(0), scale, contact)
+        if c.name in model.limited:
+            form = replace(form, when=output(f"sticks.{model.limited[c.name].name}"))
+        found.append(form)
     return found
 
 
