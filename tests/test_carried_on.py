@@ -165,6 +165,62 @@ def test_the_pull_of_a_rod_changes_as_its_closed_form_does(library):
         assert found == pytest.approx(float(formula.diff(symbol).subs(state)), rel=1e-8, abs=1e-9)
 
 
+# ------------------------------------------------------------------ model exchange
+
+
+def continuous(library: Library):
+    """An instance in continuous-time mode, its events over."""
+    one = library(kind=EXCHANGE)
+    one.does("SetupExperiment", 1, c_double(1e-8), c_double(0), 0, c_double(0))
+    one.does("EnterInitializationMode")
+    one.does("ExitInitializationMode")
+    one.events()
+    one.does("EnterContinuousTimeMode")
+    return one
+
+
+def test_drift_dies_out_as_fast_as_it_can_without_ringing(library):
+    """f'' = -2 alpha f' - alpha^2 f of f = x^2 + y^2 - L^2: critically damped, (f''/f')^2 = 4 (-f''/f)."""
+    one = continuous(library("PendulumCartesian"))
+    px, vx, py, vy = one.array("GetContinuousStates", 4)
+
+    def bend(*state: float) -> float:
+        """f'' from the derivatives that the importer gets."""
+        one.states(state)
+        _, ax, _, ay = one.array("GetDerivatives", 4)
+        return 2 * (state[0] * ax + state[2] * ay + state[1] ** 2 + state[3] ** 2)
+
+    length = px**2 + py**2
+    slipping = bend(px, vx + 1e-3 * px, py, vy + 1e-3 * py) / (2e-3 * length)
+    grown = bend(1.001 * px, vx, 1.001 * py, vy) / ((1.001**2 - 1) * length)
+    assert slipping < 0
+    assert slipping**2 == pytest.approx(-4 * grown, rel=1e-6)
+
+
+def test_a_body_that_touches_has_not_passed_its_ground(ledges):
+    """The indicator of an open contact is positive where f = 0 to rounding, and negative a nanometre of
+    its drop below: the importer finds the landing behind the touch, never before."""
+    one = continuous(ledges)
+    for height, sign in ((0.1, 1), (0.0, 1), (-1e-6, -1)):
+        one.states((height, -1.0, 0.2, 0.0))
+        first, second = one.array("GetEventIndicators", 2)
+        assert first * sign > 0
+        assert second == pytest.approx(0.2, abs=1e-6)
+
+
+def test_a_body_that_lies_below_its_ground_is_lifted(ledges):
+    """An importer's step ends at rest under the ground: the event lifts it to f >= 0, where it stays."""
+    one = continuous(ledges)
+    one.states((-1e-6, 0.0, 0.2, 0.0))
+    one.does("EnterEventMode")
+    info = one.events()
+    assert info.values
+    height, speed, *_ = one.array("GetContinuousStates", 4)
+    assert height == pytest.approx(0, abs=1e-12)
+    assert speed == 0
+    assert one.get("lambda.first") == pytest.approx(20.0)
+
+
 # ------------------------------------------------------------------ Lagrange's equations, in symbols
 
 
