@@ -29,6 +29,7 @@ LIVES = {  # steps that reach the event or the singular point in between
     "CartPendulum": 0.05,  # an input
     "PendulumAngle": 0.1,  # an embedding
     "BouncingBall": 0.1,  # impacts
+    "HalfCar": 0.05,  # a table, outputs of the model, a prescribed motion
     "PendulumNullspace": 0.1,
     "Swing": 0.1,  # one constraint too many
     "Isosceles": 0.37,  # a step that fails
