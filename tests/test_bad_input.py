@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import math
 import os
 import subprocess
@@ -16,6 +17,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from instance import instance
 from pythonfmu.builder import FmuBuilder
+from rich.console import Console
 from sympy import Abs, Eq, I, Matrix, Max, Piecewise, cos, exp, oo, sin, sqrt, symbols
 from sympy.physics.mechanics import ReferenceFrame, dynamicsymbols
 
@@ -36,6 +38,7 @@ from lagfmu import (
 )
 from lagfmu.errors import BuildError, DerivationError, ModelError, VerificationError
 from lagfmu.model.file import load
+from lagfmu.page.text import show
 from lagfmu.prepare.consistency import RedundantConstraintWarning
 from lagfmu.prepare.prepare import prepare
 
@@ -313,6 +316,27 @@ def test_a_redundant_constraint_warns_and_its_multipliers_share_the_force(tmp_pa
     assert one["unique.rod"].all()
     for name in ("Q.x", "Q.y", "x", "y"):
         assert two[name] == pytest.approx(one[name], rel=1e-6, abs=1e-7)
+
+
+def test_the_multipliers_that_are_not_unique_are_named_and_no_others():
+    """Of two equal rods and a plane only the rods' lambda is shared, though one alone is redundant; `show`
+    says so, and which norm is the least."""
+    rods = [ROD, Holonomic("again", ROD.expression), Holonomic("plane", z)]
+    with pytest.warns(RedundantConstraintWarning, match="lambda of 'rod', 'again' is shared"):
+        made = prepare(
+            pendulum(
+                lagrangian=K + m * z.diff() ** 2 / 2 - m * g * y,
+                coordinates={x: "m", y: "m", z: "m"},
+                constraints=rods,
+            )
+        )
+    assert made.structure.redundant == ("again",)
+    assert made.structure.shared == ("rod", "again")
+    console = Console(file=io.StringIO(), width=100)
+    show(made, console)
+    says(
+        console.file.getvalue(), "redundant: again; λ is not unique for rod, again", "g M⁻¹ gᵀ = 1"
+    )
 
 
 def test_a_coordinate_without_mass_is_refused():

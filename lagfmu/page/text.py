@@ -38,8 +38,12 @@ def show(prepared: Prepared, console: Console) -> None:
     count = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
     console.print(Text(count))
     if structure.redundant:
-        names = ", ".join(structure.redundant)
-        console.print(Text(f"  redundant: {names} (λ is shared with least norm, Q is unique)"))
+        names, shared = ", ".join(structure.redundant), ", ".join(structure.shared)
+        text = (
+            f"  redundant: {names}; λ is not unique for {shared}: of all λ with the same Q the one with "
+            "the least norm, rows scaled so that g M⁻¹ gᵀ = 1; Q is unique"
+        )
+        console.print(Text(text), soft_wrap=True)
 
     saved = savings(prepared)
     if saved is not None:

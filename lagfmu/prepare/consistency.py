@@ -40,12 +40,14 @@ class RedundantConstraintWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Structure:
-    """n, m, rank of G with all constraints acting, degrees of freedom, redundant constraints, start."""
+    """n, m, rank of G with all constraints acting, degrees of freedom, redundant constraints, all whose
+    multipliers are not unique, start."""
 
     n: int
     m: int
     rank: int
     redundant: tuple[str, ...]
+    shared: tuple[str, ...]
     start: Start
 
     @property
@@ -89,16 +91,17 @@ def examine(
     negative = negative_energy(full, masses[0], size)
     if negative:
         raise ModelError(eom.model.name, [negative])
-    rank, redundant = max(ranks, key=lambda r: r[0])
+    rank, redundant, shared = max(ranks, key=lambda r: r[0])
     if redundant:
         warnings.warn(
             f"model {eom.model.name!r}: constraint{'s' if len(redundant) > 1 else ''} "
             f"{', '.join(map(repr, redundant))} follow{'' if len(redundant) > 1 else 's'} from the "
-            "others; lambda is shared with least norm and flagged by unique.*, Q is right",
+            f"others; lambda of {', '.join(map(repr, shared))} is shared with least norm and flagged by "
+            "unique.*, Q is right",
             RedundantConstraintWarning,
             stacklevel=3,
         )
-    return Structure(eom.n, eom.m, rank, redundant, begun)
+    return Structure(eom.n, eom.m, rank, redundant, shared, begun)
 
 
 def _begun(
@@ -180,9 +183,10 @@ def _nearby(
         return project_from_afar(at, q, v, rows, np.array(begun.state.size))
 
 
-def _rank(full: System, G: Matrix) -> tuple[int, tuple[str, ...]]:
-    """Rank of G with rows scaled to unit norm, and the rows that add nothing to those before them: what is
-    left of each beside the span of those (Gram and Schmidt, twice)."""
+def _rank(full: System, G: Matrix) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
+    """Rank of G with rows scaled to unit norm; the rows that add nothing to those before them: what is left
+    of each beside the span of those (Gram and Schmidt, twice); and all whose multiplier is not unique: those
+    with a part in the null space of G^T (Wojtyra 2005)."""
     norm = np.linalg.norm(G, axis=1)
     G = G / np.where(norm > 0, norm, 1.0)[:, None]
     span = np.zeros((0, full.n))
@@ -198,4 +202,14 @@ def _rank(full: System, G: Matrix) -> tuple[int, tuple[str, ...]]:
             span = np.vstack([span, rest / size])
         else:
             redundant.append(full.rows[k].name)
-    return len(span), tuple(redundant)
+    return len(span), tuple(redundant), _shared(full, G, len(redundant))
+
+
+def _shared(full: System, G: Matrix, count: int) -> tuple[str, ...]:
+    """Rows with a part in the null space of G^T, which has `count` dimensions."""
+    rows = [k for k in range(full.m) if full.rows[k].friction is None]
+    if not count or not rows:
+        return ()
+    left = np.linalg.svd(G[rows])[0][:, len(rows) - count :]
+    parts = np.linalg.norm(left, axis=1)
+    return tuple(full.rows[k].name for k, part in zip(rows, parts, strict=True) if part > 1e-6)
