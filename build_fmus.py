@@ -12,6 +12,7 @@ import io
 import statistics
 import sys
 import time
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -91,6 +92,9 @@ def main(
     width = max((len(scene.name) for _, scene, _ in work), default=0)
     console.print(_line(width, "", "FMU", "target", "ms/s", "worst", "of"), style="bold")
     rows: list[tuple[str, ...]] = []
+    warnings.showwarning = lambda message, *_: console.print(
+        Text(f"note: {message}"), soft_wrap=True
+    )
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     shown = console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:

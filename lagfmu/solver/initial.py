@@ -246,5 +246,6 @@ def _moved(
     return tuple(
         Moved(names[i], float(given[i]), float(used[i]), rank[i], float(whole[i]))
         for i in range(2 * n)
-        if abs(given[i] - used[i]) > 1e-12 * unit[i]
+        # a velocity that is rounding of the motion's own has not moved
+        if abs(given[i] - used[i]) > max(1e-12 * unit[i], 4 * EPS * whole[i])
     )

@@ -185,7 +185,9 @@ static void tell_moved(const Start *x, Moved moved, void *context) {
         double given = is_velocity ? x->v0[j] : x->q0[j];
         double used = is_velocity ? state->v[j] : state->q[j];
         double unit = fmax(is_velocity ? state->scale[i] : state->size[j], fabs(given));
-        if (fabs(given - used) > 1e-12 * unit)
+        /* a velocity that is rounding of the motion's own has not moved */
+        double rounding = 4 * EPS * state->size[j] * (is_velocity ? state->now.rate : 1);
+        if (fabs(given - used) > fmax(1e-12 * unit, rounding))
             moved(context, x->s->system->coordinates[j], is_velocity, given, used,
                   is_velocity ? x->rank_v[j] : x->rank_q[j]);
     }
