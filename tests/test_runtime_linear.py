@@ -37,6 +37,7 @@ SOURCES = [
     "orthogonal.c",
     "residual.c",
     "schur.c",
+    "stiffened.c",
     "status.c",
     "system.c",
     "weighted.c",
@@ -190,7 +191,7 @@ void bench_free(Bench *b) {
 
 
 class Row(ctypes.Structure):
-    _fields_ = [("name", c_char_p), ("kind", c_int), ("while_closed", c_int)]
+    _fields_ = [("name", c_char_p), ("kind", c_int), ("while_closed", c_int), ("friction", c_int)]
 
 
 @pytest.fixture(scope="module")
@@ -584,15 +585,15 @@ def test_a_full_mass_matrix(solver, seed):
     )
 
 
-def test_an_indefinite_mass_matrix_is_left_to_the_whole_equations(library):
+def test_an_indefinite_mass_matrix_is_made_definite_by_the_constraint_that_holds_it(library):
     """A mass matrix with a negative eigenvalue has no Cholesky factor; where the constraint takes that
-    direction away the motion is determined all the same."""
+    direction away the motion is determined all the same (stiffened.c)."""
     M, b = np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([1.0, 2.0])
     G, c = np.array([[1.0, -1.0]]), np.array([0.0])
     bench = Bench(library, 2, 1, *patterns(M, G))
     bench.factor(M, G)
     found = bench.solve(b, c)
-    assert bench.rung == KKT
+    assert bench.rung == SCHUR
     np.testing.assert_allclose(found.x, [0.5, 0.5])
     np.testing.assert_allclose(found.lam, [0.5])
 
