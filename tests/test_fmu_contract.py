@@ -221,7 +221,7 @@ def test_derivatives_refer_to_their_states(xml):
     assert {names[int(variables(xml)[d][2]["derivative"]) - 1] for d in derivatives} == states
 
 
-def test_each_method_has_its_number_for_ever(xml, target):
+def test_each_method_has_its_number_for_ever(xml, name, target):
     """auto 1, dop853 2, rk4 3, radau5 4, rattle 5 (native): saved experiments mean the same by them."""
     types = {t.get("name"): t for t in xml.find("TypeDefinitions")}
     items = {i.get("name"): int(i.get("value")) for i in types["Method"].iter("Item")}
@@ -230,7 +230,8 @@ def test_each_method_has_its_number_for_ever(xml, target):
         del expected["rattle"]
     assert items == expected
     _, kind, typed = variables(xml)["solver.method"]
-    assert (kind, typed["declaredType"], typed["start"]) == ("Enumeration", "Method", "1")
+    start = "4" if name == "SliderCrank" else "1"  # its scene asks for radau5
+    assert (kind, typed["declaredType"], typed["start"]) == ("Enumeration", "Method", start)
 
 
 def test_angles_are_shown_in_degrees(xml):
