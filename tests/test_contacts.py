@@ -139,6 +139,7 @@ def test_no_bounce_is_stepped_over_however_low(step):
 
 def test_restitution_may_be_a_parameter():
     """e is settable like any parameter: e = 0.8 rises to 0.64 h."""
+    e = symbols("e", nonnegative=True)
     model = Model(
         name="Ball",
         lagrangian=kinetic(y) - m * g * y,

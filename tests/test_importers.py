@@ -22,7 +22,7 @@ from scipy.special import ellipj, ellipk, ellipkinc
 from lagfmu import build_fmu
 from lagfmu.methods import NUMBERS
 
-README = Path(__file__).parent.parent / "README.md"
+README = Path(__file__).parent.parent / "docs" / "importers.md"
 TIGHT = {"solver.tolerance": 1e-12}
 EARTH = {"m": 1.0, "g": 9.81, "a": 1.0}
 MOON = {"m": 3.0, "g": 1.62, "a": 2.0}

@@ -12,6 +12,7 @@ from scipy.special import ellipj, ellipk
 
 from lagfmu import simulate
 from lagfmu.errors import SimulationError
+from lagfmu.methods import NUMBERS
 
 BOTH = pytest.mark.parametrize("name", ["PendulumAngle", "PendulumCartesian"])
 THETA0 = 1.0
@@ -20,7 +21,7 @@ END = 5.0  # s, two and a half periods
 
 def run(path, stop=END, step=END, tolerance=None, **solver):
     """From rest at THETA0; solver_method='rk4' sets solver.method."""
-    start = {name.replace("solver_", "solver."): value for name, value in solver.items()}
+    start = {n.replace("solver_", "solver."): NUMBERS.get(v, v) for n, v in solver.items()}
     return fmpy.simulate_fmu(
         str(path),
         stop_time=stop,
