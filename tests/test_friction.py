@@ -15,7 +15,6 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import (
     Contact,
     Friction,
-    Holonomic,
     Model,
     Nonholonomic,
     Parameter,
@@ -282,10 +281,10 @@ WRONG = {
     ),
     "multiplier is no force": (
         [
-            Holonomic("circle", x**3),
+            Holonomic("circle", x**2),
             Friction("grip", of=["circle"], normal=N, static=mu),
         ],
-        "the multiplier of 'circle' is in N/m[^,]*, expected N",
+        "'circle'.*(is in N/m, expected N|no multiplier can hold it)",
     ),
     "one row in two frictions": (
         [

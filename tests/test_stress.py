@@ -17,7 +17,7 @@ from conftest import FILES, MODELS
 from rich.console import Console
 
 import lagfmu
-from lagfmu.cli.app import stress as command
+from lagfmu.cli import stress as command
 from lagfmu.cli.stress import stress
 from lagfmu.model.model import name_of
 from lagfmu.study.stress import worker

@@ -197,7 +197,7 @@ static int try_modes(Rest *x) {
         if (find_signs(x) != OK) return 0;
         for (int i = 0; i < count; i++) {
             const double e0 = x->slides[i].direction[0], e1 = x->slides[i].direction[1];
-            int found;
+            int found = 0;
             if (!x->resting[i] || x->sticking[i]) continue;
             if (steer(x, i, &found) != OK || !found) return 0;
             turned |= e0 != x->slides[i].direction[0] || e1 != x->slides[i].direction[1];
