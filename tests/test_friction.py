@@ -15,6 +15,7 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import (
     Contact,
     Friction,
+    Holonomic,
     Model,
     Nonholonomic,
     Parameter,
