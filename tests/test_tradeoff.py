@@ -21,7 +21,7 @@ from lagfmu import Scene, simulate
 from lagfmu.cli.terminal import print_whole
 from lagfmu.errors import BuildError, SimulationError
 from lagfmu.fmu.write import write
-from lagfmu.methods import EVALUATIONS
+from lagfmu.methods import EVALUATIONS, NUMBERS
 from lagfmu.model.file import load
 from lagfmu.model.goal import Goal, parse
 from lagfmu.prepare.prepare import prepare
@@ -427,7 +427,7 @@ def test_the_built_fmu_says_what_was_chosen_and_why(tmp_path):
         page = archive.read("documentation/index.html").decode()
         description = archive.read("modelDescription.xml").decode()
     method = re.search(r"chosen for 1e-06 of lambda\.link: \w+, (\w+)", text)[1]
-    assert f'start="{method}"' in description
+    assert f'start="{NUMBERS[method]}"' in description
     section = page[page.index('id="choice"') :]
     assert "<svg" in section
     assert "Held-out values" in section
