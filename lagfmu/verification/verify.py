@@ -78,11 +78,6 @@ class Verification:
         return all(c.passed for c in self.checks) and any(c.points for c in self.checks)
 
     @property
-    def reached(self) -> bool:
-        """True if every closed form was evaluated somewhere."""
-        return all(c.points for c in self.checks)
-
-    @property
     def worst(self) -> Check | None:
         """The closed form whose error is the largest part of what it is allowed; None without any."""
         measured = [c for c in self.checks if c.points and c.allowed]
