@@ -19,13 +19,13 @@ from rich.console import Console
 import lagfmu
 from lagfmu.cli import stress as command
 from lagfmu.cli.stress import stress
+from lagfmu.fmu.session import RefusalError
 from lagfmu.model.model import name_of
 from lagfmu.study.stress import worker
 from lagfmu.study.stress.bench import Bench, Finding
 from lagfmu.study.stress.claims import magnitude
 from lagfmu.study.stress.judge import Check, first_landing
 from lagfmu.study.stress.lagrange import lay_beside
-from lagfmu.study.stress.player import RefusalError
 from lagfmu.study.stress.probe import (
     CONSISTENT,
     REFUSED,
