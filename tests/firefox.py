@@ -1,4 +1,4 @@
-"""Firefox without a window, driven by WebDriver BiDi (https://w3c.github.io/webdriver-bidi), its own protocol."""
+"""Firefox without a window, driven by its own protocol, WebDriver BiDi (w3c.github.io/webdriver-bidi)."""
 
 from __future__ import annotations
 

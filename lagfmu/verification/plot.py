@@ -75,6 +75,7 @@ def panels(
 ) -> Iterator[tuple[Any, list[Any]]]:
     """The figure and its panels, one a unit, multipliers first, while the style of it holds."""
     import matplotlib as mpl
+
     from .figure import Drawn
 
     known = list(result.dtype.names or ())
