@@ -22,10 +22,11 @@ class Variable:
     """One FMI scalar variable.
 
     `of` says what it is of, and so its name.  `kind` is Real, Integer, Boolean or Enumeration (its
-    `items` are methods, `start` one by name); `role` says what may set it: parameter, start, input, solver, or output (nothing).  `depends` are the inputs
-    and states that it is computed from at a communication point, `depends_initially` the inputs and exact
-    start values at the start.  `positive`: zero, though not below the minimum, makes no sense.  `given`:
-    of a start value, the model's `start` says it; otherwise it is 0 because nobody did.
+    `items` are methods, `start` one by name); `role` says what may set it: parameter, start, input,
+    solver, or output (nothing).  `depends` are the inputs and states that it is computed from at a
+    communication point, `depends_initially` the inputs and exact start values at the start.  `positive`:
+    zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's `start` says
+    it; otherwise it is 0 because nobody did.
     """
 
     of: Subject
