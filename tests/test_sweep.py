@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -277,6 +279,57 @@ def test_a_model_file_is_built_first(tmp_path):
     done = CliRunner().invoke(app, ["sweep", str(path), "--vary", "m1=1,2", "--stop-time", "0.1"])
     assert done.exit_code == 0, done.output
     assert "2 runs, 0 refused" in done.output
+
+
+def example(word: str) -> str:
+    """The block of docs/sweeps.md that holds a word."""
+    text = (MODELS.parent / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    return next(b for b in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if word in b)
+
+
+@pytest.fixture
+def dist(native_fmu, tmp_path, monkeypatch) -> None:
+    """A folder with dist/native/, as build_fmus.py makes it."""
+    (tmp_path / "dist" / "native").mkdir(parents=True)
+    for name in ("Hemisphere", "HalfCar"):
+        (tmp_path / "dist" / "native" / f"{name}.fmu").symlink_to(native_fmu(name))
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_mass_has_no_part_in_when_the_particle_leaves(dist):
+    """Total Sobol indices by SALib, as docs/sweeps.md has it: the time of the departure is sqrt(a/g) times a
+    function of the angle, the largest force m g cos(theta)."""
+    pytest.importorskip("SALib")
+    names: dict[str, Any] = {}
+    exec(example("SALib"), names)
+    when = names["indices"]["departure.surface.time:last"]
+    force = names["indices"]["lambda.surface:max"]
+    assert when[0] < 1e-12
+    assert when[2] > 0.9 > 0.1 > when[1] > 0.01
+    m, g = (np.array([0.5, 2]), np.array([8, 12]))  # uniform: variance over squared mean
+    part = [(x[1] - x[0]) ** 2 / 12 / x.mean() ** 2 for x in (m, g)]
+    theta = np.linspace(0.1, 0.8, 10001)
+    part.append(np.cos(theta).var() / np.cos(theta).mean() ** 2)
+    total = np.prod(1 + np.array(part)) - 1
+    expected = [p * np.prod([1 + q for q in part if q is not p]) / total for p in part]
+    assert force == pytest.approx(expected, abs=0.05)
+
+
+def test_an_optimizer_finds_the_damping_at_which_the_spring_just_holds(dist):
+    """Optuna, as docs/sweeps.md has it: softer rides better and travels farther, so that the best damping is
+    where the travel is the 60 mm that are allowed."""
+    pytest.importorskip("optuna")
+    names: dict[str, Any] = {}
+    exec(example("optuna"), names)
+    damping = {"c": np.geomspace(6e3, 9e3, 12)}
+    found = lagfmu.sweep(
+        "dist/native/HalfCar.fmu", damping, keep=["front.travel:max", "body.acceleration:max"]
+    )
+    travel = found["front.travel:max"].values
+    assert (np.diff(travel) < 0).all()
+    assert (np.diff(found["body.acceleration:max"]) > 0).all()
+    allowed = np.interp(-0.06, -travel, found.c)
+    assert names["study"].best_params["c"] == pytest.approx(allowed, rel=0.1)
 
 
 def test_the_client_never_loads_the_binary(hemisphere):
