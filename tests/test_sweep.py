@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import re
@@ -23,6 +24,7 @@ from typer.testing import CliRunner
 import lagfmu
 from lagfmu.cli import app
 from lagfmu.errors import SimulationError
+from lagfmu.fmu.archive import version
 from lagfmu.fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, Session, plug
 from lagfmu.study.sweep import engine
 from lagfmu.study.sweep.design import axis, design, distribution, sampled
@@ -254,22 +256,49 @@ def test_bad_input_is_told_with_the_remedy(hemisphere, options, message):
     assert message in " ".join(done.output.split())
 
 
-def test_the_command_writes_a_table_and_a_figure(hemisphere, tmp_path):
+@pytest.mark.parametrize(("suffix", "engine_"), [("nc", "h5netcdf"), ("zarr", "zarr")])
+def test_trajectories_come_back_from_the_file_with_what_they_are(
+    hemisphere, tmp_path, suffix, engine_
+):
+    """netCDF and Zarr: the same numbers, bit for bit, with units, and in the file which FMU, which versions
+    and which command they come from; a run that was refused has its reason and NaN."""
+    xr, pd = pytest.importorskip("xarray"), pytest.importorskip("pandas")
+    out = tmp_path / f"runs.{suffix}"
+    done = CliRunner().invoke(
+        app,
+        ["sweep", str(hemisphere), "--vary", "a=-1,0.5,1", "--vary", "m=1,2", "--out", str(out),
+         "--keep", "energy.total:max", "--keep", "theta:trajectory"],
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    alone = lagfmu.sweep(
+        hemisphere, {"a": [-1, 0.5, 1], "m": [1, 2]}, keep=["energy.total:max", "theta:trajectory"]
+    )
+    with xr.open_dataset(out, engine=engine_) as found:
+        assert found.equals(alone)
+        units = {
+            n: found[n].attrs["units"] for n in ("a", "m", "time", "theta", "energy.total:max")
+        }
+        assert units == {"a": "m", "m": "kg", "time": "s", "theta": "rad", "energy.total:max": "J"}
+        digest = hashlib.sha256(hemisphere.read_bytes()).hexdigest()
+        assert found.attrs["fmu_sha256"] == digest
+        assert found.attrs["lagfmu"] == version()
+        assert found.attrs["fmpy"]
+        assert found.attrs["command"].startswith("lagfmu ")
+        assert pd.isna(found["theta"].values[0]).all()
+        assert "outside its bounds" in str(found["reason"].values[0, 0])
+
+
+def test_the_command_draws_what_was_refused(hemisphere, tmp_path):
     """Half of these starts stand off the sphere by less than nothing: refused, and marked."""
-    out, figure = tmp_path / "runs.nc", tmp_path / "runs.svg"
+    figure = tmp_path / "runs.svg"
     done = CliRunner().invoke(
         app,
         ["sweep", str(hemisphere), "--vary", "a=-1:1:6", "--keep", "energy.total:max",
-         "--keep", "theta:trajectory", "--out", str(out), "--plot", str(figure)],
+         "--plot", str(figure)],
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     assert "6 runs, 3 refused" in done.output
     assert "and 2 like it" in done.output
-    import xarray as xr
-
-    with xr.open_dataset(out, engine="h5netcdf") as found:
-        assert found["theta"].dims == ("a", "time")
-        assert found.attrs["fmu"] == hemisphere.name
     assert "refused" in figure.read_text()
 
 
