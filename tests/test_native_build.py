@@ -94,7 +94,13 @@ def test_both_targets_have_the_same_variables(native_fmu, python_fmu, name):
     assert described(native_fmu(name)) == described(python_fmu(name))
 
 
-FRICTION = {"friction.c", "share.c", "rubbing.c", "slides.c"}  # in FMUs with friction only
+FRICTION = {
+    "friction.c",
+    "painleve.c",
+    "share.c",
+    "rubbing.c",
+    "slides.c",
+}  # in FMUs with friction only
 
 
 def test_the_archive_holds_what_it_needs_and_no_more(native_fmu):

@@ -15,7 +15,7 @@ AT_CONTACTS = {
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }
-FRICTION = ("friction.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
+FRICTION = ("friction.c", "painleve.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
 NO_RUNGS = """
 #include "dependent.h"
 
