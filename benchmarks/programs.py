@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import lagfmu
 from lagfmu.codegen.c.equations import model_source
-from lagfmu.fmu.compiler import FLAGS, find_compiler, host
+from lagfmu.fmu.compiler import FAST, FLAGS, find_compiler, host
 from lagfmu.mechanics.equations import EquationsOfMotion
 from lagfmu.methods import NUMBERS
 from lagfmu.prepare.prepare import Prepared, prepare
@@ -194,7 +194,7 @@ def compiled(
         "-isystem",
         str(FMI),
     )
-    words = [*command, *FLAGS, *include, "-o", str(target), *map(str, sources), *options]
+    words = [*command, *FLAGS, FAST, *include, "-o", str(target), *map(str, sources), *options]
     libraries = [] if "-c" in options else ["-lm"]
     subprocess.run([*words, *libraries], check=True, timeout=600)
     return target
