@@ -31,6 +31,7 @@ from ..model.formula import with_outputs
 from ..model.goal import parse
 from ..model.library import known, new
 from ..model.scene import Scene
+from ..names import METHOD
 from ..page.text import show as show_prepared
 from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
@@ -49,6 +50,7 @@ from .options import (
     Derivatives,
     Fixed,
     Formulation,
+    Frictions,
     Inputs,
     Method,
     Methods,
@@ -182,6 +184,7 @@ def build(
     fixed: Fixed = None,
     inputs: Inputs = None,
     contacts: Contacts = None,
+    frictions: Frictions = None,
     methods: Methods = None,
     method: Method = None,
     formulation: Formulation = None,
@@ -192,10 +195,16 @@ def build(
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
+    needs |= {
+        "frictions": frictions,
+        "contacts": contacts,
+        "methods": methods,
+        "method": method,
+        "name": name,
+    }
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
     needs |= {"reals_only": reals_only}
-    narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
+    narrowing = (outputs, fixed, inputs, contacts, frictions, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -283,6 +292,7 @@ def show(
     fixed: Fixed = None,
     inputs: Inputs = None,
     contacts: Contacts = None,
+    frictions: Frictions = None,
     methods: Methods = None,
     method: Method = None,
     formulation: Formulation = None,
@@ -295,7 +305,7 @@ def show(
     Of a scene that needs less than everything, also what was pruned and what that saved.
     """
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"contacts": contacts, "methods": methods, "method": method}
+    needs |= {"frictions": frictions, "contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
     needs |= {"reals_only": reals_only}
     with _plainly():
@@ -648,7 +658,7 @@ def _assignments(texts: list[str] | None) -> dict[str, Any]:
         try:
             values[name] = float(value)
         except ValueError:
-            if name != "solver.method":
+            if name != METHOD:
                 raise SimulationError(f"--set {text!r}: {value!r} is no number") from None
             values[name] = value
     return values
