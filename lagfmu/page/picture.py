@@ -20,6 +20,7 @@ from ..mechanics.equations import TIME
 from ..model.closed_form import in_variables
 from ..model.model import Model, Nonholonomic
 from ..model.picture import Arrow, Disk, Ground, Line, Path, Point, Rod, Shape, Spring, points_of
+from ..model.reactions import multiplier
 from ..prepare.prepare import Prepared
 
 Expr = Any
@@ -108,7 +109,7 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
                 found[key] = expression(value)
         return found | ({"trace": True} if shape.trace else {})
     along = direction(model, shape) if shape.along is None else shape.along
-    force = sp.Symbol(f"lambda.{shape.constraint}", real=True)
+    force = multiplier(shape.constraint)
     vector = [pack(in_variables(sp.sympify(x)) * force, numbers) for x in along]
     return {"kind": "arrow", "name": shape.constraint, "at": point(shape.at), "vector": vector}
 

@@ -75,7 +75,8 @@ def panels(
 ) -> Iterator[tuple[Any, list[Any]]]:
     """The figure and its panels, one a unit, multipliers first, while the style of it holds."""
     import matplotlib as mpl
-    from matplotlib.figure import Figure
+
+    from .figure import Drawn
 
     known = list(result.dtype.names or ())
     members_of: dict[tuple[bool, str], list[str]] = {}
@@ -90,7 +91,7 @@ def panels(
         "grid.alpha": 0.3,
     }
     with mpl.rc_context(style):
-        figure = Figure(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
+        figure = Drawn(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
         axes = figure.subplots(len(members_of), 1, sharex=True, squeeze=False)
         for axis, ((_, unit), members) in zip(axes[:, 0], members_of.items(), strict=True):
             for k, n in enumerate(members):

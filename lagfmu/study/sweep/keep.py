@@ -21,6 +21,11 @@ class Kept:
     trajectories: tuple[str, ...]
 
     @property
+    def extremes(self) -> bool:
+        """Whether anything is kept that is looked for at departures too."""
+        return any(how not in ("last", "mean") for _, how in self.numbers)
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """NAME:HOW of each number."""
         return tuple(f"{name}:{how}" for name, how in self.numbers)

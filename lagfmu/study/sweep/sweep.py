@@ -138,7 +138,7 @@ def _sweep(
         tolerance=tolerance or 0.0,
         drive=drives[0],
         drives=drives[1],
-        events=_events(variables),
+        events=_events(variables) if kept.extremes else (),
         whole=bool(kept.trajectories),
     )
     facts = {

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SimulationError
-from ...model.parts import RESERVED
+from ...names import RESERVED
 from ...verification.simulate import Trajectory
 
 MULTIPLIER, FORCE, MOTION, EVENT = "lambda", "Q", "coordinates", "event time"
