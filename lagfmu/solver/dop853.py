@@ -93,9 +93,8 @@ class Dop853(DOP853):  # type: ignore[misc]
     def _error(self, h: float, scale: Vector) -> float:
         fifth, third = (ERRORS @ self.K[:COUNT]) * h / scale
         of_fifth, of_third = float(fifth @ fifth), float(third @ third)
-        if of_fifth == 0 and of_third == 0:
-            return 0.0
-        return of_fifth / math.sqrt((of_fifth + 0.01 * of_third) * self.n)
+        both = (of_fifth + 0.01 * of_third) * self.n
+        return of_fifth / math.sqrt(both) if both != 0 else 0.0
 
     def dense_output(self) -> Any:
         """The polynomial of degree 7 over the step just taken, which is not yet projected."""
