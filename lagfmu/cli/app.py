@@ -31,6 +31,7 @@ from ..model.formula import with_outputs
 from ..model.goal import parse
 from ..model.library import known, new
 from ..model.scene import Scene
+from ..names import METHOD
 from ..page.text import show as show_prepared
 from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
@@ -648,7 +649,7 @@ def _assignments(texts: list[str] | None) -> dict[str, Any]:
         try:
             values[name] = float(value)
         except ValueError:
-            if name != "solver.method":
+            if name != METHOD:
                 raise SimulationError(f"--set {text!r}: {value!r} is no number") from None
             values[name] = value
     return values
