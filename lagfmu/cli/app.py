@@ -50,6 +50,7 @@ from .options import (
     Derivatives,
     Fixed,
     Formulation,
+    Frictions,
     Inputs,
     Method,
     Methods,
@@ -183,6 +184,7 @@ def build(
     fixed: Fixed = None,
     inputs: Inputs = None,
     contacts: Contacts = None,
+    frictions: Frictions = None,
     methods: Methods = None,
     method: Method = None,
     formulation: Formulation = None,
@@ -193,10 +195,16 @@ def build(
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
+    needs |= {
+        "frictions": frictions,
+        "contacts": contacts,
+        "methods": methods,
+        "method": method,
+        "name": name,
+    }
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
     needs |= {"reals_only": reals_only}
-    narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
+    narrowing = (outputs, fixed, inputs, contacts, frictions, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -284,6 +292,7 @@ def show(
     fixed: Fixed = None,
     inputs: Inputs = None,
     contacts: Contacts = None,
+    frictions: Frictions = None,
     methods: Methods = None,
     method: Method = None,
     formulation: Formulation = None,
@@ -296,7 +305,7 @@ def show(
     Of a scene that needs less than everything, also what was pruned and what that saved.
     """
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"contacts": contacts, "methods": methods, "method": method}
+    needs |= {"frictions": frictions, "contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
     needs |= {"reals_only": reals_only}
     with _plainly():

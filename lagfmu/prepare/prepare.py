@@ -14,6 +14,7 @@ from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import reduce
 from ..mechanics.jumps import with_jumps
+from ..model.frictions import stuck
 from ..model.model import Contact, Model, name_of
 from ..model.scene import Scene
 from ..model.selection import select
@@ -91,7 +92,11 @@ def prepare(
     """
     asked = scene = scene or Scene(model.name)
     problems: list[str] = []
-    derived = derived or with_jumps(derive(model))
+    model = stuck(model, scene.frictions, problems)
+    if problems:
+        raise ModelError(scene.name, problems)
+    if derived is None or derived.model is not model:
+        derived = with_jumps(derive(model))
     equations = prune.held(derived, scene, problems)
     numbers = fold.numbers_of(derived, scene, problems)
     laid = Laid()
