@@ -47,6 +47,7 @@ from sympy.core.cache import clear_cache
 
 from lagfmu import derive
 from lagfmu.codegen.c.equations import model_source
+from lagfmu.mechanics.form import Form
 
 TOLERANCES = [10.0**-k for k in range(3, 14)]
 TARGETS = (1e-6, 1e-9)
@@ -200,7 +201,7 @@ def chain_costs(n: int, folder: Path) -> tuple[float, float, float, float, int]:
     moments = [time.process_time()]
     equations = derive(model)
     moments.append(time.process_time())
-    model_source(equations, None, "multipliers")
+    model_source(Form(equations))
     moments.append(time.process_time())
     written = write_problem(folder, equations)
     begun = os.times().children_user

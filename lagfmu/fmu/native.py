@@ -12,11 +12,7 @@ from ..codegen.c.parts import files_left_out, needs_tangents, parts_source
 from ..codegen.c.tables import entanglements
 from ..codegen.c.variables import variables_source
 from ..errors import BuildError
-from ..interface.variables import VariableTable
-from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.formulations.minimal import Reduction
-from ..model.scene import Scene
-from ..solver.system import System
+from ..prepare.prepare import Prepared
 from .archive import pack, version
 from .compiler import HOST, Platform, chosen, compile_libraries, is_first
 from .description import guid_of, model_description
@@ -59,17 +55,11 @@ class Sources:
 
 
 def build(
-    eom: EquationsOfMotion,
-    reduction: Reduction | None,
-    scene: Scene,
-    table: VariableTable,
-    system: System,
-    extra: Mapping[str, bytes],
-    platforms: Sequence[str] = (HOST,),
+    prepared: Prepared, extra: Mapping[str, bytes], platforms: Sequence[str] = (HOST,)
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
-    wanted = chosen(platforms)
-    made = sources_of(eom, reduction, scene, table, system)
+    wanted, scene = chosen(platforms), prepared.scene
+    made = sources_of(prepared)
     libraries = made.compiled(scene.name, wanted)
     contents = {"modelDescription.xml": made.description, **extra}
     for platform in wanted:
@@ -80,16 +70,12 @@ def build(
     return pack(contents)
 
 
-def sources_of(
-    eom: EquationsOfMotion,
-    reduction: Reduction | None,
-    scene: Scene,
-    table: VariableTable,
-    system: System,
-) -> Sources:
+def sources_of(prepared: Prepared) -> Sources:
     """The C files and the description.  Raises BuildError for a method that cannot step the model."""
-    formulation = scene.formulation or "multipliers"
-    if scene.method == "rattle" and (problems := entanglements(eom, formulation)):
+    form, scene = prepared.coded, prepared.scene
+    table, system = prepared.table, prepared.system
+    problems = entanglements(form.equations, form.formulation) if scene.method == "rattle" else []
+    if problems:
         raise BuildError(
             f"scene {scene.name!r}: rattle cannot step these equations: {'; '.join(problems)}; choose "
             "another method"
@@ -97,10 +83,8 @@ def sources_of(
     everything = runtime_files()
     gone = files_left_out(scene, system)
     generated = {
-        "model.c": model_source(
-            eom, reduction, formulation, needs_tangents(scene, system)
-        ).encode(),
-        "variables.c": variables_source(table, eom, reduction, scene, system).encode(),
+        "model.c": model_source(form, needs_tangents(scene, system)).encode(),
+        "variables.c": variables_source(table, form, scene, system).encode(),
     }
     parts = parts_source(scene, system)
     if parts is not None:
@@ -119,7 +103,7 @@ def sources_of(
     description = model_description(
         table,
         scene,
-        eom.model,
+        prepared.model,
         f"lagfmu {version()}",
         {
             **({} if system.estimated else {"ModelExchange": {**common, **MODEL_EXCHANGE}}),

@@ -58,12 +58,10 @@ def playable(target: Prepared | Path) -> Playable:
 
 
 def _told_by_prepared(prepared: Prepared) -> Told:
-    made = sources_of(
-        prepared.coded, prepared.coded_reduction, prepared.scene, prepared.table, prepared.system
-    )
+    made = sources_of(prepared)
     sections: list[Section] = [
         (s.title, s.remark, [(e.label, safe_mathml(mathml(e.latex)), e.text) for e in s.equations])
-        for s in typeset(prepared.equations, prepared.reduction, prepared.formulation)
+        for s in typeset(prepared.form)
     ]
     return Told(made.description, sections, picture_of(prepared), made.shipped)
 
