@@ -38,6 +38,7 @@ FILES = {
     "BouncingBall": "bouncing_ball",
     "Crane": "crane",
     "HalfCar": "half_car",
+    "SlippingSphere": "rolling_sphere",  # friction: it rolls, slips, leaves
 }
 
 

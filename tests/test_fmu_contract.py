@@ -114,6 +114,11 @@ def test_names_are_those_of_the_design(name, xml, prepared):
             expected |= {f"contact.{c}", f"departure.{c}.time", f"departure.{c}.count"}
             expected |= {f"departure.{c}.{s}" for s in q}
             expected |= {f"departure.{c}.velocity.{s}" for s in q}
+    for law in model.frictions:
+        expected |= {f"{head}.{law.name}" for head in ("sticks", "margin", "power")}
+        expected |= {f"slip.{row}" for row in law.of} | {"energy.dissipated"}
+        expected |= {f"slipping.{law.name}.{s}" for s in ("time", "count", *q)}
+        expected |= {f"slipping.{law.name}.velocity.{s}" for s in q}
     expected |= {o.name for o in model.outputs}
     expected |= {f"energy.{e}" for e in ("kinetic", "potential", "total")}
     expected |= {
@@ -326,6 +331,7 @@ APPROX = {
     "Ladder": {"x", "y", "theta", "der(x)", "der(y)", "der(theta)"},
     "Loop": {"x", "y", "der(x)", "der(y)"},
     "RollingSphere": {"r", "der(r)", "der(theta)", "der(phi)"},  # rolling ties velocities alone
+    "SlippingSphere": {f(c) for c in ("r", "theta", "phi") for f in (str, "der({})".format)},
     "SliderCrank": {"phi", "x", "der(phi)", "der(x)"},  # the load y hangs on the spring
 }
 

@@ -17,6 +17,7 @@ from test_jumps import MODELS as JUMPS
 
 from lagfmu import Scene, build_fmu
 from lagfmu.fmu.compiler import find_compiler
+from lagfmu.model.file import load
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
@@ -31,6 +32,8 @@ LIVES = {  # steps that reach the event or the singular point in between
     "PendulumAngle": 0.1,  # an embedding
     "BouncingBall": 0.1,  # impacts
     "HalfCar": 0.05,  # a table, outputs of the model, a prescribed motion
+    "SlippingSphere": 0.1,  # friction
+    "FallingRod": 0.05,  # friction in an impact
     "PendulumNullspace": 0.1,
     "Swing": 0.1,  # one constraint too many
     "Isosceles": 0.37,  # a step that fails
@@ -53,6 +56,9 @@ def unpacked(native_fmu, prepared, tmp_path_factory):
     def get(name: str):
         if name == "Swing":
             path = build_fmu(swing(), folder, target="native", check=False)
+        elif name == "FallingRod":
+            file = load(Path(__file__).parent.parent / "models" / "falling_rod.py")
+            path = build_fmu(file.model, folder, target="native", check=False)
         elif name in JUMPS:
             path = build_fmu(JUMPS[name](), folder, target="native", check=False)
         elif name == "Isosceles":

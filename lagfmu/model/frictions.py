@@ -227,7 +227,8 @@ def _check_coefficients(
         if value.is_number:
             numbers[kind] = float(value) if value.is_real else math.nan
             if not 0 <= numbers[kind] < math.inf:
-                problems.append(f"{what} is {plain(value)}, expected a number of at least 0")
+                shown = repr(numbers[kind]) if value.is_real else plain(value)
+                problems.append(f"{what} is {shown}, expected a number of at least 0")
     if "kinetic" in numbers and numbers["kinetic"] > numbers.get("static", math.inf):
         problems.append(
             f"friction {f.name!r}: kinetic = {numbers['kinetic']!r} is above static = "

@@ -40,10 +40,12 @@ class Kept:
 
 def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
     """`known` maps the FMU's variables to their FMI types.  Without texts: the largest multipliers, and
-    counts and times of departures.  Raises SimulationError with all problems at once."""
+    counts and times of departures and slips.  Raises SimulationError with all problems at once."""
     if not texts:
         texts = [f"{n}:max" for n in names.those(known, names.MULTIPLIER)]
-        events = names.those(known, names.DEPARTURES, names.DEPARTURE_TIME)
+        events = names.those(
+            known, names.DEPARTURES, names.DEPARTURE_TIME, names.SLIPS, names.SLIP_TIME
+        )
         texts += [f"{n}:last" for n in events]
         if not texts:
             texts = [f"{n}:last" for n in known if names.read(n).head == names.ENERGY]

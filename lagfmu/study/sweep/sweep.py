@@ -71,7 +71,7 @@ def sweep(
     pandas DataFrame, a structured array, or a dict of sequences).
 
     `keep` are 'NAME:last', ':max', ':min', ':mean', ':time-of-max' (over communication points and departures)
-    or ':trajectory'; if empty, the largest multipliers, and counts and times of departures.  `out` is a file:
+    or ':trajectory'; if empty, the largest multipliers, counts and times of departures and slips.  `out`:
     .parquet for a row a run, .nc or .zarr for all, trajectories included; finished chunks stand in OUT.parts
     at once, and `resume` goes on from them.  `on` is a Dask scheduler's address or a
     `dask.distributed.Client`; without it `workers` processes of this machine do the runs (all cores).
@@ -320,10 +320,13 @@ def _drives(
 
 
 def _events(variables: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """(count, time) of every kind of departure that the FMU reports."""
-    contacts = names.constraints(variables, names.DEPARTURES)
-    event = names.DEPARTURES, names.DEPARTURE_TIME
-    pairs = [(names.name(event[0], c), names.name(event[1], c)) for c in contacts]
+    """(count, time) of what happens between points and is counted: departures, starts of slipping."""
+    events = ((names.DEPARTURES, names.DEPARTURE_TIME), (names.SLIPS, names.SLIP_TIME))
+    pairs = [
+        (names.name(count, c), names.name(time, c))
+        for count, time in events
+        for c in names.constraints(variables, count)
+    ]
     return tuple(p for p in pairs if p[1] in variables)
 
 
