@@ -6,7 +6,8 @@ along any direction
     sum_k  dR/do_k  do_k = 0
 
 with the changes do_k that fmi2GetDirectionalDerivative names: nothing but the FMU's own values stands in
-it, and no difference quotient.  It may be off by WITHIN of the sum of the terms' magnitudes.
+it, and no difference quotient.  It may be off by WITHIN of the sum of the terms' magnitudes, or of the law's
+own size (in the metric of M, lagrange.py) over that of what is changed.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
 
 @dataclass(frozen=True)
 class _Law:
-    """R's partial derivatives by the variables `moving`, of the variables `needs`."""
+    """R's partial derivatives by the variables `moving` and last its size, of the variables `needs`."""
 
     statement: Statement
     moving: tuple[str, ...]
@@ -52,12 +53,13 @@ class _Law:
 def _law(form: Statement, variables: set[str]) -> _Law | None:
     """None where R has no derivative everywhere."""
     R = sp.sympify(form.claim.actual) - sp.sympify(form.claim.expected)
-    symbols = sorted(R.free_symbols, key=str)
-    by = [s for s in symbols if str(s) in variables]
+    size = sp.sympify(0 if form.claim.scale is None else form.claim.scale)
+    symbols = sorted(R.free_symbols | size.free_symbols, key=str)
+    by = [s for s in symbols if s in R.free_symbols and str(s) in variables]
     slopes = [] if R.has(*KINKED) else [R.diff(s) for s in by]
     if not slopes or any(e.has(sp.Derivative, sp.Subs) for e in slopes):
         return None
-    function = sp.lambdify(symbols, slopes, modules=["scipy", "numpy"], dummify=True)
+    function = sp.lambdify(symbols, [*slopes, size], modules=["scipy", "numpy"], dummify=True)
     return _Law(form, tuple(map(str, by)), tuple(map(str, symbols)), function)
 
 
@@ -82,7 +84,8 @@ def _along_each(bench: Bench) -> Finding:
             references = player.references(asked), player.references([seed])
             found = player.call("getDirectionalDerivative", *references, [1.0])
             changes = dict.fromkeys(seeds, 0.0) | dict(zip(asked, found, strict=True)) | {seed: 1.0}
-            checks += [_missed(x, known | values, changes, seed) for x in laws]
+            size = _size(bench, seed, known | values)
+            checks += [_missed(x, known | values, changes, seed, size) for x in laws]
     return Finding(tuple(checks))
 
 
@@ -92,9 +95,20 @@ def _defined(name: str, values: Mapping[str, Any]) -> bool:
     return name == constraint or bool(values[f"unique.{constraint}"])
 
 
-def _missed(law: _Law, values: Mapping[str, Any], changes: Mapping[str, float], seed: str) -> Check:
-    slopes = np.array(law.slopes(*(float(values[n]) for n in law.needs)), dtype=float)
-    terms = slopes * [changes[n] for n in law.moving]
-    allowed = WITHIN * float(np.abs(terms).sum()) + float(np.finfo(float).tiny)
+def _size(bench: Bench, name: str, values: Mapping[str, Any]) -> float:
+    """How large a coordinate is, a velocity in a natural time, an input."""
+    facts, q = bench.facts, name.removeprefix("der(").removesuffix(")")
+    if q not in facts.coordinates:
+        return abs(float(values[name])) or 1.0
+    size = max(abs(float(values[q])), facts.same_unit(q, values)) or facts.usual(q)
+    return size if q == name else max(size * bench.ordinary_rate, abs(float(values[name])))
+
+
+def _missed(
+    law: _Law, values: Mapping[str, Any], changes: Mapping[str, float], seed: str, size: float
+) -> Check:
+    *slopes, own = (float(x) for x in law.slopes(*(float(values[n]) for n in law.needs)))
+    terms = np.array(slopes) * [changes[n] for n in law.moving]
+    allowed = WITHIN * (float(np.abs(terms).sum()) + own / size) + float(np.finfo(float).tiny)
     what = f"{law.statement.claim.name} along {seed}"
     return Check(what, abs(float(terms.sum())), allowed)
