@@ -1,6 +1,6 @@
 """The closed forms that an FMU carries, compiled once, with the error that each is allowed.
 
-A claim `actual = expected` that follows the motion (it knows the start, the time or a departure, or says
+A claim `actual = expected` that follows the motion (it knows the start, the time or an event, or says
 that something is conserved) may be off by
 
     LEEWAY * within * tol * max(1, N) * A * size,    at least    LEEWAY * rounding * max(1, N) * A * size
@@ -152,7 +152,8 @@ def statements(claims: tuple[Claim, ...], inputs: set[str]) -> tuple[Statement, 
     for c in claims:
         parts = [c.actual] + ([] if c.expected is None else [c.expected])
         used = {str(s) for e in parts for s in sp.sympify(e).free_symbols}
-        follows = any(u == "time" or u.startswith(("initial(", "departure.")) for u in used)
+        earlier = ("initial(", "departure.", "slipping.")
+        follows = any(u == "time" or u.startswith(earlier) for u in used)
         found.append(_statement(c, c.expected is not None and not follows, False, inputs))
     return tuple(found)
 

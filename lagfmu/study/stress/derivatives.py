@@ -21,7 +21,7 @@ import sympy as sp
 
 from ...verification.verify import applies
 from .bench import Bench, Finding
-from .claims import Statement
+from .claims import Statement, magnitude
 from .facts import Facts
 from .judge import Check
 from .player import table
@@ -53,7 +53,8 @@ class _Law:
 def _law(form: Statement, variables: set[str]) -> _Law | None:
     """None where R has no derivative everywhere."""
     R = sp.sympify(form.claim.actual) - sp.sympify(form.claim.expected)
-    size = sp.sympify(0 if form.claim.scale is None else form.claim.scale)
+    parts = [sp.sympify(e) for e in (form.claim.actual, form.claim.expected)]
+    size = sp.Add(*(magnitude(e) for e in parts), form.claim.scale or 0)
     symbols = sorted(R.free_symbols | size.free_symbols, key=str)
     by = [s for s in symbols if s in R.free_symbols and str(s) in variables]
     slopes = [] if R.has(*KINKED) else [R.diff(s) for s in by]

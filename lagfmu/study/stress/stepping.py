@@ -116,7 +116,7 @@ def _method(method: str, bench: Bench) -> Finding:
     """Those with a fixed step have no tolerance: judged as at 1e-6, with a step made for that."""
     values: dict[str, float | str] = {"solver.method": method}
     if method in FIXED_STEP:
-        values["solver.step"] = 1e-3 / bench.ordinary_rate
+        values["solver.step"] = min(1e-3 / bench.ordinary_rate, 1e-2 / bench.fastest_rate)
     run = bench.run(values, bench.times(bench.facts.stop_time))
     if method in FIXED_STEP:
         run = replace(run, tolerance=1e-6)
