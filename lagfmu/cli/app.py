@@ -463,7 +463,7 @@ def page(
     add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
-    needs = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     given = {"scene": scene, **needs, "add-output": add_output}
     with _plainly():
         source: Model | Path = target
@@ -685,7 +685,7 @@ def _print(found: Verification) -> None:
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
         table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
     print_whole(console, table)
-    if not found.claims:
+    if not found.closed_forms:
         console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
     for check in found.checks:
         if not check.passed and check.detail:
