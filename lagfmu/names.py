@@ -23,6 +23,7 @@ SLIPS, SLIP_TIME = "slipping.count", "slipping.time"
 KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
 ENERGY, SOLVER = "energy", "solver"
+ERROR = "error"  # how far off another variable may be: error.lambda.rod
 STEPS = "solver.steps"
 METHOD, TOLERANCE, STEP = "solver.method", "solver.tolerance", "solver.step"
 MAXIMUM_STEP, MAXIMUM_STEPS = "solver.maximum_step", "solver.maximum_steps"
@@ -31,6 +32,7 @@ OF_ONE = (MULTIPLIER, UNIQUE, RESIDUAL, CONTACT, STICKS, MARGIN, POWER, SLIP)
 EVENTS = (DEPARTURE, SLIPPING)
 REACTIONS = (MULTIPLIER, FORCE)
 MODES = (CONTACT, STICKS)
+OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING)
 RESERVED = (  # what nothing of a model's can be called
     *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
     *("t", "time", "unique", "velocity"),
@@ -83,6 +85,8 @@ def read(text: str) -> Subject:
     head, *rest = text.split(".")
     if head in (ENERGY, SOLVER) and len(rest) == 1:
         return Subject(text)
+    if head == ERROR and rest:
+        return Subject(head, "", ".".join(rest))
     if head in EVENTS and len(rest) in (2, 3):
         constraint, last, rate = rest[0], rest[-1], len(rest) - 2
         if last in ("count", "time"):

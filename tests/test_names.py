@@ -23,6 +23,7 @@ from lagfmu.names import Subject
         ("departure.rod.velocity.x", Subject(names.DEPARTURE, "rod", "x", 1)),
         ("slipping.grip.time", Subject(names.SLIP_TIME, "grip")),
         ("solver.tolerance", Subject(names.TOLERANCE)),
+        ("error.lambda.rod", Subject(names.ERROR, "", "lambda.rod")),
         ("bob.height", Subject(names.OWN, "", "bob.height")),
     ],
 )

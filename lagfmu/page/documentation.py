@@ -59,9 +59,7 @@ TITLES = {  # by the kind of what a variable is of
     **dict.fromkeys(
         (names.MULTIPLIER, names.RESIDUAL, names.UNIQUE), "Multipliers and constraints"
     ),
-    **dict.fromkeys(
-        (names.STICKS, names.MARGIN, names.POWER, names.SLIP, names.SLIPPING), "Friction"
-    ),
+    **dict.fromkeys(names.OF_FRICTION, "Friction"),
 }
 
 

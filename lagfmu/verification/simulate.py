@@ -16,7 +16,8 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
-from ..errors import SimulationError, VerificationError
+from .. import names
+from ..errors import SettingError, SimulationError, VerificationError
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
 from ..model.scene import Scene
@@ -62,9 +63,9 @@ def simulate(
     values = dict(start_values or {})
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
         if number is not None and not 0 < number < np.inf:
-            raise SimulationError(f"{what} = {number!r} s, expected a positive number")
+            raise SettingError(f"{what} = {number!r} s, expected a positive number")
     if tolerance is not None and not 0 < tolerance < np.inf:
-        raise SimulationError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+        raise SettingError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared):
@@ -86,6 +87,11 @@ def communication_points(stop_time: float, step_size: float) -> NDArray[np.float
     times = np.arange(count + 1, dtype=np.float64) * step_size
     times[-1] = stop_time
     return times
+
+
+def steps_of(table: Trajectory) -> int:
+    """Internal steps of a run; 0 where they are not reported."""
+    return int(table[names.STEPS][-1]) if names.STEPS in (table.dtype.names or ()) else 0
 
 
 def _check_count(stop_time: float, step_size: float) -> None:
@@ -123,15 +129,15 @@ def _simulate_model(
     }
     _check_values(scene.name, limits, values)
     known |= values
-    method = known.get("solver.method", scene.method)
+    method = known.get(names.METHOD, scene.method)
     if not isinstance(method, str):
         method = next(m for m, k in NUMBERS.items() if k == method)
     settings = Settings(
         method,
-        max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
-        known.get("solver.step", scene.step),
-        known["solver.maximum_step"],
-        known["solver.maximum_steps"],
+        max(known[names.TOLERANCE] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
+        known.get(names.STEP, scene.step),
+        known[names.MAXIMUM_STEP],
+        known[names.MAXIMUM_STEPS],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
     drives = [v for v in table.variables if v.role in ("input", "estimate")]
@@ -157,7 +163,7 @@ def _simulate_model(
     result = np.zeros(len(times), dtype=columns)
     try:
         q = [float(known[c]) for c in system.coordinates]
-        v = [float(known[f"der({c})"]) for c in system.coordinates]
+        v = [float(known[names.derivative(c)]) for c in system.coordinates]
         u = drive(0.0)
         begun = start(system, settings, 0.0, q, v, u, p, ranks(system, table, values))
         tell(begun.moved)
@@ -214,7 +220,7 @@ def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[
         elif v.positive and not value > 0:
             problems.append(f"{name!r} = {value!r}, expected a positive number")
     if problems:
-        raise SimulationError(f"{what}: " + "; ".join(problems))
+        raise SettingError(f"{what}: " + "; ".join(problems))
 
 
 def items_of(variable: Any) -> dict[str, int]:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from ...fmu.session import RefusalError, Session, plug
-from ...methods import NUMBERS
 from ...verification.simulate import Trajectory
 from .facts import Facts
 
@@ -44,60 +43,28 @@ class Player(Session):
 
     def __init__(self, facts: Facts, folder: Path, name: str = "stress") -> None:
         self.facts, self.time = facts, 0.0
-        self.groups = [
-            (kind, [v.name for v in facts.outputs if v.type == kind])
-            for kind in KINDS
-            if any(v.type == kind for v in facts.outputs)
-        ]
+        self.outputs = [v.name for v in facts.outputs]
         super().__init__(plug(facts.path, facts.description, str(folder)), name)
 
-    def references(self, names: Sequence[str]) -> list[int]:
-        """Value references."""
-        return [self.plug.reference(n) for n in names]
-
-    def give(self, values: Values) -> None:
-        """Set variables: Reals, and methods by name; an unknown name goes in as an unknown number."""
-        methods = {
-            n: NUMBERS.get(v, 1 + max(NUMBERS.values()))
-            for n, v in values.items()
-            if isinstance(v, str)
-        }
-        reals = {n: float(v) for n, v in values.items() if not isinstance(v, str)}
-        if methods:
-            self.call("setInteger", self.references(list(methods)), list(methods.values()))
-        if reals:
-            self.call("setReal", self.references(list(reals)), list(reals.values()))
-
-    def prepare(self, values: Values, tolerance: float | None, stop: float | None = None) -> None:
-        """Reset if it was used; set up, set, enter the initialization mode."""
-        if self.used:
-            self.call("reset")
-        self.used, self.time = True, 0.0
-        self.call("setupExperiment", tolerance=tolerance, startTime=0.0, stopTime=stop)
-        self.give(values)
-        self.call("enterInitializationMode")
-
-    def begin(self, values: Values, tolerance: float | None, stop: float | None = None) -> None:
-        """The same, and initialize."""
-        self.prepare(values, tolerance, stop)
-        self.call("exitInitializationMode")
+    def prepare(
+        self, values: Values, tolerance: float | None, stop: float | None = None, start: float = 0.0
+    ) -> None:
+        """As a session does; it stands at the start."""
+        self.time = start
+        super().prepare(values, tolerance, stop, start)
 
     def step(self, size: float) -> None:
         """fmi2DoStep from where it stands."""
         self.call("doStep", self.time, size)
         self.time += size
 
-    def read(self) -> dict[str, Any]:
-        """All outputs."""
-        found: dict[str, Any] = {}
-        for kind, names in self.groups:
-            found |= dict(zip(names, self.call(f"get{kind}", self.references(names)), strict=True))
-        return found
+    def read(self, names: Sequence[str] | None = None) -> dict[str, Any]:
+        """Values of variables; of all outputs without names."""
+        return super().read(self.outputs if names is None else names)
 
     def inputs(self) -> dict[str, float]:
         """All inputs, as they stand."""
-        names = [i.name for i in self.facts.inputs]
-        return dict(zip(names, self.call("getReal", self.references(names)), strict=True))
+        return self.read([i.name for i in self.facts.inputs])
 
     def save(self) -> Any:
         """fmi2GetFMUstate."""
