@@ -47,6 +47,7 @@ from .options import (
     AddOutput,
     Contacts,
     Derivatives,
+    ErrorBars,
     Fixed,
     Formulation,
     Inputs,
@@ -187,6 +188,7 @@ def build(
     formulation: Formulation = None,
     derivatives: Derivatives = None,
     reals_only: RealsOnly = None,
+    error_bars: ErrorBars = None,
     name: Name = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -194,7 +196,7 @@ def build(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    needs |= {"reals_only": reals_only}
+    needs |= {"reals_only": reals_only, "error_bars": error_bars}
     narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
     failed = False
     kind = target.value
@@ -288,6 +290,7 @@ def show(
     formulation: Formulation = None,
     derivatives: Derivatives = None,
     reals_only: RealsOnly = None,
+    error_bars: ErrorBars = None,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
@@ -297,7 +300,7 @@ def show(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
-    needs |= {"reals_only": reals_only}
+    needs |= {"reals_only": reals_only, "error_bars": error_bars}
     with _plainly():
         file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
@@ -395,6 +398,7 @@ def simulate_command(
         typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
     ] = None,
     inputs: InputFile = None,
+    error_bars: ErrorBars = None,
     add_output: AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest."""
@@ -402,7 +406,8 @@ def simulate_command(
         source: Any = target
         if target.suffix == ".py":
             file = _load(target, add_output)
-            source = prepare(file.model, _chosen(file, None if scene is None else [scene])[0])
+            chosen = _chosen(file, None if scene is None else [scene])
+            source = prepare(file.model, narrowed(chosen, error_bars=error_bars)[0])
             name = source.scene.name
             variables = source.table.variables
             units = {v.name: v.unit.name for v in variables if v.unit is not None}
@@ -420,7 +425,14 @@ def simulate_command(
         with console.status(f"simulating {name}"):
             signals = None if inputs is None else read_table(inputs)
             result = simulate(
-                source, stop_time, step_size, tolerance, given, signals, besides=besides
+                source,
+                stop_time,
+                step_size,
+                tolerance,
+                given,
+                signals,
+                besides=besides,
+                error_bars=bool(error_bars),
             )
         _print_last(name, result, units, variable or ())
         if csv is not None:

@@ -115,7 +115,11 @@ def sources_of(
         eom.model,
         f"lagfmu {version()}",
         {
-            **({} if system.estimated else {"ModelExchange": {**common, **MODEL_EXCHANGE}}),
+            **(
+                {}
+                if system.estimated or scene.error_bars
+                else {"ModelExchange": {**common, **MODEL_EXCHANGE}}
+            ),
             "CoSimulation": {**common, **CO_SIMULATION, **order},
         },
         b"".join(name.encode() + text for name, text in {**runtime, **generated}.items()),

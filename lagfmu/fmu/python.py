@@ -70,7 +70,7 @@ class {name}(Fmi2Slave):
     default_method = {method!r}
     default_step = {step!r}
     identity = {identity!r}
-'''
+{bars}'''
 
 
 def build(
@@ -146,8 +146,17 @@ def _script(
         numbers={NUMBERS[m]: m for m in methods},
         method=scene.method,
         step=scene.step,
+        bars=_bars(table),
         identity=f"{scene.name} {_digest(equations.encode(), rows.encode(), package.encode())}",
     )
+
+
+def _bars(table: VariableTable) -> str:
+    """The references of the error bars, and those of the variables whose bars they are."""
+    found = tuple(
+        (table.reference(v.name), table.reference(v.bar_of)) for v in table.variables if v.bar_of
+    )
+    return f"    barred = {found!r}\n" if found else ""
 
 
 def _row(v: Variable) -> tuple[Any, ...]:

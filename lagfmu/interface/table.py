@@ -6,6 +6,7 @@ Names, order, references, causality, units, start values and dependencies are de
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
@@ -33,7 +34,7 @@ from ..model.units import (
     parse_unit,
 )
 from ..solver.state import MAXIMUM_STEPS
-from .variables import Value, Variable, VariableTable
+from .variables import BAR, Value, Variable, VariableTable
 
 Expr = Any
 SPEED = METRE / SECOND
@@ -230,6 +231,8 @@ class _Builder:
             *self.friction_outputs(),
             self.output("solver.steps", "internal steps taken so far", None, (), "Integer"),
         ]
+        if self.scene.error_bars:
+            variables += self.error_bars(variables)
         n = len(self.state_names) // 2
         q = self.state_names[:n]
         derivatives = [x for c in q for x in (f"der({c})", f"der({c},2)")]
@@ -511,6 +514,28 @@ class _Builder:
             text = "energy that frictions and impacts dissipated so far (Model Exchange: impacts)"
             variables.append(self.output("energy.dissipated", text, ENERGY, ()))
         return variables
+
+    def error_bars(self, variables: Iterable[Variable]) -> list[Variable]:
+        """One for each lambda, Q, coordinate, velocity, own output, and time of an event."""
+        own = {o.name for o in self.eom.outputs}
+        motion = {str(s) for eom in (self.eom, self.stepped) for s in (*eom.q, *eom.v)}
+        barred = [
+            v
+            for v in variables
+            if v.name.startswith(("lambda.", "Q."))
+            or v.name in own | motion
+            or re.fullmatch(r"(departure|slipping)\.\w+\.time", v.name)
+        ]
+        text = (
+            "error bar of {}: an estimate of how far it may be off, by a run at a coarser tolerance"
+        )
+        return [
+            dataclasses.replace(
+                self.output(f"{BAR}{v.name}", text.format(v.name), v.unit, (), discrete=True),
+                bar_of=v.name,
+            )
+            for v in barred
+        ]
 
     def _rates(self, k: int) -> set[str]:
         """The symbols behind G v - nu of a row."""

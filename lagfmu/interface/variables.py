@@ -12,6 +12,7 @@ from ..methods import described
 from ..model.units import ONE, Unit
 
 Value = float | int | bool | str
+BAR = "error."  # before the name of a variable: its error bar
 RECORD = re.compile(
     r"contact\.\w+\Z|departure\.\w+\.count\Z|solver\.steps\Z|sticks\.\w+\Z|slipping\.\w+\.count\Z"
 )
@@ -25,7 +26,8 @@ class Variable:
     says what may set it: parameter, start, input, solver, or output (nothing).  `depends` are the inputs
     and states that it is computed from at a communication point, `depends_initially` the inputs and exact
     start values at the start.  `positive`: zero, though not below the minimum, makes no sense.  `given`:
-    of a start value, the model's `start` says it; otherwise it is 0 because nobody did.
+    of a start value, the model's `start` says it; otherwise it is 0 because nobody did.  `bar_of`: the
+    variable whose error bar it is.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Variable:
     nominal: float | None = None
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
+    bar_of: str | None = None
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ Expr = Any  # a SymPy expression; SymPy carries no types
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 RESERVED: tuple[str, ...] = (
-    *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
-    *("t", "time", "unique", "velocity"),
+    *("Q", "contact", "count", "departure", "der", "energy", "error", "lambda", "residual"),
+    *("solver", "t", "time", "unique", "velocity"),
 )
 
 

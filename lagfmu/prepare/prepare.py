@@ -8,7 +8,7 @@ from typing import Any
 from ..codegen.py.equations import lower
 from ..errors import CannotStartError, DerivationError, ModelError
 from ..interface.table import variable_table
-from ..interface.variables import VariableTable
+from ..interface.variables import BAR, VariableTable
 from ..mechanics import fold, prune
 from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.formulations.minimal import Reduction, reduce
@@ -195,4 +195,7 @@ def _outputs(
     eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene, problems: list[str]
 ) -> tuple[str, ...]:
     known = [v.name for v in variable_table(eom, reduction, scene).outputs]
-    return select(scene.outputs, known, "output", problems)
+    found = set(select(scene.outputs, known, "output", problems))
+    found |= {name.removeprefix(BAR) for name in found}  # a bar is of an output, ...
+    found |= {f"{BAR}{name}" for name in found}  # ... and an output has its own
+    return tuple(name for name in known if name in found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import collections
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,8 +34,12 @@ def advance(
     u: Sequence[float],
     p: Sequence[float],
     t_end: float,
+    coarsen: Callable[[Any], Vector] | None = None,
 ) -> State:
-    """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was."""
+    """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was.
+
+    `coarsen`: of a companion (bars.py), what makes of the integrator, after a step, the state to go on with.
+    """
     begun = state.t
     events: collections.deque[float] = collections.deque(maxlen=CHATTER)
     if not np.isfinite(t_end) or t_end <= state.t:
@@ -61,7 +65,7 @@ def advance(
             state = complete(at, settings, state, t_end - state.t)
         headway = Headway(settings, begun, t_end, state.rate)
         while state.t < t_end:
-            leg = Leg(system, settings, state, u, p, begun)
+            leg = Leg(system, settings, state, u, p, begun, coarsen)
             state = _travel(leg, state, t_end, headway)
             events.append(state.t)
             if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
@@ -119,6 +123,8 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
         offered = solver.h_abs
         try:
             leg.step(solver)
+            if leg.coarsen is not None:
+                solver.y = leg.coarsen(solver)
             y1 = leg.project(solver.t, solver.y)
             if not (
                 leg.system.prescribed and t0 == leg.begun
@@ -184,7 +190,7 @@ def _meet(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: dict[in
         state = replace(
             state, t=t, q=tuple(y0[:n].tolist()), v=tuple(y0[n:].tolist()), levels=levels
         )
-        leg = Leg(leg.system, leg.settings, state, leg.u, leg.p, leg.begun)
+        leg = replace(leg, state=state)
     if not (contacts or leg.system.frictions):
         return state
     return at_contacts.switched(leg, state, t0, y0, t, [k for k in left if k not in jumps])

@@ -18,6 +18,10 @@ class Dop853(DOP853):  # type: ignore[misc]
     def _estimate_error_norm(self, K: Any, h: float, scale: Vector) -> Any:
         return super()._estimate_error_norm(K * h, 1.0, scale)  # type: ignore[misc]
 
+    def estimated_error(self, h: float) -> Vector:
+        """Of the step of h [s] just taken: estimates of order 5 and 3 make one of order 8 (eq. II.10.17)."""
+        return self._estimate_error(self.K, h)  # type: ignore[no-any-return]
+
     def last_stage(self, y0: Vector) -> tuple[Vector, Vector]:
         """Argument and rate of change of the stage at the end of the step from y0."""
         h, k = self.t - self.t_old, len(self.A) - 1

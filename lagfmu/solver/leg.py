@@ -8,7 +8,7 @@ as an ordinary differential equation, and its projection onto f = 0 and G v = nu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,7 +31,8 @@ FEWEST_STEPS = 100  # rk4's steps in one natural time of the motion, unless solv
 
 @dataclass
 class Leg:
-    """From one event to the next; `begun` [s]: the communication step began, from which inputs run on."""
+    """From one event to the next; `begun` [s]: the communication step began, from which inputs run on;
+    `coarsen`: see advance()."""
 
     system: System
     settings: Settings
@@ -39,6 +40,7 @@ class Leg:
     u: Sequence[float]
     p: Sequence[float]
     begun: float
+    coarsen: Callable[[Any], Vector] | None = None
 
     def __post_init__(self) -> None:
         self.rows = self.system.active(self.state.closed)

@@ -10,6 +10,7 @@ from ...interface.variables import Variable, VariableTable
 from ...mechanics.equations import EquationsOfMotion
 from ...mechanics.formulations.minimal import Reduction
 from ...model.scene import Scene
+from ...solver.bars import COARSER, INSIDE, ROUNDING, SHARE
 from ...solver.system import System
 from .printer import string
 
@@ -21,6 +22,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include <math.h>
 #include <stddef.h>
 
+#include "bars.h"
 #include "identity.h"
 #include "state.h"
 #include "variables.h"
@@ -34,6 +36,11 @@ const char *const MODEL_IDENTIFIER = {identifier};
 const char *const MODEL_GUID = LAGFMU_GUID;
 const double DEFAULT_TOLERANCE = {tolerance};
 const int DEFAULT_METHOD = {method};
+{bars}"""
+NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
+WITH_BARS = f"""const ErrorBars *const ERROR_BARS = &BARS;
+const double BAR_COARSER = {COARSER!r}, BAR_SHARE = {SHARE!r};
+const double BAR_INSIDE = {INSIDE!r}, BAR_ROUNDING = {ROUNDING!r};
 """
 
 
@@ -48,6 +55,11 @@ def variables_source(
     where = places(system, [str(s) for s in eom.u], [str(s) for s in eom.p])
     stepped = eom if reduction is None else reduction.reduced
     states = {str(s): j for j, s in enumerate((*stepped.q, *stepped.v))}
+    position = {v.name: k for k, v in enumerate(table.variables)}
+    where |= {
+        name: ("ERROR", position[of], k)
+        for k, (name, of) in enumerate((v.name, v.bar_of) for v in table.variables if v.bar_of)
+    }
     rows = [f"    {_row(v, where[v.name], states)},\n" for v in table.variables]
     return HEAD.format(
         name=scene.name,
@@ -56,6 +68,7 @@ def variables_source(
         identifier=string(scene.name),
         tolerance=repr(float(scene.tolerance)),
         method=scene.method.upper(),
+        bars=WITH_BARS if scene.error_bars else NO_BARS,
     )
 
 

@@ -49,6 +49,7 @@ typedef struct {
     Choice choice;       /* of the method `auto` */
     double lost;         /* [J] that frictions and impacts have dissipated, ... */
     double lost_old, lost_ahead; /* ... and so far where the integrator began its step, and stands */
+    int strikes;         /* impacts so far: contacts that were struck */
 } Numbers;
 
 /* ... and its arrays, which lie in one block. */
