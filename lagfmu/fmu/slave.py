@@ -161,7 +161,8 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                     self._outputs(keep=True)
                     bars = self.bars
                 settings, self.coarse = at_bars.paired_settings(settings, before, end)
-            self.state = advance(self.system, settings, before, u, self.p, end)
+            after_step = at_bars.after_step if self.barred else None
+            self.state = advance(self.system, settings, before, u, self.p, end, after_step)
             if self.barred:
                 self.bars, told = at_bars.followed(self.system, self.coarse, bars, u, self.p, end)
             self.expected = self.system.inputs_at(u, self.state.t - before.t)

@@ -1,8 +1,8 @@
 """What an FMU with error bars needs; one without holds none of it."""
 
 from .bars import (
+    after_step,
     begun,
-    coarsened,
     followed,
     halved,
     paired_settings,
@@ -12,8 +12,8 @@ from .bars import (
 )
 
 __all__ = [
+    "after_step",
     "begun",
-    "coarsened",
     "followed",
     "halved",
     "paired_settings",

@@ -4,10 +4,10 @@ The companion steps the same equations from the same consistent start under the 
 that is COARSER times the delivered one's.  With x of the delivered run and y of the companion, at the
 communication points t_k so far,
 
-    bar = max( SHARE max_k |x(t_k) - y(t_k)| ,  rounding of max_k |x(t_k)| ) :
+    bar = max( max_k s_k |x(t_k) - y(t_k)| ,  rounding of max_k |x(t_k)| ) ,   s_k = min(1, MARGIN / r_k) :
 
-their difference is the error of the coarser one, of which that of the finer is a part
-(docs/error_bars.md).
+the difference is the companion's error, which is r times the delivered one's if local errors were all there
+is: r is the ratio of the sums of h^(p + 1) of both (docs/error_bars.md).
 
 Events pair by their count: while one of the runs has met an event that the other has not, a difference says
 nothing and the bar is infinite, for which the largest double stands.  A method of fixed steps delivers twice
@@ -23,21 +23,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from .advance import advance
 from .failure import StepFailureError
 from .leg import FEWEST_STEPS
 from .observe import Values, observe
 from .restored import restored
 from .state import Settings, State
-from .system import System, Vector
+from .system import System
 
 COARSER = 100.0  # the companion's tolerance, in those of the delivered run
-SHARE = (
-    1.0  # of the largest difference so far that is the bar; all of it where a fixed step is halved
-)
-INSIDE = 0.0  # of the tolerance: the least bar, relative, where dense output answers (native FMUs)
+MARGIN = 10.0  # a bar is so many times what the ratio of local errors leaves of a difference
 ROUNDING = (
     4.0  # bars are no smaller than this times eps, sqrt(steps) and the largest magnitude so far
 )
@@ -149,7 +144,7 @@ def widened(
         return bars, [INFINITE] * len(names), told
     all_paired = paired(state, companion)
     worst, size, found = list(bars.worst), list(bars.size), []
-    share = 1.0 if coarse.method == "rk4" else SHARE
+    share = 1.0 if coarse.method == "rk4" else min(1.0, MARGIN / _ratio(state, companion))
     states = (*system.coordinates, *(f"der({c})" for c in system.coordinates))
     natural = dict(zip(states, state.scale, strict=True))
     rounding = ROUNDING * EPS * math.sqrt(1 + state.steps)
@@ -174,13 +169,29 @@ def _count(name: str) -> str:
     return f"{head}.count" if tail == "time" else ""
 
 
-def coarsened(solver: Any) -> Vector:
-    """The end of a companion's step.  One that the run beside it could take as well, since its end was given
-    and not chosen (an input may change there), would not differ: the estimated error stays in it."""
+def _ratio(a: State, b: State) -> float:
+    """How much larger the local errors of a companion b are than those of the run a beside it; at least 1."""
+    least = min((y / x for x, y in zip(a.local, b.local, strict=True) if x > 0), default=1.0)
+    return max(least, 1.0) if math.isfinite(least) else 1.0
+
+
+def after_step(solver: Any, state: State) -> tuple[float, float]:
+    """What a step adds to the sums of local errors of explicit and implicit methods, State.local.
+
+    The local error of a method of order p grows with h^(p + 1); h in units of the motion's natural time.
+    """
+    h = float(solver.t - solver.t_old) * state.rate
+    found = (h**9, 0.0) if hasattr(solver, "estimated_error") else (0.0, h**6)
+    return found if all(map(math.isfinite, found)) else (0.0, 0.0)
+
+
+def coarsened(solver: Any, state: State) -> tuple[float, float]:
+    """The same for a companion.  A step that the run beside it could take as well, since its end was given
+    and not chosen (an input may change there), would not differ: its estimated error stays in it."""
     h = solver.t - solver.t_old
-    if not hasattr(solver, "estimated_error") or not solver.h_abs >= 0.9 * COARSER ** (1 / 8) * h:
-        return np.asarray(solver.y)
-    return np.asarray(solver.y + solver.estimated_error(h))
+    if hasattr(solver, "estimated_error") and solver.h_abs >= 0.9 * COARSER ** (1 / 8) * h:
+        solver.y = solver.y + solver.estimated_error(h)
+    return after_step(solver, state)
 
 
 def to_list(bars: Bars) -> list[Any]:

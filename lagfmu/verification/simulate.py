@@ -205,7 +205,8 @@ def _simulate_model(
                     fine, coarse = companion.paired_settings(settings, state, float(t))
                     bars, lost = companion.followed(system, coarse, bars, u, p, float(t))
                     warn(lost)
-                moved = advance(system, fine, state, u, p, float(t))
+                noted = companion.after_step if with_bars else None
+                moved = advance(system, fine, state, u, p, float(t), noted)
                 u = system.inputs_at(u, moved.t - state.t)
                 state = moved
             seen = observe(system, state, u, p)

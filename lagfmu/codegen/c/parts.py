@@ -62,7 +62,7 @@ def parts_source(scene: Scene, system: System) -> str | None:
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
-    rows += ["    .coarsen = companion_coarsen,\n"] if scene.error_bars else []
+    rows += ["    .after_step = companion_after_step,\n"] if scene.error_bars else []
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""

@@ -10,7 +10,7 @@ from ...interface.variables import Variable, VariableTable
 from ...mechanics.equations import EquationsOfMotion
 from ...mechanics.formulations.minimal import Reduction
 from ...model.scene import Scene
-from ...solver.bars import COARSER, INSIDE, ROUNDING, SHARE
+from ...solver.bars import COARSER, MARGIN, ROUNDING
 from ...solver.system import System
 from .printer import string
 
@@ -39,8 +39,7 @@ const int DEFAULT_METHOD = {method};
 {bars}"""
 NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
 WITH_BARS = f"""const ErrorBars *const ERROR_BARS = &BARS;
-const double BAR_COARSER = {COARSER!r}, BAR_SHARE = {SHARE!r};
-const double BAR_INSIDE = {INSIDE!r}, BAR_ROUNDING = {ROUNDING!r};
+const double BAR_COARSER = {COARSER!r}, BAR_MARGIN = {MARGIN!r}, BAR_ROUNDING = {ROUNDING!r};
 """
 
 

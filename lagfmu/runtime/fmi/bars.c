@@ -56,6 +56,7 @@ static void share(Instance *x) {
     c->settings = x->solver.settings;
     c->settings.tolerance *= BAR_COARSER;
     c->coarser = BAR_COARSER;
+    x->solver.coarser = 1;
     if (has_fixed_step(x)) c->settings.step = step;
 }
 
@@ -140,14 +141,10 @@ static Status look(Instance *x) {
     return OK;
 }
 
-/* Is the state one between the ends of a step, by dense output? */
-static int is_inside(const Solver *s) {
-    return s->state.now.ahead && s->state.now.t_integrator > s->state.now.t;
-}
-
 /* The bar that differences ask for and the magnitude of a variable so far, with the present ones; 0 if there
  * is no difference to take. */
-static int compare(Instance *x, const Variable *bar, int paired, double *worst, double *size) {
+static int compare(Instance *x, const Variable *bar, int paired, double share, double *worst,
+                   double *size) {
     Bars *b = x->bars;
     const Variable *of = &VARIABLES[bar->index];
     double mine = 0, other = 0;
@@ -162,23 +159,28 @@ static int compare(Instance *x, const Variable *bar, int paired, double *worst, 
         *size = fmax(*size, fabs(mine));
         if (of->state >= 0) *size = fmax(*size, x->solver.state.scale[of->state]);
     }
-    if (is_inside(&x->solver)) *worst = fmax(*worst, BAR_INSIDE * x->solver.settings.tolerance * *size);
     if (!is_paired_for(of, &x->solver, &b->solver, paired)) return 0;
     if (instance_value(&b->solver, &b->seen, of, &other) != OK) return 0;
-    const double share = has_fixed_step(x) ? 1 : BAR_SHARE;
     *worst = fmin(fmax(*worst, share * fabs(mine - other)), INFINITE);
     return 1;
+}
+
+/* The part of a difference that is the bar: all of it where a fixed step is halved. */
+static double share_of(const Instance *x) {
+    if (has_fixed_step(x)) return 1;
+    return fmin(1, BAR_MARGIN / companion_ratio(&x->solver, &x->bars->solver));
 }
 
 static void widen(Instance *x) {
     Bars *b = x->bars;
     if (*b->lost || look(x) != OK || *b->lost) return;
     const int paired = companion_paired(&x->solver, &b->solver);
+    const double part = share_of(x);
     for (int k = 0; k < VARIABLE_COUNT; k++) {
         const Variable *bar = &VARIABLES[k];
         double worst, size;
         if (bar->place != AT_ERROR) continue;
-        (void)compare(x, bar, paired, &worst, &size);
+        (void)compare(x, bar, paired, part, &worst, &size);
         b->worst[bar->contact] = worst;
         b->size[bar->contact] = size;
     }
@@ -200,7 +202,8 @@ static Status get(Instance *x, const Variable *v, double *value) {
     if (look(x) != OK) return FAILED;
     *value = INFINITE;
     if (*b->lost) return OK;
-    if (!compare(x, v, companion_paired(&x->solver, &b->solver), &worst, &size)) return OK;
+    const int paired = companion_paired(&x->solver, &b->solver);
+    if (!compare(x, v, paired, share_of(x), &worst, &size)) return OK;
     const double steps = 1 + x->solver.state.now.steps;
     *value = fmin(fmax(worst, BAR_ROUNDING * DBL_EPSILON * sqrt(steps) * size), INFINITE);
     return OK;

@@ -443,10 +443,10 @@ Status instance_step(Instance *x, double t_end) {
     if (s->system->estimated_count > 0) estimate_rates(x);
     if (s->system->prescribed_count > 0) warn_of_rates(x);
     if (s->system->contacts > 0) note_contacts(x);
+    if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;
     const int implicit = s->state.now.choice.implicit;
-    if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
     if (solver_advance(s, t_end) != OK) {
         instance_restore(x, x->backup);
         return FAILED;

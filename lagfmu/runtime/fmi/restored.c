@@ -139,6 +139,8 @@ static Status times(Instance *x, const Solver *s) {
         {"energy dissipated", now->lost, -DBL_MAX, DBL_MAX},
         {"energy dissipated", now->lost_old, -DBL_MAX, DBL_MAX},
         {"energy dissipated", now->lost_ahead, -DBL_MAX, DBL_MAX},
+        {"sum of local errors", now->local[0], 0, DBL_MAX},
+        {"sum of local errors", now->local[1], 0, DBL_MAX},
     };
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (numbers(x, list, sizeof list / sizeof *list) != OK) return FAILED;

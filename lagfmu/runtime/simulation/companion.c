@@ -1,15 +1,35 @@
 /* companion.c -- a run beside the delivered one, at a coarser tolerance, for its error bars (bars.c). */
 #include "companion.h"
 
-#include <string.h>
+#include <float.h>
+#include <math.h>
 
 #include "parts.h"
 #include "step_size.h"
 
-void companion_coarsen(const Solver *s, Integrator *i) {
+static double power(double x, int n) {
+    double product = 1;
+    for (int k = 0; k < n; k++) product *= x;
+    return product;
+}
+
+void companion_after_step(Solver *s, Integrator *i) {
     const double h = i->t - i->t_old, longer = 0.9 * step_size_root(s->coarser, 8);
-    if (i->method != PARTS.methods[DOP853] || !(i->h_next >= longer * h)) return;
+    const int explicit_one = i->method == PARTS.methods[DOP853];
+    const double local = power(h * s->state.now.rate, explicit_one ? 9 : 6);
+    if (local <= DBL_MAX - s->state.now.local[!explicit_one])
+        s->state.now.local[!explicit_one] += local;
+    if (!explicit_one || !(s->coarser > 1 && i->h_next >= longer * h)) return;
     for (int j = 0; j < i->ny; j++) i->y[j] += PARTS.dop853_error(i, j);
+}
+
+double companion_ratio(const Solver *a, const Solver *b) {
+    double least = HUGE_VAL;
+    for (int k = 0; k < 2; k++) {
+        const double mine = a->state.now.local[k], other = b->state.now.local[k];
+        if (mine > 0) least = fmin(least, other / mine);
+    }
+    return least >= 1 && least < HUGE_VAL ? least : 1;
 }
 
 static int slides_paired(const Slide *a, const Slide *b) {

@@ -20,7 +20,7 @@ typedef struct {
     double (*rk4_error)(const Integrator *i, int component);
     /* Of error bars; NULL without. */
     double (*dop853_error)(const Integrator *i, int component);
-    void (*coarsen)(const Solver *s, Integrator *i);
+    void (*after_step)(Solver *s, Integrator *i);
     Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *level,
                           const double *u, const double *p, const Control *control,
                           double t_bound);
