@@ -27,6 +27,7 @@ from .archive import pack, version
 from .description import model_description
 
 SHIPPED = (
+    "names.py",
     "solver",
     "fmu/entry.py",
     "fmu/references.py",
@@ -153,9 +154,8 @@ def _script(
 
 def _bars(table: VariableTable) -> str:
     """The references of the error bars, and those of the variables whose bars they are."""
-    found = tuple(
-        (table.reference(v.name), table.reference(v.bar_of)) for v in table.variables if v.bar_of
-    )
+    position = {v.name: k for k, v in enumerate(table.variables)}
+    found = tuple((position[v.name], position[v.bar_of]) for v in table.variables if v.bar_of)
     return f"    barred = {found!r}\n" if found else ""
 
 

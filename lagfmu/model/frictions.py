@@ -15,7 +15,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
 from .parts import NAME, Contact, Expr, Friction, ModelFields, name_of
-from .reactions import multiplier, reactions_in
+from .reactions import is_reaction, multiplier, reactions_in
 from .units import ONE, Unit, check_dimension, parse_unit, plain
 
 MOST_ROWS = 2  # tangential directions of a surface
@@ -214,7 +214,7 @@ def _check_symbols(
     inner = {a for d in expression.atoms(sp.Derivative) for a in d.atoms(AppliedUndef)}
     for s in sorted(found - known - inner, key=str):
         name = name_of(s) if not isinstance(s, sp.Derivative) else plain(s)
-        if what.startswith("normal") and str(s).startswith(("lambda.", "Q.")):
+        if what.startswith("normal") and is_reaction(s):
             continue  # told already
         problems.append(
             f"{what}: {name} is neither coordinate, parameter nor input"

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from .. import names
 from ..codegen.py.equations import lower
 from ..errors import CannotStartError, DerivationError, ModelError
 from ..interface.table import variable_table
-from ..interface.variables import BAR, VariableTable
+from ..interface.variables import VariableTable
 from ..mechanics import fold, prune
 from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.formulations.minimal import Reduction, reduce
@@ -196,6 +197,6 @@ def _outputs(
 ) -> tuple[str, ...]:
     known = [v.name for v in variable_table(eom, reduction, scene).outputs]
     found = set(select(scene.outputs, known, "output", problems))
-    found |= {name.removeprefix(BAR) for name in found}  # a bar is of an output, ...
-    found |= {f"{BAR}{name}" for name in found}  # ... and an output has its own
+    found |= {names.barred(name) for name in found}  # a bar is of an output, ...
+    found |= {names.bar(name) for name in found}  # ... and an output has its own
     return tuple(name for name in known if name in found)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from .. import names
 from ..errors import BuildError
-from ..interface.variables import BAR
 from .simulate import Trajectory
 
 COLOURS = ("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72", "#6940a5", "#64473a")
@@ -19,11 +19,9 @@ DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # once the co
 PER_COLUMN = 8  # curves in one column of a legend, which stands beside its panel
 
 
-def default_names(names: Sequence[str]) -> list[str]:
+def default_names(known: Sequence[str]) -> list[str]:
     """What is plotted unless the user says otherwise: every lambda, then the coordinates."""
-    lam = [n for n in names if n.startswith("lambda.")]
-    coordinates = [n[4:-3] for n in names if n.startswith("der(") and n.endswith(",2)")]
-    return lam + coordinates
+    return names.those(known, names.MULTIPLIER) + names.coordinates(known)
 
 
 def plot(
@@ -78,12 +76,14 @@ def panels(
 ) -> Iterator[tuple[Any, list[Any]]]:
     """The figure and its panels, one a unit, multipliers first, while the style of it holds."""
     import matplotlib as mpl
-    from matplotlib.figure import Figure
+
+    from .figure import Drawn
 
     known = list(result.dtype.names or ())
     members_of: dict[tuple[bool, str], list[str]] = {}
     for n in chosen:
-        members_of.setdefault((not n.startswith("lambda."), units.get(n, "")), []).append(n)
+        later = names.read(n).quantity != names.MULTIPLIER
+        members_of.setdefault((later, units.get(n, "")), []).append(n)
     style: dict[str, Any] = {
         "svg.hashsalt": "lagfmu",
         "font.size": 11,
@@ -93,7 +93,7 @@ def panels(
         "grid.alpha": 0.3,
     }
     with mpl.rc_context(style):
-        figure = Figure(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
+        figure = Drawn(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
         axes = figure.subplots(len(members_of), 1, sharex=True, squeeze=False)
         for axis, ((_, unit), members) in zip(axes[:, 0], members_of.items(), strict=True):
             for k, n in enumerate(members):
@@ -124,9 +124,9 @@ def panels(
 
 def _band(axis: Any, result: Trajectory, name: str, colour: str) -> None:
     """The error bars of a curve as a band about it; where they are infinite, hatched from bottom to top."""
-    if f"{BAR}{name}" not in (result.dtype.names or ()):
+    if names.bar(name) not in (result.dtype.names or ()):
         return
-    time, value, bar = result["time"], result[name], result[f"{BAR}{name}"]
+    time, value, bar = result["time"], result[name], result[names.bar(name)]
     known = bar < np.finfo(float).max
     bar = np.where(known, bar, 0.0)
     axis.fill_between(
@@ -148,10 +148,9 @@ def _band(axis: Any, result: Trajectory, name: str, colour: str) -> None:
 
 
 def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:
-    for n in known:
-        if n.startswith("departure.") and n.endswith(".count") and result[n][-1] > 0:
-            contact = n.split(".")[1]
-            moment = float(result[f"departure.{contact}.time"][-1])
+    for contact in names.constraints(known, names.DEPARTURES):
+        if result[names.name(names.DEPARTURES, contact)][-1] > 0:
+            moment = float(result[names.name(names.DEPARTURE_TIME, contact)][-1])
             axis.axvline(moment, color="#888888", linewidth=1, linestyle="--")
             if named:
                 axis.annotate(

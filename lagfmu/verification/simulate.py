@@ -17,8 +17,8 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
+from .. import names
 from ..errors import SimulationError, VerificationError
-from ..interface.variables import BAR
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
 from ..model.scene import Scene
@@ -98,8 +98,8 @@ def simulate(
 
 def has_error_bars(variables: Sequence[Any]) -> bool:
     """True if one of the variables, a table's or fmpy's, is the error bar of another."""
-    names = {v.name for v in variables}
-    return any(n.startswith(BAR) and n.removeprefix(BAR) in names for n in names)
+    known = {v.name for v in variables}
+    return any(names.barred(n) in known for n in known)
 
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
@@ -109,6 +109,11 @@ def communication_points(stop_time: float, step_size: float) -> NDArray[np.float
     times = np.arange(count + 1, dtype=np.float64) * step_size
     times[-1] = stop_time
     return times
+
+
+def steps_of(table: Trajectory) -> int:
+    """Internal steps of a run; 0 where they are not reported."""
+    return int(table[names.STEPS][-1]) if names.STEPS in (table.dtype.names or ()) else 0
 
 
 def _check_count(stop_time: float, step_size: float) -> None:
@@ -146,15 +151,15 @@ def _simulate_model(
     }
     _check_values(scene.name, limits, values)
     known |= values
-    method = known.get("solver.method", scene.method)
+    method = known.get(names.METHOD, scene.method)
     if not isinstance(method, str):
         method = next(m for m, k in NUMBERS.items() if k == method)
     settings = Settings(
         method,
-        max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
-        known.get("solver.step", scene.step),
-        known["solver.maximum_step"],
-        known["solver.maximum_steps"],
+        max(known[names.TOLERANCE] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
+        known.get(names.STEP, scene.step),
+        known[names.MAXIMUM_STEP],
+        known[names.MAXIMUM_STEPS],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
     drives = [v for v in table.variables if v.role in ("input", "estimate")]
@@ -185,7 +190,7 @@ def _simulate_model(
     result = np.zeros(len(times), dtype=columns)
     try:
         q = [float(known[c]) for c in system.coordinates]
-        v = [float(known[f"der({c})"]) for c in system.coordinates]
+        v = [float(known[names.derivative(c)]) for c in system.coordinates]
         u = drive(0.0)
         begun = start(system, settings, 0.0, q, v, u, p, ranks(system, table, values))
         tell(begun.moved)
@@ -214,7 +219,7 @@ def _simulate_model(
                 now = (state, seen)
                 bars, found, lost = companion.widened(system, settings, bars, with_bars, now, u, p)
                 warn(lost)
-                seen |= {f"{BAR}{n}": x for n, x in zip(with_bars, found, strict=True)}
+                seen |= {names.bar(n): x for n, x in zip(with_bars, found, strict=True)}
             driven = dict(zip((d.name for d in drives), u, strict=True))
             result[k] = (t, *(driven[o.name] if o in drives else seen[o.name] for o in read))
     except StepFailureError as error:
