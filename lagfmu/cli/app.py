@@ -51,6 +51,7 @@ from .options import (
     ErrorBars,
     Fixed,
     Formulation,
+    Frictions,
     Inputs,
     Method,
     Methods,
@@ -184,6 +185,7 @@ def build(
     fixed: Fixed = None,
     inputs: Inputs = None,
     contacts: Contacts = None,
+    frictions: Frictions = None,
     methods: Methods = None,
     method: Method = None,
     formulation: Formulation = None,
@@ -195,10 +197,16 @@ def build(
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
+    needs |= {
+        "frictions": frictions,
+        "contacts": contacts,
+        "methods": methods,
+        "method": method,
+        "name": name,
+    }
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
     needs |= {"reals_only": reals_only, "error_bars": error_bars}
-    narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
+    narrowing = (outputs, fixed, inputs, contacts, frictions, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -286,6 +294,7 @@ def show(
     fixed: Fixed = None,
     inputs: Inputs = None,
     contacts: Contacts = None,
+    frictions: Frictions = None,
     methods: Methods = None,
     method: Method = None,
     formulation: Formulation = None,
@@ -299,7 +308,7 @@ def show(
     Of a scene that needs less than everything, also what was pruned and what that saved.
     """
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"contacts": contacts, "methods": methods, "method": method}
+    needs |= {"frictions": frictions, "contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
     needs |= {"reals_only": reals_only, "error_bars": error_bars}
     with _plainly():

@@ -9,8 +9,7 @@ from collections.abc import Iterable, Sequence
 
 from ... import names
 from ...interface.variables import Variable, VariableTable
-from ...mechanics.equations import EquationsOfMotion
-from ...mechanics.formulations.minimal import Reduction
+from ...mechanics.form import Form
 from ...model.scene import Scene
 from ...solver.bars import COARSER, MARGIN, ROUNDING
 from ...solver.system import System
@@ -45,16 +44,10 @@ const double BAR_COARSER = {COARSER!r}, BAR_MARGIN = {MARGIN!r}, BAR_ROUNDING = 
 """
 
 
-def variables_source(
-    table: VariableTable,
-    eom: EquationsOfMotion,
-    reduction: Reduction | None,
-    scene: Scene,
-    system: System,
-) -> str:
+def variables_source(table: VariableTable, form: Form, scene: Scene, system: System) -> str:
     """C text that defines VARIABLES and the defaults of the scene."""
+    eom, stepped = form.equations, form.stepped
     place = Places(system, [str(s) for s in eom.u], [str(s) for s in eom.p])
-    stepped = eom if reduction is None else reduction.reduced
     states = {str(s): j for j, s in enumerate((*stepped.q, *stepped.v))}
     position = {v.name: k for k, v in enumerate(table.variables)}
     number = {v.name: k for k, v in enumerate(v for v in table.variables if v.bar_of)}
