@@ -30,6 +30,7 @@ from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
 from ..model.library import known, new
+from ..model.model import Model
 from ..model.scene import Scene
 from ..names import METHOD
 from ..page.text import show as show_prepared
@@ -468,16 +469,29 @@ def page(
         Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    outputs: Outputs = None,
+    fixed: Fixed = None,
+    inputs: Inputs = None,
+    add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
+    needs = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    given = {"scene": scene, **needs, "add-output": add_output}
     with _plainly():
+        source: Model | Path = target
         chosen = None
         if target.suffix == ".py":
-            chosen = _chosen(load(target), None if scene is None else [scene])[0]
-        elif scene is not None:
-            raise LagfmuError(f"--scene {scene}: an FMU is one scene; leave it out")
+            file = _load(target, add_output)
+            source = file.model
+            scenes = _chosen(file, None if scene is None else [scene])
+            chosen = narrowed(scenes[:1], **needs)[0]
+        elif said := [f"--{n}" for n, value in given.items() if value is not None]:
+            raise LagfmuError(
+                f"{' and '.join(said)}: an FMU is one scene with outputs of its own; leave it out, or "
+                "make the page from the model file"
+            )
         with console.status("compiling to WebAssembly"):
-            path = write_page(target, out, chosen)
+            path = write_page(source, out, chosen)
         console.print(
             f"[green]wrote[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
             soft_wrap=True,

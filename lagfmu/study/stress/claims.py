@@ -26,6 +26,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from ... import names
 from ...errors import VerificationError
 from ...fmu.claims import Claim
 from ...verification.verify import applies
@@ -70,11 +71,11 @@ class Compiled:
         self, chosen: NDArray[np.bool_], run: Run, floors: Mapping[str, float] | None = None
     ) -> Column:
         """Its values at the chosen rows; magnitudes below `floors` are taken for those."""
-        rows, names, columns = run.rows[chosen], run.rows.dtype.names or (), []
+        rows, known, columns = run.rows[chosen], run.rows.dtype.names or (), []
         for text in map(str, self.symbols):
-            if text.startswith("initial("):
-                column: Any = run.rows[text[len("initial(") : -1]][0]
-            elif text in names:
+            if inner := names.initially(text):
+                column: Any = run.rows[inner][0]
+            elif text in known:
                 column = rows[text]
             elif text in run.values:
                 column = run.values[text]
@@ -152,7 +153,9 @@ def statements(claims: tuple[Claim, ...], inputs: set[str]) -> tuple[Statement, 
     for c in claims:
         parts = [c.actual] + ([] if c.expected is None else [c.expected])
         used = {str(s) for e in parts for s in sp.sympify(e).free_symbols}
-        follows = any(u == "time" or u.startswith(("initial(", "departure.")) for u in used)
+        follows = any(
+            u == "time" or names.initially(u) or names.read(u).head == names.DEPARTURE for u in used
+        )
         found.append(_statement(c, c.expected is not None and not follows, False, inputs))
     return tuple(found)
 

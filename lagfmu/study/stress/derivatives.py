@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from ... import names
 from ...verification.verify import applies
 from .bench import Bench, Finding
 from .claims import Statement
@@ -88,8 +89,10 @@ def _along_each(bench: Bench) -> Finding:
 
 def _defined(name: str, values: Mapping[str, Any]) -> bool:
     """A multiplier that is not unique has no derivative."""
-    constraint = name.removeprefix("lambda.")
-    return name == constraint or bool(values[f"unique.{constraint}"])
+    of = names.read(name)
+    if of.quantity != names.MULTIPLIER:
+        return True
+    return bool(values[names.name(names.UNIQUE, of.constraint)])
 
 
 def _missed(law: _Law, values: Mapping[str, Any], changes: Mapping[str, float], seed: str) -> Check:
