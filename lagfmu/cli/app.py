@@ -475,7 +475,7 @@ def page(
     add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
-    needs = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     given = {"scene": scene, **needs, "add-output": add_output}
     with _plainly():
         source: Model | Path = target

@@ -443,6 +443,13 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                 )
             elif after.closed[c] and not before.closed[c]:
                 self.log(f"contact {name} closed", Fmi2Status.ok, "logEvents")
+        for i, friction in enumerate(self.system.frictions):
+            name, latest = friction.name, after.slippings[i]
+            if latest.count != before.slippings[i].count:
+                told = f"friction {name} began to slip at t = {latest.time!r} s"
+                self.log(told, Fmi2Status.ok, "logEvents")
+            elif after.slides[i].sticks and not before.slides[i].sticks:
+                self.log(f"friction {name} sticks", Fmi2Status.ok, "logEvents")
 
     # -------------------------------------------------------------- saved states
 

@@ -15,10 +15,10 @@ from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import reduce
 from ..mechanics.jumps import with_jumps
-from ..model.frictions import stuck
 from ..model.model import Contact, Model, name_of
 from ..model.scene import Scene
 from ..model.selection import select
+from ..model.stuck import stuck
 from ..solver.system import System
 from .consistency import Structure, check_embedding, check_held, examine
 

@@ -16,7 +16,7 @@ AT_CONTACTS = {
     "switch_released": "switch.c",
 }
 COMPANION = ("bars.c", "companion.c")  # behind ERROR_BARS of variables.c
-FRICTION = ("friction.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
+FRICTION = ("friction.c", "painleve.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
 NO_RUNGS = """
 #include "dependent.h"
 

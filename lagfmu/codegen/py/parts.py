@@ -10,7 +10,7 @@ from ...model.scene import Scene
 from ...solver.indicators import is_watched
 from ...solver.system import System
 
-FRICTION = ("friction.py", "rubbing.py", "share.py", "slides.py")
+FRICTION = ("friction.py", "painleve.py", "rubbing.py", "share.py", "slides.py")
 CONTACTS = ("complementarity.py", "contacts.py", "impact.py", "switch.py")
 EVENTS = ("clearance.py", "events.py", "looks.py")
 CONSTRAINTS = ("nullspace.py", "orthogonal.py")

@@ -34,6 +34,8 @@ void instance_layout(Instance *x, Arena *arena) {
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
+        x->stuck = arena_ints(&scratch, system->frictions);
+        x->slips = arena_ints(&scratch, system->frictions);
         x->happened = arena_ints(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
@@ -415,12 +417,28 @@ static void report_events(Instance *x) {
             continue;
         x->tell(x->context, NOTE_EVENT, x->note);
     }
+    for (int i = 0; i < x->solver.system->frictions; i++) {
+        const char *name = x->solver.system->friction[i].name;
+        if (now->slip_count[i] != x->slips[i])
+            (void)snprintf(x->note, sizeof x->note, "friction %s began to slip at t = %s s", name,
+                           digits(now->slip_time[i]).text);
+        else if (now->slide[i].sticks && !x->stuck[i])
+            (void)snprintf(x->note, sizeof x->note, "friction %s sticks", name);
+        else
+            continue;
+        x->tell(x->context, NOTE_EVENT, x->note);
+    }
 }
 
-static void note_contacts(Instance *x) {
-    const size_t size = (size_t)x->solver.system->contacts * sizeof *x->closed;
+static void note_modes(Instance *x) {
+    const System *s = x->solver.system;
+    const size_t size = (size_t)s->contacts * sizeof *x->closed;
     memcpy(x->closed, x->solver.state.closed, size);
     memcpy(x->count, x->solver.state.count, size);
+    for (int i = 0; i < s->frictions; i++) {
+        x->stuck[i] = x->solver.state.slide[i].sticks;
+        x->slips[i] = x->solver.state.slip_count[i];
+    }
 }
 
 /* Of `auto`: why radau5 took over, the first time; then each change that a communication step ends with. */
@@ -442,7 +460,7 @@ Status instance_step(Instance *x, double t_end) {
     instance_save(x, x->backup);
     if (s->system->estimated_count > 0) estimate_rates(x);
     if (s->system->prescribed_count > 0) warn_of_rates(x);
-    if (s->system->contacts > 0) note_contacts(x);
+    if (s->system->contacts + s->system->frictions > 0) note_modes(x);
     if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;
@@ -454,7 +472,7 @@ Status instance_step(Instance *x, double t_end) {
     if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
     move_inputs(x, t_end);
     if (s->system->lookup_count > 0) warn_of_tables(x);
-    if (s->system->contacts > 0) report_events(x);
+    if (s->system->contacts + s->system->frictions > 0) report_events(x);
     tell_of_method(x, product, implicit);
     if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
     return OK;
