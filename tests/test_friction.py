@@ -23,7 +23,7 @@ from lagfmu import (
     multiplier,
     simulate,
 )
-from lagfmu.errors import ModelError
+from lagfmu.errors import ModelError, SimulationError
 from lagfmu.fmu.claims import claims_of
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
@@ -228,9 +228,23 @@ def test_a_friction_that_shall_not_slip_is_the_plain_constraint() -> None:
     assert not names & {"mu_s", "mu_k", "sticks.grip", "slip.rolling", "energy.dissipated"}
 
 
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_the_log_tells_when_a_friction_slips_and_that_it_sticks(
+    rubbing: Build, target: str
+) -> None:
+    """Category logEvents, as the departures of contacts: the block rides on the belt, slips, rides again."""
+    with instance(rubbing("Belt", target)) as one:
+        one.start()
+        for _ in range(8):
+            one.step(0.1)
+        told = [text for _, category, text in one.log if category == "logEvents"]
+        slipped = f"friction grip began to slip at t = {one.get('slipping.grip.time')!r} s"
+        assert told == [slipped, "friction grip sticks"]
+
+
 # ------------------------------------------------------------------ what is refused
 
-x, y, u = dynamicsymbols("x y u")
+x, y, z, u = dynamicsymbols("x y z u")
 m, mu = symbols("m mu", positive=True)
 G = symbols("g", positive=True)
 
@@ -239,8 +253,8 @@ def block(*constraints: Any, **more: Any) -> Model:
     """A block on a table, pushed by nothing."""
     return Model(
         name="Block",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * G * y,
-        coordinates={x: "m", y: "m"},
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * G * y,
+        coordinates={x: "m", y: "m", z: "m"},
         constraints=[
             Contact("table", y),
             Nonholonomic("rest", x.diff()),
@@ -312,6 +326,13 @@ WRONG = {
         ],
         "belongs to the frictions 'grip' and 'other'",
     ),
+    "rows that are not perpendicular": (
+        [
+            Nonholonomic("slant", x.diff() + z.diff()),
+            Friction("grip", of=["rest", "slant"], normal=N, static=mu),
+        ],
+        r"'rest' and 'slant' are not perpendicular \(the product of their directions is 1\)",
+    ),
     "an unknown symbol": (
         [Friction("grip", of=["rest"], normal=N, static=symbols("nu"))],
         "nu is neither coordinate, parameter nor input",
@@ -338,3 +359,14 @@ def test_a_multiplier_in_a_force_is_told_of_friction() -> None:
     """A force that is limited by another is a Friction, not an expression."""
     with pytest.raises(ModelError, match="is a Friction in `constraints`"):
         block(forces={x: -mu * N})
+
+
+def test_a_power_that_is_no_number_is_refused(rubbing: Build) -> None:
+    """m g R sqrt(g/R) at g = 1e300 m/s^2 is beyond all doubles: never -inf with fmi2OK."""
+    with pytest.raises(SimulationError, match=r"not finite at t = .*: power\.grip"):
+        simulate(
+            rubbing("RoughHemisphere"),
+            start_values={"g": 1e300},
+            stop_time=2e-150,
+            step_size=1e-150,
+        )

@@ -3,6 +3,7 @@ uninitialized, nothing undefined, nothing left behind, in a life with everything
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -99,20 +100,13 @@ def objects(tmp_path_factory):
 
 
 def program(folder: Path, name: str, flags: tuple[str, ...], objects: list[str]) -> Path:
-    """scenario.c with the FMU's sources: what it holds of the runtime is the same for every FMU, but for
-    parts.c, which says what that is."""
+    """scenario.c with the FMU's generated sources and what it holds of the runtime, which is the same for
+    every FMU."""
     sources = folder / "sources"
-    generated = ["model.c", "variables.c"]
-    for file in RUNTIME_FILES.values():
-        own = sources / file.name
-        if file.name == "parts.c" and own.read_bytes() != file.read_bytes():
-            generated.append("parts.c")
-        elif own.exists():
-            assert own.read_bytes() == file.read_bytes(), file.name
+    held = re.findall(r"^/\* (\w+)\.c \*/$", (sources / "lagfmu.c").read_text(), re.MULTILINE)
+    generated = [str(p) for p in sorted(sources.glob("*.c")) if p.name != "lagfmu.c"]
     target = folder / f"{name}_{len(flags)}"
-    present = {file.stem for file in sources.glob("*.c")} - {Path(g).stem for g in generated}
-    objects = [o for o in objects if Path(o).stem in present | {SCENARIO.stem}]
-    generated = [str(sources / file) for file in generated]
+    objects = [o for o in objects if Path(o).stem in {*held, SCENARIO.stem}]
     command = [compiler(), *FLAGS, *flags, f"-I{sources}", "-o", str(target), *generated, *objects]
     run = subprocess.run([*command, "-lm"], capture_output=True, text=True, timeout=300)
     assert run.returncode == 0, run.stderr[-2000:]

@@ -30,6 +30,7 @@ from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
 from ..model.library import known, new
+from ..model.model import Model
 from ..model.scene import Scene
 from ..names import METHOD
 from ..page.text import show as show_prepared
@@ -50,6 +51,7 @@ from .options import (
     AddOutput,
     Contacts,
     Derivatives,
+    ErrorBars,
     Fixed,
     Formulation,
     Frictions,
@@ -195,6 +197,7 @@ def build(
     formulation: Formulation = None,
     derivatives: Derivatives = None,
     reals_only: RealsOnly = None,
+    error_bars: ErrorBars = None,
     name: Name = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -208,7 +211,7 @@ def build(
         "name": name,
     }
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    needs |= {"reals_only": reals_only}
+    needs |= {"reals_only": reals_only, "error_bars": error_bars}
     narrowing = (outputs, fixed, inputs, contacts, frictions, methods, method, reals_only)
     failed = False
     kind = target.value
@@ -303,6 +306,7 @@ def show(
     formulation: Formulation = None,
     derivatives: Derivatives = None,
     reals_only: RealsOnly = None,
+    error_bars: ErrorBars = None,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
@@ -312,7 +316,7 @@ def show(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"frictions": frictions, "contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
-    needs |= {"reals_only": reals_only}
+    needs |= {"reals_only": reals_only, "error_bars": error_bars}
     with _plainly():
         file = _load(model, add_output)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
@@ -405,6 +409,7 @@ def simulate_command(
         typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
     ] = None,
     inputs: InputFile = None,
+    error_bars: ErrorBars = None,
     add_output: AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest."""
@@ -412,7 +417,8 @@ def simulate_command(
         source: Any = target
         if target.suffix == ".py":
             file = _load(target, add_output)
-            source = prepare(file.model, _chosen(file, None if scene is None else [scene])[0])
+            chosen = _chosen(file, None if scene is None else [scene])
+            source = prepare(file.model, narrowed(chosen, error_bars=error_bars)[0])
             name = source.scene.name
             variables = source.table.variables
             units = {v.name: v.unit.name for v in variables if v.unit is not None}
@@ -430,7 +436,14 @@ def simulate_command(
         with console.status(f"simulating {name}"):
             signals = None if inputs is None else read_table(inputs)
             result = simulate(
-                source, stop_time, step_size, tolerance, given, signals, besides=besides
+                source,
+                stop_time,
+                step_size,
+                tolerance,
+                given,
+                signals,
+                besides=besides,
+                error_bars=bool(error_bars),
             )
         _print_last(name, result, units, variable or ())
         if csv is not None:
@@ -456,16 +469,29 @@ def page(
         Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    outputs: Outputs = None,
+    fixed: Fixed = None,
+    inputs: Inputs = None,
+    add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
+    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    given = {"scene": scene, **needs, "add-output": add_output}
     with _plainly():
+        source: Model | Path = target
         chosen = None
         if target.suffix == ".py":
-            chosen = _chosen(load(target), None if scene is None else [scene])[0]
-        elif scene is not None:
-            raise LagfmuError(f"--scene {scene}: an FMU is one scene; leave it out")
+            file = _load(target, add_output)
+            source = file.model
+            scenes = _chosen(file, None if scene is None else [scene])
+            chosen = narrowed(scenes[:1], **needs)[0]
+        elif said := [f"--{n}" for n, value in given.items() if value is not None]:
+            raise LagfmuError(
+                f"{' and '.join(said)}: an FMU is one scene with outputs of its own; leave it out, or "
+                "make the page from the model file"
+            )
         with console.status("compiling to WebAssembly"):
-            path = write_page(target, out, chosen)
+            path = write_page(source, out, chosen)
         console.print(
             f"[green]wrote[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
             soft_wrap=True,

@@ -15,12 +15,14 @@ Each comes as an error and what is allowed; the run is right if no error exceeds
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import names
 from .claims import Statement, undisturbed
 from .facts import Facts
 from .player import Run
@@ -108,10 +110,10 @@ def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
     after = np.diff(run.rows["time"])[1:]
     landed = np.zeros(len(run.rows), dtype=bool)
     for c in facts.contacts:
-        closed = np.asarray(run.rows[f"contact.{c}"], dtype=bool)
-        departed = np.diff(run.rows[f"departure.{c}.count"])
+        closed = np.asarray(run.rows[names.name(names.CONTACT, c)], dtype=bool)
+        departed = np.diff(run.rows[names.name(names.DEPARTURES, c)])
         landed[1:] |= (closed[1:] & ~closed[:-1]) | (departed > closed[:-1])
-        f = run.rows[f"residual.{c}"]
+        f = run.rows[names.name(names.RESIDUAL, c)]
         with np.errstate(all="ignore"):
             ahead = f[1:-1] + np.diff(f)[:-1] * (after / before)
         landed[2:] |= ~closed[:-2] & ~closed[1:-1] & ~closed[2:] & (ahead < 0)
@@ -122,27 +124,25 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
     """The magnitude that an error is relative to, at the least: of coordinates, velocities, energy.
 
     A coordinate is known to the rounding of the value that it was given at the start, however small the
-    one is onto which that was projected; the energy to the work of Q over that rounding.
+    one is onto which that was projected; a velocity to that of the motion's natural one, sqrt(|vdot| size),
+    beside which a throw at 8 m/s is none where g = 1e300 m/s^2; the energy to the work of Q over the rounding
+    of the sizes.
     """
     found = {}
-    rounding = {q: EPS * abs(run.values.get(q, 0.0)) for q in facts.coordinates}
-    if "energy.potential" in facts.variables:
-        parts = np.abs(run.rows["energy.kinetic"]) + np.abs(run.rows["energy.potential"])
-        work = sum(
-            rounding[q] * float(np.abs(run.rows[f"Q.{q}"]).max())
-            for q in facts.coordinates
-            if f"Q.{q}" in facts.variables
-        )
-        found["energy.total"] = max(float(parts.max()), work)
+    work = 0.0
     for q in facts.coordinates:
-        found[q] = max(facts.same_unit(q, run.values), rounding[q])
-        rate = f"der({q})"
-        peers = [f"der({p})" for p in facts.coordinates]
-        found[rate] = max(
-            float(np.abs(run.rows[p]).max())
-            for p in peers
-            if facts.dimensions[p] == facts.dimensions[rate]
-        )
+        rounding = EPS * abs(run.values.get(q, 0.0))
+        found[q] = max(facts.same_unit(q, run.values), rounding)
+        peers = [p for p in facts.coordinates if facts.dimensions[p] == facts.dimensions[q]]
+        fastest = max(float(np.abs(run.rows[names.derivative(p)]).max()) for p in peers)
+        size = found[q] or facts.usual(q)
+        natural = math.sqrt(size) * math.sqrt(float(np.abs(run.rows[names.derivative(q, 2)]).max()))
+        found[names.derivative(q)] = max(fastest, EPS * natural)
+        if names.name(names.FORCE, "", q) in facts.variables:
+            work += EPS * size * float(np.abs(run.rows[names.name(names.FORCE, "", q)]).max())
+    if names.POTENTIAL in facts.variables:
+        parts = np.abs(run.rows[names.KINETIC]) + np.abs(run.rows[names.POTENTIAL])
+        found[names.TOTAL] = found[names.DISSIPATED] = max(float(parts.max()), work)
     return found
 
 
@@ -156,7 +156,7 @@ def _worst(what: str, error: Column, allowed: Column) -> Check:
 def _shares(facts: Facts, run: Run) -> list[Check]:
     checks = []
     for q in facts.coordinates:
-        if f"Q.{q}" not in facts.variables:
+        if names.name(names.FORCE, "", q) not in facts.variables:
             continue
         shares = [
             run.rows[name] for c in facts.constraints if (name := facts.share(c, q)) is not None
@@ -164,13 +164,19 @@ def _shares(facts: Facts, run: Run) -> list[Check]:
         total = sum(shares, np.zeros(len(run.rows)))
         size = sum((np.abs(s) for s in shares), np.zeros(len(run.rows)))
         allowed = 4 * (1 + len(shares)) * EPS * size + np.finfo(float).tiny
-        checks.append(_worst(f"shares of Q.{q}", np.abs(run.rows[f"Q.{q}"] - total), allowed))
+        checks.append(
+            _worst(
+                f"shares of Q.{q}",
+                np.abs(run.rows[names.name(names.FORCE, "", q)] - total),
+                allowed,
+            )
+        )
     return checks
 
 
 def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
     """The size of f, or of G v - nu, up to each row; None where lambda never shows G."""
-    rows, lam = run.rows, run.rows[f"lambda.{constraint}"]
+    rows, lam = run.rows, run.rows[names.name(names.MULTIPLIER, constraint)]
     acting = np.abs(lam) > np.finfo(float).tiny / EPS
     if not acting.any():
         return None
@@ -181,7 +187,7 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
             continue
         column, name = rows[q], q
         if facts.rates(constraint):
-            name = f"der({q})"
+            name = names.derivative(q)
             column = rows[name]
         least = max(facts.same_unit(name, run.values), abs(run.values.get(name, 0.0)))
         if not facts.rates(constraint):  # the square of a rounding of the usual place is nothing
@@ -196,12 +202,12 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
 def acts(facts: Facts, run: Run, constraint: str) -> NDArray[np.bool_]:
     """A contact acts while it is closed; what goes with a contact has no multiplier otherwise; what holds
     by friction is judged by its law (lagrange.py)."""
-    if f"slip.{constraint}" in facts.variables:
+    if names.name(names.SLIP, constraint) in facts.variables:
         return np.zeros(len(run.rows), dtype=bool)
     if constraint in facts.contacts:
-        return np.asarray(run.rows[f"contact.{constraint}"], dtype=bool)
+        return np.asarray(run.rows[names.name(names.CONTACT, constraint)], dtype=bool)
     if facts.contacts:
-        return np.asarray(run.rows[f"lambda.{constraint}"] != 0)
+        return np.asarray(run.rows[names.name(names.MULTIPLIER, constraint)] != 0)
     return np.ones(len(run.rows), dtype=bool)
 
 
@@ -210,16 +216,20 @@ def _residuals(facts: Facts, run: Run, sizes: Mapping[str, Column | None]) -> li
     for c in facts.constraints:
         where, size = acts(facts, run, c), sizes[c]
         if size is not None and where.any():
-            error = np.where(where, np.abs(run.rows[f"residual.{c}"]), 0.0)
-            checks.append(_worst(f"residual.{c}", error, ROUNDING * size))
+            error = np.where(where, np.abs(run.rows[names.name(names.RESIDUAL, c)]), 0.0)
+            checks.append(_worst(names.name(names.RESIDUAL, c), error, ROUNDING * size))
     return checks
 
 
 def _contacts(facts: Facts, run: Run, sizes: Mapping[str, Column | None]) -> list[Check]:
     checks = []
     for c in facts.contacts:
-        closed = np.asarray(run.rows[f"contact.{c}"], dtype=bool)
-        lam, f, size = run.rows[f"lambda.{c}"], run.rows[f"residual.{c}"], sizes[c]
+        closed = np.asarray(run.rows[names.name(names.CONTACT, c)], dtype=bool)
+        lam, f, size = (
+            run.rows[names.name(names.MULTIPLIER, c)],
+            run.rows[names.name(names.RESIDUAL, c)],
+            sizes[c],
+        )
         largest = float(np.abs(lam).max())
         push = float(np.maximum(-lam[closed], 0.0).max(initial=0.0))
         allowed = (10 * run.tolerance + 1e-12) * largest + np.finfo(float).tiny
