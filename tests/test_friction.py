@@ -228,9 +228,23 @@ def test_a_friction_that_shall_not_slip_is_the_plain_constraint() -> None:
     assert not names & {"mu_s", "mu_k", "sticks.grip", "slip.rolling", "energy.dissipated"}
 
 
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_the_log_tells_when_a_friction_slips_and_that_it_sticks(
+    rubbing: Build, target: str
+) -> None:
+    """Category logEvents, as the departures of contacts: the block rides on the belt, slips, rides again."""
+    with instance(rubbing("Belt", target)) as one:
+        one.start()
+        for _ in range(8):
+            one.step(0.1)
+        told = [text for _, category, text in one.log if category == "logEvents"]
+        slipped = f"friction grip began to slip at t = {one.get('slipping.grip.time')!r} s"
+        assert told == [slipped, "friction grip sticks"]
+
+
 # ------------------------------------------------------------------ what is refused
 
-x, y, u = dynamicsymbols("x y u")
+x, y, z, u = dynamicsymbols("x y z u")
 m, mu = symbols("m mu", positive=True)
 G = symbols("g", positive=True)
 
@@ -239,8 +253,8 @@ def block(*constraints: Any, **more: Any) -> Model:
     """A block on a table, pushed by nothing."""
     return Model(
         name="Block",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * G * y,
-        coordinates={x: "m", y: "m"},
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * G * y,
+        coordinates={x: "m", y: "m", z: "m"},
         constraints=[
             Contact("table", y),
             Nonholonomic("rest", x.diff()),
@@ -311,6 +325,13 @@ WRONG = {
             Friction("other", of=["rest"], normal=N, static=mu),
         ],
         "belongs to the frictions 'grip' and 'other'",
+    ),
+    "rows that are not perpendicular": (
+        [
+            Nonholonomic("slant", x.diff() + z.diff()),
+            Friction("grip", of=["rest", "slant"], normal=N, static=mu),
+        ],
+        r"'rest' and 'slant' are not perpendicular \(the product of their directions is 1\)",
     ),
     "an unknown symbol": (
         [Friction("grip", of=["rest"], normal=N, static=symbols("nu"))],

@@ -17,7 +17,7 @@ from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
 from .. import names
-from ..errors import SimulationError, VerificationError
+from ..errors import SettingError, VerificationError
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
 from .simulate import Trajectory, read_description, simulate, steps_of
 
@@ -196,7 +196,7 @@ def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
     texts = {v.name for v in description.modelVariables if v.type == "Enumeration"}
     wrong = [f"{k} = {v!r}" for k, v in given.items() if isinstance(v, str) and k not in texts]
     if wrong:
-        raise SimulationError(f"{', '.join(wrong)}: expected a number")
+        raise SettingError(f"{', '.join(wrong)}: expected a number")
 
 
 def closed_forms_in(path: Path) -> list[CarriedForm]:

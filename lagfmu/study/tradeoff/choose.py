@@ -80,7 +80,9 @@ def pick(
         try:
             chosen = as_scene(measured.scene, option, goal)
             with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-                prepared = prepare(model, replace(chosen, methods=METHODS, reals_only=False))
+                prepared = prepare(
+                    model, replace(chosen, methods=METHODS, reals_only=False, error_bars=False)
+                )
                 path = write(prepared, folder, closed_forms, target=measured.target)
                 with Importer(path) as importer:
                     cases = held_out(importer, closed_forms_in(path))

@@ -61,7 +61,8 @@ class Row:
 
     `errors` relative to the reference's scales; `residual` the largest |residual| in SI units;
     `statements` the errors of the closed forms along the run; `seconds` each timed run [s]; `below`:
-    quantities whose error is less than that of the reference itself.
+    quantities whose error is less than that of the reference itself; `broken`: closed forms that are not
+    held as `lagfmu verify` holds them at this tolerance (a fixed step promises none).
     """
 
     setting: Setting
@@ -71,6 +72,7 @@ class Row:
     steps: int
     seconds: tuple[float, ...] = ()
     below: tuple[str, ...] = ()
+    broken: tuple[str, ...] = ()
 
     @property
     def median(self) -> float:
@@ -274,7 +276,7 @@ def weigh(
         for v in importer.description.modelVariables
         if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
     }
-    checks = [check_closed_form(c, run, parameters, 1.0) for c in closed_forms]
+    checks = [check_closed_form(c, run, parameters, setting.tolerance) for c in closed_forms]
     return Row(
         setting=setting,
         errors=errors,
@@ -282,6 +284,7 @@ def weigh(
         statements={c.name: c.error for c in checks if c.points},
         steps=steps_of(run),
         below=tuple(n for n, e in errors.items() if e < reference.own[n]),
+        broken=tuple(str(c) for c in checks if setting.tolerance and not c.passed),
     )
 
 

@@ -94,7 +94,13 @@ def survey(
         for formulation in tried:
             say(f"building {formulation}", 0, 1)
             try:
-                wide = replace(scene, formulation=formulation, methods=METHODS, reals_only=False)
+                wide = replace(
+                    scene,
+                    formulation=formulation,
+                    methods=METHODS,
+                    reals_only=False,
+                    error_bars=False,
+                )
                 prepared = prepare(model, wide)
                 path = write(prepared, Path(folder, formulation), closed_forms, target=target)
                 importers[formulation] = stack.enter_context(Importer(path))
