@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from ... import names
 from ...verification.verify import applies
 from .bench import Bench, Finding
-from .claims import Statement, magnitude
+from .closed_forms import JudgedForm, magnitude
 from .facts import Facts
 from .judge import Check
 from .player import table
@@ -44,17 +45,17 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
 class _Law:
     """R's partial derivatives by the variables `moving` and last its size, of the variables `needs`."""
 
-    statement: Statement
+    judged: JudgedForm
     moving: tuple[str, ...]
     needs: tuple[str, ...]
     slopes: Callable[..., Any]
 
 
-def _law(form: Statement, variables: set[str]) -> _Law | None:
+def _law(form: JudgedForm, variables: set[str]) -> _Law | None:
     """None where R has no derivative everywhere."""
-    R = sp.sympify(form.claim.actual) - sp.sympify(form.claim.expected)
-    parts = [sp.sympify(e) for e in (form.claim.actual, form.claim.expected)]
-    size = sp.Add(*(magnitude(e) for e in parts), form.claim.scale or 0)
+    R = sp.sympify(form.closed_form.actual) - sp.sympify(form.closed_form.expected)
+    parts = [sp.sympify(e) for e in (form.closed_form.actual, form.closed_form.expected)]
+    size = sp.Add(*(magnitude(e) for e in parts), form.closed_form.scale or 0)
     symbols = sorted(R.free_symbols | size.free_symbols, key=str)
     by = [s for s in symbols if s in R.free_symbols and str(s) in variables]
     slopes = [] if R.has(*KINKED) else [R.diff(s) for s in by]
@@ -80,7 +81,7 @@ def _along_each(bench: Bench) -> Finding:
             rows[name][0] = value
         asked = [n for n in reals if _defined(n, values)]
         laws = [x for x in forms if x is not None and {*x.moving} <= {*asked, *seeds}]
-        laws = [x for x in laws if applies(x.statement.claim, rows, known)[0]]
+        laws = [x for x in laws if applies(x.judged.closed_form, rows, known)[0]]
         for seed in seeds:
             references = player.references(asked), player.references([seed])
             found = player.call("getDirectionalDerivative", *references, [1.0])
@@ -92,8 +93,10 @@ def _along_each(bench: Bench) -> Finding:
 
 def _defined(name: str, values: Mapping[str, Any]) -> bool:
     """A multiplier that is not unique has no derivative."""
-    constraint = name.removeprefix("lambda.")
-    return name == constraint or bool(values[f"unique.{constraint}"])
+    of = names.read(name)
+    if of.quantity != names.MULTIPLIER:
+        return True
+    return bool(values[names.name(names.UNIQUE, of.constraint)])
 
 
 def _size(bench: Bench, name: str, values: Mapping[str, Any]) -> float:
@@ -111,5 +114,5 @@ def _missed(
     *slopes, own = (float(x) for x in law.slopes(*(float(values[n]) for n in law.needs)))
     terms = np.array(slopes) * [changes[n] for n in law.moving]
     allowed = WITHIN * (float(np.abs(terms).sum()) + own / size) + float(np.finfo(float).tiny)
-    what = f"{law.statement.claim.name} along {seed}"
+    what = f"{law.judged.closed_form.name} along {seed}"
     return Check(what, abs(float(terms.sum())), allowed)
