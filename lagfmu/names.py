@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 VALUE = (
     "value"  # of a coordinate, an input, a parameter or an output of one word; or its derivative
@@ -60,6 +61,7 @@ class Subject:
         return self.quantity.partition(".")[0]
 
 
+@lru_cache(maxsize=4096)  # the python target asks at every communication point
 def name(quantity: str, constraint: str = "", coordinate: str = "", order: int = 0) -> str:
     """The name of what a `Subject` with these fields is."""
     if quantity in (VALUE, OWN):

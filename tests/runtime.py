@@ -18,9 +18,7 @@ import pytest
 from once import once
 
 RUNTIME = Path(__file__).parent.parent / "lagfmu" / "runtime"
-RUNTIME_FILES = {
-    p.name: p for p in sorted(RUNTIME.glob("*/*.[ch]"))
-}  # in an FMU they lie side by side
+RUNTIME_FILES = {p.name: p for p in sorted(RUNTIME.glob("*/*.[ch]"))}
 INCLUDES = tuple(f"-I{folder}" for folder in sorted(p for p in RUNTIME.iterdir() if p.is_dir()))
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion")
 

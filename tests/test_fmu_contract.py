@@ -103,7 +103,7 @@ def test_names_are_those_of_the_design(name, xml, prepared):
     for i in model.prescribed:
         expected |= {f"der({name_of(i.symbol)})", f"der({name_of(i.symbol)},2)"}
     motions = list(q)
-    if prepared(name).reduction is not None and model.embedding is not None:
+    if prepared(name).form.reduction is not None and model.embedding is not None:
         motions += [name_of(c) for c in model.embedding.coordinates]
     expected |= {form.format(c) for c in motions for form in ("{}", "der({})", "der({},2)")}
     expected |= {f"Q.{c}" for c in q}

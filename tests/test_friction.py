@@ -23,7 +23,7 @@ from lagfmu import (
     multiplier,
     simulate,
 )
-from lagfmu.errors import ModelError
+from lagfmu.errors import ModelError, SimulationError
 from lagfmu.fmu.claims import claims_of
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
@@ -338,3 +338,14 @@ def test_a_multiplier_in_a_force_is_told_of_friction() -> None:
     """A force that is limited by another is a Friction, not an expression."""
     with pytest.raises(ModelError, match="is a Friction in `constraints`"):
         block(forces={x: -mu * N})
+
+
+def test_a_power_that_is_no_number_is_refused(rubbing: Build) -> None:
+    """m g R sqrt(g/R) at g = 1e300 m/s^2 is beyond all doubles: never -inf with fmi2OK."""
+    with pytest.raises(SimulationError, match=r"not finite at t = .*: power\.grip"):
+        simulate(
+            rubbing("RoughHemisphere"),
+            start_values={"g": 1e300},
+            stop_time=2e-150,
+            step_size=1e-150,
+        )

@@ -14,6 +14,7 @@ from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu
 from lagfmu.errors import ModelError
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.mechanics.equations import derive
+from lagfmu.mechanics.form import Form
 from lagfmu.mechanics.jumps import jumps_of, with_jumps
 from lagfmu.prepare.prepare import prepare
 
@@ -241,7 +242,7 @@ def test_a_kink_is_no_jump(force, lagrangian):
 def test_surfaces_of_jumps_are_found(force, surfaces):
     """h of each jump, up to its sign, in position, time and inputs."""
     eom = with_jumps(derive(cart("Jumps", force)))
-    found = {s.h for s in jumps_of(eom).surfaces}
+    found = {s.h for s in jumps_of(Form(eom)).surfaces}
     expected = {s.xreplace(eom.symbols) for s in surfaces}
     assert {h if h in expected else -h for h in found} == expected
 

@@ -27,6 +27,7 @@ from lagfmu.codegen.c.equations import model_source
 from lagfmu.codegen.py.equations import lower
 from lagfmu.errors import ModelError
 from lagfmu.mechanics.equations import derive
+from lagfmu.mechanics.form import Form
 from lagfmu.prepare.prepare import Prepared, prepare
 from lagfmu.solver import initial
 from lagfmu.solver.contacts import complementary_modes
@@ -187,7 +188,7 @@ def bench(runtime: ctypes.CDLL, folder: Path, prepared: Any) -> Any:
                 one = prepared(model)
             else:
                 one = prepare(model, Scene(model.name, formulation=formulation))
-            text = model_source(one.equations, one.reduction, one.scene.formulation)
+            text = model_source(one.form)
             keep[name] = compile_library(folder, ["interval.c"], text), one
         library, one = keep[name]
         made.append(Bench(runtime, c_void_p.in_dll(library, "MODEL_SYSTEM"), one))
@@ -400,7 +401,7 @@ def test_constraints_that_no_velocity_satisfies_are_still_refused(bench):
     )
     with pytest.raises(ModelError, match="contradict each other"):
         prepare(model)
-    system = lower(derive(model))
+    system = lower(Form(derive(model)))
     with pytest.raises(StartFailureError, match="no velocities satisfy"):
         initial.start(system, Settings(), 0.0, [0, 0], [0, 1], [], [2.0, 1e-3])
 
@@ -1070,7 +1071,7 @@ def test_no_byte_outside_the_arrays_is_touched(name, folder, prepared):
     one = prepared(name)
     q, v, _ = defaults(one.system, one.table)
     p = [x.start for x in one.table.variables if x.role == "parameter"]
-    text = model_source(one.equations, one.reduction, one.scene.formulation)
+    text = model_source(one.form)
     (folder / f"{name}.c").write_text(text, encoding="utf-8")
     (folder / f"{name}_main.c").write_text(BENCH.read_text("utf-8") + DRIVER, encoding="utf-8")
     program = folder / name

@@ -3,6 +3,7 @@ uninitialized, nothing undefined, nothing left behind, in a life with everything
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -74,22 +75,17 @@ def unpacked(native_fmu, prepared, tmp_path_factory):
 
 
 def program(folder: Path, name: str, flags: tuple[str, ...]) -> Path:
-    """scenario.c with the FMU's sources: what it holds of the runtime is the same for every FMU, but for
-    parts.c, which says what that is."""
+    """scenario.c with the FMU's generated sources and what it holds of the runtime, which is the same for
+    every FMU."""
     sources = folder / "sources"
-    generated = ["model.c", "variables.c"]
-    for file in RUNTIME_FILES.values():
-        own = sources / file.name
-        if file.name == "parts.c" and own.read_bytes() != file.read_bytes():
-            generated.append("parts.c")
-        elif own.exists():
-            assert own.read_bytes() == file.read_bytes(), file.name
+    held = re.findall(r"^/\* (\w+\.c) \*/$", (sources / "lagfmu.c").read_text(), re.MULTILINE)
+    generated = [str(p) for p in sorted(sources.glob("*.c")) if p.name != "lagfmu.c"]
     target = folder / f"{name}_{len(flags)}"
-    present = sorted({file.name for file in sources.glob("*.c")} - {*generated})
-    linked = objects([SCENARIO, *(RUNTIME_FILES[file] for file in present)], flags)
-    texts = [str(sources / file) for file in generated]
-    command = [compiler(), *FLAGS, *flags, "-Werror", f"-I{sources}", "-o", str(target), *texts]
-    run = subprocess.run([*command, *linked, "-lm"], capture_output=True, text=True, timeout=300)
+    linked = objects([SCENARIO, *(RUNTIME_FILES[file] for file in held)], flags)
+    command = [compiler(), *FLAGS, *flags, "-Werror", f"-I{sources}", "-o", str(target)]
+    run = subprocess.run(
+        [*command, *generated, *linked, "-lm"], capture_output=True, text=True, timeout=300
+    )
     assert run.returncode == 0, run.stderr[-2000:]
     return target
 

@@ -314,12 +314,13 @@ def test_what_cannot_be_meant_is_wrong_usage(tmp_path):
 
 def test_terms_count_in_full():
     """magnitude(a - b) = |a| + |b|: what cancels is no more accurate than its terms."""
-    from sympy import cos, symbols
+    from sympy import cos, sign, symbols
 
     a, b, x = symbols("a b x", real=True)
     assert magnitude(a - b).subs({a: 3, b: 3}) == 6
     assert float(magnitude(1 - cos(x)).subs(x, 1e-3)) == pytest.approx(2, rel=1e-5)
     assert float(magnitude(a**2 * b).subs({a: -2, b: -3})) == 12
+    assert magnitude(3 * sign(x)).subs(x, -1e-3) == 3  # its slope is none that counts
 
 
 def test_probes_cover_the_ranges(bench):

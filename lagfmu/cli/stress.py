@@ -109,7 +109,7 @@ def build(file: ModelFile, scene: Scene, folder: Path, target: str, console: Con
         prepared = prepare(file.model, scene)
         fmu = write(prepared, folder, file.closed_forms, target=target)
         lay_beside(fmu, prepared)
-        if prepared.system.contacts:
+        if prepared.system.m:
             lay_geometry(fmu, prepared)
         if len(prepared.system.contacts) > 1:
             _turned(file.model, scene, fmu, target)

@@ -1,4 +1,4 @@
-"""(equations, scene) -> the FMU's variable table.
+"""(form, scene) -> the FMU's variable table.
 
 Names, order, references, causality, units, start values and dependencies are decided here only.
 """
@@ -15,8 +15,8 @@ import sympy as sp
 from .. import names
 from ..errors import ModelError
 from ..mechanics.coupling import coupled
-from ..mechanics.equations import EquationsOfMotion, symbols_of
-from ..mechanics.formulations.minimal import Reduction
+from ..mechanics.equations import symbols_of
+from ..mechanics.form import Form
 from ..methods import FIXED_STEP, described
 from ..model.model import Contact, Nonholonomic, name_of
 from ..model.scene import Scene
@@ -41,11 +41,9 @@ Expr = Any
 SPEED = METRE / SECOND
 
 
-def variable_table(
-    eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene
-) -> VariableTable:
+def variable_table(form: Form, scene: Scene) -> VariableTable:
     """All variables of the FMU.  Raises ModelError if names collide or a unit cannot be written."""
-    builder = _Builder(eom, reduction, scene)
+    builder = _Builder(form, scene)
     table = builder.table()
     if scene.reals_only:
         table = table.as_reals()
@@ -57,7 +55,7 @@ def variable_table(
                 "express: write the constraint in another power"
             )
     if problems:
-        raise ModelError(eom.model.name, problems)
+        raise ModelError(form.equations.model.name, problems)
     return table
 
 
@@ -79,11 +77,12 @@ def _collisions(known: Sequence[str]) -> list[str]:
 
 
 class _Builder:
-    def __init__(self, eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene) -> None:
+    def __init__(self, form: Form, scene: Scene) -> None:
+        eom, reduction = form.equations, form.reduction
         self.eom, self.reduction, self.scene = eom, reduction, scene
         self.model = eom.model
         self.units = eom.units
-        self.stepped = eom if reduction is None else reduction.reduced
+        self.stepped = form.stepped
         self.into = {}
         if reduction is not None:
             self.into = dict(zip((*eom.q, *eom.v), (*reduction.phi, *reduction.vel), strict=True))

@@ -9,8 +9,7 @@ from collections.abc import Iterable, Sequence
 
 from ... import names
 from ...interface.variables import Variable, VariableTable
-from ...mechanics.equations import EquationsOfMotion
-from ...mechanics.formulations.minimal import Reduction
+from ...mechanics.form import Form
 from ...model.scene import Scene
 from ...solver.system import System
 from .printer import string
@@ -39,16 +38,10 @@ const int DEFAULT_METHOD = {method};
 """
 
 
-def variables_source(
-    table: VariableTable,
-    eom: EquationsOfMotion,
-    reduction: Reduction | None,
-    scene: Scene,
-    system: System,
-) -> str:
+def variables_source(table: VariableTable, form: Form, scene: Scene, system: System) -> str:
     """C text that defines VARIABLES and the defaults of the scene."""
+    eom, stepped = form.equations, form.stepped
     place = Places(system, [str(s) for s in eom.u], [str(s) for s in eom.p])
-    stepped = eom if reduction is None else reduction.reduced
     states = {str(s): j for j, s in enumerate((*stepped.q, *stepped.v))}
     rows = [f"    {_row(v, place.of(v), states)},\n" for v in table.variables]
     return HEAD.format(
