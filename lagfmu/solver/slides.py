@@ -19,10 +19,11 @@ import numpy as np
 
 from .. import names
 from .failure import StepFailureError
-from .friction import heading, loaded, paradox, slip_velocity
+from .friction import heading, loaded, slip_velocity
 from .instant import Instant, Motion
 from .leg import Leg
 from .motion import motion
+from .painleve import paradox
 from .ranges import Range, first_of_frictions
 from .state import Departure, Slide, State
 from .system import Matrix, System, Vector
