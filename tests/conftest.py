@@ -2,7 +2,7 @@
 
 How builds and runs are shared:
 
-- `python_fmu`, `native_fmu`, `fmu` (both targets), `library`, `prepared`, `playable` and `page_file`: models/;
+- `python_fmu`, `native_fmu`, `fmu` (both targets), `library`, `prepared`, `playable`, `page_file`: models/;
   a model of a test's own is built in a fixture of its module;
 - `shared_folder` with `once(folder, make)` of once.py, for what tests in several files build;
 - `objects` and `compile_library` of runtime.py: the runtime's C files, compiled once for what they hold, also
