@@ -20,12 +20,12 @@ from ...mechanics.form import Form
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
+from ...model.parts import Expr
 from .. import bounds
 from .function import FILL, Result, function
 from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
 
-Expr = Any
 HEAD = """/* model.c -- {name}{description}
  *
  *   M(q,t) vdot = F(q,v,t,u) + G^T lambda ,  G v = nu(q,t,u) ,  G vdot = gamma(q,v,t,u) ,  f(q,t) = 0
