@@ -177,6 +177,7 @@ static Status arrive(Solver *s, double t_end) {
     if (i->t > t_end) {
         double *between = s->work_advance;
         i->method->dense(i, t_end, between);
+        if (s->coarser > 1) PARTS.inside(s, i, t_end, between);
         if (leg_project(s, t_end, between) != OK) return FAILED;
         y = between;
     }
