@@ -36,6 +36,8 @@ static void layout(Instance *x, Arena *saved, Arena *scratch) {
     const int count = b->end - b->first;
     solver_layout(&b->solver, saved, scratch, MODEL_SYSTEM);
     b->solver.p = x->solver.p;
+    b->solver.alike = companion_alike(BAR_COARSER);
+    x->solver.alike = HUGE_VAL;
     observed_layout(&b->seen, scratch, MODEL_SYSTEM);
     b->kept = arena_take(saved, 1, sizeof *b->kept);
     b->worst = arena_doubles(saved, count);
@@ -57,8 +59,6 @@ static void share(Instance *x) {
     c->stop_time = x->solver.stop_time;
     c->settings = x->solver.settings;
     c->settings.tolerance *= BAR_COARSER;
-    c->coarser = BAR_COARSER;
-    x->solver.coarser = 1;
     if (has_fixed_step(x)) c->settings.step = step;
 }
 

@@ -13,17 +13,19 @@ static double power(double x, int n) {
     return product;
 }
 
-/* A step of dop853 that the delivered run could have taken, whose tolerance is s->coarser times finer. */
+double companion_alike(double coarser) {
+    return 0.9 * step_size_root(coarser, 8);
+}
+
 static int is_alike(const Solver *s, const Integrator *i) {
-    const double longer = 0.9 * step_size_root(s->coarser, 8);
-    return i->method == PARTS.methods[DOP853] && i->h_next >= longer * (i->t - i->t_old);
+    return i->method == PARTS.methods[DOP853] && i->h_next > s->alike * (i->t - i->t_old);
 }
 
 void companion_after_step(Solver *s, Integrator *i) {
     const int implicit = i->method != PARTS.methods[DOP853];
     const double local = power((i->t - i->t_old) * s->state.now.rate, implicit ? 6 : 9);
     if (local <= DBL_MAX - s->state.now.local[implicit]) s->state.now.local[implicit] += local;
-    if (!(s->coarser > 1) || !is_alike(s, i)) return;
+    if (!is_alike(s, i)) return;
     for (int j = 0; j < i->ny; j++) i->y[j] += PARTS.dop853_error(i, j);
 }
 

@@ -4,6 +4,10 @@
 
 #include "solver.h"
 
+/* solver.alike of a companion: the next step of dop853 is h_next = 0.9 h err^(-1/8), so that a step with
+ * h_next > alike h would be accepted at a tolerance `coarser` times finer too.  Of the delivered run: infinite. */
+double companion_alike(double coarser);
+
 /* After a step of either run, before it is projected.
  *
  * The local error of a method of order p grows with h^(p + 1): its sum over the steps, in units of the
