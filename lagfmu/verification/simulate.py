@@ -18,7 +18,7 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from .. import names
-from ..errors import SimulationError, VerificationError
+from ..errors import SettingError, SimulationError, VerificationError
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
 from ..model.scene import Scene
@@ -72,9 +72,9 @@ def simulate(
     values = dict(start_values or {})
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
         if number is not None and not 0 < number < np.inf:
-            raise SimulationError(f"{what} = {number!r} s, expected a positive number")
+            raise SettingError(f"{what} = {number!r} s, expected a positive number")
     if tolerance is not None and not 0 < tolerance < np.inf:
-        raise SimulationError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+        raise SettingError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared) and error_bars and not target.asked.error_bars:
@@ -261,7 +261,7 @@ def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[
         elif v.positive and not value > 0:
             problems.append(f"{name!r} = {value!r}, expected a positive number")
     if problems:
-        raise SimulationError(f"{what}: " + "; ".join(problems))
+        raise SettingError(f"{what}: " + "; ".join(problems))
 
 
 def items_of(variable: Any) -> dict[str, int]:

@@ -7,7 +7,7 @@ times as the FMU's default experiment does at its default values.
 Two runs that must agree are compared with what the problem itself makes of small changes: a third
 run, whose start values are shifted by SHIFT of their size, shows the amplification; a difference is
 right up to SAFETY * tol * max(1, N) times (1 + amplification so far), relative to the largest
-magnitude of the column.  N as in claims.py.
+magnitude of the column.  N as in closed_forms.py.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...fmu.session import RefusalError
-from .claims import laws, statements
+from .closed_forms import judged, laws
 from .facts import Facts, facts_of
 from .judge import EPS, Check, invariants, lost
 from .player import Drive, Player, Run, Values, play
@@ -52,7 +52,7 @@ class Bench:
         self.facts: Facts = facts_of(path)
         self.quick = quick
         self.forms = (
-            *statements(self.facts.claims, {i.name for i in self.facts.inputs}),
+            *judged(self.facts.closed_forms, {i.name for i in self.facts.inputs}),
             *laws(self.facts.laws),
         )
         self.folder = Path(fmpy.extract(str(path)))

@@ -13,7 +13,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from ... import names
-from ...fmu.claims import pack_closed_forms, unpack_closed_forms
+from ...fmu.closed_forms import pack_closed_forms, unpack_closed_forms
 from ...model.closed_form import TIME, ClosedForm
 from ...model.model import Contact, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
@@ -85,8 +85,8 @@ def geometry_of(fmu: Path) -> Geometry | None:
     file = _beside(fmu)
     if not file.exists():
         return None
-    claims = unpack_closed_forms(file.read_bytes(), str(file))
-    forms = {c.name: sp.sympify(c.expected) for c in claims}
+    closed_forms = unpack_closed_forms(file.read_bytes(), str(file))
+    forms = {c.name: sp.sympify(c.expected) for c in closed_forms}
     return Geometry(forms) if forms.get("count") == len(forms) - 1 else None
 
 
