@@ -35,8 +35,8 @@ REACTIONS = (MULTIPLIER, FORCE)
 MODES = (CONTACT, STICKS)
 OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING)
 RESERVED = (  # what nothing of a model's can be called
-    *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
-    *("t", "time", "unique", "velocity"),
+    *("Q", "contact", "count", "departure", "der", "energy", "error", "lambda", "residual"),
+    *("solver", "t", "time", "unique", "velocity"),
 )
 
 
@@ -102,6 +102,17 @@ def read(text: str) -> Subject:
         return Subject(OWN, coordinate=text)
     inner, _, order = text.removeprefix("der(").removesuffix(")").partition(",")
     return Subject(VALUE, "", inner, 0 if inner == text else int(order or 1))
+
+
+def bar(of: str) -> str:
+    """The error bar of a variable."""
+    return name(ERROR, "", of)
+
+
+def barred(text: str) -> str:
+    """The variable whose error bar it is; empty if it is none."""
+    found = read(text)
+    return found.coordinate if found.quantity == ERROR else ""
 
 
 def those(known: Iterable[str], *quantities: str) -> list[str]:
