@@ -220,6 +220,27 @@ def test_painleve_is_refused_by_name_and_only_there(
         assert start() == pytest.approx(g / inner, rel=1e-10)
 
 
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_painleve_is_looked_for_with_each_foot_in_the_air(
+    native: Make, target: str, way: int
+) -> None:
+    """On both feet sliding is well posed for any mu (det B = det K); on the front one alone it is up to
+    mu = (1/m + a^2/J) J/(a h) = 2.6, and beyond that there may be two solutions: refused."""
+    angle = {"alpha": 0.0, "der(x)": 1.0 * way}
+
+    def start(friction: float) -> np.ndarray:
+        run = {"stop_time": 1e-3, "step_size": 1e-3, "start_values": {**angle, "mu": friction}}
+        if target == "native":
+            return simulate(native(feet), **run)
+        return simulate(feet(), scene=Scene("Feet"), **run)
+
+    assert start(1.9)["der(x,2)"][0] == pytest.approx(-way * 1.9 * g, rel=1e-10)
+    assert start(2.59)["contact.low"][0] != start(2.59)["contact.up"][0]  # it tips over
+    with pytest.raises(SimulationError, match="has no acceleration, or several"):
+        start(2.61)
+
+
 @pytest.mark.parametrize(
     ("restitution", "friction"), [(0.0, 0.3), (0.5, 0.3), (0.0, 0.1), (1.0, 0.05)]
 )

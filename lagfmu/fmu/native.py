@@ -106,7 +106,11 @@ def sources_of(prepared: Prepared) -> Sources:
         prepared.model,
         f"lagfmu {version()}",
         {
-            **({} if system.estimated else {"ModelExchange": {**common, **MODEL_EXCHANGE}}),
+            **(
+                {}
+                if system.estimated or scene.error_bars
+                else {"ModelExchange": {**common, **MODEL_EXCHANGE}}
+            ),
             "CoSimulation": {**common, **CO_SIMULATION, **order},
         },
         b"".join(name.encode() + text for name, text in shipped.items()),

@@ -69,7 +69,7 @@ class {name}(Fmi2Slave):
     default_method = {method!r}
     default_step = {step!r}
     identity = {identity!r}
-'''
+{bars}'''
 
 
 def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
@@ -132,8 +132,16 @@ def _script(prepared: Prepared, table: VariableTable, package: str, methods: Seq
         numbers={NUMBERS[m]: m for m in methods},
         method=scene.method,
         step=scene.step,
+        bars=_bars(table),
         identity=f"{scene.name} {_digest(equations.encode(), rows.encode(), package.encode())}",
     )
+
+
+def _bars(table: VariableTable) -> str:
+    """The references of the error bars, and those of the variables whose bars they are."""
+    position = {v.name: k for k, v in enumerate(table.variables)}
+    found = tuple((position[v.name], position[v.bar_of]) for v in table.variables if v.bar_of)
+    return f"    barred = {found!r}\n" if found else ""
 
 
 def _row(v: Variable) -> tuple[Any, ...]:

@@ -39,6 +39,9 @@ from .variables import Value, Variable, VariableTable
 
 Expr = Any
 SPEED = METRE / SECOND
+BARRED = (  # what has an error bar, besides coordinates, velocities and outputs of one word
+    *(names.MULTIPLIER, names.FORCE, names.OWN, names.DEPARTURE_TIME, names.SLIP_TIME),
+)
 
 
 def variable_table(form: Form, scene: Scene) -> VariableTable:
@@ -232,6 +235,8 @@ class _Builder:
             *self.friction_outputs(),
             self.output(Subject(names.STEPS), "internal steps taken so far", None, (), "Integer"),
         ]
+        if self.scene.error_bars:
+            variables += self.error_bars(variables)
         n = len(self.state_names) // 2
         q = self.state_names[:n]
         derivatives = [derivative(c, k) for c in q for k in (1, 2)]
@@ -488,6 +493,20 @@ class _Builder:
             text = "energy that frictions and impacts dissipated so far (Model Exchange: impacts)"
             variables.append(self.output(Subject(names.DISSIPATED), text, ENERGY, ()))
         return variables
+
+    def error_bars(self, variables: Iterable[Variable]) -> list[Variable]:
+        """One for each lambda, Q, coordinate, velocity, own output, and time of an event."""
+        text = (
+            "error bar of {}: an estimate of how far it may be off, by a run at a coarser tolerance"
+        )
+        return [
+            self.output(
+                Subject(names.ERROR, "", v.name), text.format(v.name), v.unit, (), discrete=True
+            )
+            for v in variables
+            if v.of.quantity in BARRED
+            or (v.of.quantity == names.VALUE and v.of.order < 2 and v.role in ("output", "start"))
+        ]
 
     def _event(self, quantity: str, of: str, what: str) -> list[Variable]:
         """How often it happened; time, coordinates and velocities when it did so last."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from .. import names
 from ..codegen.py.equations import compile_system, lower, source
 from ..errors import CannotStartError, DerivationError, ModelError
 from ..interface.table import variable_table
@@ -14,10 +15,10 @@ from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import reduce
 from ..mechanics.jumps import with_jumps
-from ..model.frictions import stuck
 from ..model.model import Contact, Model, name_of
 from ..model.scene import Scene
 from ..model.selection import select
+from ..model.stuck import stuck
 from ..solver.system import System
 from .consistency import Structure, check_embedding, check_held, examine
 
@@ -226,4 +227,8 @@ def _refused_with_friction(eom: EquationsOfMotion, scene: Scene) -> list[str]:
 
 
 def _outputs(table: VariableTable, scene: Scene, problems: list[str]) -> tuple[str, ...]:
-    return select(scene.outputs, [v.name for v in table.outputs], "output", problems)
+    known = [v.name for v in table.outputs]
+    found = set(select(scene.outputs, known, "output", problems))
+    found |= {names.barred(name) for name in found}  # a bar is of an output, ...
+    found |= {names.bar(name) for name in found}  # ... and an output has its own
+    return tuple(name for name in known if name in found)

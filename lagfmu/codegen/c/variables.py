@@ -11,6 +11,7 @@ from ... import names
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.form import Form
 from ...model.scene import Scene
+from ...solver.bars import COARSER, MARGIN, ROUNDING
 from ...solver.system import System
 from .printer import string
 
@@ -22,6 +23,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include <math.h>
 #include <stddef.h>
 
+#include "bars.h"
 #include "identity.h"
 #include "state.h"
 #include "variables.h"
@@ -35,6 +37,10 @@ const char *const MODEL_IDENTIFIER = {identifier};
 const char *const MODEL_GUID = LAGFMU_GUID;
 const double DEFAULT_TOLERANCE = {tolerance};
 const int DEFAULT_METHOD = {method};
+{bars}"""
+NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
+WITH_BARS = f"""const ErrorBars *const ERROR_BARS = &BARS;
+const double BAR_COARSER = {COARSER!r}, BAR_MARGIN = {MARGIN!r}, BAR_ROUNDING = {ROUNDING!r};
 """
 
 
@@ -43,7 +49,12 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
     eom, stepped = form.equations, form.stepped
     place = Places(system, [str(s) for s in eom.u], [str(s) for s in eom.p])
     states = {str(s): j for j, s in enumerate((*stepped.q, *stepped.v))}
-    rows = [f"    {_row(v, place.of(v), states)},\n" for v in table.variables]
+    position = {v.name: k for k, v in enumerate(table.variables)}
+    number = {v.name: k for k, v in enumerate(v for v in table.variables if v.bar_of)}
+    rows = []
+    for v in table.variables:
+        at = ("ERROR", position[v.bar_of], number[v.name]) if v.bar_of else place.of(v)
+        rows.append(f"    {_row(v, at, states)},\n")
     return HEAD.format(
         name=scene.name,
         rows="".join(rows),
@@ -51,6 +62,7 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
         identifier=string(scene.name),
         tolerance=repr(float(scene.tolerance)),
         method=scene.method.upper(),
+        bars=WITH_BARS if scene.error_bars else NO_BARS,
     )
 
 

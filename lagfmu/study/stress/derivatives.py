@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from ... import names
 from ...verification.verify import applies
 from .bench import Bench, Finding
-from .claims import Statement
+from .closed_forms import JudgedForm
 from .facts import Facts
 from .judge import Check
 from .player import table
@@ -43,15 +44,15 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
 class _Law:
     """R's partial derivatives by the variables `moving`, of the variables `needs`."""
 
-    statement: Statement
+    judged: JudgedForm
     moving: tuple[str, ...]
     needs: tuple[str, ...]
     slopes: Callable[..., Any]
 
 
-def _law(form: Statement, variables: set[str]) -> _Law | None:
+def _law(form: JudgedForm, variables: set[str]) -> _Law | None:
     """None where R has no derivative everywhere."""
-    R = sp.sympify(form.claim.actual) - sp.sympify(form.claim.expected)
+    R = sp.sympify(form.closed_form.actual) - sp.sympify(form.closed_form.expected)
     symbols = sorted(R.free_symbols, key=str)
     by = [s for s in symbols if str(s) in variables]
     slopes = [] if R.has(*KINKED) else [R.diff(s) for s in by]
@@ -77,7 +78,7 @@ def _along_each(bench: Bench) -> Finding:
             rows[name][0] = value
         asked = [n for n in reals if _defined(n, values)]
         laws = [x for x in forms if x is not None and {*x.moving} <= {*asked, *seeds}]
-        laws = [x for x in laws if applies(x.statement.claim, rows, known)[0]]
+        laws = [x for x in laws if applies(x.judged.closed_form, rows, known)[0]]
         for seed in seeds:
             references = player.references(asked), player.references([seed])
             found = player.call("getDirectionalDerivative", *references, [1.0])
@@ -88,13 +89,15 @@ def _along_each(bench: Bench) -> Finding:
 
 def _defined(name: str, values: Mapping[str, Any]) -> bool:
     """A multiplier that is not unique has no derivative."""
-    constraint = name.removeprefix("lambda.")
-    return name == constraint or bool(values[f"unique.{constraint}"])
+    of = names.read(name)
+    if of.quantity != names.MULTIPLIER:
+        return True
+    return bool(values[names.name(names.UNIQUE, of.constraint)])
 
 
 def _missed(law: _Law, values: Mapping[str, Any], changes: Mapping[str, float], seed: str) -> Check:
     slopes = np.array(law.slopes(*(float(values[n]) for n in law.needs)), dtype=float)
     terms = slopes * [changes[n] for n in law.moving]
     allowed = WITHIN * float(np.abs(terms).sum()) + float(np.finfo(float).tiny)
-    what = f"{law.statement.claim.name} along {seed}"
+    what = f"{law.judged.closed_form.name} along {seed}"
     return Check(what, abs(float(terms.sum())), allowed)

@@ -12,7 +12,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...fmu.claims import pack_closed_forms, unpack_closed_forms
+from ... import names
+from ...fmu.closed_forms import pack_closed_forms, unpack_closed_forms
 from ...model.closed_form import TIME, ClosedForm
 from ...model.model import Contact, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
@@ -67,15 +68,15 @@ class Geometry:
                 G[k, i] = known.get(f"row:{c}:{a}", 0.0)
         for k, c in enumerate(self.names):
             each[:, k] = [known.get(f"{what}:{c}", 0.0) for what in ("gap", "speed", "restitution")]
-        v = np.array([values[f"der({n})"] for n in self.coordinates])
+        v = np.array([values[names.derivative(n)] for n in self.coordinates])
         f, s, e = each
         return Collision(M, G, f, s, e, G @ v - s)
 
 
 def lay_geometry(fmu: Path, prepared: Prepared) -> None:
     """Write it to where the judge of the FMU looks for it."""
-    names = {v.name for v in prepared.table.variables}
-    forms = [ClosedForm(n, e, sp.S.Zero) for n, e in _forms(prepared.model, names).items()]
+    known = {v.name for v in prepared.table.variables}
+    forms = [ClosedForm(n, e, sp.S.Zero) for n, e in _forms(prepared.model, known).items()]
     _beside(fmu).write_bytes(pack_closed_forms(prepared.scene, forms, prepared.table))
 
 
@@ -84,8 +85,8 @@ def geometry_of(fmu: Path) -> Geometry | None:
     file = _beside(fmu)
     if not file.exists():
         return None
-    claims = unpack_closed_forms(file.read_bytes(), str(file))
-    forms = {c.name: sp.sympify(c.expected) for c in claims}
+    closed_forms = unpack_closed_forms(file.read_bytes(), str(file))
+    forms = {c.name: sp.sympify(c.expected) for c in closed_forms}
     return Geometry(forms) if forms.get("count") == len(forms) - 1 else None
 
 
@@ -98,7 +99,7 @@ def _beside(fmu: Path) -> Path:
     return fmu.with_suffix(".impacts.json")
 
 
-def _forms(model: Model, names: set[str]) -> dict[str, Expr]:
+def _forms(model: Model, known: set[str]) -> dict[str, Expr]:
     forms: dict[str, Expr] = {}
     rates = {q: q.diff(TIME) for q in model.coordinates}
     for q, v in rates.items():
@@ -121,6 +122,6 @@ def _forms(model: Model, names: set[str]) -> dict[str, Expr]:
         if isinstance(c, Contact):
             forms[f"restitution:{c.name}"] = sp.sympify(c.restitution)
     forms = {n: e for n, e in forms.items() if e != 0}
-    if any(f"der({name_of(q)})" not in names for q in rates):
+    if any(names.derivative(name_of(q)) not in known for q in rates):
         forms = {}
     return forms | {"count": sp.Integer(len(forms))}
