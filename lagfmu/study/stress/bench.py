@@ -155,8 +155,13 @@ class Bench:
             count = 0.0
         return max(count, 1.0)
 
-    def _counted(self, run: Run) -> NDArray[np.float64]:
-        """The integral of the natural rate over time."""
+    @cached_property
+    def fastest_rate(self) -> float:
+        """The largest natural rate [1/s] in the default experiment.  Raises RefusalError."""
+        return max(float(self._rates(self.ordinary).max()), self.ordinary_rate)
+
+    def _rates(self, run: Run) -> NDArray[np.float64]:
+        """The natural rate at each point."""
         rate = np.zeros(len(run.rows))
         with np.errstate(all="ignore"):
             for q in self.facts.coordinates:
@@ -165,6 +170,12 @@ class Bench:
                 v = np.abs(run.rows[names.derivative(q)])
                 vdot = np.abs(run.rows[names.derivative(q, 2)])
                 rate = np.maximum(rate, np.maximum(v / size, np.sqrt(vdot / size)))
+        return rate
+
+    def _counted(self, run: Run) -> NDArray[np.float64]:
+        """The integral of the natural rate over time."""
+        rate = self._rates(run)
+        with np.errstate(all="ignore"):
             parts = np.diff(run.rows["time"]) * (rate[1:] + rate[:-1]) / 2
         counted: NDArray[np.float64] = np.concatenate([[0.0], np.cumsum(parts)])[: len(rate)]
         return np.where(np.isfinite(counted), counted, 0.0)

@@ -1,6 +1,6 @@
 """The closed forms that an FMU carries, compiled once, with the error that each is allowed.
 
-A closed form `actual = expected` that follows the motion (it knows the start, the time or a departure, or
+A closed form `actual = expected` that follows the motion (it knows the start, the time or an event, or
 says that something is conserved) may be off by
 
     LEEWAY * within * tol * max(1, N) * A * size,    at least    LEEWAY * rounding * max(1, N) * A * size
@@ -154,7 +154,7 @@ def judged(closed_forms: tuple[CarriedForm, ...], inputs: set[str]) -> tuple[Jud
         parts = [c.actual] + ([] if c.expected is None else [c.expected])
         used = {str(s) for e in parts for s in sp.sympify(e).free_symbols}
         follows = any(
-            u == "time" or names.initially(u) or names.read(u).head == names.DEPARTURE for u in used
+            u == "time" or names.initially(u) or names.read(u).head in names.EVENTS for u in used
         )
         found.append(_judged(c, c.expected is not None and not follows, False, inputs))
     return tuple(found)
