@@ -94,7 +94,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     const int watch = indicators_count(s->system) > 0;
     double *y1 = s->work_advance;
     if (leg_step(s, i, bound, longest) != OK) return FAILED;
-    if (s->coarser > 0) PARTS.after_step(s, i);
+    if (s->alike > 0) PARTS.after_step(s, i);
     if ((watch || i->t > t_end) && leg_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (leg_project(s, i->t, y1) != OK) return FAILED;
@@ -165,6 +165,7 @@ static Status put_between(Solver *s, double t) {
     const Integrator *i = &s->integrator;
     double *y = s->work_advance;
     i->method->dense(i, t, y);
+    if (s->alike > 0) PARTS.inside(s, i, t, y);
     if (leg_project(s, t, y) != OK) return FAILED;
     put(s, t, y);
     return OK;

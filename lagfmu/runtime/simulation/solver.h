@@ -12,7 +12,7 @@ typedef struct {
     Settings settings;
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
-    double coarser;            /* with error bars: the tolerance in those of the delivered run, 1 or more; else 0 */
+    double alike;              /* with error bars, else 0: see companion.h */
     State state;
     Drive drive;
     double *p;                 /* (parameters) */
