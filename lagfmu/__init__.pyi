@@ -2,6 +2,7 @@
 
 from .api import build_fmu, show, verify
 from .errors import LagfmuError, VerificationError
+from .live.command import play
 from .mechanics.equations import EquationsOfMotion, derive
 from .mechanics.integrability.classify import classify
 from .model.closed_form import ClosedForm, Conserved, departure, initial, output
@@ -61,6 +62,7 @@ __all__ = [
     "initial",
     "multiplier",
     "output",
+    "play",
     "show",
     "simulate",
     "sweep",

@@ -30,7 +30,7 @@ from lagfmu import (
 t = dynamicsymbols._t
 x, y, theta = dynamicsymbols("x y theta")
 m, g, l = symbols("m g l", positive=True)  # noqa: E741 - half of the length
-mu = symbols("mu", nonnegative=True)
+mu, e = symbols("mu e", nonnegative=True)
 
 foot = (x - l * cos(theta), y - l * sin(theta))
 head = (x + l * cos(theta), y + l * sin(theta))
@@ -42,16 +42,17 @@ model = Model(
     - m * g * y,
     coordinates={x: "m", y: "m", theta: "rad"},
     constraints=[
-        Contact("floor", y - l * sin(theta), "the foot stands on the floor"),
+        Contact("floor", y - l * sin(theta), "the foot stands on the floor", restitution=e),
         Nonholonomic("foot", x.diff() + l * sin(theta) * theta.diff(), "the foot rests"),
         Friction("grip", of=["foot"], normal=multiplier("floor"), static=mu),
-        Contact("lying", y + l * sin(theta), "the head hits the floor"),
+        Contact("lying", y + l * sin(theta), "the head hits the floor", restitution=e),
     ],
     parameters=[
         Parameter(m, 1.0, "kg", "mass of the rod", min=0),
         Parameter(g, 9.81, "m/s^2", "acceleration of gravity", min=0),
         Parameter(l, 1.0, "m", "half of its length", min=0),
         Parameter(mu, 0.5, "1", "coefficient of friction", min=0),
+        Parameter(e, 0.0, "1", "coefficient of restitution", min=0, max=1),
     ],
     outputs=[Output("head.height", y + l * sin(theta), "m", "height of the upper end")],
     start={x: 0.0, y: 0.9320390859672263, theta: 1.2},

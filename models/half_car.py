@@ -14,11 +14,11 @@ from lagfmu import (
     ClosedForm,
     Contact,
     Disk,
-    Ground,
     Input,
     Model,
     Output,
     Parameter,
+    Path,
     Rod,
     Scene,
     Spline,
@@ -29,6 +29,7 @@ from lagfmu import (
 
 t = dynamicsymbols._t
 z, theta, zf, zr, s = dynamicsymbols("z theta zf zr s")
+w = symbols("w", real=True)  # m, along the drawn road
 M, J, m, g, a, b, k = symbols("M J m g a b k", positive=True)
 c = symbols("c", nonnegative=True)
 
@@ -91,6 +92,7 @@ model = Model(
         zr: "rear wheel, above its place at rest",
     },
     outputs=[
+        Output("way", s, "m", "of the body's centre along the road, as it is driven"),
         Output("body.acceleration", z.diff(t, 2), "m/s^2", "what the passenger feels"),
         Output("front.travel", df, "m", "compression of the front spring"),
         Output("rear.travel", dr, "m", "compression of the rear spring"),
@@ -114,12 +116,7 @@ model = Model(
         Spring((-b, zr + WHEEL), (-b, z - b * theta + HIGH), coils=5),
         Disk((a, zf + WHEEL), radius=WHEEL),
         Disk((-b, zr + WHEEL), radius=WHEEL),
-        Ground(
-            (a - WHEEL, zf - output("residual.front")), (a + WHEEL, zf - output("residual.front"))
-        ),
-        Ground(
-            (-b - WHEEL, zr - output("residual.rear")), (-b + WHEEL, zr - output("residual.rear"))
-        ),
+        Path((w, road(output("way") + w)), w, -3, 3),
         Arrow("front", at=(a, zf)),
         Arrow("rear", at=(-b, zr)),
     ],
@@ -160,6 +157,7 @@ closed_forms += [
         "weight and loads",
         M * z.diff(t, 2) + m * (zf.diff(t, 2) + zr.diff(t, 2)) + (M + 2 * m) * g,
         actual=output("lambda.front") + output("lambda.rear"),
-        scale=M * g + c * s.diff(),
+        # the springs' pushes cancel to rounding of their own ends
+        scale=M * g + c * s.diff() + k * (abs(z) + abs(zf) + abs(zr) + (a + b) * abs(theta)),
     ),
 ]

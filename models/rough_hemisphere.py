@@ -118,7 +118,7 @@ closed_forms = [
         cos(angle),
         actual=w(angle),
         at_departure="surface",
-        when=first * sign(sin(initial(theta)) - mu_s * cos(initial(theta))),
+        when=first * (1 - upwards) * sign(sin(initial(theta)) - mu_s * cos(initial(theta))),
     ),
     Conserved(
         "energy and heat", output("energy.total") + output("energy.dissipated"), scale=m * g * a

@@ -15,7 +15,6 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter
 from lagfmu.mechanics.equations import derive
-from lagfmu.mechanics.formulations.nullspace import accelerations
 from lagfmu.model.scene import Scene
 from lagfmu.page.documentation import page
 from lagfmu.page.text import show
@@ -92,7 +91,7 @@ def test_printed_equations_are_those_that_are_integrated(model):
     """Read back, they say M v' = F + G^T lambda, Q = G^T lambda and G v' = gamma."""
     eom = derive(model)
     sections = {section.title: section.equations for section in typeset(eom)}
-    vdot = accelerations(eom)
+    vdot = eom.vdot
     generator = random.Random(3)
     notation = Notation(eom)
     point = {symbol: generator.uniform(-2, 2) for symbol in notation.into}

@@ -23,7 +23,7 @@ from lagfmu import (
     multiplier,
     simulate,
 )
-from lagfmu.errors import ModelError
+from lagfmu.errors import ModelError, SimulationError
 from lagfmu.fmu.claims import claims_of
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
@@ -41,6 +41,7 @@ FILES = {
     "InclineFriction": "incline_friction",
     "Bowling": "bowling",
     "RoughHemisphere": "rough_hemisphere",
+    "SlippingSphere": "rolling_sphere",
 }
 Build = Callable[..., Path]
 
@@ -54,11 +55,15 @@ def rubbing(tmp_path_factory: pytest.TempPathFactory) -> Build:
         if (name, target) not in made:
             file = load(MODELS / f"{FILES[name]}.py")
             folder = tmp_path_factory.mktemp(target)
-            prepared = prepare(file.model, file.scenes[0])
+            prepared = prepare(file.model, scene_of(name))
             made[name, target] = write(prepared, folder, file.closed_forms, target=target)
         return made[name, target]
 
     return get
+
+
+def scene_of(name: str) -> Scene:
+    return next(s for s in load(MODELS / f"{FILES[name]}.py").scenes if s.name == name)
 
 
 def built(model: Model, folder: Path) -> Path:
@@ -70,7 +75,7 @@ def misses(name: str, result: Any, values: dict[str, float], tolerance: float) -
     file = load(MODELS / f"{FILES[name]}.py")
     known = {str(p.symbol): p.value for p in file.model.parameters} | values
     found = {}
-    for claim in claims_of(file.scenes[0], file.closed_forms):
+    for claim in claims_of(scene_of(name), file.closed_forms):
         check = check_claim(claim, result, known, tolerance)
         if check.points:
             found[claim.name] = check.error / check.allowed
@@ -91,6 +96,7 @@ RUNS: dict[str, list[dict[str, float]]] = {
         {"alpha": 0.2, "der(y)": -1.0, "der(theta)": 3.0, "kappa": 1.0},
     ],
     "Bowling": [{}, {"der(x)": 3.0, "der(phi)": -20.0, "mu": 0.3}],
+    "SlippingSphere": [{}, {"mu_s": 1.2, "mu_k": 0.9}, {"theta": 0.3, "mu_k": 0.05}],
     "RoughHemisphere": [{}, {"theta": 0.2}, {"theta": 0.4, "mu_k": 0.3}, {"der(theta)": 0.9}],
 }
 
@@ -108,7 +114,7 @@ def test_each_motion_is_that_of_its_closed_forms(
         assert all(miss < 1 for miss in found.values()), (values, found)
         reached |= found.keys()
     file = load(MODELS / f"{FILES[name]}.py")
-    assert reached == {c.name for c in claims_of(file.scenes[0], file.closed_forms)}
+    assert reached == {c.name for c in claims_of(scene_of(name), file.closed_forms)}
 
 
 @pytest.mark.parametrize("name", sorted(RUNS))
@@ -139,9 +145,9 @@ def test_reported_values_obey_lagranges_and_coulombs_laws_to_rounding(
     """Each equation of motion, each constraint, the cone and the force of sliding, from the model file alone:
     relative to its own terms 1e-13, the cone 1e-12."""
     file = load(MODELS / f"{FILES[name]}.py")
-    prepared = prepare(file.model, file.scenes[0])
+    prepared = prepare(file.model, scene_of(name))
     laws = lagrange(file.model, frozenset(v.name for v in prepared.table.variables))
-    claims = claims_of(file.scenes[0], laws)
+    claims = claims_of(scene_of(name), laws)
     assert any(c.name == "cone of grip" for c in claims)
     for values in RUNS[name]:
         result = simulate(rubbing(name), start_values=values, step_size=0.0137)
@@ -208,6 +214,18 @@ def test_both_targets_tell_the_same_motion(rubbing: Build, name: str) -> None:
         if column != "solver.steps":
             a, b = (np.asarray(x[column], dtype=float) for x in (ours, theirs))
             assert a == pytest.approx(b, rel=1e-6, abs=1e-6 * max(1e-3, np.abs(b).max())), column
+
+
+def test_a_friction_that_shall_not_slip_is_the_plain_constraint() -> None:
+    """Scene(frictions=()): on a smooth incline the disk rolls, lambda = -(1/3) M g sin(alpha); coefficients,
+    modes and heat are no more, and `minimal` is there again."""
+    file = load(MODELS / "incline_friction.py")
+    scene = Scene("Rolls", frictions=(), contacts=(), formulation="minimal")
+    run = simulate(file.model, scene=scene, stop_time=1.0, step_size=0.5)
+    assert run["lambda.rolling"] == pytest.approx(-g * np.sin(np.pi / 6) / 3, rel=1e-12)
+    assert run["y"][-1] == pytest.approx(g * np.sin(np.pi / 6) / 3, rel=1e-8)
+    names = {v.name for v in prepare(file.model, scene).table.variables}
+    assert not names & {"mu_s", "mu_k", "sticks.grip", "slip.rolling", "energy.dissipated"}
 
 
 # ------------------------------------------------------------------ what is refused
@@ -320,3 +338,14 @@ def test_a_multiplier_in_a_force_is_told_of_friction() -> None:
     """A force that is limited by another is a Friction, not an expression."""
     with pytest.raises(ModelError, match="is a Friction in `constraints`"):
         block(forces={x: -mu * N})
+
+
+def test_a_power_that_is_no_number_is_refused(rubbing: Build) -> None:
+    """m g R sqrt(g/R) at g = 1e300 m/s^2 is beyond all doubles: never -inf with fmi2OK."""
+    with pytest.raises(SimulationError, match=r"not finite at t = .*: power\.grip"):
+        simulate(
+            rubbing("RoughHemisphere"),
+            start_values={"g": 1e300},
+            stop_time=2e-150,
+            step_size=1e-150,
+        )

@@ -10,6 +10,9 @@ import pytest
 
 from lagfmu.solver.failure import StepFailureError
 from lagfmu.solver.linear import solve, solve_nullspace
+from lagfmu.solver.solution import Solution
+from lagfmu.solver.straight import solver_of
+from lagfmu.solver.system import HOLONOMIC, Row, System
 
 SOLVERS = pytest.mark.parametrize("solver", [solve, solve_nullspace])
 
@@ -274,3 +277,43 @@ def test_eliminating_lambda_gives_the_same(seed):
             found.lam, lam, rtol=0, atol=1e-12 * max(np.abs(lam).max(initial=0), 1e-300)
         )
         np.testing.assert_allclose(M @ found.x - G.T @ found.lam, b, atol=1e-11)
+
+
+def in_straight_lines(M, b, G, c):
+    """What straight.py says of the matrices, whose zeros are structural."""
+    mass = [(i, j) for i, j in zip(*np.nonzero(M), strict=True) if i >= j]
+    entries = list(zip(*np.nonzero(G), strict=True))
+    n, m = len(b), len(c)
+    system = System(
+        tuple(f"q{i}" for i in range(n)),
+        tuple(Row(f"r{k}", HOLONOMIC) for k in range(m)),
+        tuple(zip(*mass, strict=True)),
+        tuple(zip(*entries, strict=True)) or ((), ()),
+        *(None,) * 4,
+    )
+    solve = solver_of(system, range(m))
+    values = [float(M[place]) for place in mass], [float(G[place]) for place in entries]
+    return solve and solve(values[0], b.tolist(), values[1], c.tolist())
+
+
+@pytest.mark.parametrize("slope", [(0.0, -1.0), (0.6, -0.8)], ids=["hanging", "slanting"])
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_straight_lines_give_the_same_chain(slope, count):
+    """A chain of equal masses, whose rods carry all that hangs below them, solved term by term over the
+    entries that are not zero: lambda to 1e-12."""
+    system = hanging_chain([1.0] * count, slope)
+    x, lam = in_straight_lines(*system)
+    check(Solution(np.array(x), np.array(lam), np.ones(count, dtype=bool)), *system)
+
+
+def test_straight_lines_leave_to_the_ladder_what_needs_it():
+    """A light mass between heavy ones, a constraint given twice, a force that is no number, a mass whose
+    principal axes nearly vanish: the short way says nothing."""
+    assert in_straight_lines(*hanging_chain([1.0, 1e-3, 1.0])) is None
+    M, b, G, c = hanging_chain([1.0])
+    assert in_straight_lines(M, b, np.vstack([G, G]), np.append(c, c)) is None
+    assert in_straight_lines(M, np.array([np.inf, 0.0]), G, c) is None
+    assert in_straight_lines(M, b, G, np.array([np.nan])) is None
+    tied = np.array([[1.0, 1 - 1e-4], [1 - 1e-4, 1.0]])
+    assert in_straight_lines(tied, b, G, c) is None
+    assert in_straight_lines(tied * [[1, -1], [-1, 1]] * 1e-3 + np.eye(2), b, G, c) is not None

@@ -8,16 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy as sp
 from browser import Page
 from conftest import FILES, MODELS
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Arrow, Disk, Holonomic, Line, Model, Parameter, Rod, Scene, output
+from lagfmu import Arrow, Disk, Holonomic, Line, Model, Parameter, Rod, Scene, Spline, output
 from lagfmu import Path as Curve
 from lagfmu.errors import BuildError, ModelError
 from lagfmu.live.playable import playable as playable_of
+from lagfmu.live.render import render
 from lagfmu.model.file import load
 from lagfmu.page.picture import as_bytes, direction, pack, picture_of, read_picture, values
 from lagfmu.prepare.prepare import Prepared, prepare
@@ -208,7 +210,6 @@ def test_the_arrow_is_as_long_as_the_force(opened: Callable[..., Page]) -> None:
 def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
     """A spherical pendulum: z stays upward on the screen as the view is turned."""
     from lagfmu.live.playable import playable as playable_of
-    from lagfmu.live.render import render
 
     z = dynamicsymbols("z")
     m, g = sp.symbols("m g", positive=True)
@@ -246,3 +247,33 @@ def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
     assert places[0] != places[1]
     page.close()
     assert page.problems == []
+
+
+@pytest.mark.parametrize("ends", ["natural", "periodic"])
+def test_a_table_is_drawn_as_it_is(ends: str) -> None:
+    """A road in a picture has the table's height between, at and beyond its points, also read from an FMU."""
+    road = Spline("road", [0, 1, 2.5, 4], [0, 0.1, -0.2, 0], "m", "m", ends=ends)
+    line = {"kind": "disk", "center": [pack(road(2 * sp.Symbol("s"))), 0.0]}
+    found = read_picture(as_bytes({"dimensions": 2, "shapes": [line]}))["shapes"][0]["center"][0]
+    places = np.array([-3.0, 0.0, 0.4, 0.5, 1.1, 1.25, 2.0, 5.0])
+    heights = values(found, lambda name: places)
+    assert heights == pytest.approx([road.table(2 * p) for p in places], abs=1e-15)
+    wrong = {"kind": "disk", "center": [["spline", 0.0, 0.0, 1.0, 2.0], 0.0]}
+    text = as_bytes({"dimensions": 2, "shapes": [wrong]})
+    with pytest.raises(BuildError, match="five a row"):
+        read_picture(text)
+
+
+def test_the_road_passes_below_the_car(opened: Callable[..., Page], tmp_path: Path) -> None:
+    """The page draws the table as a curve that is finite everywhere, and moves it along with s."""
+    page = opened("HalfCar")
+    page.until("lagfmu.runs")
+    drawn = []
+    for key in ("Home", "End"):
+        page.tab.locator("#scrub").focus()
+        page.tab.keyboard.press(key)
+        page.tab.wait_for_timeout(100)
+        page.tab.screenshot(path=str(tmp_path / f"{key}.png"))
+        drawn.append(page.tab.locator("#picture .path").get_attribute("points"))
+    assert "NaN" not in drawn[0] + drawn[1]
+    assert drawn[0] != drawn[1]

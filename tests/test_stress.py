@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,17 +16,19 @@ import numpy as np
 import pytest
 from conftest import FILES, MODELS
 from rich.console import Console
+from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu.cli import stress as command
+from lagfmu.cli.app import app
 from lagfmu.cli.stress import stress
+from lagfmu.fmu.session import RefusalError
 from lagfmu.model.model import name_of
 from lagfmu.study.stress import worker
 from lagfmu.study.stress.bench import Bench, Finding
 from lagfmu.study.stress.claims import magnitude
 from lagfmu.study.stress.judge import Check, first_landing
 from lagfmu.study.stress.lagrange import lay_beside
-from lagfmu.study.stress.player import RefusalError
 from lagfmu.study.stress.probe import (
     CONSISTENT,
     REFUSED,
@@ -39,6 +42,7 @@ from lagfmu.study.stress.probe import (
 )
 from lagfmu.study.stress.report import VERDICTS, Stressed
 from lagfmu.study.stress.summary import as_summary
+from lagfmu.verification.pipeline import NOT_RUN, WRONG_USAGE
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +74,8 @@ def judged(bench, change):
 def test_the_hemisphere_is_never_wrong(native_fmu, tmp_path):
     """Every quick probe is right or refused; the summary is a table, a JSON file and a Markdown file."""
     text = io.StringIO()
-    (found,) = stress([native_fmu("Hemisphere")], tmp_path, Console(file=text), quick=True)
+    (tried,) = stress([native_fmu("Hemisphere")], tmp_path, Console(file=text), quick=True)
+    found = tried.found
     assert [r for r in found.rows if r.verdict in (WRONG, UNFINISHED)] == []
     assert found.count(RIGHT) > 50
     assert found.count(REFUSED) > 10
@@ -253,8 +258,9 @@ def test_a_refusal_needs_a_cause():
     assert verdict(Probe("", "", lambda bench: Finding(())), Finding(()), 0.0).verdict == WRONG
 
 
-def test_a_crash_is_one_wrong_row(native_fmu, monkeypatch, tmp_path):
-    """The probe that takes the process down is wrong, one that hangs is unfinished, the rest goes on."""
+@pytest.fixture
+def four_probes(monkeypatch, tmp_path):
+    """In place of all: one that is right, one that crashes, one that hangs, one that is right."""
     program = tmp_path / "worker.py"
     program.write_text(
         "import os, sys, time\n"
@@ -271,23 +277,50 @@ def test_a_crash_is_one_wrong_row(native_fmu, monkeypatch, tmp_path):
     popen = command.subprocess.Popen
 
     def start(arguments, **named):
-        return popen([arguments[0], str(program), *arguments[3:]], **named)
+        if "lagfmu.study.stress.worker" in arguments:
+            arguments = [arguments[0], str(program), *arguments[3:]]
+        return popen(arguments, **named)
 
     monkeypatch.setattr(command.subprocess, "Popen", start)
-    out = Console(file=io.StringIO())
-    (found,) = stress([native_fmu("Hemisphere")], tmp_path, out, quick=True, limit=1.0)
-    assert [r.verdict for r in found.rows] == [RIGHT, WRONG, UNFINISHED, RIGHT]
-    assert "SIGABRT" in found.rows[1].detail
+
+
+@pytest.mark.usefixtures("four_probes")
+def test_a_crash_is_one_wrong_row(native_fmu, tmp_path):
+    """A probe that takes the process down is wrong, one that hangs is unfinished, the rest goes on; JSON and
+    JUnit say the same, and a file that is missing is an error of its own: exit code 3, the worst of all."""
+    xml, data, fmu = tmp_path / "out.xml", tmp_path / "out.json", str(native_fmu("Hemisphere"))
+    words = ["stress", fmu, "--quick", "--limit", "1", "--out", str(tmp_path / "out")]
+    files = ["--junit", str(xml), "--json", str(data)]
+    done = CliRunner().invoke(app, [*words, str(tmp_path / "gone.fmu"), *files])
+    assert done.exit_code == NOT_RUN
+    assert "there is no such file" in " ".join(done.output.split())
+    found, gone = json.loads(data.read_text())
+    assert [r["verdict"] for r in found["rows"]] == [RIGHT, WRONG, UNFINISHED, RIGHT]
+    assert "SIGABRT" in found["rows"][1]["detail"]
+    assert (found["verdict"], gone["verdict"]) == ("fail", "not run")
+    first, second = ET.parse(xml).getroot().findall("testsuite")
+    assert [first.get(what) for what in ("tests", "failures", "skipped")] == ["4", "1", "1"]
+    assert second.get("errors") == "1"
+
+
+def test_what_cannot_be_meant_is_wrong_usage(tmp_path):
+    """A time limit of 0 s, a scene that no file has: exit code 2, and nothing is built."""
+    model = str(MODELS / "hemisphere.py")
+    for words in ([model, "--limit", "0"], [model, "--scene", "Nobody"]):
+        done = CliRunner().invoke(app, ["stress", *words, "--out", str(tmp_path / "out")])
+        assert done.exit_code == WRONG_USAGE
+    assert not (tmp_path / "out").exists()
 
 
 def test_terms_count_in_full():
     """magnitude(a - b) = |a| + |b|: what cancels is no more accurate than its terms."""
-    from sympy import cos, symbols
+    from sympy import cos, sign, symbols
 
     a, b, x = symbols("a b x", real=True)
     assert magnitude(a - b).subs({a: 3, b: 3}) == 6
     assert float(magnitude(1 - cos(x)).subs(x, 1e-3)) == pytest.approx(2, rel=1e-5)
     assert float(magnitude(a**2 * b).subs({a: -2, b: -3})) == 12
+    assert magnitude(3 * sign(x)).subs(x, -1e-3) == 3  # its slope is none that counts
 
 
 def test_probes_cover_the_ranges(bench):

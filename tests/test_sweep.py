@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +14,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +24,7 @@ from typer.testing import CliRunner
 import lagfmu
 from lagfmu.cli import app
 from lagfmu.errors import SimulationError
+from lagfmu.fmu.archive import version
 from lagfmu.fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, Session, plug
 from lagfmu.study.sweep import engine
 from lagfmu.study.sweep.design import axis, design, distribution, sampled
@@ -252,22 +256,49 @@ def test_bad_input_is_told_with_the_remedy(hemisphere, options, message):
     assert message in " ".join(done.output.split())
 
 
-def test_the_command_writes_a_table_and_a_figure(hemisphere, tmp_path):
+@pytest.mark.parametrize(("suffix", "engine_"), [("nc", "h5netcdf"), ("zarr", "zarr")])
+def test_trajectories_come_back_from_the_file_with_what_they_are(
+    hemisphere, tmp_path, suffix, engine_
+):
+    """netCDF and Zarr: the same numbers, bit for bit, with units, and in the file which FMU, which versions
+    and which command they come from; a run that was refused has its reason and NaN."""
+    xr, pd = pytest.importorskip("xarray"), pytest.importorskip("pandas")
+    out = tmp_path / f"runs.{suffix}"
+    done = CliRunner().invoke(
+        app,
+        ["sweep", str(hemisphere), "--vary", "a=-1,0.5,1", "--vary", "m=1,2", "--out", str(out),
+         "--keep", "energy.total:max", "--keep", "theta:trajectory"],
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    alone = lagfmu.sweep(
+        hemisphere, {"a": [-1, 0.5, 1], "m": [1, 2]}, keep=["energy.total:max", "theta:trajectory"]
+    )
+    with xr.open_dataset(out, engine=engine_) as found:
+        assert found.equals(alone)
+        units = {
+            n: found[n].attrs["units"] for n in ("a", "m", "time", "theta", "energy.total:max")
+        }
+        assert units == {"a": "m", "m": "kg", "time": "s", "theta": "rad", "energy.total:max": "J"}
+        digest = hashlib.sha256(hemisphere.read_bytes()).hexdigest()
+        assert found.attrs["fmu_sha256"] == digest
+        assert found.attrs["lagfmu"] == version()
+        assert found.attrs["fmpy"]
+        assert found.attrs["command"].startswith("lagfmu ")
+        assert pd.isna(found["theta"].values[0]).all()
+        assert "outside its bounds" in str(found["reason"].values[0, 0])
+
+
+def test_the_command_draws_what_was_refused(hemisphere, tmp_path):
     """Half of these starts stand off the sphere by less than nothing: refused, and marked."""
-    out, figure = tmp_path / "runs.nc", tmp_path / "runs.svg"
+    figure = tmp_path / "runs.svg"
     done = CliRunner().invoke(
         app,
         ["sweep", str(hemisphere), "--vary", "a=-1:1:6", "--keep", "energy.total:max",
-         "--keep", "theta:trajectory", "--out", str(out), "--plot", str(figure)],
+         "--plot", str(figure)],
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     assert "6 runs, 3 refused" in done.output
     assert "and 2 like it" in done.output
-    import xarray as xr
-
-    with xr.open_dataset(out, engine="h5netcdf") as found:
-        assert found["theta"].dims == ("a", "time")
-        assert found.attrs["fmu"] == hemisphere.name
     assert "refused" in figure.read_text()
 
 
@@ -277,6 +308,57 @@ def test_a_model_file_is_built_first(tmp_path):
     done = CliRunner().invoke(app, ["sweep", str(path), "--vary", "m1=1,2", "--stop-time", "0.1"])
     assert done.exit_code == 0, done.output
     assert "2 runs, 0 refused" in done.output
+
+
+def example(word: str) -> str:
+    """The block of docs/sweeps.md that holds a word."""
+    text = (MODELS.parent / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    return next(b for b in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if word in b)
+
+
+@pytest.fixture
+def dist(native_fmu, tmp_path, monkeypatch) -> None:
+    """A folder with dist/native/, as build_fmus.py makes it."""
+    (tmp_path / "dist" / "native").mkdir(parents=True)
+    for name in ("Hemisphere", "HalfCar"):
+        (tmp_path / "dist" / "native" / f"{name}.fmu").symlink_to(native_fmu(name))
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_mass_has_no_part_in_when_the_particle_leaves(dist):
+    """Total Sobol indices by SALib, as docs/sweeps.md has it: the time of the departure is sqrt(a/g) times a
+    function of the angle, the largest force m g cos(theta)."""
+    pytest.importorskip("SALib")
+    names: dict[str, Any] = {}
+    exec(example("SALib"), names)
+    when = names["indices"]["departure.surface.time:last"]
+    force = names["indices"]["lambda.surface:max"]
+    assert when[0] < 1e-12
+    assert when[2] > 0.9 > 0.1 > when[1] > 0.01
+    m, g = (np.array([0.5, 2]), np.array([8, 12]))  # uniform: variance over squared mean
+    part = [(x[1] - x[0]) ** 2 / 12 / x.mean() ** 2 for x in (m, g)]
+    theta = np.linspace(0.1, 0.8, 10001)
+    part.append(np.cos(theta).var() / np.cos(theta).mean() ** 2)
+    total = np.prod(1 + np.array(part)) - 1
+    expected = [p * np.prod([1 + q for q in part if q is not p]) / total for p in part]
+    assert force == pytest.approx(expected, abs=0.05)
+
+
+def test_an_optimizer_finds_the_damping_at_which_the_spring_just_holds(dist):
+    """Optuna, as docs/sweeps.md has it: softer rides better and travels farther, so that the best damping is
+    where the travel is the 60 mm that are allowed."""
+    pytest.importorskip("optuna")
+    names: dict[str, Any] = {}
+    exec(example("optuna"), names)
+    damping = {"c": np.geomspace(6e3, 9e3, 12)}
+    found = lagfmu.sweep(
+        "dist/native/HalfCar.fmu", damping, keep=["front.travel:max", "body.acceleration:max"]
+    )
+    travel = found["front.travel:max"].values
+    assert (np.diff(travel) < 0).all()
+    assert (np.diff(found["body.acceleration:max"]) > 0).all()
+    allowed = np.interp(-0.06, -travel, found.c)
+    assert names["study"].best_params["c"] == pytest.approx(allowed, rel=0.1)
 
 
 def test_the_client_never_loads_the_binary(hemisphere):

@@ -31,15 +31,16 @@ from ..model.formula import with_outputs
 from ..model.goal import parse
 from ..model.library import known, new
 from ..model.scene import Scene
+from ..names import METHOD
 from ..page.text import show as show_prepared
 from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
-from ..study.stress.probe import WRONG
+from ..study.stress.report import all_as_json
 from ..study.tradeoff.page import section
 from ..verification.crosscheck import as_csv, write_crosscheck
+from ..verification.pipeline import as_junit, exit_code
 from ..verification.plot import plot
 from ..verification.reference import read_table
-from ..verification.report import exit_code
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification
 from .film import film
@@ -49,6 +50,7 @@ from .options import (
     Derivatives,
     Fixed,
     Formulation,
+    Frictions,
     Inputs,
     Method,
     Methods,
@@ -182,6 +184,7 @@ def build(
     fixed: Fixed = None,
     inputs: Inputs = None,
     contacts: Contacts = None,
+    frictions: Frictions = None,
     methods: Methods = None,
     method: Method = None,
     formulation: Formulation = None,
@@ -192,10 +195,16 @@ def build(
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"contacts": contacts, "methods": methods, "method": method, "name": name}
+    needs |= {
+        "frictions": frictions,
+        "contacts": contacts,
+        "methods": methods,
+        "method": method,
+        "name": name,
+    }
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
     needs |= {"reals_only": reals_only}
-    narrowing = (outputs, fixed, inputs, contacts, methods, method, reals_only)
+    narrowing = (outputs, fixed, inputs, contacts, frictions, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -283,6 +292,7 @@ def show(
     fixed: Fixed = None,
     inputs: Inputs = None,
     contacts: Contacts = None,
+    frictions: Frictions = None,
     methods: Methods = None,
     method: Method = None,
     formulation: Formulation = None,
@@ -295,7 +305,7 @@ def show(
     Of a scene that needs less than everything, also what was pruned and what that saved.
     """
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"contacts": contacts, "methods": methods, "method": method}
+    needs |= {"frictions": frictions, "contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
     needs |= {"reals_only": reals_only}
     with _plainly():
@@ -355,7 +365,7 @@ def verify_command(
                 errors.print(
                     f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
                 )
-    raise typer.Exit(exit_code(done))
+    raise typer.Exit(exit_code([d.suite for d in done]))
 
 
 @app.command(name="reference")
@@ -520,12 +530,25 @@ def stress(
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Some of the probes only.")] = False,
     limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = LIMIT,
+    json: Annotated[Path | None, typer.Option(help="Write everything as JSON.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")] = None,
 ) -> None:
-    """Push FMUs to the extremes: each row is right, refused with a clear message, or wrong."""
+    """Push FMUs to the extremes: each row is right, refused with a clear message, or wrong.
+
+    Exit codes: 0 none is wrong, 1 a row is wrong, 2 wrong usage, 3 an FMU could not be built or run.
+    """
     with _plainly():
-        found = stress_fmus(targets, out, console, target.value, scene or (), quick, limit)
-    if any(f.count(WRONG) for f in found):
-        raise typer.Exit(1)
+        done = stress_fmus(targets, out, console, target.value, scene or (), quick, limit)
+        if json is not None:
+            write_whole(json, all_as_json(done).encode())
+        if junit is not None:
+            write_whole(junit, as_junit("lagfmu stress", [t.suite for t in done]))
+        for one in done:
+            if one.error:
+                errors.print(
+                    f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
+                )
+    raise typer.Exit(exit_code([t.suite for t in done]))
 
 
 def _load(path: Path, added: list[str] | None) -> ModelFile:
@@ -635,7 +658,7 @@ def _assignments(texts: list[str] | None) -> dict[str, Any]:
         try:
             values[name] = float(value)
         except ValueError:
-            if name != "solver.method":
+            if name != METHOD:
                 raise SimulationError(f"--set {text!r}: {value!r} is no number") from None
             values[name] = value
     return values

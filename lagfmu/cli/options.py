@@ -18,6 +18,7 @@ OUTPUTS = (
 FIXED = "Parameters that become numbers: m,g at the model's values, g=1.62 at another; * all."
 INPUTS = "Only these inputs are driven; the others keep their start values. '' for none."
 CONTACTS = "Only these contacts may open; the others hold. '' for none."
+FRICTIONS = "Only these frictions may slip; what the others limit sticks. '' for none."
 METHODS = "Methods that solver.method can be set to (default with --outputs: one)."
 
 
@@ -29,6 +30,7 @@ Outputs = Annotated[Names, _option(OUTPUTS)]
 Fixed = Annotated[Names, _option(FIXED)]
 Inputs = Annotated[Names, _option(INPUTS)]
 Contacts = Annotated[Names, _option(CONTACTS)]
+Frictions = Annotated[Names, _option(FRICTIONS)]
 Methods = Annotated[Names, _option(METHODS)]
 Method = Annotated[
     str | None,
@@ -76,6 +78,7 @@ def narrowed(
     fixed: Names = None,
     inputs: Names = None,
     contacts: Names = None,
+    frictions: Names = None,
     methods: Names = None,
     method: str | None = None,
     formulation: str | None = None,
@@ -94,6 +97,7 @@ def narrowed(
             f"{', '.join(s.name for s in scenes)}"
         )
     lists = {"outputs": outputs, "fixed": fixed, "inputs": inputs, "contacts": contacts}
+    lists["frictions"] = frictions
     said: dict[str, Any] = {k: _split(v) for k, v in lists.items() if v is not None}
     if methods is not None:
         said["methods"] = _split(methods)

@@ -9,8 +9,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from rich.markup import escape
 
 from ..errors import BuildError, LagfmuError
 from ..fmu.write import write, write_whole
-from ..model.file import load
+from ..model.file import ModelFile, load
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
@@ -27,8 +28,9 @@ from ..study.stress.facts import facts_of
 from ..study.stress.geometry import lay_geometry, twin
 from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import UNFINISHED, WRONG, Row
-from ..study.stress.report import MEANING, Stressed, as_json, as_markdown, summary, table
+from ..study.stress.report import MEANING, Stressed, Tried, as_json, as_markdown, summary, table
 from ..study.stress.summary import as_summary
+from ..verification.pipeline import UsageError
 from .tradeoff import progress
 
 LIMIT = 60.0  # [s] for one probe
@@ -44,33 +46,31 @@ def stress(
     scenes: Sequence[str] = (),
     quick: bool = False,
     limit: float = LIMIT,
-) -> list[Stressed]:
+) -> list[Tried]:
     """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json, .md, and OUT/TARGET.md.
 
-    Raises LagfmuError with the causes for what cannot be built or read, when the rest is done.
+    What cannot be built or run does not keep the others from it.  Raises UsageError.
     """
-    found: list[Stressed] = []
-    problems: list[str] = []
+    tried: list[Tried] = []
     if not limit > 0:
-        raise BuildError(f"the time limit is {limit!r} s, expected a positive number")
+        raise UsageError(f"the time limit is {limit!r} s, expected a positive number")
     if not console.is_terminal:
         console = Console(file=console.file, width=WIDTH)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         for path in paths:
-            try:
-                for fmu in _fmus(path, scenes, Path(folder) / target, target, console):
-                    found.append(_one(fmu, out, console, quick, limit))
-            except LagfmuError as error:
-                problems.append(str(error))  # the others are probed all the same
+            for name, make in _works(path, scenes, Path(folder) / target, target, console):
+                try:
+                    tried.append(Tried(name, _one(make(), out, console, quick, limit)))
+                except LagfmuError as error:
+                    tried.append(Tried(name, None, str(error)))
+    if not tried:
+        raise UsageError(f"no FMU is called {', '.join(scenes) or 'anything'}")
+    found = [t.found for t in tried if t.found is not None]
     if found:
         console.print(summary(found))
         console.print(MEANING, highlight=False)
         _file(found, out, console)
-    if problems:
-        raise BuildError("\n".join(problems))
-    if not found:
-        raise BuildError(f"no FMU is called {', '.join(scenes) or 'anything'}")
-    return found
+    return tried
 
 
 def _file(found: Sequence[Stressed], out: Path, console: Console) -> None:
@@ -81,24 +81,39 @@ def _file(found: Sequence[Stressed], out: Path, console: Console) -> None:
         console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
 
 
-def _fmus(
+def _works(
     path: Path, scenes: Sequence[str], folder: Path, target: str, console: Console
-) -> list[Path]:
+) -> Iterator[tuple[str, Callable[[], Path]]]:
+    """What is to be probed, by name, and what makes its FMU."""
     if path.suffix != ".py":
-        return [path]
-    file, built = load(path), []
+        yield str(path), lambda: path
+        return
+    try:
+        file = load(path)
+    except LagfmuError as error:
+        problem = error
+
+        def refuse() -> Path:
+            raise problem
+
+        yield str(path), refuse
+        return
     for scene in file.scenes:
         if not scenes or scene.name in scenes:
-            with console.status(f"building {scene.name}"):
-                prepared = prepare(file.model, scene)
-                fmu = write(prepared, folder, file.closed_forms, target=target)
-                lay_beside(fmu, prepared)
-                if prepared.system.contacts:
-                    lay_geometry(fmu, prepared)
-                if len(prepared.system.contacts) > 1:
-                    _turned(file.model, scene, fmu, target)
-                built.append(fmu)
-    return built
+            yield f"{path} ({scene.name})", partial(build, file, scene, folder, target, console)
+
+
+def build(file: ModelFile, scene: Scene, folder: Path, target: str, console: Console) -> Path:
+    """An FMU with all beside it that the judge takes from the model."""
+    with console.status(f"building {scene.name}"):
+        prepared = prepare(file.model, scene)
+        fmu = write(prepared, folder, file.closed_forms, target=target)
+        lay_beside(fmu, prepared)
+        if prepared.system.m:
+            lay_geometry(fmu, prepared)
+        if len(prepared.system.contacts) > 1:
+            _turned(file.model, scene, fmu, target)
+        return fmu
 
 
 def _turned(model: Model, scene: Scene, fmu: Path, target: str) -> None:

@@ -6,17 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import LagfmuError, SimulationError, VerificationError
+from ..errors import SimulationError, VerificationError
 from ..fmu.write import write_whole
+from ..verification.pipeline import UsageError, as_junit
 from ..verification.reference import Reference, read_table
-from ..verification.report import WRONG_USAGE, Examined, as_json, as_junit
+from ..verification.report import Examined, as_json
 from ..verification.verify import verify
-
-
-class UsageError(LagfmuError):
-    """A command that cannot be meant; its exit code is report.WRONG_USAGE."""
-
-    code = WRONG_USAGE
 
 
 def tolerances(texts: Sequence[str]) -> tuple[float, dict[str, float]]:
@@ -75,4 +70,4 @@ def write_reports(examined: Sequence[Examined], json: Path | None, junit: Path |
     if json is not None:
         write_whole(json, as_json(examined).encode())
     if junit is not None:
-        write_whole(junit, as_junit(examined))
+        write_whole(junit, as_junit("lagfmu verify", [e.suite for e in examined]))

@@ -11,6 +11,7 @@ from typing import Any
 
 import sympy as sp
 
+from .. import names
 from ..errors import ModelError, TableError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
@@ -56,18 +57,18 @@ class Claim:
     @property
     def variables(self) -> set[str]:
         """The FMU's variables and parameters that it needs."""
-        names = {
+        found = {
             str(s)
             for e in (self.actual, self.expected, self.scale, self.when)
             if e is not None
             for s in sp.sympify(e).free_symbols
         }
-        read = {n[len("initial(") : -1] if n.startswith("initial(") else n for n in names}
+        read = {names.initially(n) or n for n in found}
         contacts = {c for condition in CONDITIONS if (c := getattr(self, condition))}
-        read |= {f"contact.{c}" for c in contacts}
+        read |= {names.name(names.CONTACT, c) for c in contacts}
         left = {c for c in (self.until_departure, self.at_departure) if c}
-        left |= {n.split(".")[1] for n in read if n.startswith("departure.")}
-        return (read | {f"departure.{c}.count" for c in left}) - {"time"}
+        left |= {s.constraint for s in map(names.read, read) if s.head == names.DEPARTURE}
+        return (read | {names.name(names.DEPARTURES, c) for c in left}) - {"time"}
 
     def in_scene(self, numbers: Mapping[str, Expr], held: Collection[str]) -> Claim | None:
         """The same with numbers for parameters, and contacts that stay closed; None if it speaks of
@@ -168,14 +169,14 @@ def pack_closed_forms(
         entry: dict[str, Any] = {
             key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
         }
-        names: dict[Expr, str] = {}
+        short_of: dict[Expr, str] = {}
         for key in EXPRESSIONS:
             e = getattr(claim, key)
-            entry[key] = None if e is None else _text(sp.sympify(e), names)
+            entry[key] = None if e is None else _text(sp.sympify(e), short_of)
         if goal is not None:
             symbols = {str(s) for s in sp.sympify(claim.actual).free_symbols}
             entry["accuracy"] = goal.allowed(symbols, claim.within)
-        entry["symbols"] = {short: str(symbol) for symbol, short in names.items()}
+        entry["symbols"] = {short: str(symbol) for symbol, short in short_of.items()}
         packed.append(entry)
         try:
             _claim(entry, functions)  # it has to come back
@@ -226,10 +227,10 @@ def _unpacked(content: bytes, name: str) -> tuple[list[Claim], list[Spline]]:
         ) from None
 
 
-def _text(e: Expr, names: dict[Expr, str]) -> str:
+def _text(e: Expr, short_of: dict[Expr, str]) -> str:
     for symbol in sorted(e.free_symbols, key=str):
-        names.setdefault(symbol, f"s{len(names)}")
-    return text_of(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}))
+        short_of.setdefault(symbol, f"s{len(short_of)}")
+    return text_of(e.xreplace({s: sp.Symbol(n) for s, n in short_of.items()}))
 
 
 def _spline(entry: Any) -> Spline:
@@ -266,10 +267,10 @@ def _claim(entry: Any, tables: Mapping[str, Any]) -> Claim:
             continue
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not number >= 0:
             raise ValueError(f"{key!r} of {entry['name']!r} is {number!r}, expected a number >= 0")
-    names = entry["symbols"]
-    if not isinstance(names, dict) or not all(isinstance(n, str) for n in names.values()):
+    named = entry["symbols"]
+    if not isinstance(named, dict) or not all(isinstance(n, str) for n in named.values()):
         raise ValueError(f"the symbols of {entry['name']!r} are not names")
-    symbols = {short: output(name) for short, name in names.items()}
+    symbols = {short: output(name) for short, name in named.items()}
     fields: dict[str, Any] = {key: entry[key] for key in ("name", *CONDITIONS)}
     fields |= {key: float(entry[key]) for key in numbers}
     if entry.get("accuracy") is not None:

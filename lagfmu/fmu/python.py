@@ -27,6 +27,7 @@ from .archive import pack, version
 from .description import model_description
 
 SHIPPED = (
+    "names.py",
     "solver",
     "fmu/entry.py",
     "fmu/references.py",

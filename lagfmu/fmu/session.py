@@ -26,6 +26,8 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 from numpy.typing import NDArray
 
+from ..methods import NUMBERS
+
 STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 TYPES = {"Real": 0, "Integer": 1, "Enumeration": 1, "Boolean": 2}  # BatchType in batch.h
 KINDS = ("Real", "Integer", "Boolean")  # the suffix of the getter and setter of each BatchType
@@ -182,11 +184,55 @@ class Session:
         except FMICallException as error:
             raise RefusalError(name, error.status, reason()) from None
 
-    def set(self, name: str, value: float) -> None:
-        """Set a Real, Integer, Enumeration or Boolean."""
-        kind = KINDS[self.plug.type(name)]
-        number: Any = float(value) if kind == "Real" else int(value)
-        self.call(f"set{kind}", [self.plug.reference(name)], [number])
+    def references(self, names: Sequence[str]) -> list[int]:
+        """Value references."""
+        return [self.plug.reference(n) for n in names]
+
+    def give(self, values: Mapping[str, float | str]) -> None:
+        """Set variables of any type; a method also by name, one that there is not as an unknown number."""
+        for kind in reversed(KINDS):
+            found: dict[str, Any] = {
+                name: float(value) if kind == "Real" else int(value)
+                for name, value in _numbers(values).items()
+                if KINDS[self.plug.type(name)] == kind
+            }
+            if found:
+                self.call(f"set{kind}", self.references(list(found)), list(found.values()))
+
+    def prepare(
+        self,
+        values: Mapping[str, float | str],
+        tolerance: float | None,
+        stop: float | None = None,
+        start: float = 0.0,
+    ) -> None:
+        """Reset if it was used; set up (times in s), set `values`, enter the initialization mode."""
+        if self.used:
+            self.call("reset")
+        self.used = True
+        self.call("setupExperiment", tolerance=tolerance, startTime=start, stopTime=stop)
+        self.give(values)
+        self.call("enterInitializationMode")
+
+    def begin(
+        self,
+        values: Mapping[str, float | str],
+        tolerance: float | None,
+        stop: float | None = None,
+    ) -> None:
+        """The same, and initialize."""
+        self.prepare(values, tolerance, stop)
+        self.call("exitInitializationMode")
+
+    def read(self, names: Sequence[str]) -> dict[str, Any]:
+        """Values of variables, in the types of their kinds."""
+        found: dict[str, Any] = {}
+        for kind in KINDS:
+            those = [n for n in names if KINDS[self.plug.type(n)] == kind]
+            if those:
+                seen = self.call(f"get{kind}", self.references(those))
+                found |= dict(zip(those, seen, strict=True))
+        return found
 
     def get(self, name: str) -> float:
         """The value of a Real, Integer, Enumeration or Boolean."""
@@ -270,20 +316,10 @@ class Session:
 
     def _run(self, plan: Plan, row: NDArray[np.float64], r: int, found: Outcome) -> None:
         """One run, as run() in batch.c."""
-        if self.used:
-            self.call("reset")
-        self.used = True
         times = plan.times
-        self.call(
-            "setupExperiment",
-            tolerance=plan.tolerance or None,
-            startTime=float(times[0]),
-            stopTime=float(times[-1]),
-        )
-        for name, value in zip(plan.vary, row, strict=True):
-            self.set(name, value)
-        self._drive(plan, 0)
-        self.call("enterInitializationMode")
+        values = dict(zip(plan.vary, row.tolist(), strict=True)) | self._driven(plan, 0)
+        first, last = float(times[0]), float(times[-1])
+        self.prepare(values, plan.tolerance or None, last, first)
         self.call("exitInitializationMode")
         kept, largest = found.result[r], np.zeros(len(plan.keep))
         before = self._observe(plan, kept, largest, None, 0, float(times[0]))
@@ -306,7 +342,7 @@ class Session:
                     self.call("freeFMUstate", later)
                 self.call("freeFMUstate", earlier)
                 count = now
-            self._drive(plan, k)
+            self.give(self._driven(plan, k))
             before = self._observe(plan, kept, largest, before, k, float(times[k]))
             self._whole(found, r, k, before)
 
@@ -344,10 +380,11 @@ class Session:
         if found.trajectory is not None:
             found.trajectory[r, k] = seen
 
-    def _drive(self, plan: Plan, k: int) -> None:
-        if plan.drive and plan.drives is not None:
-            references = [self.plug.reference(n) for n in plan.drive]
-            self.call("setReal", references, [float(x) for x in plan.drives[k]])
+    def _driven(self, plan: Plan, k: int) -> dict[str, float]:
+        """The inputs at a communication point."""
+        if plan.drives is None:
+            return {}
+        return dict(zip(plan.drive, plan.drives[k].tolist(), strict=True))
 
     def _departures(self, plan: Plan) -> tuple[float, float]:
         """How many so far, and the time [s] of the latest."""
@@ -356,10 +393,16 @@ class Session:
         return sum(c for c, _ in counts), max(happened, default=-np.inf)
 
     def _references(self, names: Sequence[str]) -> NDArray[np.uintc]:
-        return np.array([self.plug.reference(n) for n in names], dtype=np.uintc)
+        return np.array(self.references(names), dtype=np.uintc)
 
     def _types(self, names: Sequence[str]) -> NDArray[np.intc]:
         return np.array([self.plug.type(n) for n in names], dtype=np.intc)
+
+
+def _numbers(values: Mapping[str, float | str]) -> dict[str, float]:
+    """Methods by their numbers; a text that is none by a number that is none."""
+    unknown = 1 + max(NUMBERS.values())
+    return {k: NUMBERS.get(v, unknown) if isinstance(v, str) else v for k, v in values.items()}
 
 
 class _Listener:

@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
+from .. import names
 from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
@@ -355,21 +356,21 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def _initialize(self) -> None:
         """The consistent start; what had to be moved is logged, every value and how far."""
         value = {name: self.values[k] for name, k in self.reference.items()}
-        tolerance = value["solver.tolerance"] or self.tolerance or self.default_tolerance
+        tolerance = value[names.TOLERANCE] or self.tolerance or self.default_tolerance
         if tolerance < SMALLEST_TOLERANCE:
             self._warn(
                 f"tolerance {tolerance!r} is below what double precision allows, "
                 f"{SMALLEST_TOLERANCE!r} is used"
             )
         self.settings = Settings(
-            method=self.numbers.get(value.get("solver.method", 0), self.default_method),
+            method=self.numbers.get(value.get(names.METHOD, 0), self.default_method),
             tolerance=max(tolerance, SMALLEST_TOLERANCE),
-            step=value.get("solver.step", self.default_step),
-            maximum_step=value["solver.maximum_step"],
-            maximum_steps=value["solver.maximum_steps"],
+            step=value.get(names.STEP, self.default_step),
+            maximum_step=value[names.MAXIMUM_STEP],
+            maximum_steps=value[names.MAXIMUM_STEPS],
         )
         self.p = self._values(self.parameters)
-        states = [*self.system.coordinates, *(f"der({c})" for c in self.system.coordinates)]
+        states = names.motion(self.system.coordinates)
         y, rank = [value[name] for name in states], [self._rank(name) for name in states]
         n, u = self.system.n, self._values(self.inputs)
         found = start(self.system, self.settings, self.start_time, y[:n], y[n:], u, self.p, rank)
@@ -462,7 +463,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             good = good and (low is None or number >= low) and (high is None or number <= high)
             good = good and (not positive or number > 0)
         else:
-            good = value in self.numbers if name == "solver.method" else True
+            good = value in self.numbers if name == names.METHOD else True
         if not good:
             raise ValueError(f"its {name} is {value!r}")
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import sympy as sp
 
+from .. import names
 from ..errors import ModelError
 from ..mechanics.coupling import coupled
 from ..mechanics.equations import EquationsOfMotion, symbols_of
@@ -32,6 +33,7 @@ from ..model.units import (
     multiplier_unit,
     parse_unit,
 )
+from ..names import Subject, derivative
 from ..solver.state import MAXIMUM_STEPS
 from .variables import Value, Variable, VariableTable
 
@@ -59,10 +61,10 @@ def variable_table(
     return table
 
 
-def _collisions(names: Sequence[str]) -> list[str]:
+def _collisions(known: Sequence[str]) -> list[str]:
     problems = []
     seen = set()
-    for name in names:
+    for name in known:
         if name in seen:
             problems.append(f"two variables of the FMU would be called {name!r}: rename one")
         seen.add(name)
@@ -157,9 +159,9 @@ class _Builder:
             found.append((own, own | behind))
         return found
 
-    def at_start(self, names: Iterable[str]) -> tuple[str, ...]:
+    def at_start(self, symbols: Iterable[str]) -> tuple[str, ...]:
         """Inputs, parameters and exact start values behind a value at the start."""
-        found = set(names)
+        found = set(symbols)
         for own, behind in self.stepped_groups:
             if found & own & self.movable:
                 found |= behind
@@ -167,16 +169,16 @@ class _Builder:
         exact = set(self.state_names) - self.movable
         return self.sorted(found & (parameters | exact | set(self.inputs)))
 
-    def sorted(self, names: Iterable[str]) -> tuple[str, ...]:
+    def sorted(self, symbols: Iterable[str]) -> tuple[str, ...]:
         order = [*(str(p) for p in self.eom.p), *self.inputs, *self.state_names]
-        wanted = set(names)
+        wanted = set(symbols)
         return tuple(n for n in order if n in wanted)
 
     # ------------------------------------------------------------------ variables
 
     def output(
         self,
-        name: str,
+        of: Subject,
         description: str,
         unit: Unit | None,
         symbols: Iterable[str],
@@ -184,9 +186,9 @@ class _Builder:
         derivative_of: str | None = None,
         discrete: bool = False,
     ) -> Variable:
-        names = set(symbols)
+        behind = set(symbols)
         return Variable(
-            name=name,
+            of=of,
             kind=kind,
             role="output",
             causality="output",
@@ -195,14 +197,15 @@ class _Builder:
             description=description,
             unit=unit,
             derivative_of=derivative_of,
-            depends=self.sorted(names & self.known),
-            depends_initially=self.at_start(names),
+            depends=self.sorted(behind & self.known),
+            depends_initially=self.at_start(behind),
         )
 
-    def state(self, name: str, description: str, derivative_of: str | None) -> Variable:
+    def state(self, of: Subject, description: str, derivative_of: str | None) -> Variable:
+        name = of.name
         approx = name in self.movable
         return Variable(
-            name=name,
+            of=of,
             kind="Real",
             role="start",
             causality="output",
@@ -228,18 +231,18 @@ class _Builder:
             *self.own_outputs(),
             *self.contact_outputs(),
             *self.friction_outputs(),
-            self.output("solver.steps", "internal steps taken so far", None, (), "Integer"),
+            self.output(Subject(names.STEPS), "internal steps taken so far", None, (), "Integer"),
         ]
         n = len(self.state_names) // 2
         q = self.state_names[:n]
-        derivatives = [x for c in q for x in (f"der({c})", f"der({c},2)")]
-        states = [x for c in q for x in (c, f"der({c})")]
+        derivatives = [derivative(c, k) for c in q for k in (1, 2)]
+        states = [derivative(c, k) for c in q for k in (0, 1)]
         return VariableTable(tuple(variables), tuple(states), tuple(derivatives))
 
     def parameters(self) -> list[Variable]:
         return [
             Variable(
-                name=name_of(p.symbol),
+                of=_value(name_of(p.symbol)),
                 kind="Real",
                 role="parameter",
                 causality="parameter",
@@ -260,7 +263,7 @@ class _Builder:
             name: str, start: Value, unit: Unit | None, text: str, maximum: float | None = None
         ) -> Variable:
             return Variable(
-                name=f"solver.{name}",
+                of=Subject(name),
                 kind="Enumeration" if isinstance(start, str) else "Real",
                 role="solver",
                 causality="parameter",
@@ -274,15 +277,18 @@ class _Builder:
             )
 
         methods = self.scene.selectable
-        choice = setting("method", self.scene.method, None, described(methods))
+        choice = setting(names.METHOD, self.scene.method, None, described(methods))
         choice = dataclasses.replace(choice, items=tuple(methods))
         step = setting(
-            "step", self.scene.step, SECOND, "largest fixed step of rk4; 0: chosen from the start"
+            names.STEP,
+            self.scene.step,
+            SECOND,
+            "largest fixed step of rk4; 0: chosen from the start",
         )
         return [
             *([choice] if len(methods) > 1 else []),
             setting(
-                "tolerance",
+                names.TOLERANCE,
                 0.0,
                 ONE,
                 "relative tolerance of each step; 0: the one of fmi2SetupExperiment, else "
@@ -290,9 +296,9 @@ class _Builder:
                 1.0,
             ),
             *([step] if set(FIXED_STEP).intersection(methods) else []),
-            setting("maximum_step", 0.0, SECOND, "largest adaptive step; 0: no limit"),
+            setting(names.MAXIMUM_STEP, 0.0, SECOND, "largest adaptive step; 0: no limit"),
             setting(
-                "maximum_steps",
+                names.MAXIMUM_STEPS,
                 MAXIMUM_STEPS,
                 ONE,
                 "steps shorter than 1e-6 of the natural time that a communication step may take; "
@@ -307,20 +313,17 @@ class _Builder:
             if name not in self.inputs:
                 continue  # it keeps its start value
             estimated = i.rates == "estimated"
-            names, text = [name], i.description or f"input {name}"
-            if i in self.model.prescribed:
-                names += [f"der({name})", f"der({name},2)"]
-            if estimated:
-                names.append(f"der({name},3)")
+            text = i.description or f"input {name}"
+            orders = (3 if i in self.model.prescribed else 1) + (1 if estimated else 0)
             heads = ("", "rate of: ", "second derivative of: ", "third derivative of: ")
             starts = (float(i.start), float(i.rate), 0.0, 0.0)
             unit = self.units[name]
-            for order, full in enumerate(names):
+            for order in range(orders):
                 given = order == 0 or not estimated
                 tail = "" if given else ", estimated from its values at the communication points"
                 variables.append(
                     Variable(
-                        name=full,
+                        of=_value(name, order),
                         kind="Real",
                         role="input" if given else "estimate",
                         causality="input" if given else "local",
@@ -329,7 +332,7 @@ class _Builder:
                         description=f"{heads[order]}{text}{tail}",
                         start=starts[order],
                         unit=unit,
-                        derivative_of=names[order - 1] if order and given else None,
+                        derivative_of=derivative(name, order - 1) if order and given else None,
                     )
                 )
                 unit = unit.per_second()
@@ -341,37 +344,36 @@ class _Builder:
         states = set(self.state_names)
         for j, (q, v) in enumerate(zip(self.eom.q, self.eom.v, strict=True)):
             texts = self._texts(str(q))
-            for s, text, of in ((str(q), texts[0], None), (str(v), texts[1], str(q))):
-                if s in states:
-                    variables.append(self.state(s, text, of))
+            for order, (s, of) in enumerate(((q, None), (v, str(q)))):
+                what, text = _value(str(q), order), texts[order]
+                if what.name in states:
+                    variables.append(self.state(what, text, of))
                 else:
-                    variables.append(
-                        self.output(
-                            s, text, self.units[s], self.symbols(q if of is None else v), "Real", of
-                        )
-                    )
+                    unit = self.units[what.name]
+                    variables.append(self.output(what, text, unit, self.symbols(s), "Real", of))
             if self.eom.bare and str(q) not in states:
                 continue
             symbols = self.motion_of_stepped if self.eom.bare else self.group(coordinate=j)
-            name = f"der({q},2)"
-            variables.append(self.output(name, texts[2], self.units[name], symbols, "Real", str(v)))
+            variables.append(self._acceleration(q, v, symbols))
         own = {str(q) for q in self.eom.q}
         for q, v in zip(self.stepped.q, self.stepped.v, strict=True):
             if str(q) in own:
                 continue
             texts = self._texts(str(q))
-            variables.append(self.state(str(q), texts[0], None))
-            variables.append(self.state(str(v), texts[1], str(q)))
-            name = f"der({q},2)"
-            symbols = self.motion_of_stepped
-            variables.append(self.output(name, texts[2], self.units[name], symbols, "Real", str(v)))
+            variables.append(self.state(_value(str(q)), texts[0], None))
+            variables.append(self.state(_value(str(q), 1), texts[1], str(q)))
+            variables.append(self._acceleration(q, v, self.motion_of_stepped))
         return sorted(variables, key=self._place) if self.eom.bare else variables
+
+    def _acceleration(self, q: Expr, v: Expr, symbols: Iterable[str]) -> Variable:
+        of, text = _value(str(q), 2), self._texts(str(q))[2]
+        return self.output(of, text, self.units[of.name], symbols, "Real", str(v))
 
     def _place(self, v: Variable) -> int:
         """Where the coordinate stands in the model; those of an embedding come last."""
         order = [str(self.eom.symbols[c]) for c in self.model.coordinates]
-        name = v.name.removeprefix("der(").removesuffix(")").removesuffix(",2")
-        return order.index(name) if name in order else len(order)
+        q = v.of.coordinate
+        return order.index(q) if q in order else len(order)
 
     @cached_property
     def motion_of_stepped(self) -> set[str]:
@@ -393,44 +395,43 @@ class _Builder:
             unit = dimension_of(expression, model.units, c.name) or ONE
             lam = multiplier_unit(unit, isinstance(c, Nonholonomic))
             row = self.group(row=k)
-            variables.append(self.output(f"lambda.{c.name}", f"multiplier of {what}", lam, row))
+            of = Subject(names.MULTIPLIER, c.name)
+            variables.append(self.output(of, f"multiplier of {what}", lam, row))
             if isinstance(c, Nonholonomic) or c.name in self.eom.limited:
                 text = f"velocity residual of {what}"
-                own = {j: a for (i, j), a in jacobian.items() if i == k}
-                behind = self.symbols(*own.values(), self.eom.nu[k], *(self.eom.v[j] for j in own))
+                behind = self._rates(k)
             else:
                 text = f"position residual of {what}"
                 behind = self.symbols(self.eom.f[k])
             if c.name in self.eom.limited and not isinstance(c, Nonholonomic):
                 unit = unit.per_second()
-            variables.append(self.output(f"residual.{c.name}", text, unit, behind))
-            text = f"true where lambda.{c.name} is determined uniquely"
-            variables.append(self.output(f"unique.{c.name}", text, None, entries, "Boolean"))
+            variables.append(self.output(Subject(names.RESIDUAL, c.name), text, unit, behind))
+            text = f"true where {of.name} is determined uniquely"
+            of = Subject(names.UNIQUE, c.name)
+            variables.append(self.output(of, text, None, entries, "Boolean"))
         for j, q in enumerate(() if self.eom.bare else self.eom.q):
             unit = generalized_force_unit(self.units[str(q)])
             touching = [k for k in range(self.eom.m) if (k, j) in jacobian]
             symbols = self.group(coordinate=j) if touching else set()
             text = f"generalized force of all constraints on {q}"
-            variables.append(self.output(f"Q.{q}", text, unit, symbols))
+            variables.append(self.output(Subject(names.FORCE, "", str(q)), text, unit, symbols))
             for k in touching:
-                name = self.eom.constraints[k].name
-                text = f"generalized force of constraint {name} on {q}"
-                variables.append(self.output(f"Q.{name}.{q}", text, unit, symbols))
+                of = Subject(names.FORCE, self.eom.constraints[k].name, str(q))
+                text = f"generalized force of constraint {of.constraint} on {q}"
+                variables.append(self.output(of, text, unit, symbols))
         return variables
 
     def energies(self) -> list[Variable]:
         T, V = self.eom.kinetic, self.eom.potential
         kinetic, potential = self.symbols(T), self.symbols(V)
-        total = kinetic | potential
-        variables = []
-        if T is not None:
-            variables.append(self.output("energy.kinetic", "kinetic energy", ENERGY, kinetic))
-        if V is not None:
-            variables.append(self.output("energy.potential", "potential energy", ENERGY, potential))
-        if T is not None and V is not None:
-            text = "kinetic plus potential energy"
-            variables.append(self.output("energy.total", text, ENERGY, total))
-        return variables
+        both = "kinetic plus potential energy", kinetic | potential
+        found = {} if T is None else {names.KINETIC: ("kinetic energy", kinetic)}
+        found |= {} if V is None else {names.POTENTIAL: ("potential energy", potential)}
+        found |= {} if T is None or V is None else {names.TOTAL: both}
+        return [
+            self.output(Subject(name), text, ENERGY, behind)
+            for name, (text, behind) in found.items()
+        ]
 
     def own_outputs(self) -> list[Variable]:
         """The model's own: their dependencies are those of all that stands in them."""
@@ -445,12 +446,12 @@ class _Builder:
                 if lam in found:
                     behind |= self.group(row=k)
             text = o.description or f"output {o.name}"
-            variables.append(self.output(o.name, text, parse_unit(o.unit, o.name), behind))
+            unit = parse_unit(o.unit, o.name)
+            variables.append(self.output(Subject(names.OWN, "", o.name), text, unit, behind))
         return variables
 
     def contact_outputs(self) -> list[Variable]:
         variables = []
-        coordinates = [(str(q), str(v)) for q, v in zip(self.eom.q, self.eom.v, strict=True)]
         constraints = self.eom.constraints
         if self.eom.bare and self.reduction is not None:
             constraints = self.reduction.constraints
@@ -458,23 +459,11 @@ class _Builder:
             if not isinstance(c, Contact):
                 continue
             behind = self.motion_of_stepped if self.eom.bare else self.group(row=k)
-            names = self.known | behind  # it opens and closes by f, its rate and lambda
-            head = f"departure.{c.name}"
-            tail = f"the latest departure from {c.name}, 0 before the first"
-            variables += [
-                self.output(
-                    f"contact.{c.name}", f"true while {c.name} is closed", None, names, "Boolean"
-                ),
-                self.output(f"{head}.count", f"departures from {c.name}", None, (), "Integer"),
-                self.output(f"{head}.time", f"time of {tail}", SECOND, (), discrete=True),
-            ]
-            for q, v in coordinates:
-                variables += [
-                    self.output(f"{head}.{q}", f"{q} at {tail}", self.units[q], (), discrete=True),
-                    self.output(
-                        f"{head}.velocity.{q}", f"{v} at {tail}", self.units[v], (), discrete=True
-                    ),
-                ]
+            behind = self.known | behind  # it opens and closes by f, its rate and lambda
+            of, text = Subject(names.CONTACT, c.name), f"true while {c.name} is closed"
+            variables.append(self.output(of, text, None, behind, "Boolean"))
+            what = f"departure{{}} from {c.name}"
+            variables += self._event(names.DEPARTURE, c.name, what)
         return variables
 
     def friction_outputs(self) -> list[Variable]:
@@ -483,36 +472,43 @@ class _Builder:
         for law in self.eom.frictions:
             what = f"friction {law.name}" + (f": {law.description}" if law.description else "")
             behind = self.group(row=row[law.of[0]]) | self.symbols(*law.expressions)
-            names = self.known | behind
-            force, head = FORCE, f"slipping.{law.name}"
+            behind = self.known | behind
             text = f"true while {what} sticks (and its normal contact is closed)"
-            variables.append(self.output(f"sticks.{law.name}", text, None, names, "Boolean"))
+            of = Subject(names.STICKS, law.name)
+            variables.append(self.output(of, text, None, behind, "Boolean"))
             for name in law.of:
-                text = f"slip velocity G v - nu of {name}"
-                variables.append(self.output(f"slip.{name}", text, SPEED, self._rates(row[name])))
+                text, of = f"slip velocity G v - nu of {name}", Subject(names.SLIP, name)
+                variables.append(self.output(of, text, SPEED, self._rates(row[name])))
             text = f"static coefficient times normal force less |lambda| of {what}"
-            variables.append(self.output(f"margin.{law.name}", text, force, names))
+            variables.append(self.output(Subject(names.MARGIN, law.name), text, FORCE, behind))
             text = f"power of {what}, lambda times slip velocity, never positive"
-            variables.append(self.output(f"power.{law.name}", text, POWER, names))
-            tail = f"the latest start of slipping of {law.name}, 0 before the first"
-            variables += [
-                self.output(
-                    f"{head}.count", f"starts of slipping of {law.name}", None, (), "Integer"
-                ),
-                self.output(f"{head}.time", f"time of {tail}", SECOND, (), discrete=True),
-            ]
-            for q, v in zip(self.eom.q, self.eom.v, strict=True):
-                for name, s in ((f"{q}", f"{q}"), (f"velocity.{q}", f"{v}")):
-                    text = f"{s} at {tail}"
-                    variables.append(
-                        self.output(f"{head}.{name}", text, self.units[s], (), discrete=True)
-                    )
+            variables.append(self.output(Subject(names.POWER, law.name), text, POWER, behind))
+            what = f"start{{}} of slipping of {law.name}"
+            variables += self._event(names.SLIPPING, law.name, what)
         if self.eom.frictions:
             text = "energy that frictions and impacts dissipated so far (Model Exchange: impacts)"
-            variables.append(self.output("energy.dissipated", text, ENERGY, ()))
+            variables.append(self.output(Subject(names.DISSIPATED), text, ENERGY, ()))
         return variables
+
+    def _event(self, quantity: str, of: str, what: str) -> list[Variable]:
+        """How often it happened; time, coordinates and velocities when it did so last."""
+        tail = f"the latest {what.format('')}, 0 before the first"
+        count, moment = Subject(f"{quantity}.count", of), Subject(f"{quantity}.time", of)
+        found = [
+            self.output(count, what.format("s"), None, (), "Integer"),
+            self.output(moment, f"time of {tail}", SECOND, (), discrete=True),
+        ]
+        for q, v in zip(self.eom.q, self.eom.v, strict=True):
+            for order, s in enumerate((str(q), str(v))):
+                at = Subject(quantity, of, str(q), order)
+                found.append(self.output(at, f"{s} at {tail}", self.units[s], (), discrete=True))
+        return found
 
     def _rates(self, k: int) -> set[str]:
         """The symbols behind G v - nu of a row."""
         own = {j: a for (i, j), a in self.eom.G.todok().items() if i == k}
         return self.symbols(*own.values(), self.eom.nu[k], *(self.eom.v[j] for j in own))
+
+
+def _value(coordinate: str, order: int = 0) -> Subject:
+    return Subject(names.VALUE, "", coordinate, order)

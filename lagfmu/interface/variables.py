@@ -4,31 +4,32 @@ table itself is made in table.py.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
+from .. import names
 from ..methods import described
 from ..model.units import ONE, Unit
+from ..names import Subject
 
 Value = float | int | bool | str
-RECORD = re.compile(
-    r"contact\.\w+\Z|departure\.\w+\.count\Z|solver\.steps\Z|sticks\.\w+\Z|slipping\.\w+\.count\Z"
-)
+RECORD = (names.STEPS, names.CONTACT, names.DEPARTURES, names.STICKS, names.SLIPS)
 
 
 @dataclass(frozen=True)
 class Variable:
     """One FMI scalar variable.
 
-    `kind` is Real, Integer, Boolean or Enumeration (its `items` are methods, `start` one by name); `role`
-    says what may set it: parameter, start, input, solver, or output (nothing).  `depends` are the inputs
-    and states that it is computed from at a communication point, `depends_initially` the inputs and exact
-    start values at the start.  `positive`: zero, though not below the minimum, makes no sense.  `given`:
-    of a start value, the model's `start` says it; otherwise it is 0 because nobody did.
+    `of` says what it is of, and so its name.  `kind` is Real, Integer, Boolean or Enumeration (its
+    `items` are methods, `start` one by name); `role` says what may set it: parameter, start, input,
+    solver, or output (nothing).  `depends` are the inputs and states that it is computed from at a
+    communication point, `depends_initially` the inputs and exact start values at the start.  `positive`:
+    zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's `start` says
+    it; otherwise it is 0 because nobody did.
     """
 
-    name: str
+    of: Subject
     kind: str
     role: str  # or estimate: the FMU itself, from an input's values
     causality: str
@@ -47,6 +48,11 @@ class Variable:
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
 
+    @cached_property
+    def name(self) -> str:
+        """As the FMU calls it."""
+        return self.of.name
+
 
 @dataclass(frozen=True)
 class VariableTable:
@@ -56,15 +62,20 @@ class VariableTable:
     states: tuple[str, ...]
     derivatives: tuple[str, ...]
 
+    @cached_property
+    def position(self) -> dict[str, int]:
+        """Value reference by name; the index in modelDescription.xml is one more."""
+        return {v.name: k for k, v in enumerate(self.variables)}
+
     def __getitem__(self, name: str) -> Variable:
-        return self.variables[self.reference(name)]
+        return self.variables[self.position[name]]
 
     def __contains__(self, name: str) -> bool:
-        return any(v.name == name for v in self.variables)
+        return name in self.position
 
-    def reference(self, name: str) -> int:
-        """Value reference; the index in modelDescription.xml is one more."""
-        return next(k for k, v in enumerate(self.variables) if v.name == name)
+    def those(self, *quantities: str) -> tuple[Variable, ...]:
+        """The variables of these quantities."""
+        return tuple(v for v in self.variables if v.of.quantity in quantities)
 
     def keeping(self, outputs: Collection[str]) -> VariableTable:
         """Without the outputs that are not among these.
@@ -78,19 +89,19 @@ class VariableTable:
         kept = []
         for v in self.variables:
             if v.causality == "output" and v.name not in outputs:
-                if v.name not in moving and not RECORD.match(v.name):
+                if v.name not in moving and v.of.quantity not in RECORD:
                     continue
                 v = replace(v, causality="local")
             kept.append(v)
-        names = {v.name for v in kept}
-        kept = [v if v.derivative_of in names else replace(v, derivative_of=None) for v in kept]
+        known = {v.name for v in kept}
+        kept = [v if v.derivative_of in known else replace(v, derivative_of=None) for v in kept]
         return VariableTable(tuple(kept), self.states, self.derivatives)
 
     def offering(self, methods: Collection[str]) -> VariableTable:
         """The same, where `solver.method` can only be one of these."""
         variables = [
             replace(v, description=described(methods), items=tuple(methods))
-            if v.name == "solver.method"
+            if v.of.quantity == names.METHOD
             else v
             for v in self.variables
         ]

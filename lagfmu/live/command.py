@@ -1,32 +1,69 @@
-"""A model file or an FMU -> the file of its live page."""
+"""A model, a model file or an FMU -> its live page: as a file, or shown in a notebook."""
 
 from __future__ import annotations
 
+import os
+from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 
 from ..fmu.write import write_whole
 from ..model.file import load
+from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from .playable import playable
 from .render import Playable, render
 
 FOLDER = Path("dist/page")
+HEIGHT = 900  # CSS pixels of a page in a notebook
 
 
-def write_page(target: Path, out: Path | None = None, scene: Scene | None = None) -> Path:
-    """Write the page of a model file (in `scene`, default: its first) or of a native FMU.
+@dataclass(frozen=True)
+class Played:
+    """A live page that a notebook shows inline; `write` makes a file of it."""
+
+    name: str
+    text: str = field(repr=False)
+    height: int = HEIGHT
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe title="{escape(self.name)}: the page in which the FMU runs" '
+            f'style="width: 100%; height: {self.height}px; border: 0" srcdoc="{escape(self.text)}"></iframe>'
+        )
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """The page as an HTML file, to be opened by a browser."""
+        write_whole(Path(path), self.text.encode())
+        return Path(path)
+
+
+def play(
+    target: Model | str | os.PathLike[str], scene: Scene | None = None, height: int = HEIGHT
+) -> Played:
+    """The page in which the FMU of a model, a model file or a native FMU runs; a notebook shows it, `height`
+    pixels high.
+
+    Raises ModelError, DerivationError, and BuildError where nothing can be compiled (ziglang).
+    """
+    made = _playable(target if isinstance(target, Model) else Path(target), scene)
+    return Played(made.name, render(made), height)
+
+
+def write_page(target: Model | Path, out: Path | None = None, scene: Scene | None = None) -> Path:
+    """Write the page of a model or a model file (in `scene`, default: its first) or of a native FMU.
 
     `out` is the HTML file, by default dist/page/NAME.html.  Raises ModelError, DerivationError,
     VerificationError for a file that is no FMU, and BuildError where nothing can be compiled.
     """
-    made = _playable(target, scene)
-    path = out or FOLDER / f"{made.name}.html"
-    write_whole(path, render(made).encode())
-    return path
+    page = play(target, scene)
+    return page.write(out or FOLDER / f"{page.name}.html")
 
 
-def _playable(target: Path, scene: Scene | None) -> Playable:
+def _playable(target: Model | Path, scene: Scene | None) -> Playable:
+    if isinstance(target, Model):
+        return playable(prepare(target, scene))
     if target.suffix != ".py":
         return playable(target)
     file = load(target)

@@ -11,25 +11,21 @@ from typing import Any
 
 import fmpy
 
+from .. import names
 from ..fmu.archive import pack
 from .markup import shown_name
 
 NUMBERS = ("Real", "Integer", "Boolean")
-GROUPS = {  # by the first part of a name
-    "lambda": "Multipliers λ",
-    "margin": "Friction",
-    "slip": "Friction",
-    "sticks": "Friction",
-    "slipping": "Friction",
-    "power": "Friction",
-    "Q": "Generalized forces of constraint",
-    "energy": "Energies",
-    "residual": "Residuals",
-    "unique": "Residuals",
-    "contact": "Contacts and departures",
-    "departure": "Contacts and departures",
-    "error": "Error bars",
-    "solver": "Solver",
+GROUPS = {  # by the kind of what a variable is of
+    names.MULTIPLIER: "Multipliers λ",
+    **dict.fromkeys(names.OF_FRICTION, "Friction"),
+    names.FORCE: "Generalized forces of constraint",
+    names.ENERGY: "Energies",
+    **dict.fromkeys((names.RESIDUAL, names.UNIQUE), "Residuals"),
+    **dict.fromkeys((names.CONTACT, names.DEPARTURE), "Contacts and departures"),
+    names.ERROR: "Error bars",
+    names.SOLVER: "Solver",
+    names.OWN: "Outputs",
 }
 
 
@@ -70,14 +66,14 @@ def _variable(v: Any, named: set[str]) -> dict[str, Any]:
         "description": v.description or "",
         "column": v.causality == "output" and v.type in NUMBERS,
         "discrete": v.variability == "discrete",
-        "event": v.name.endswith(".count") and f"{v.name[:-6]}.time" in named,
+        "event": names.read(v.name).quantity in (names.DEPARTURES, names.SLIPS),
     }
 
 
 def _role(v: Any) -> str:
     """What may set it: parameter, start, input, solver; or output: nothing."""
     if v.causality == "parameter":
-        return "solver" if v.name.startswith("solver.") else "parameter"
+        return "solver" if names.read(v.name).head == names.SOLVER else "parameter"
     if v.causality == "input":
         return "input"
     return "start" if v.initial in ("exact", "approx") else "output"
@@ -99,11 +95,11 @@ def _items(v: Any) -> list[dict[str, Any]]:
 
 def _group(v: Any, role: str, named: set[str]) -> str:
     """The heading under which a curve stands."""
-    head = v.name.split(".")[0]
-    if v.name.startswith("Q.") and v.name.count(".") > 1:
+    of = names.read(v.name)
+    if of.quantity == names.FORCE and of.constraint:
         return "Forces of each constraint"
-    if head in GROUPS and head != v.name:
-        return GROUPS[head]
-    if v.name.startswith("der("):
-        return "Accelerations" if v.name.endswith(",2)") else "Velocities"
-    return "Coordinates" if role == "start" or f"der({v.name})" in named else "Outputs"
+    if of.head in GROUPS:
+        return GROUPS[of.head]
+    if of.order:
+        return "Accelerations" if of.order == 2 else "Velocities"
+    return "Coordinates" if role == "start" or names.derivative(v.name) in named else "Outputs"

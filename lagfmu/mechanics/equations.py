@@ -27,6 +27,7 @@ from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Par
 from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
+from ..names import derivative, read
 
 Expr = Any
 TIME = dynamicsymbols._t
@@ -154,7 +155,7 @@ class EquationsOfMotion(Displayed):
     @property
     def vdot(self) -> tuple[Expr, ...]:
         """The symbols der(q,2) of the accelerations (n)."""
-        return tuple(sp.Symbol(f"der({q},2)", real=True) for q in self.q)
+        return tuple(sp.Symbol(derivative(str(q), 2), real=True) for q in self.q)
 
     @property
     def lam(self) -> tuple[Expr, ...]:
@@ -241,8 +242,8 @@ def plain_symbols(model: Model) -> dict[Expr, Expr]:
         if s.is_Symbol:
             continue  # an input that was written as a plain symbol
         table[s] = sp.Symbol(name, real=True)
-        table[s.diff(TIME)] = sp.Symbol(f"der({name})", real=True)
-        table[s.diff(TIME, 2)] = sp.Symbol(f"der({name},2)", real=True)
+        for k in (1, 2):
+            table[s.diff(TIME, k)] = sp.Symbol(derivative(name, k), real=True)
     return table
 
 
@@ -314,7 +315,7 @@ def _friction(f: Friction, table: dict[Expr, Expr]) -> FrictionLaw:
     return FrictionLaw(
         name=f.name,
         of=tuple(f.of),
-        normal={str(s).removeprefix("lambda."): normal.diff(s) for s in symbols},
+        normal={read(str(s)).constraint: normal.diff(s) for s in symbols},
         load=normal.xreplace(dict.fromkeys(symbols, sp.S.Zero)),
         static=sp.sympify(f.static).xreplace(table),
         kinetic=sp.sympify(f.sliding).xreplace(table),
@@ -356,7 +357,7 @@ def _inputs(model: Model, table: dict[Expr, Expr]) -> tuple[tuple[Expr, ...], di
             rates |= {u[-1]: first, first: second}
             u += [first, second]
             if i.rates == "estimated":
-                u.append(sp.Symbol(f"der({name_of(i.symbol)},3)", real=True))
+                u.append(sp.Symbol(derivative(name_of(i.symbol), 3), real=True))
     return tuple(u), rates
 
 

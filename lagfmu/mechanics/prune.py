@@ -15,17 +15,21 @@ from typing import Any
 
 import sympy as sp
 
+from .. import names
 from ..errors import ModelError
 from ..model.model import Constraint, Contact, Holonomic, Output
 from ..model.scene import Scene
 from ..model.selection import select
+from ..names import derivative
 from .coupling import coupled
 from .equations import EquationsOfMotion, symbols_of
 from .formulations.minimal import Reduction
 
 Expr = Any
 Indices = frozenset[int]
-SOLVED = ("lambda.", "unique.", "residual.", "Q.")  # what needs the full equations solved
+SOLVED = {names.MULTIPLIER, names.UNIQUE, names.RESIDUAL, names.FORCE}  # from the full equations
+ENERGIES = {names.KINETIC, names.POTENTIAL, names.TOTAL}
+NONE: Indices = frozenset()
 
 
 def held(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> EquationsOfMotion:
@@ -54,11 +58,11 @@ def needed(
     coordinates: set[int] = set()
     rows: set[int] = set()
     for name in outputs:
-        more, more_rows = of.get(name, (frozenset(), frozenset()))
+        more, more_rows = of.get(name, (NONE, NONE))
         coordinates |= more
         rows |= more_rows
     groups = [(c, r, _positions(eom, _behind(eom, c, r))) for c, r in coupled(eom)]
-    names = [c.name for c in eom.constraints]
+    known = [c.name for c in eom.constraints]
     grown = True
     while grown:
         before = len(coordinates), len(rows)
@@ -67,7 +71,7 @@ def needed(
                 coordinates |= own | others
                 rows |= own_rows
         rows |= {
-            names.index(w) for k in rows if (w := getattr(eom.constraints[k], "while_closed", None))
+            known.index(w) for k in rows if (w := getattr(eom.constraints[k], "while_closed", None))
         }
         grown = (len(coordinates), len(rows)) != before
     if not coordinates:
@@ -82,58 +86,65 @@ def subjects(
     eom: EquationsOfMotion, reduction: Reduction | None
 ) -> dict[str, tuple[Indices, Indices]]:
     """Name of an output -> the coordinates and rows that it is of."""
-    none: Indices = frozenset()
     found: dict[str, tuple[Indices, Indices]] = {}
     for j, q in enumerate(eom.q):
-        for name in (f"{q}", f"der({q})", f"der({q},2)", f"Q.{q}"):
-            found[name] = frozenset({j}), none
+        for name in (*_motion(q), names.name(names.FORCE, "", str(q))):
+            found[name] = frozenset({j}), NONE
+    of_rows = (names.MULTIPLIER, names.UNIQUE, names.RESIDUAL, names.CONTACT)
     for k, c in enumerate(eom.constraints):
         row = frozenset({k})
-        for head in ("lambda", "unique", "residual", "contact"):
-            found[f"{head}.{c.name}"] = none, row
-        for tail in ("count", "time"):
-            found[f"departure.{c.name}.{tail}"] = none, row
+        found |= {names.name(quantity, c.name): (NONE, row) for quantity in of_rows}
+        found |= _event(eom, names.DEPARTURE, c.name, row)
         for j, q in enumerate(eom.q):
-            for name in (f"{c.name}.{q}", f"{c.name}.velocity.{q}"):
-                found[f"departure.{name}"] = frozenset({j}), row
-            found[f"Q.{c.name}.{q}"] = frozenset({j}), row
+            found[names.name(names.FORCE, c.name, str(q))] = frozenset({j}), row
     for o in eom.outputs:
         found[o.name] = _of_output(eom, o)
     found |= _of_frictions(eom)
     for name, parts in (
-        ("kinetic", [eom.kinetic]),
-        ("potential", [eom.potential]),
-        ("total", [eom.kinetic, eom.potential]),
+        (names.KINETIC, [eom.kinetic]),
+        (names.POTENTIAL, [eom.potential]),
+        (names.TOTAL, [eom.kinetic, eom.potential]),
     ):
         symbols = set().union(*(e.free_symbols for e in parts if e is not None))
-        found[f"energy.{name}"] = _positions(eom, symbols), none
+        found[name] = _positions(eom, symbols), NONE
     if reduction is None:
         return found
     for s in reduction.s:
         moved = frozenset(j for j, phi in enumerate(reduction.phi) if s in phi.free_symbols)
-        for name in (f"{s}", f"der({s})", f"der({s},2)"):
-            found.setdefault(name, (moved, none))
+        for name in _motion(s):
+            found.setdefault(name, (moved, NONE))
+    return found
+
+
+def _motion(q: Expr) -> list[str]:
+    """A coordinate, its velocity, its acceleration."""
+    return [derivative(str(q), k) for k in range(3)]
+
+
+def _event(
+    eom: EquationsOfMotion, quantity: str, of: str, rows: Indices
+) -> dict[str, tuple[Indices, Indices]]:
+    """What is kept of a departure or the start of slipping."""
+    found = {names.name(f"{quantity}.{what}", of): (NONE, rows) for what in ("count", "time")}
+    for j, q in enumerate(eom.q):
+        for order in (0, 1):
+            found[names.name(quantity, of, str(q), order)] = frozenset({j}), rows
     return found
 
 
 def _of_frictions(eom: EquationsOfMotion) -> dict[str, tuple[Indices, Indices]]:
     """What frictions show: all of it is of the rows that they limit."""
-    none: Indices = frozenset()
     position = {c.name: k for k, c in enumerate(eom.constraints)}
     found: dict[str, tuple[Indices, Indices]] = {}
-    every: Indices = frozenset()
+    every = NONE
     for law in eom.frictions:
         rows = frozenset(position[name] for name in law.of)
         every |= rows
-        names = [f"{head}.{law.name}" for head in ("sticks", "margin", "power")]
-        names += [f"slipping.{law.name}.{tail}" for tail in ("count", "time")]
-        names += [f"slip.{name}" for name in law.of]
-        found |= dict.fromkeys(names, (none, rows))
-        for j, q in enumerate(eom.q):
-            for tail in (f"{q}", f"velocity.{q}"):
-                found[f"slipping.{law.name}.{tail}"] = frozenset({j}), rows
+        own = [names.name(head, law.name) for head in (names.STICKS, names.MARGIN, names.POWER)]
+        own += [names.name(names.SLIP, name) for name in law.of]
+        found |= dict.fromkeys(own, (NONE, rows)) | _event(eom, names.SLIPPING, law.name, rows)
     if every:
-        found["energy.dissipated"] = none, every
+        found[names.DISSIPATED] = NONE, every
     return found
 
 
@@ -213,8 +224,8 @@ def only(
 
 def silent(eom: EquationsOfMotion, outputs: Collection[str]) -> EquationsOfMotion:
     """Without the energies and outputs of the model's own that are not read."""
-    kinetic = bool({"energy.kinetic", "energy.total"} & set(outputs))
-    potential = bool({"energy.potential", "energy.total"} & set(outputs))
+    kinetic = bool({names.KINETIC, names.TOTAL} & set(outputs))
+    potential = bool({names.POTENTIAL, names.TOTAL} & set(outputs))
     return replace(
         eom,
         kinetic=eom.kinetic if kinetic else None,
@@ -231,22 +242,22 @@ def read_only(
     Unchanged if an output needs lambda, Q, a residual or a dependent acceleration.  If only the
     stepped coordinates are read, their equations are all there is.
     """
-    stepped = {f"der({s},2)" for s in reduction.s}
-    solved = {f"der({q},2)" for q in eom.q} - stepped
+    stepped = {derivative(str(s), 2) for s in reduction.s}
+    solved = {derivative(str(q), 2) for q in eom.q} - stepped
     reactions = {*eom.vdot, *eom.lam, *eom.Q}
     solved |= {o.name for o in eom.outputs if symbols_of(o) & reactions}
-    if any(name.startswith(SOLVED) or name in solved for name in outputs):
+    if names.those(outputs, *SOLVED) or solved & set(outputs):
         return eom, reduction
-    of_s = {name for s in reduction.s for name in (f"{s}", f"der({s})", f"der({s},2)")}
+    of_s = {name for s in reduction.s for name in _motion(s)}
     of = subjects(eom, reduction)
     wanted: set[int] = set()
     for name in set(outputs) - of_s:
-        wanted |= of.get(name, (frozenset(), frozenset()))[0]
+        wanted |= of.get(name, (NONE, NONE))[0]
     js = sorted(wanted)
     if not js:
         own = replace(reduction.reduced, constraints=reduction.constraints, outputs=eom.outputs)
         return silent(own, outputs), None
-    rates = [n for n in outputs if n.startswith(("der(", "energy.")) or ".velocity." in n]
+    rates = [n for n in outputs if names.read(n).order or names.read(n).quantity in ENERGIES]
     rates += [o.name for o in eom.outputs if o.name in outputs and symbols_of(o) & set(eom.v)]
     moving = bool(set(rates) - of_s)  # of what is read, velocities are asked for
     nothing = sp.ImmutableSparseMatrix(len(js), len(js), {})

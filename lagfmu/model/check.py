@@ -13,6 +13,7 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
+from ..names import read
 from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
@@ -112,8 +113,8 @@ def _check_start(
         if isinstance(state, str):
             problems.append(
                 f"{what} has the text {state!r} as a key, expected a coordinate or its velocity: write "
-                f"{state.removeprefix('der(').removesuffix(')')} without quotes"
-                + (", and .diff() behind it" if state.startswith("der(") else "")
+                f"{read(state).coordinate} without quotes"
+                + (", and .diff() behind it" if read(state).order else "")
             )
             continue
         if state not in states:

@@ -13,6 +13,7 @@ from typing import Any
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
+from .. import names
 from .model import name_of
 
 Expr = Any
@@ -70,7 +71,7 @@ def output(name: str) -> Expr:
 
 def initial(state: Expr) -> Expr:
     """The value of a coordinate or of its derivative at the first communication point."""
-    return sp.Symbol(f"initial({variable_name(state)})", real=True)
+    return output(names.initial(variable_name(state)))
 
 
 def departure(contact: str, state: Expr = None) -> Expr:
@@ -79,10 +80,10 @@ def departure(contact: str, state: Expr = None) -> Expr:
     A closed form that uses it applies only once the contact has opened.
     """
     if state is None:
-        return sp.Symbol(f"departure.{contact}.time", real=True)
-    if isinstance(state, sp.Derivative):
-        return sp.Symbol(f"departure.{contact}.velocity.{name_of(state.expr)}", real=True)
-    return sp.Symbol(f"departure.{contact}.{name_of(state)}", real=True)
+        return output(names.name(names.DEPARTURE_TIME, contact))
+    order = 1 if isinstance(state, sp.Derivative) else 0
+    coordinate = name_of(state.expr if order else state)
+    return output(names.name(names.DEPARTURE, contact, coordinate, order))
 
 
 def variable_name(state: Expr) -> str:
@@ -90,9 +91,7 @@ def variable_name(state: Expr) -> str:
     if state == TIME:
         return "time"
     if isinstance(state, sp.Derivative):
-        order = state.derivative_count
-        inner = name_of(state.expr)
-        return f"der({inner})" if order == 1 else f"der({inner},{order})"
+        return names.derivative(name_of(state.expr), int(state.derivative_count))
     return name_of(state)
 
 

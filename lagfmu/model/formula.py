@@ -19,6 +19,7 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
+from ..names import derivative
 from .model import Model
 from .parts import Input, Output, name_of
 from .reactions import force_of_constraint, multiplier
@@ -80,9 +81,10 @@ def _known(model: Model) -> dict[str, Expr]:
         name = name_of(symbol)
         known[name] = symbol
         if symbol in model.coordinates or _moves(model, symbol):
-            known |= {f"der({name})": symbol.diff(t), f"der({name},2)": symbol.diff(t, 2)}
-    known |= {f"lambda.{c.name}": multiplier(c.name) for c in model.constraints}
-    return known | {f"Q.{name_of(q)}": force_of_constraint(q) for q in model.coordinates}
+            known |= {derivative(name, k): symbol.diff(t, k) for k in (1, 2)}
+    reactions = [multiplier(c.name) for c in model.constraints]
+    reactions += [force_of_constraint(q) for q in model.coordinates]
+    return known | {str(s): s for s in reactions}
 
 
 def _moves(model: Model, symbol: Expr) -> bool:

@@ -1,4 +1,4 @@
-"""What is wrong with the frictions of a model, in words.
+"""What is wrong with the frictions of a model, in words; a model in which some of them never slip.
 
 A friction limits the multipliers of one or two constraints, each a force in newtons, by a normal force that
 is linear in multipliers of other constraints.
@@ -8,18 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
-from .parts import NAME, Contact, Expr, Friction, ModelFields, name_of
-from .reactions import multiplier, reactions_in
+from .parts import NAME, Contact, Expr, Friction, ModelFields, Nonholonomic, name_of
+from .reactions import is_reaction, multiplier, reactions_in
+from .selection import select
 from .units import ONE, Unit, check_dimension, parse_unit, plain
 
 MOST_ROWS = 2  # tangential directions of a surface
 NEWTON = parse_unit("N", "a force")
+Fields = TypeVar("Fields", bound=ModelFields)
 
 
 def split(constraints: Iterable[object]) -> tuple[tuple[object, ...], tuple[Friction, ...]]:
@@ -27,6 +31,65 @@ def split(constraints: Iterable[object]) -> tuple[tuple[object, ...], tuple[Fric
     items = tuple(constraints)
     rest = tuple(c for c in items if not isinstance(c, Friction))
     return rest, tuple(c for c in items if isinstance(c, Friction))
+
+
+def stuck(model: Fields, slipping: Sequence[str], problems: list[str]) -> Fields:
+    """The model in which only the frictions `slipping` (names or patterns) may slip.
+
+    What the others limit holds always, or while the one contact is closed that presses it; parameters that
+    stand in those frictions alone go with them.
+    """
+    may = select(slipping, [f.name for f in model.frictions], "friction", problems)
+    gone = [f for f in model.frictions if f.name not in may]
+    if not gone:
+        return model
+    gates: dict[str, str] = {}
+    contacts = {multiplier(c.name): c.name for c in model.constraints if isinstance(c, Contact)}
+    for f in gone:
+        normal = sp.sympify(f.normal)
+        pressing = [name for symbol, name in contacts.items() if normal.has(symbol)]
+        gates |= {name: pressing[0] for name in f.of if pressing}
+        rough = [name for name in f.of if not isinstance(_row(model, name), Nonholonomic)]
+        if len(pressing) > 1 or (pressing and rough):
+            problems.append(
+                f"the friction {f.name!r} shall not slip, but {', '.join(map(repr, f.of))} acts with "
+                f"{' and '.join(map(repr, pressing))}: that can be said of a Nonholonomic constraint and "
+                f"one contact alone (while_closed); name it in `frictions`"
+            )
+    if problems:
+        return model
+    kept = tuple(f for f in model.frictions if f.name in may)
+    rest = {f.name: getattr(model, f.name) for f in fields(model)} | {"frictions": kept}
+    used = _symbols([v for name, v in rest.items() if name != "parameters"])
+    idle = _symbols(gone) - used
+    return replace(
+        model,
+        frictions=kept,
+        constraints=tuple(
+            replace(c, while_closed=gates[c.name])
+            if c.name in gates and isinstance(c, Nonholonomic)
+            else c
+            for c in model.constraints
+        ),
+        parameters=tuple(p for p in model.parameters if p.symbol not in idle),
+    )
+
+
+def _row(model: ModelFields, name: str) -> object:
+    return next(c for c in model.constraints if c.name == name)
+
+
+def _symbols(x: Any) -> set[Expr]:
+    """The symbols in everything that a model holds."""
+    if isinstance(x, sp.Basic):
+        return set(x.free_symbols)
+    if isinstance(x, Mapping):
+        return _symbols([*x.keys(), *x.values()])
+    if is_dataclass(x) and not isinstance(x, type):
+        return _symbols([getattr(x, f.name) for f in fields(x)])
+    if isinstance(x, list | tuple):
+        return set().union(*map(_symbols, x)) if x else set()
+    return set()
 
 
 def check_kinds(model: ModelFields, problems: list[str]) -> None:
@@ -214,7 +277,7 @@ def _check_symbols(
     inner = {a for d in expression.atoms(sp.Derivative) for a in d.atoms(AppliedUndef)}
     for s in sorted(found - known - inner, key=str):
         name = name_of(s) if not isinstance(s, sp.Derivative) else plain(s)
-        if what.startswith("normal") and str(s).startswith(("lambda.", "Q.")):
+        if what.startswith("normal") and is_reaction(s):
             continue  # told already
         problems.append(
             f"{what}: {name} is neither coordinate, parameter nor input"

@@ -13,10 +13,10 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
+from ..names import RESERVED
 from .frictions import check_kinds
 from .parts import (
     NAME,
-    RESERVED,
     Contact,
     Embedding,
     Expr,

@@ -18,7 +18,6 @@ from .frictions import split
 from .kinds import check_containers
 from .parts import (
     NAME,
-    RESERVED,
     Constraint,
     Contact,
     Embedding,
@@ -38,7 +37,6 @@ from .units import Unit
 
 __all__ = [
     "NAME",
-    "RESERVED",
     "Constraint",
     "Contact",
     "Embedding",

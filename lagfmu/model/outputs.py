@@ -9,7 +9,8 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
-from .parts import NAME, RESERVED, Contact, Expr, ModelFields, Nonholonomic, name_of
+from ..names import MULTIPLIER, RESERVED, read
+from .parts import NAME, Contact, Expr, ModelFields, Nonholonomic, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
 from .units import Unit, check_dimension, parse_unit, plain
 
@@ -100,7 +101,7 @@ def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
     reactions |= {force_of_constraint(q) for q in model.coordinates}
     for symbol in reactions_in(expression):
         if symbol not in reactions:
-            kind = "constraint" if str(symbol).startswith("lambda.") else "coordinate"
+            kind = "constraint" if read(str(symbol)).quantity == MULTIPLIER else "coordinate"
             known_names = constraints if kind == "constraint" else map(name_of, model.coordinates)
             yield (
                 f"{what}: {symbol} is of no {kind} of this model, expected one of "

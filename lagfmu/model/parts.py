@@ -14,10 +14,6 @@ from sympy.core.function import AppliedUndef
 Expr = Any  # a SymPy expression; SymPy carries no types
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
-RESERVED: tuple[str, ...] = (
-    *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
-    *("t", "time", "unique", "velocity"),
-)
 
 
 @dataclass(frozen=True)

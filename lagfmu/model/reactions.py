@@ -17,6 +17,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from ..errors import UnitError
+from ..names import FORCE, MULTIPLIER, REACTIONS, name, read
 from .parts import ModelFields, Nonholonomic, name_of
 from .units import ONE, Unit, dimension_of, generalized_force_unit, multiplier_unit
 
@@ -25,17 +26,17 @@ Expr = Any
 
 def multiplier(constraint: str) -> Expr:
     """lambda of the constraint of that name; its unit is J/[f], W/[expression] if nonholonomic."""
-    return sp.Symbol(f"lambda.{constraint}", real=True)
+    return sp.Symbol(name(MULTIPLIER, constraint), real=True)
 
 
 def force_of_constraint(coordinate: Expr) -> Expr:
     """Q of all constraints on a coordinate, in J/[coordinate]."""
-    return sp.Symbol(f"Q.{name_of(coordinate)}", real=True)
+    return sp.Symbol(name(FORCE, "", name_of(coordinate)), real=True)
 
 
 def is_reaction(symbol: Expr) -> bool:
     """True for what `multiplier` and `force_of_constraint` make."""
-    return bool(symbol.is_Symbol) and str(symbol).startswith(("lambda.", "Q."))
+    return bool(symbol.is_Symbol) and read(str(symbol)).quantity in REACTIONS
 
 
 def reactions_in(expression: Expr) -> list[Expr]:

@@ -1,7 +1,7 @@
 """What one FMU must show, and so what it must hold: the full FMU is the scene that asks for everything.
 
-`outputs`, `fixed`, `inputs` and `contacts` say what an importer will read, change, drive and see open;
-prune.py and fold.py take everything else away before code is printed.
+`outputs`, `fixed`, `inputs`, `contacts` and `frictions` say what an importer will read, change, drive, see
+open and see slip; prune.py and fold.py take everything else away before code is printed.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ class Scene:
     `inputs`: those that it drives; the others keep their start values, and can no longer be set.
     `contacts`: those that may open; the others hold like a holonomic constraint, whatever the sign of
     lambda.
+    `frictions`: those that may slip; what the others limit always sticks, while their contact is closed.
     `accuracy`: '1e-6' or '1e-6:lambda.surface', the relative error that the FMU is to hold; the
     method, its tolerance or step, and the formulation if None, are then measured and chosen when it
     is built.
@@ -60,6 +61,7 @@ class Scene:
     fixed: Sequence[str] = ()
     inputs: Sequence[str] = EVERYTHING
     contacts: Sequence[str] = EVERYTHING
+    frictions: Sequence[str] = EVERYTHING
     accuracy: str | None = None
     methods: Sequence[str] | None = None
     derivatives: bool | None = None
@@ -87,7 +89,7 @@ class Scene:
                 problems.append(f"{what} = {value!r}, expected a positive number")
         if not 0 <= self.step < float("inf"):
             problems.append(f"step = {self.step!r}, expected a positive number, or 0")
-        for what in ("outputs", "fixed", "inputs", "contacts"):
+        for what in ("outputs", "fixed", "inputs", "contacts", "frictions"):
             problems += self._listed(what)
         if self.methods is not None:
             wanted = {self.method, *self.methods}

@@ -7,25 +7,23 @@ same bytes.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 import jinja2
 from latex2mathml.converter import convert
 from markupsafe import Markup
 
+from .. import names
 from ..interface.variables import Variable
 from ..model.model import Contact, Holonomic, Nonholonomic
 from ..model.units import Unit
+from ..prepare.prepare import Prepared
 from ..solver.precedence import OMITTED
 from .savings import savings
 from .typeset import SUPERSCRIPT, typeset
-
-if TYPE_CHECKING:  # build.py imports this module
-    from ..prepare.prepare import Prepared
 
 MEANING = {
     "multipliers": "Lagrange's equations and the constraints, differentiated to accelerations, are "
@@ -48,12 +46,21 @@ GROUPS = (
     ("Energies", ""),
     ("Outputs of the model", "What they are made of stands among the equations."),
     ("Contacts and departures", ""),
+    ("Friction", "Sticking, slip velocities, and what is left before a contact slips."),
     ("Solver", "Method, accuracy, and what was done."),
 )
 AFTER_FACTOR = re.compile(r"(?<=[\w})]) (?=\\(?:a?(?:sin|cos|tan)h?|log|exp|operatorname)\b)")
-HEADS = {"energy": "Energies", "contact": "Contacts and departures"}
-HEADS |= {"departure": "Contacts and departures", "Q": "Generalized forces of constraint"}
-HEADS |= dict.fromkeys(("lambda", "residual", "unique"), "Multipliers and constraints")
+TITLES = {  # by the kind of what a variable is of
+    "energy": "Energies",
+    "solver": "Solver",
+    names.OWN: "Outputs of the model",
+    names.FORCE: "Generalized forces of constraint",
+    **dict.fromkeys((names.CONTACT, names.DEPARTURE), "Contacts and departures"),
+    **dict.fromkeys(
+        (names.MULTIPLIER, names.RESIDUAL, names.UNIQUE), "Multipliers and constraints"
+    ),
+    **dict.fromkeys(names.OF_FRICTION, "Friction"),
+}
 
 
 @dataclass(frozen=True)
@@ -100,7 +107,7 @@ def page(
                 KINDS[type(c)],
                 c.description,
                 c.while_closed if not isinstance(c, Contact) else None,
-                shown(whole[f"lambda.{c.name}"].unit),
+                shown(whole[names.name(names.MULTIPLIER, c.name)].unit),
             )
             for c in acting
         ],
@@ -114,7 +121,7 @@ def page(
             )
             for m in structure.start.moved
         ],
-        groups=_grouped(table.variables, {o.name for o in model.outputs}),
+        groups=_grouped(table.variables),
         inputs=[v.name for v in table.variables if v.causality == "input"],
         prescribed=bool(prepared.system.prescribed),
         tolerance=f"{prepared.scene.tolerance:g}",
@@ -138,23 +145,19 @@ def shown(unit: Unit | None) -> str:
     return name.replace(".", "·")
 
 
-def _grouped(
-    variables: Sequence[Variable], own: Collection[str]
-) -> list[tuple[str, str, list[Row]]]:
+def _grouped(variables: Sequence[Variable]) -> list[tuple[str, str, list[Row]]]:
     rows: dict[str, list[Row]] = {title: [] for title, _ in GROUPS}
     for v in variables:
         start = "" if v.start is None else str(v.start)
         row = Row(v.name, v.causality, v.kind, shown(v.unit), start, v.description)
-        rows["Outputs of the model" if v.name in own else _group(v)].append(row)
+        rows[_group(v)].append(row)
     return [(title, remark, rows[title]) for title, remark in GROUPS if rows[title]]
 
 
 def _group(v: Variable) -> str:
-    if v.name.startswith("solver."):
-        return "Solver"
     by_role = {"parameter": "Parameters", "input": "Inputs", "start": "Motion"}
     by_role["estimate"] = "Inputs"
-    return by_role.get(v.role) or HEADS.get(v.name.split(".")[0], "Motion")
+    return by_role.get(v.role) or TITLES.get(v.of.head, "Motion")
 
 
 @cache

@@ -20,7 +20,10 @@ from ..mechanics.equations import TIME
 from ..model.closed_form import in_variables
 from ..model.model import Model, Nonholonomic
 from ..model.picture import Arrow, Disk, Ground, Line, Path, Point, Rod, Shape, Spring, points_of
+from ..model.reactions import multiplier
+from ..model.spline import SplineBase
 from ..prepare.prepare import Prepared
+from ..solver.cubic import Cubic
 
 Expr = Any
 Packed = float | str | list[Any]
@@ -29,6 +32,15 @@ FUNCTIONS: Mapping[Any, str] = {
     **{f: f.__name__ for f in (sp.sinh, sp.cosh, sp.tanh, sp.exp, sp.log, sp.sign)},
     **{sp.Abs: "abs", sp.Min: "min", sp.Max: "max", sp.Add: "+", sp.Mul: "*", sp.Pow: "^"},
 }
+
+
+def _spline(x: Any, periodic: float, *rows: float) -> Any:
+    """A table at x: whether it repeats, then a knot and its four coefficients, row by row."""
+    knots, *columns = (rows[k::5] for k in range(5))
+    table = Cubic(knots, list(zip(*columns, strict=True)), bool(periodic))
+    return np.vectorize(table, otypes=[float])(x)
+
+
 OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "+": lambda *x: sum(x),
     "*": lambda *x: math.prod(x),
@@ -36,6 +48,7 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh")},
     **{name: getattr(np, name) for name in ("exp", "log", "sign", "abs")},
     **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2},
+    "spline": _spline,
     **{"min": lambda *x: np.minimum.reduce(x), "max": lambda *x: np.maximum.reduce(x)},
 }
 FIELDS = {  # kind -> names of its points, lists of points, single expressions, and the rest
@@ -108,7 +121,7 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
                 found[key] = expression(value)
         return found | ({"trace": True} if shape.trace else {})
     along = direction(model, shape) if shape.along is None else shape.along
-    force = sp.Symbol(f"lambda.{shape.constraint}", real=True)
+    force = multiplier(shape.constraint)
     vector = [pack(in_variables(sp.sympify(x)) * force, numbers) for x in along]
     return {"kind": "arrow", "name": shape.constraint, "at": point(shape.at), "vector": vector}
 
@@ -151,10 +164,18 @@ def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
         if not math.isfinite(value):
             raise ValueError(f"{expression} is no finite number")
         return value
+    if isinstance(expression, SplineBase) and expression.order == 0:
+        table = expression.spline.table
+        rows = [
+            float(x) for k, c in zip(table.knots, table.coefficients, strict=True) for x in (k, *c)
+        ]
+        return ["spline", pack(expression.args[0], numbers), float(table.periodic), *rows]
     operation = FUNCTIONS.get(expression.func)
     if operation is None:
         known = ", ".join(sorted(f for f in FUNCTIONS.values() if f.isalpha()))
-        raise ValueError(f"{expression} cannot be drawn, expected sums, products, powers, {known}")
+        raise ValueError(
+            f"{expression} cannot be drawn, expected sums, products, powers, tables, {known}"
+        )
     return [operation, *(pack(a, numbers) for a in expression.args)]
 
 
@@ -228,6 +249,8 @@ def _checked(packed: Any, depth: int = 0) -> Packed:
     if isinstance(packed, str):
         return packed
     if isinstance(packed, list) and packed and packed[0] in OPERATIONS and len(packed) > 1:
+        if packed[0] == "spline" and (len(packed) < 8 or len(packed) % 5 != 3):
+            raise ValueError(f"a table of {len(packed) - 3} numbers, expected five a row")
         return [packed[0], *(_checked(p, depth + 1) for p in packed[1:])]
     if isinstance(packed, int | float) and not isinstance(packed, bool) and math.isfinite(packed):
         return float(packed)

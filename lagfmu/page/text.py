@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
 import sympy as sp
 from rich.console import Console
@@ -13,13 +12,12 @@ from rich.text import Text
 from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.integrability.classify import Classification, classify
 from ..model.model import Contact, Nonholonomic, name_of
+from ..names import FORCE, MULTIPLIER, OWN
+from ..prepare.prepare import Derived, Prepared
 from ..solver.precedence import OMITTED
 from .documentation import shown
 from .savings import Savings, savings
 from .typeset import Notation, typeset
-
-if TYPE_CHECKING:
-    from ..prepare.prepare import Derived, Prepared
 
 
 def show(prepared: Prepared, console: Console) -> None:
@@ -184,12 +182,10 @@ def _units(prepared: Prepared) -> Table:
     names = [str(q) for q in eom.q]
     if prepared.reduction is not None:
         names += [str(s) for s in prepared.reduction.s if s not in eom.q]
-    names += [f"lambda.{c.name}" for c in eom.constraints]
-    names += [f"Q.{q}" for q in eom.q if f"Q.{q}" in prepared.table]
-    names += [o.name for o in eom.outputs]
-    for name in (n for n in names if n in prepared.table):
-        v = prepared.table[name]
-        table.add_row(Text(name), Text(shown(v.unit) or "1"), Text(v.description))
+    reported = prepared.table.those(MULTIPLIER, FORCE, OWN)
+    found = [prepared.table[name] for name in names if name in prepared.table]
+    for v in (*found, *(v for v in reported if not (v.of.constraint and v.of.coordinate))):
+        table.add_row(Text(v.name), Text(shown(v.unit) or "1"), Text(v.description))
     return table
 
 

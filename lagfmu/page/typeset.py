@@ -23,9 +23,10 @@ from sympy.printing.str import StrPrinter
 from ..mechanics import shorter
 from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
-from ..mechanics.formulations.nullspace import accelerations, lambda_free, largest_group
+from ..mechanics.formulations.nullspace import lambda_free, largest_group
 from ..model.model import Contact, Nonholonomic
 from ..model.reactions import multiplier
+from ..names import derivative, read
 
 Expr = Any  # SymPy carries no types
 Printed = tuple[str, str]  # LaTeX, text
@@ -90,7 +91,7 @@ def name_text(name: str, dots: int = 0) -> str:
     base, subscripts = _parts(name)
     letter = _greek(base)
     if dots and len(letter) > 1:
-        return f"der({name})" if dots == 1 else f"der({name},{dots})"
+        return derivative(name, dots)
     tail = "".join(
         s.translate(SUBSCRIPT) if s.isdigit() and len(subscripts) == 1 else f"_{_greek(s)}"
         for s in subscripts
@@ -152,9 +153,10 @@ class Notation:
         if reduction is not None:
             pairs += list(zip(reduction.s, reduction.sdot, strict=True))
         moving = [*eom.u, *(q for q, _ in pairs), *(v for _, v in pairs)]
-        moving += [sp.Symbol(f"der({q},2)", real=True) for q, _ in pairs]
+        moving += [sp.Symbol(derivative(str(q), 2), real=True) for q, _ in pairs]
         for symbol in moving:
-            name, dots = _undotted(str(symbol))
+            of = read(str(symbol))
+            name, dots = of.coordinate, of.order
             written.setdefault(symbol, (name_latex(name, dots), name_text(name, dots)))
         self.multipliers = []
         for c in eom.constraints:
@@ -221,13 +223,6 @@ class Notation:
         return out
 
 
-def _undotted(name: str) -> tuple[str, int]:
-    match = re.fullmatch(r"der\((\w+)(?:,2)?\)", name)
-    if match is None:
-        return name, 0
-    return match[1], 2 if name.endswith(",2)") else 1
-
-
 def _joined(factors: Sequence[Printed]) -> Printed:
     latex = " ".join(a for a, _ in factors)
     text = " ".join(b for _, b in factors)
@@ -274,7 +269,7 @@ class _Typesetter:
     def __init__(self, eom: EquationsOfMotion, reduction: Reduction | None) -> None:
         self.eom = eom
         self.notation = Notation(eom, reduction)
-        self.vdot = accelerations(eom)
+        self.vdot = eom.vdot
 
     def section(
         self,
@@ -431,7 +426,7 @@ class _Typesetter:
 
     def reduced(self, reduction: Reduction) -> Section:
         eom = reduction.reduced
-        sddot = accelerations(eom)
+        sddot = eom.vdot
         equations = []
         for j, s in enumerate(eom.q[:MOST]):
             right = self.multiplied(eom.G, reduction.rows, j)

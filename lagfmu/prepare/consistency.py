@@ -19,6 +19,7 @@ from ..errors import DerivationError, ModelError
 from ..interface.variables import VariableTable
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations.minimal import Reduction
+from ..names import derivative
 from ..solver.afar import project_from_afar
 from ..solver.failure import OmittedStartError, StepFailureError
 from ..solver.initial import Start, start
@@ -111,7 +112,7 @@ def _begun(
     p = [float(numbers.get(x.symbol, x.value)) for x in eom.parameters]
     u = [float(numbers.get(s, table[str(s)].start or 0.0)) for s in eom.u]
     q0 = [float(table[c].start or 0.0) for c in system.coordinates]
-    v0 = [float(table[f"der({c})"].start or 0.0) for c in system.coordinates]
+    v0 = [float(table[derivative(c)].start or 0.0) for c in system.coordinates]
     try:
         begun = start(system, Settings(), 0.0, q0, v0, u, p, ranks(system, table, {}))
         observe(system, begun.state, u, p)

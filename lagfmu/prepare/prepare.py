@@ -13,6 +13,7 @@ from ..mechanics import fold, prune
 from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.formulations.minimal import Reduction, reduce
 from ..mechanics.jumps import with_jumps
+from ..model.frictions import stuck
 from ..model.model import Contact, Model, name_of
 from ..model.scene import Scene
 from ..model.selection import select
@@ -81,6 +82,9 @@ def prepare(model: Model, scene: Scene | None = None) -> Prepared:
     """Derive, prune, reduce, lower and examine.  Raises ModelError or DerivationError."""
     asked = scene = scene or Scene(model.name)
     problems: list[str] = []
+    model = stuck(model, scene.frictions, problems)
+    if problems:
+        raise ModelError(scene.name, problems)
     derived = with_jumps(derive(model))
     equations = prune.held(derived, scene, problems)
     numbers = fold.numbers_of(derived, scene, problems)

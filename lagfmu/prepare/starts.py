@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import ModelError
 from ..interface.variables import VariableTable
+from ..names import motion
 from ..solver.initial import Moved
 from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.system import System
@@ -24,7 +25,7 @@ def ranks(system: System, table: VariableTable, values: Mapping[str, Any]) -> li
 
     `values`: what is set, by name; a value that is the described one is not.
     """
-    names = [*system.coordinates, *(f"der({c})" for c in system.coordinates)]
+    names = motion(system.coordinates)
     said = [GIVEN if table[name].given else OMITTED for name in names]
     return [
         SET if name in values and float(values[name]) != table[name].start else rank

@@ -26,8 +26,13 @@ class Instant:
 
     def evaluate(self, q: Vector, v: Vector) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
         """M (n, n), F (n), G (m, n), nu (m), gamma (m), with arithmetic failures named."""
+        return self.system.placed(self.values(q, v))
+
+    def values(self, q: Vector, v: Vector) -> Any:
+        """The values of M, F, G, nu, gamma that are not structurally zero, as lists (system.py)."""
+        assert self.system.dynamics is not None
         try:
-            return self.system.assemble(self.t, q, v, self.u, self.p)
+            return self.system.dynamics(self.t, q.tolist(), v.tolist(), self.u, self.p)
         except (ArithmeticError, ValueError) as error:
             raise StepFailureError(
                 f"the equations cannot be evaluated at t = {float(self.t)!r} s ({plain(error)})"

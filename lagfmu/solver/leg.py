@@ -16,11 +16,12 @@ import numpy as np
 
 from .failure import StepFailureError, plain
 from .instant import Instant, Motion
-from .magnitudes import alike, shared
+from .magnitudes import shared
 from .methods import share, stepper
 from .motion import distance, independent, motion, project
 from .state import Settings, State
 from .stiffness import Choice
+from .straight import solver_of
 from .system import Matrix, System, Vector
 
 FAR, LEAST_FAR = 1e3, 1e-6  # how far a projection may move the state: in tolerances, and at least
@@ -42,33 +43,44 @@ class Leg:
 
     def __post_init__(self) -> None:
         self.rows = self.system.active(self.state.closed)
-        self.basis = (
-            self.rows
-        )  # of a step's stages, which lie off the constraints: those independent on them
+        self.take(self.rows)
         self.dependent = False
+        self.held = [*self.u, *self.state.levels]
         self.offset = np.array(self.state.offset)
         self.scale = np.array(self.state.scale)
         self.size = np.array(self.state.size)
-        self.tied = alike(self.system)
         self.cause = ""
         self.auto = self.settings.method == "auto"
         if self.auto:
             self.choose(self.state.choice)
+
+    def take(self, basis: list[int]) -> None:
+        """The rows of a step's stages, which lie off the constraints: those independent on them."""
+        self.basis = basis
+        self.written = None if self.system.frictions else solver_of(self.system, basis)
 
     def choose(self, choice: Choice) -> None:
         """The method of `auto` for the steps to come."""
         method = "radau5" if choice.implicit else "dop853"
         self.settings = replace(self.settings, method=method)
 
+    def inputs_at(self, t: float) -> list[float]:
+        """What drives the equations at t: inputs and the levels of jumps."""
+        if not self.system.prescribed:
+            return self.held
+        return [*self.system.inputs_at(self.u, t - self.begun), *self.state.levels]
+
     def at(self, t: float) -> Instant:
-        u = self.system.inputs_at(self.u, t - self.begun)
-        return Instant(self.system, t, [*u, *self.state.levels], self.p, self.state.slides)
+        return Instant(self.system, t, self.inputs_at(t), self.p, self.state.slides)
 
     def split(self, y: Vector) -> tuple[Vector, Vector]:
         return y[: self.system.n], y[self.system.n :]
 
     def rate(self, t: float, y: Vector) -> Vector:
         """y' (2 n); not a number where the equations cannot be evaluated: the step is cut there."""
+        found = self._rate_as_written(t, y)
+        if found is not None:
+            return found
         q, v = self.split(y)
         try:
             now = (
@@ -81,11 +93,30 @@ class Leg:
             return np.full_like(y, np.nan)
         return np.concatenate([v, now.vdot])
 
+    def _rate_as_written(self, t: float, y: Vector) -> Vector | None:
+        """The same by straight.py; None where that does not answer."""
+        if self.written is None or self.system.dynamics is None:
+            return None
+        values = y.tolist()
+        q, v = values[: self.system.n], values[self.system.n :]
+        try:
+            M, F, G, _, gamma = self.system.dynamics(t, q, v, self.inputs_at(t), self.p)
+            found = self.written(M, F, G, gamma)
+        except (ArithmeticError, ValueError):
+            return None
+        return None if found is None else np.array(v + found[0])
+
     def accept(self, t: float, y: Vector) -> Vector:
         """y' (2 n) at a state on the constraints, where a step begins: by all rows, of which those that
         depend on others are then left out in its stages."""
         if len(self.rows) < 2 and not self.system.frictions:
             return self.rate(t, y)
+        if self.written is not None:
+            self.take(self.rows)
+            found = self._rate_as_written(t, y)
+            if found is not None:
+                self.dependent = False
+                return found
         q, v = self.split(y)
         try:
             now = motion(self.at(t), q, v, self.rows)
@@ -94,7 +125,7 @@ class Leg:
             return np.full_like(y, np.nan)
         self.dependent = not now.unique.all()
         if not self.system.frictions:  # these need all rows: which of them press?
-            self.basis = independent(now, self.rows)
+            self.take(independent(now, self.rows))
         return np.concatenate([v, now.vdot])
 
     def is_dependent(self) -> bool:
@@ -148,12 +179,12 @@ class Leg:
             first_step = 1 / (FEWEST_STEPS * self.state.rate)
         elif self.settings.method == "rk4":
             first_step = self.settings.step
-        slope, scale = (self.rate, self.jacobian), shared(self.tied, self.scale, y)
+        slope, scale = (self.rate, self.jacobian), shared(self.system, self.scale, y)
         return stepper(self.settings, slope, t, y, t_bound, scale, first_step)
 
     def step(self, solver: Any) -> None:
         """One accepted step, or the reason why there is none."""
-        share(solver, self.settings, shared(self.tied, self.scale, solver.y))
+        share(solver, self.settings, shared(self.system, self.scale, solver.y))
         try:
             message = solver.step()
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:

@@ -87,35 +87,14 @@ def motion_speeds(system: System, M: Matrix, speed: Vector) -> Vector:
     return shared
 
 
-def alike(system: System) -> NDArray[np.bool_]:
-    """(n, n) which coordinates turn into each other by another choice of axes: those of one dimension that a
-    constraint or the mass matrix ties; angles that a constraint does."""
-    tied = np.eye(system.n, dtype=bool)
-    rows: dict[int, list[int]] = {}
-    for k, j in zip(*system.jacobian, strict=True):
-        rows.setdefault(k, []).append(j)
-    for entries in rows.values():
-        tied[np.ix_(entries, entries)] = True
-    for i, j in zip(*system.mass, strict=True):
-        if i not in system.angles:
-            tied[i, j] = tied[j, i] = True
-    same = np.zeros_like(tied)
-    for j in range(system.n):
-        same[j, list(system.like[j]) if system.like else [j]] = True
-    found: NDArray[np.bool_] = tied & same
-    return found
-
-
-def shared(tied: NDArray[np.bool_], scale: Vector, y: Vector) -> Vector:
+def shared(system: System, scale: Vector, y: Vector) -> Vector:
     """`scale` (2 n), no smaller than the scales and magnitudes in y (2 n) of the coordinates that are alike:
     the steps are the same in whatever frame."""
-    n, others = len(tied), tied & ~np.eye(len(tied), dtype=bool)
-    largest = np.maximum(scale, np.abs(y))
-    found = [
-        np.where(others.any(axis=1), np.where(tied, part, 0.0).max(axis=1), 0.0)
-        for part in (largest[:n], largest[n:])
-    ]
-    together: Vector = np.maximum(scale, np.concatenate(found))
+    alike = system.alike
+    if not alike.any():
+        return scale
+    largest = np.maximum(scale, np.abs(y)).reshape(2, 1, system.n)
+    together: Vector = np.maximum(scale, np.where(alike, largest, 0.0).max(axis=2).ravel())
     return together
 
 

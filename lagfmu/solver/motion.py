@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
@@ -12,6 +13,7 @@ from .failure import StepFailureError
 from .instant import Instant, Motion
 from .linear import solve, solve_nullspace
 from .solution import RANK, Solution
+from .straight import solver_of
 from .system import NONHOLONOMIC, Matrix, Vector
 
 EPS = float(np.finfo(float).eps)
@@ -30,21 +32,31 @@ def motion(
 ) -> Motion:
     """Accelerations (n) and multipliers (m; 0 for rows that do not act) at a state, `off` the constraints."""
 
+    if at.slides:
+        return at_friction.motion_with_friction(at, q, v, active, _method(at, off))
+    values, rows = at.values(q, v), list(active)
+    M, F, G, nu, gamma = at.system.placed(values)
+    lam, unique = np.zeros(at.system.m), np.ones(at.system.m, dtype=bool)
+    written = solver_of(at.system, rows)
+    quick = written(values[0], values[1], values[2], values[4]) if written else None
+    if quick is not None:
+        lam[rows] = quick[1]
+        return Motion(M, F, G, nu, gamma, np.array(quick[0]), lam, unique)
+    found = _method(at, off)(M, F, G[rows], gamma[rows])
+    lam[rows] = found.lam
+    unique[rows] = found.unique
+    return Motion(M, F, G, nu, gamma, found.x, lam, unique)
+
+
+def _method(at: Instant, off: float) -> Callable[[Matrix, Vector, Matrix, Vector], Solution]:
+    """The ladder of linear.py, as the formulation has it."""
+
     def method(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
         if at.system.formulation == "nullspace":
             return solve_nullspace(M, b, G, c, off)
         return solve(M, b, G, c, off=off)
 
-    if at.slides:
-        return at_friction.motion_with_friction(at, q, v, active, method)
-    M, F, G, nu, gamma = at.evaluate(q, v)
-    rows = list(active)
-    found = method(M, F, G[rows], gamma[rows])
-    lam = np.zeros(at.system.m)
-    lam[rows] = found.lam
-    unique = np.ones(at.system.m, dtype=bool)
-    unique[rows] = found.unique
-    return Motion(M, F, G, nu, gamma, found.x, lam, unique)
+    return method
 
 
 def independent(now: Motion, active: Sequence[int]) -> list[int]:
@@ -95,8 +107,9 @@ def project(
     if not rows:
         return q, v
     fixed = [k for k in rows if at.system.rows[k].kind != NONHOLONOMIC]
-    M, _, G, nu, _ = at.evaluate(q, v)
-    before, none = np.inf, np.zeros(at.system.n)
+    values = at.values(q, v)
+    _, _, G, nu, _ = at.system.placed(values)
+    before = np.inf
     for count in range(ITERATIONS + 1 if fixed else 0):
         f = (at.residual(q) - offset)[fixed]
         miss, steepness = np.abs(f), np.abs(G[fixed])
@@ -116,7 +129,21 @@ def project(
                 f"{cause or 'take smaller steps'}"
             )
         before = error
-        q = q + solve(M, none, G[fixed], -f, nearest=True, off=error if dependent else 0.0).x
-        M, _, G, nu, _ = at.evaluate(q, v)
-    slip = nu[rows] - G[rows] @ v
-    return q, v + solve(M, np.zeros(at.system.n), G[rows], slip, nearest=True).x
+        q = q + _nearest(at, values, fixed, -f, off=error if dependent else 0.0)
+        values = at.values(q, v)
+        _, _, G, nu, _ = at.system.placed(values)
+    return q, v + _nearest(at, values, rows, nu[rows] - G[rows] @ v)
+
+
+def _nearest(at: Instant, values: Any, rows: Sequence[int], c: Vector, off: float = 0.0) -> Vector:
+    """x (n) with G x = c on the rows, the shortest in the metric of M; `values` as of `dynamics`."""
+    written = solver_of(at.system, rows)
+    if written is not None:
+        asked = [0.0] * at.system.m
+        for k, x in zip(rows, c.tolist(), strict=True):
+            asked[k] = x
+        found = written(values[0], [0.0] * at.system.n, values[2], asked)
+        if found is not None:
+            return np.array(found[0])
+    M, _, G, _, _ = at.system.placed(values)
+    return solve(M, np.zeros(at.system.n), G[list(rows)], c, nearest=True, off=off).x

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,7 +30,7 @@ def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]
         raise StepFailureError(
             f"the outputs cannot be evaluated at t = {state.t!r} s ({plain(error)})"
         ) from error
-    bad = [name for name, value in values.items() if not np.isfinite(value)]
+    bad = [name for name, value in values.items() if not math.isfinite(value)]
     if bad:
         raise StepFailureError(f"not finite at t = {state.t!r} s: {', '.join(bad)}")
     return values
@@ -39,9 +40,9 @@ def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float
     values: Values = {}
     u = [*u, *state.levels]
     full, q, v = expand(system, state.t, np.array(state.q), np.array(state.v), u, p)
-    for j, name in enumerate(full.coordinates):
-        values[name] = float(q[j])
-        values[f"der({name})"] = float(v[j])
+    for name, x, xdot in zip(full.coordinates, q.tolist(), v.tolist(), strict=True):
+        values[name] = x
+        values[f"der({name})"] = xdot
     if full.dynamics is not None:
         values |= _solved(system, full, state, q, v, u, p)
     if system.embedding is not None:
@@ -82,14 +83,14 @@ def _solved(
     now = motion(at, q, v, active)
     if system.frictions:
         values |= at_slides.observed(system, state, now)
-    for j, name in enumerate(full.coordinates):
-        values[f"der({name},2)"] = float(now.vdot[j])
-    f = at.residual(q)
+    for name, a in zip(full.coordinates, now.vdot.tolist(), strict=True):
+        values[f"der({name},2)"] = a
+    f, lam, unique = at.residual(q), now.lam.tolist(), now.unique.tolist()
     slip = now.G @ v - now.nu
     kept = {row.name: level for row, level in zip(system.rows, state.offset, strict=True)}
     for k, row in enumerate(full.rows):
-        values[f"lambda.{row.name}"] = float(now.lam[k])
-        values[f"unique.{row.name}"] = bool(now.unique[k])
+        values[f"lambda.{row.name}"] = lam[k]
+        values[f"unique.{row.name}"] = unique[k]
         miss = (
             slip[k]
             if row.kind == NONHOLONOMIC or row.friction is not None
@@ -97,8 +98,8 @@ def _solved(
         )
         values[f"residual.{row.name}"] = float(miss)
     share = now.G * now.lam[:, None]
-    for j, name in enumerate(full.coordinates):
-        values[f"Q.{name}"] = float(share[:, j].sum())
+    for name, Q in zip(full.coordinates, share.sum(axis=0).tolist(), strict=True):
+        values[f"Q.{name}"] = Q
     for k, j in zip(*full.jacobian, strict=True):
         values[f"Q.{full.rows[k].name}.{full.coordinates[j]}"] = float(share[k, j])
     return values

@@ -116,12 +116,12 @@ class System:
     bounds: Callable[..., Any] | None = None
     driven: int = 0
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)
 
-    @property
+    @cached_property
     def m(self) -> int:
         """Number of constraint rows."""
         return len(self.rows)
@@ -156,6 +156,32 @@ class System:
         k, j = (np.asarray(a, dtype=np.intp) for a in self.jacobian)
         return k, j
 
+    @cached_property
+    def alike(self) -> NDArray[np.bool_]:
+        """(n, n) for each coordinate those that turn into each other, itself among them, by another choice of
+        axes: of one dimension, and tied by a constraint or the mass matrix; angles by a constraint.  None in
+        the row of a coordinate that is like no other."""
+        tied = np.eye(self.n, dtype=bool)
+        entries: dict[int, list[int]] = {}
+        for k, j in zip(*self.jacobian, strict=True):
+            entries.setdefault(k, []).append(j)
+        for row in entries.values():
+            tied[np.ix_(row, row)] = True
+        for i, j in zip(*self.mass, strict=True):
+            if i not in self.angles:
+                tied[i, j] = tied[j, i] = True
+        same = np.zeros_like(tied)
+        for j in range(self.n):
+            same[j, list(self.like[j]) if self.like else [j]] = True
+        found: NDArray[np.bool_] = tied & same
+        found[found.sum(axis=1) < 2] = False
+        return found
+
+    @cached_property
+    def written(self) -> dict[tuple[int, ...], Any]:
+        """What straight.py wrote for this system so far, by the rows that act."""
+        return {}
+
     def active(self, closed: Sequence[bool]) -> list[int]:
         """Rows that act while the contacts stand as in `closed` (one entry a contact); those that stick
         by friction come to them in friction.py."""
@@ -172,7 +198,11 @@ class System:
     ) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
         """M (n, n), F (n), G (m, n), nu (m), gamma (m) at a state; all constraint rows."""
         assert self.dynamics is not None
-        mass, F, jacobian, nu, gamma = self.dynamics(t, q.tolist(), v.tolist(), u, p)
+        return self.placed(self.dynamics(t, q.tolist(), v.tolist(), u, p))
+
+    def placed(self, values: Any) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
+        """The same from the values that `dynamics` gave."""
+        mass, F, jacobian, nu, gamma = values
         M = np.zeros((self.n, self.n))
         i, j = self._mass
         M[i, j] = mass

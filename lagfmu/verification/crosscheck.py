@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from .. import names
 from ..errors import SimulationError
 from ..fmu.write import write_whole
 from .report import Examined, as_json
@@ -81,7 +82,8 @@ def write_crosscheck(
     """Write the files into the folder `out`.  Raises SimulationError or BuildError."""
     table, stop, step = reference_run(fmu, stop_time, step_size, inputs)
     name = fmu.stem
-    outputs = [n for n in table.dtype.names or () if n != "time" and not n.startswith("solver.")]
+    known = [n for n in table.dtype.names or () if n != "time"]
+    outputs = [n for n in known if names.read(n).head != names.SOLVER]
     options = {"StartTime": 0.0, "StopTime": stop, "StepSize": step, "RelTol": TOLERANCE}
     files = {
         f"{name}_ref.csv": as_csv(table, outputs),
@@ -173,18 +175,12 @@ def at_points(fmu: Path, stop: float, step: float) -> Trajectory:
 
 def _told(table: Trajectory) -> list[str]:
     """The columns of a result that travels: forces of constraint, motion, events."""
-    names = [n for n in table.dtype.names or () if n != "time"]
-    events = ("contact.", "departure.", "sticks.", "slipping.")
-    moving = [n for n in names if f"der({n},2)" in names]
-    return [
-        n
-        for n in names
-        if n in moving
-        or n.startswith("lambda.")
-        or (n.startswith("Q.") and n.count(".") == 1)
-        or n.startswith(events[0])
-        or (n.startswith(events[1:]) and n.endswith((".time", ".count")))
-    ]
+    known = [n for n in table.dtype.names or () if n != "time"]
+    moving = names.coordinates(known)
+    events = (names.DEPARTURES, names.DEPARTURE_TIME, names.SLIPS, names.SLIP_TIME)
+    shares = {n for n in names.those(known, names.FORCE) if names.read(n).constraint}
+    told = names.those(known, names.MULTIPLIER, names.FORCE, names.CONTACT, *events)
+    return [n for n in known if n in moving or (n in told and n not in shares)]
 
 
 def _stable(found: Verification) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from .. import names
 from ..errors import BuildError
 from .simulate import Trajectory
 
@@ -16,11 +17,9 @@ DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # once the co
 PER_COLUMN = 8  # curves in one column of a legend, which stands beside its panel
 
 
-def default_names(names: Sequence[str]) -> list[str]:
+def default_names(known: Sequence[str]) -> list[str]:
     """What is plotted unless the user says otherwise: every lambda, then the coordinates."""
-    lam = [n for n in names if n.startswith("lambda.")]
-    coordinates = [n[4:-3] for n in names if n.startswith("der(") and n.endswith(",2)")]
-    return lam + coordinates
+    return names.those(known, names.MULTIPLIER) + names.coordinates(known)
 
 
 def plot(
@@ -75,12 +74,14 @@ def panels(
 ) -> Iterator[tuple[Any, list[Any]]]:
     """The figure and its panels, one a unit, multipliers first, while the style of it holds."""
     import matplotlib as mpl
-    from matplotlib.figure import Figure
+
+    from .figure import Drawn
 
     known = list(result.dtype.names or ())
     members_of: dict[tuple[bool, str], list[str]] = {}
     for n in chosen:
-        members_of.setdefault((not n.startswith("lambda."), units.get(n, "")), []).append(n)
+        later = names.read(n).quantity != names.MULTIPLIER
+        members_of.setdefault((later, units.get(n, "")), []).append(n)
     style: dict[str, Any] = {
         "svg.hashsalt": "lagfmu",
         "font.size": 11,
@@ -90,7 +91,7 @@ def panels(
         "grid.alpha": 0.3,
     }
     with mpl.rc_context(style):
-        figure = Figure(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
+        figure = Drawn(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
         axes = figure.subplots(len(members_of), 1, sharex=True, squeeze=False)
         for axis, ((_, unit), members) in zip(axes[:, 0], members_of.items(), strict=True):
             for k, n in enumerate(members):
@@ -119,10 +120,9 @@ def panels(
 
 
 def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:
-    for n in known:
-        if n.startswith("departure.") and n.endswith(".count") and result[n][-1] > 0:
-            contact = n.split(".")[1]
-            moment = float(result[f"departure.{contact}.time"][-1])
+    for contact in names.constraints(known, names.DEPARTURES):
+        if result[names.name(names.DEPARTURES, contact)][-1] > 0:
+            moment = float(result[names.name(names.DEPARTURE_TIME, contact)][-1])
             axis.axvline(moment, color="#888888", linewidth=1, linestyle="--")
             if named:
                 axis.annotate(

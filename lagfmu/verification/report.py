@@ -1,4 +1,4 @@
-"""What a verification found, for machines: JSON, and JUnit's XML, a suite an FMU, a case a statement."""
+"""What a verification found, for machines: JSON, and a suite an FMU with a case a statement."""
 
 from __future__ import annotations
 
@@ -8,11 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
-
+from .pipeline import Case, Suite
 from .verify import Check, Verification
-
-HOLDS, FAILS, WRONG_USAGE, NOT_RUN = 0, 1, 2, 3  # exit codes
 
 
 @dataclass(frozen=True)
@@ -24,16 +21,22 @@ class Examined:
     error: str = ""
 
     @property
-    def code(self) -> int:
-        """The exit code that this FMU alone would give."""
+    def suite(self) -> Suite:
+        """A case a statement."""
         if self.found is None:
-            return NOT_RUN
-        return HOLDS if self.found.passed else FAILS
+            return Suite(self.file, (), self.error)
+        name, seconds = (
+            self.found.name,
+            self.found.seconds,
+        )  # one run serves all: its time at the first
+        cases = [_case(c, name, 0.0 if k else seconds) for k, c in enumerate(self.found.checks)]
+        return Suite(self.file, cases, "", {"uncovered outputs": ", ".join(self.found.uncovered)})
 
 
-def exit_code(examined: Sequence[Examined]) -> int:
-    """The largest of all."""
-    return max((e.code for e in examined), default=HOLDS)
+def _case(check: Check, fmu: str, seconds: float) -> Case:
+    skipped = "not reached in this run" if check.points == 0 else ""
+    failure = "" if skipped or check.passed else str(check)
+    return Case(check.name, fmu, failure, skipped, seconds)
 
 
 def as_json(examined: Sequence[Examined]) -> str:
@@ -42,7 +45,7 @@ def as_json(examined: Sequence[Examined]) -> str:
         {
             "file": e.file,
             "name": None if e.found is None else e.found.name,
-            "verdict": ("pass", "fail", "", "not run")[e.code],
+            "verdict": ("pass", "fail", "", "not run")[e.suite.code],
             "error": e.error or None,
             "simulated_s": None if e.found is None else e.found.simulated,
             "wall_s": None if e.found is None else e.found.seconds,
@@ -64,28 +67,3 @@ def _statement(check: Check) -> dict[str, Any]:
         "verdict": check.verdict,
         "detail": check.detail,
     }
-
-
-def as_junit(examined: Sequence[Examined]) -> bytes:
-    """JUnit's XML: a statement that was not reached is skipped, an FMU that could not be run is an error."""
-    document = JUnitXml("lagfmu verify")
-    for e in examined:
-        suite = TestSuite(e.file)
-        if e.found is None:
-            case = TestCase("runs", e.file, 0.0)
-            case.result = [Error(e.error, "not run")]
-            suite.add_testcase(case)
-        else:
-            suite.add_property("uncovered outputs", ", ".join(e.found.uncovered))
-            for k, check in enumerate(e.found.checks):
-                # one run serves all statements: its time stands at the first
-                case = TestCase(check.name, e.found.name, 0.0 if k else round(e.found.seconds, 6))
-                if check.points == 0:
-                    case.result = [Skipped("not reached in this run")]
-                elif not check.passed:
-                    case.result = [Failure(str(check), "statement")]
-                suite.add_testcase(case)
-        document.add_testsuite(suite)
-    document.update_statistics()
-    text: bytes = document.tostring()
-    return text

@@ -16,6 +16,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
+from .. import names
 from ..errors import SimulationError, VerificationError
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
@@ -88,6 +89,11 @@ def communication_points(stop_time: float, step_size: float) -> NDArray[np.float
     return times
 
 
+def steps_of(table: Trajectory) -> int:
+    """Internal steps of a run; 0 where they are not reported."""
+    return int(table[names.STEPS][-1]) if names.STEPS in (table.dtype.names or ()) else 0
+
+
 def _check_count(stop_time: float, step_size: float) -> None:
     """Refuse a run that would fill the memory with communication points."""
     if stop_time / step_size > MOST_POINTS:
@@ -123,15 +129,15 @@ def _simulate_model(
     }
     _check_values(scene.name, limits, values)
     known |= values
-    method = known.get("solver.method", scene.method)
+    method = known.get(names.METHOD, scene.method)
     if not isinstance(method, str):
         method = next(m for m, k in NUMBERS.items() if k == method)
     settings = Settings(
         method,
-        max(known["solver.tolerance"] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
-        known.get("solver.step", scene.step),
-        known["solver.maximum_step"],
-        known["solver.maximum_steps"],
+        max(known[names.TOLERANCE] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
+        known.get(names.STEP, scene.step),
+        known[names.MAXIMUM_STEP],
+        known[names.MAXIMUM_STEPS],
     )
     p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
     drives = [v for v in table.variables if v.role in ("input", "estimate")]
@@ -157,7 +163,7 @@ def _simulate_model(
     result = np.zeros(len(times), dtype=columns)
     try:
         q = [float(known[c]) for c in system.coordinates]
-        v = [float(known[f"der({c})"]) for c in system.coordinates]
+        v = [float(known[names.derivative(c)]) for c in system.coordinates]
         u = drive(0.0)
         begun = start(system, settings, 0.0, q, v, u, p, ranks(system, table, values))
         tell(begun.moved)

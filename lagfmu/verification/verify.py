@@ -16,9 +16,10 @@ import sympy as sp
 from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
+from .. import names
 from ..errors import SimulationError, VerificationError
 from ..fmu.claims import LARGEST_RECORD, Claim, unpack_closed_forms
-from .simulate import Trajectory, read_description, simulate
+from .simulate import Trajectory, read_description, simulate, steps_of
 
 Expr = Any
 RECORD = "resources/lagfmu.json"
@@ -139,18 +140,20 @@ def verify(
         if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
     }
     values |= {k: float(v) for k, v in (start_values or {}).items() if not isinstance(v, str)}
-    used = values.get("solver.tolerance") or used
+    used = values.get(names.TOLERANCE) or used
     checks = [
         Check("valid for fmpy", len(problems), 0, 1, "; ".join(problems)),
         _finite(result),
         _starts(description, start_values or {}, result),
     ]
-    as_built = tolerance is None and not any(k.startswith("solver.") for k in start_values or ())
+    as_built = tolerance is None and not any(
+        names.read(k).head == names.SOLVER for k in start_values or ()
+    )
     checks += [check_claim(claim, result, values, used, as_built) for claim in claims]
     if reference is not None:
         checks += reference.checks(result)
     span = float(result["time"][-1] - result["time"][0])
-    steps = int(result["solver.steps"][-1]) if "solver.steps" in (result.dtype.names or ()) else 0
+    steps = steps_of(result)
     said = set().union(*(claim.variables for claim in claims))
     said |= set(reference.table.dtype.names or ()) if reference is not None else set()
     outputs = [v.name for v in description.modelVariables if v.causality == "output"]
@@ -212,7 +215,7 @@ def claims_in(path: Path) -> list[Claim]:
             v = variables.get(name)
             if v is None:
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
-            elif v.type not in (MODES if name.startswith(("contact.", "sticks.")) else NUMBERS):
+            elif v.type not in (MODES if names.read(name).quantity in names.MODES else NUMBERS):
                 problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
@@ -232,16 +235,18 @@ def _finite(result: Trajectory) -> Check:
 
 def _starts(description: Any, given: Mapping[str, Any], result: Trajectory) -> Check:
     """Outputs with an exact start begin with it."""
-    worst, count, names = 0.0, 0, []
+    worst, count, missed = 0.0, 0, []
     for v in description.modelVariables:
         if v.initial == "exact" and v.causality == "output" and v.type == "Real":
             expected = float(given.get(v.name, v.start))
             error = abs(float(result[v.name][0]) - expected)
             count += 1
             if error > 0:
-                names.append(f"{v.name} starts at {result[v.name][0]!r}, described as {expected!r}")
+                missed.append(
+                    f"{v.name} starts at {result[v.name][0]!r}, described as {expected!r}"
+                )
             worst = max(worst, error)
-    return Check("starts as described", worst, 0, max(count, 1), "; ".join(names))
+    return Check("starts as described", worst, 0, max(count, 1), "; ".join(missed))
 
 
 def check_claim(
@@ -279,30 +284,34 @@ def check_claim(
 
 def _with_modes(result: Trajectory) -> Trajectory:
     """Modes as Booleans, also of an FMU that has Reals alone (Scene.reals_only)."""
-    names = result.dtype.names or ()
-    modes = {n for n in names if n.startswith(("contact.", "sticks."))}
-    types = [(n, np.bool_ if n in modes else result.dtype[n]) for n in names]
+    known = result.dtype.names or ()
+    modes = set(names.those(known, *names.MODES))
+    types = [(n, np.bool_ if n in modes else result.dtype[n]) for n in known]
     return result.astype(types)
 
 
 def applies(claim: Claim, result: Trajectory, values: Mapping[str, float]) -> NDArray[np.bool_]:
     """The communication points of a run at which a closed form says something; `values`: parameters."""
+
+    def closed(contact: str) -> NDArray[np.bool_]:
+        return np.asarray(result[names.name(names.CONTACT, contact)], dtype=bool)
+
+    def left(contact: str) -> NDArray[np.bool_]:
+        return np.asarray(result[names.name(names.DEPARTURES, contact)] > 0)
+
     chosen = np.ones(len(result), dtype=bool)
     if claim.while_closed is not None:
-        chosen &= result[f"contact.{claim.while_closed}"]
+        chosen &= closed(claim.while_closed)
     if claim.while_open is not None:
-        chosen &= ~result[f"contact.{claim.while_open}"]
+        chosen &= ~closed(claim.while_open)
     for contact in _departures(claim):  # before the first one there is nothing to compare with
-        chosen &= result[f"departure.{contact}.count"] > 0
-    if claim.until_departure is not None:
-        closed = result[f"contact.{claim.until_departure}"]
-        left = result[f"departure.{claim.until_departure}.count"] > 0
-        chosen &= np.logical_and.accumulate(closed & ~left)
+        chosen &= left(contact)
+    if (until := claim.until_departure) is not None:
+        chosen &= np.logical_and.accumulate(closed(until) & ~left(until))
     if claim.when is not None:
         chosen &= evaluate(claim.when, result, result, values, claim.name) != 0
-    if claim.at_departure is not None:
-        left = result[f"departure.{claim.at_departure}.count"] > 0
-        chosen &= (np.cumsum(left) == 1) & result[f"contact.{claim.at_departure}"][0]
+    if (at := claim.at_departure) is not None:
+        chosen &= (np.cumsum(left(at)) == 1) & closed(at)[0]
     return chosen
 
 
@@ -312,8 +321,8 @@ def _departures(claim: Claim) -> list[str]:
         str(s) for e in (claim.actual, claim.expected) if e is not None for s in e.free_symbols
     }
     counted = set() if claim.when is None else {str(s) for s in claim.when.free_symbols}
-    told = {s.split(".")[1] for s in symbols if s.startswith("departure.")}
-    return sorted(c for c in told if f"departure.{c}.count" not in counted)
+    told = {s.constraint for s in map(names.read, symbols) if s.head == names.DEPARTURE}
+    return sorted(c for c in told if names.name(names.DEPARTURES, c) not in counted)
 
 
 def evaluate(
@@ -328,14 +337,14 @@ def evaluate(
     Raises VerificationError if it uses what the FMU does not have.
     """
     symbols = sorted(expression.free_symbols, key=str)
-    names = rows.dtype.names or ()
+    known = rows.dtype.names or ()
     columns = []
     for symbol in symbols:
         text = str(symbol)
-        inner = text[len("initial(") : -1] if text.startswith("initial(") else ""
-        if inner in names:
+        inner = names.initially(text)
+        if inner in known:
             column = result[inner][0]
-        elif text in names:
+        elif text in known:
             column = rows[text]
         elif text in values:
             column = values[text]

@@ -15,6 +15,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean, BooleanFunction
 
 from ...errors import DerivationError
+from ..identifier import identifier
 
 Expr = Any
 Text = tuple[str, int]  # of an expression, and how tightly its outermost operator binds
@@ -133,15 +134,8 @@ def identifiers(symbols: Sequence[Expr], taken: Sequence[str] = ()) -> dict[Expr
     names: dict[Expr, str] = {}
     for symbol in symbols:
         text = str(symbol)
-        head = ""
-        if text.startswith("d("):
-            text, head = text[2:-1], "d_"
-        if text.startswith("der("):
-            inner = text[4:-1]
-            text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
-        if text.startswith("level("):
-            text = f"level_{text[6:-1]}"
-        text = head + text.replace(".", "_")
+        change = text.startswith("d(")
+        text = f"d_{identifier(text[2:-1])}" if change else identifier(text)
         if MACROS.match(text):
             text = f"x_{text}"
         while text in TAKEN or text in used:

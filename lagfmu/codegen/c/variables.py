@@ -1,11 +1,13 @@
 """Variable table -> variables.c: the FMU's variables as runtime/variables.h declares them.
 
-Position = value reference.  Names are those of table.py; where each value lies follows from the
-name, by the same rules as in solver/observe.py.
+Position = value reference.  Where a value lies follows from what the variable is of.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
+from ... import names
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.equations import EquationsOfMotion
 from ...mechanics.formulations.minimal import Reduction
@@ -45,10 +47,10 @@ def variables_source(
     system: System,
 ) -> str:
     """C text that defines VARIABLES and the defaults of the scene."""
-    where = places(system, [str(s) for s in eom.u], [str(s) for s in eom.p])
+    place = Places(system, [str(s) for s in eom.u], [str(s) for s in eom.p])
     stepped = eom if reduction is None else reduction.reduced
     states = {str(s): j for j, s in enumerate((*stepped.q, *stepped.v))}
-    rows = [f"    {_row(v, where[v.name], states)},\n" for v in table.variables]
+    rows = [f"    {_row(v, place.of(v), states)},\n" for v in table.variables]
     return HEAD.format(
         name=scene.name,
         rows="".join(rows),
@@ -59,63 +61,90 @@ def variables_source(
     )
 
 
-def places(system: System, inputs: list[str], parameters: list[str]) -> dict[str, Place]:
-    """Variable name -> where its value lies: place, index, contact."""
-    full = system if system.embedding is None else system.embedding.full
-    found: dict[str, Place] = {
-        "solver.method": ("METHOD", 0, NONE),
-        "solver.tolerance": ("TOLERANCE", 0, NONE),
-        "solver.step": ("STEP", 0, NONE),
-        "solver.maximum_step": ("MAXIMUM_STEP", 0, NONE),
-        "solver.maximum_steps": ("MAXIMUM_STEPS", 0, NONE),
-        "solver.steps": ("STEPS", 0, NONE),
-        "energy.kinetic": ("KINETIC", 0, NONE),
-        "energy.potential": ("POTENTIAL", 0, NONE),
-        "energy.total": ("TOTAL", 0, NONE),
-    }
-    found |= {name: ("PARAMETER", k, NONE) for k, name in enumerate(parameters)}
-    found |= {name: ("INPUT", k, NONE) for k, name in enumerate(inputs)}
-    stepped = _motion(system, ("S", "SDOT", "SDDOT"))
-    read = _motion(full, ("Q", "V", "VDOT"))
-    # a coordinate of both is read from the full ones, unless these have no accelerations
-    found |= stepped | read if full.dynamics is not None else read | stepped
-    for k, row in enumerate(full.rows):
-        for head in ("lambda", "unique", "residual"):
-            found[f"{head}.{row.name}"] = (head.upper(), k, NONE)
-    for j, q in enumerate(full.coordinates):
-        found[f"Q.{q}"] = ("FORCE", j, NONE)
-    for e, (k, j) in enumerate(zip(*full.jacobian, strict=True)):
-        found[f"Q.{full.rows[k].name}.{full.coordinates[j]}"] = ("SHARE", e, NONE)
-    found |= {own.name: ("OUTPUT", k, NONE) for k, own in enumerate(full.outputs)}
-    for c, k in enumerate(system.contacts):
-        name = system.rows[k].name
-        found[f"contact.{name}"] = ("CONTACT", c, c)
-        found[f"departure.{name}.count"] = ("COUNT", c, c)
-        found[f"departure.{name}.time"] = ("DEPARTURE_TIME", c, c)
-        for j, q in enumerate(full.coordinates):
-            found[f"departure.{name}.{q}"] = ("DEPARTURE_Q", j, c)
-            found[f"departure.{name}.velocity.{q}"] = ("DEPARTURE_V", j, c)
-    for i, f in enumerate(system.frictions):
-        found[f"sticks.{f.name}"] = ("STICKS", i, NONE)
-        found[f"margin.{f.name}"] = ("MARGIN", i, NONE)
-        found[f"power.{f.name}"] = ("POWER", i, NONE)
-        found[f"slipping.{f.name}.count"] = ("SLIP_COUNT", i, i)
-        found[f"slipping.{f.name}.time"] = ("SLIP_TIME", i, i)
-        for j, k in enumerate(f.rows):
-            found[f"slip.{system.rows[k].name}"] = ("SLIP", 2 * i + j, i)
-        for j, q in enumerate(system.coordinates):
-            found[f"slipping.{f.name}.{q}"] = ("SLIP_Q", j, i)
-            found[f"slipping.{f.name}.velocity.{q}"] = ("SLIP_V", j, i)
-    found["energy.dissipated"] = ("LOST", 0, NONE)
-    return found
+ALONE = {  # where a value lies of which there is one
+    names.METHOD: "METHOD",
+    names.TOLERANCE: "TOLERANCE",
+    names.STEP: "STEP",
+    names.MAXIMUM_STEP: "MAXIMUM_STEP",
+    names.MAXIMUM_STEPS: "MAXIMUM_STEPS",
+    names.STEPS: "STEPS",
+    names.KINETIC: "KINETIC",
+    names.POTENTIAL: "POTENTIAL",
+    names.TOTAL: "TOTAL",
+    names.DISSIPATED: "LOST",
+}
+OF_ROW = {names.MULTIPLIER: "LAMBDA", names.UNIQUE: "UNIQUE", names.RESIDUAL: "RESIDUAL"}
+OF_CONTACT = {
+    names.CONTACT: "CONTACT",
+    names.DEPARTURES: "COUNT",
+    names.DEPARTURE_TIME: "DEPARTURE_TIME",
+}
+OF_FRICTION = {names.STICKS: "STICKS", names.MARGIN: "MARGIN", names.POWER: "POWER"}
+OF_SLIDE = {names.SLIPS: "SLIP_COUNT", names.SLIP_TIME: "SLIP_TIME"}
+
+
+class Places:
+    """Where the value of each variable lies: place, index, contact."""
+
+    def __init__(self, system: System, inputs: Sequence[str], parameters: Sequence[str]) -> None:
+        self.system = system
+        self.full = full = system if system.embedding is None else system.embedding.full
+        self.coordinates = _numbered(full.coordinates)
+        self.rows = _numbered(row.name for row in full.rows)
+        self.contacts = _numbered(system.rows[k].name for k in system.contacts)
+        self.frictions = _numbered(f.name for f in system.frictions)
+        self.shares = {kj: e for e, kj in enumerate(zip(*full.jacobian, strict=True))}
+        self.slips = {
+            system.rows[k].name: (i, j)
+            for i, f in enumerate(system.frictions)
+            for j, k in enumerate(f.rows)
+        }
+        stepped = _motion(system, ("S", "SDOT", "SDDOT"))
+        read = _motion(full, ("Q", "V", "VDOT"))
+        # a coordinate of both is read from the full ones, unless these have no accelerations
+        self.values = {name: ("PARAMETER", k, NONE) for k, name in enumerate(parameters)}
+        self.values |= {name: ("INPUT", k, NONE) for k, name in enumerate(inputs)}
+        self.values |= stepped | read if full.dynamics is not None else read | stepped
+        self.own = {own.name: ("OUTPUT", k, NONE) for k, own in enumerate(full.outputs)}
+
+    def of(self, v: Variable) -> Place:
+        """Of one variable."""
+        of = v.of
+        what, c, q, rate = of.quantity, of.constraint, of.coordinate, of.order
+        if what in ALONE:
+            return ALONE[what], 0, NONE
+        if what in OF_ROW:
+            return OF_ROW[what], self.rows[c], NONE
+        if what in OF_CONTACT:
+            return OF_CONTACT[what], self.contacts[c], self.contacts[c]
+        if what == names.DEPARTURE:
+            return f"DEPARTURE_{'QV'[rate]}", self.coordinates[q], self.contacts[c]
+        if what in OF_FRICTION:
+            return OF_FRICTION[what], self.frictions[c], NONE
+        if what in OF_SLIDE:
+            return OF_SLIDE[what], self.frictions[c], self.frictions[c]
+        if what == names.SLIPPING:
+            return f"SLIP_{'QV'[rate]}", self.coordinates[q], self.frictions[c]
+        if what == names.SLIP:
+            i, j = self.slips[c]
+            return "SLIP", 2 * i + j, i
+        if what == names.FORCE and c:
+            return "SHARE", self.shares[self.rows[c], self.coordinates[q]], NONE
+        if what == names.FORCE:
+            return "FORCE", self.coordinates[q], NONE
+        return self.own[v.name] if what == names.OWN else self.values[v.name]
+
+
+def _numbered(known: Iterable[str]) -> dict[str, int]:
+    return {name: k for k, name in enumerate(known)}
 
 
 def _motion(system: System, rates: tuple[str, str, str]) -> dict[str, Place]:
     """Where coordinates, velocities and accelerations lie."""
     return {
-        name: (place, j, NONE)
+        names.derivative(q, order): (place, j, NONE)
         for j, q in enumerate(system.coordinates)
-        for name, place in zip((q, f"der({q})", f"der({q},2)"), rates, strict=True)
+        for order, place in enumerate(rates)
     }
 
 

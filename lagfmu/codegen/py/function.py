@@ -15,6 +15,7 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from ...errors import DerivationError
+from ..identifier import identifier
 
 Expr = Any
 ARGUMENTS = (
@@ -68,13 +69,7 @@ def identifiers(symbols: Sequence[Expr]) -> dict[Expr, str]:
     taken = {*keyword.kwlist, *dir(math), *dir(builtins), *ARGUMENTS}
     names: dict[Expr, str] = {}
     for symbol in symbols:
-        text = str(symbol)
-        if text.startswith("der("):
-            inner = text[4:-1]
-            text = f"der2_{inner[:-2]}" if inner.endswith(",2") else f"der_{inner}"
-        if text.startswith("level("):
-            text = f"level_{text[6:-1]}"
-        text = text.replace(".", "_")
+        text = identifier(symbol)
         if text.startswith(TABLE):
             text = f"x_{text}"
         while text in taken:

@@ -1,7 +1,19 @@
 /* expression.js -- the expressions of a picture: numbers, names, and lists [operation, ...operands].
  *
- * They are data of the FMU, evaluated here and never run as a program.  picture/expression.py has the
+ * They are data of the FMU, evaluated here and never run as a program.  page/picture.py has the
  * same operations. */
+
+/* A table at x: whether it repeats, then a knot and its four coefficients, row by row (solver/cubic.py). */
+function spline(x, periodic, ...rows) {
+  const last = rows.length - 5;
+  const period = rows[last] - rows[0];
+  if (periodic) x -= period * Math.floor((x - rows[0]) / period);
+  let k = last;
+  while (k > 0 && rows[k] > x) k -= 5;
+  const s = x - rows[k];
+  const [c0, c1, c2, c3] = rows.slice(k + 1, k + 5);
+  return s < 0 ? c0 + s * c1 : c0 + s * (c1 + s * (c2 + s * c3));
+}
 
 const OPERATIONS = {
   "+": (...x) => x.reduce((a, b) => a + b, 0),
@@ -23,6 +35,7 @@ const OPERATIONS = {
   sign: Math.sign,
   min: Math.min,
   max: Math.max,
+  spline,
 };
 
 /* A function of a look-up of names; NaN where a name is unknown. */

@@ -25,11 +25,6 @@ Pivots = tuple[int, ...]
 TRIALS = 100  # choices of pivot columns that are compared
 
 
-def accelerations(eom: EquationsOfMotion) -> tuple[Expr, ...]:
-    """The symbols der(q,2) of the accelerations (n)."""
-    return tuple(sp.Symbol(f"der({q},2)", real=True) for q in eom.q)
-
-
 def null_space(eom: EquationsOfMotion) -> Expr:
     """S (n, N) with G S = 0, all constraints acting; N = n - r, r being the generic rank of G.
 
@@ -48,7 +43,7 @@ def lambda_free(eom: EquationsOfMotion) -> list[Expr]:
 
     Expressions in q, v and the symbols der(q,2), without the factors that all terms share.
     """
-    vdot = accelerations(eom)
+    vdot = eom.vdot
     inertia = [-f for f in eom.F]
     for (i, j), mass in eom.M.todok().items():
         inertia[i] += mass * vdot[j]
@@ -184,7 +179,7 @@ def _reduced(equation: Expr, eom: EquationsOfMotion) -> Expr:
         factors = shorter.factors(equation)
     except PolynomialError:
         factors = [(e, 1) for e in sp.Mul.make_args(sp.factor_terms(equation))]
-    for symbols in (set(accelerations(eom)), {*eom.q, *eom.v, *eom.u}):
+    for symbols in (set(eom.vdot), {*eom.q, *eom.v, *eom.u}):
         kept = [e**power for e, power in factors if e.free_symbols & symbols]
         if kept:
             return _sign(sp.expand(sp.Mul(*kept)), eom)
@@ -193,7 +188,7 @@ def _reduced(equation: Expr, eom: EquationsOfMotion) -> Expr:
 
 def _sign(equation: Expr, eom: EquationsOfMotion) -> Expr:
     """The sign for which the first acceleration in the equation has a plus."""
-    for symbol in accelerations(eom):
+    for symbol in eom.vdot:
         slope = equation.diff(symbol)
         if slope != 0:
             return -equation if slope.could_extract_minus_sign() else equation

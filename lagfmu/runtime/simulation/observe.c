@@ -155,6 +155,18 @@ static void check_motion(Bad *bad, const char *name, double q, double v, double 
     check(bad, vdot, "der(", name, "", "", ",2)");
 }
 
+static void check_frictions(Bad *bad, const Solver *s, const Observed *o) {
+    const System *system = s->system;
+    for (int i = 0; i < system->frictions; i++) {
+        const Friction *f = &system->friction[i];
+        for (int r = 0; r < f->rows; r++)
+            check(bad, o->slip[2 * i + r], "slip.", system->rows[f->row[r]].name, "", "", "");
+        check(bad, o->margin[i], "margin.", f->name, "", "", "");
+        check(bad, o->power[i], "power.", f->name, "", "", "");
+    }
+    if (system->frictions > 0) check(bad, s->state.now.lost, "", "energy.dissipated", "", "", "");
+}
+
 static Status check_finite(Solver *s, const System *full, const Observed *o) {
     Bad bad = {&s->why, s->state.now.t, 0};
     for (int j = 0; j < full->n; j++) {
@@ -182,6 +194,7 @@ static Status check_finite(Solver *s, const System *full, const Observed *o) {
                   full->coordinates[j], "");
         }
     }
+    check_frictions(&bad, s, o);
     return bad.count == 0 ? OK : FAILED;
 }
 

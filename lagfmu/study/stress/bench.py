@@ -24,10 +24,11 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...fmu.session import RefusalError
 from .claims import laws, statements
 from .facts import Facts, facts_of
 from .judge import EPS, Check, invariants, lost
-from .player import Drive, Player, RefusalError, Run, Values, play
+from .player import Drive, Player, Run, Values, play
 
 SHIFT = 1e-6
 SAFETY = 30.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
+from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .facts import Facts
 from .judge import Check
-from .player import RefusalError
 from .probe import Probe
 
 FAMILY = "inputs"
@@ -65,7 +65,7 @@ def _not_finite(name: str, value: float, bench: Bench) -> Finding:
         one.step(h)
         refusal: RefusalError | None = None
         try:
-            one.set({name: value})
+            one.give({name: value})
         except RefusalError as error:
             refusal = error
         checks = [Check("refused", 0.0 if refusal else 1.0, 0.5)]

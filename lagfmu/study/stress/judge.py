@@ -15,6 +15,7 @@ Each comes as an error and what is allowed; the run is right if no error exceeds
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -122,27 +123,25 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
     """The magnitude that an error is relative to, at the least: of coordinates, velocities, energy.
 
     A coordinate is known to the rounding of the value that it was given at the start, however small the
-    one is onto which that was projected; the energy to the work of Q over that rounding.
+    one is onto which that was projected; a velocity to that of the motion's natural one, sqrt(|vdot| size),
+    beside which a throw at 8 m/s is none where g = 1e300 m/s^2; the energy to the work of Q over the rounding
+    of the sizes.
     """
     found = {}
-    rounding = {q: EPS * abs(run.values.get(q, 0.0)) for q in facts.coordinates}
+    work = 0.0
+    for q in facts.coordinates:
+        rounding = EPS * abs(run.values.get(q, 0.0))
+        found[q] = max(facts.same_unit(q, run.values), rounding)
+        peers = [p for p in facts.coordinates if facts.dimensions[p] == facts.dimensions[q]]
+        fastest = max(float(np.abs(run.rows[f"der({p})"]).max()) for p in peers)
+        size = found[q] or facts.usual(q)
+        natural = math.sqrt(size) * math.sqrt(float(np.abs(run.rows[f"der({q},2)"]).max()))
+        found[f"der({q})"] = max(fastest, EPS * natural)
+        if f"Q.{q}" in facts.variables:
+            work += EPS * size * float(np.abs(run.rows[f"Q.{q}"]).max())
     if "energy.potential" in facts.variables:
         parts = np.abs(run.rows["energy.kinetic"]) + np.abs(run.rows["energy.potential"])
-        work = sum(
-            rounding[q] * float(np.abs(run.rows[f"Q.{q}"]).max())
-            for q in facts.coordinates
-            if f"Q.{q}" in facts.variables
-        )
-        found["energy.total"] = max(float(parts.max()), work)
-    for q in facts.coordinates:
-        found[q] = max(facts.same_unit(q, run.values), rounding[q])
-        rate = f"der({q})"
-        peers = [f"der({p})" for p in facts.coordinates]
-        found[rate] = max(
-            float(np.abs(run.rows[p]).max())
-            for p in peers
-            if facts.dimensions[p] == facts.dimensions[rate]
-        )
+        found["energy.total"] = found["energy.dissipated"] = max(float(parts.max()), work)
     return found
 
 

@@ -104,10 +104,11 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
         )
     )
     for x, s in zip(lam, slip, strict=True):
+        along = sp.sign(s) if len(slip) == 1 else s / speed
         forms.append(
             ClosedForm(
                 f"{x} while it slips",
-                -kinetic * N * s / speed,
+                -kinetic * N * along,
                 x,
                 scale=kinetic * N,
                 when=slips,

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ...fmu.session import RefusalError
 from .bench import Bench, Finding
-from .player import RefusalError
+from .player import clear
 
 RIGHT, REFUSED, WRONG, UNFINISHED = "right", "refused", "wrong", "unfinished"
 CONSISTENT = "consistent"  # right at each instant; nothing could be said of the motion's course
@@ -46,7 +47,7 @@ def verdict(probe: Probe, finding: Finding, seconds: float) -> Row:
     answer, detail = RIGHT, finding.note
     if finding.refusal is not None:
         answer, detail = REFUSED, str(finding.refusal)
-        if not finding.refusal.clear:
+        if not clear(finding.refusal):
             answer, detail = WRONG, f"refused without a cause: {detail}"
         elif not probe.may_refuse:
             answer, detail = WRONG, f"has to be done and is refused: {detail}"

@@ -14,6 +14,7 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
+from ...verification.pipeline import Case, Suite
 from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Row
 
 FORMAT = 1
@@ -111,9 +112,45 @@ def _text(row: Row) -> str:
     return "; ".join(t for t in (nearest, row.detail) if t)
 
 
+@dataclass(frozen=True)
+class Tried:
+    """An FMU, or a file of which none could be made: what was found, or why it could not be run."""
+
+    file: str
+    found: Stressed | None
+    error: str = ""
+
+    @property
+    def suite(self) -> Suite:
+        """A case a probe: wrong fails, unfinished is skipped, a clear refusal is as good as right."""
+        rows = () if self.found is None else self.found.rows
+        return Suite(self.file, [_case(r) for r in rows], self.error)
+
+
+def _case(row: Row) -> Case:
+    failure = row.detail if row.verdict == WRONG else ""
+    skipped = row.detail if row.verdict == UNFINISHED else ""
+    return Case(row.probe, row.family, failure, skipped, row.seconds)
+
+
+def all_as_json(tried: Sequence[Tried]) -> str:
+    """Every FMU with all its rows, in one list."""
+    data = [
+        {"file": t.file, "verdict": ("pass", "fail", "", "not run")[t.suite.code]}
+        | {"error": t.error or None}
+        | ({} if t.found is None else _data(t.found))
+        for t in tried
+    ]
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
 def as_json(found: Stressed) -> str:
     """Everything."""
-    data: dict[str, Any] = {
+    return json.dumps(_data(found), indent=1, allow_nan=False) + "\n"
+
+
+def _data(found: Stressed) -> dict[str, Any]:
+    return {
         "format": FORMAT,
         "fmu": found.name,
         "target": found.target,
@@ -131,7 +168,6 @@ def as_json(found: Stressed) -> str:
             asdict(r) | {"ratio": r.ratio if math.isfinite(r.ratio) else None} for r in found.rows
         ],
     }
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
 def as_markdown(found: Stressed) -> str:

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .facts import Facts
 from .judge import Check
-from .player import Player, RefusalError, play, table
+from .player import Player, clear, play, table
 from .probe import Probe
 
 FAMILY = "states"
@@ -130,7 +131,7 @@ def _corrupt(bench: Bench) -> Finding:
                 one.restore(one.call("deSerializeFMUstate", bytes(data)), one.time)
                 checks.append(Check(f"{what} bytes refused", 1.0, 0.5))
             except RefusalError as error:
-                refusal = error if refusal is None or refusal.clear else refusal
+                refusal = error if refusal is None or clear(refusal) else refusal
                 if error.status != 4:
                     checks.append(_differ(before, one.read(), f"as before, {what}:"))
     return Finding(tuple(checks), refusal)

@@ -7,12 +7,13 @@ from functools import partial
 
 import numpy as np
 
+from ...fmu.session import RefusalError
 from ...methods import FIXED_STEP, INTEGRATORS
 from .bench import REFERENCE, Bench, Finding
 from .facts import Facts
 from .judge import Check
 from .parameters import departures
-from .player import RefusalError, Run
+from .player import Run
 from .probe import Probe
 
 

@@ -14,12 +14,34 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from . import impacts, inputs, parameters, starts, states, stepping
+from . import (
+    calls,
+    derivatives,
+    exchange,
+    impacts,
+    inputs,
+    parameters,
+    starts,
+    states,
+    stepping,
+    unique,
+)
 from .bench import Bench
 from .facts import Facts
 from .probe import Probe, attempt, verdict
 
-FAMILIES = (parameters, starts, impacts, stepping, inputs, states)
+FAMILIES = (
+    parameters,
+    starts,
+    impacts,
+    stepping,
+    inputs,
+    calls,
+    derivatives,
+    unique,
+    states,
+    exchange,
+)
 
 
 def probes(facts: Facts, quick: bool) -> list[Probe]:

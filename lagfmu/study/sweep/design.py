@@ -21,6 +21,7 @@ from scipy import stats
 
 from ...errors import SimulationError
 from ...methods import NUMBERS
+from ...names import METHOD
 
 Values = NDArray[np.float64]
 MOST = 10**8  # values of one quantity
@@ -60,7 +61,7 @@ class Design:
 def number(text: str, name: str, what: str) -> float:
     """A finite number; for `solver.method` also a method's name."""
     text = text.strip()
-    if name == "solver.method" and text in NUMBERS:
+    if name == METHOD and text in NUMBERS:
         return float(NUMBERS[text])
     try:
         value = float(text)
@@ -155,7 +156,7 @@ def from_file(path: Path) -> tuple[tuple[str, ...], Values]:
     names = tuple(str(c).strip() for c in frame.columns)
     wrong = []
     for name, column in zip(names, frame.columns, strict=True):
-        if name == "solver.method":
+        if name == METHOD:
             frame[column] = [NUMBERS.get(str(v).strip(), v) for v in frame[column]]
         numbers = pd.to_numeric(frame[column], errors="coerce")
         bad = np.flatnonzero(~np.isfinite(numbers.to_numpy(dtype=float, na_value=np.nan)))

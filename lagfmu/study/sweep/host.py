@@ -49,7 +49,8 @@ class Host:
         """End the process."""
         if self.process is not None:
             self.process.kill()
-            self.process.wait()
+            with contextlib.suppress(OSError), self.process:
+                pass  # waits, and closes the pipes
         self.process = None
 
     def _ask(self, plan: Plan, values: NDArray[np.float64]) -> Outcome:
@@ -76,7 +77,7 @@ class Host:
             answer = pickle.load(process.stdout)
         except (OSError, EOFError, pickle.UnpicklingError):
             code = process.wait()
-            self.process = None
+            self.close()
             how = f"signal {-code}" if code < 0 else f"exit code {code}"
             raise HostDiedError(f"the FMU took its process down ({how})") from None
         if isinstance(answer, SimulationError):

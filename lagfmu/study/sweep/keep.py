@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from ... import names
 from ...errors import SimulationError
 from ...fmu.session import LAST, MAX, MEAN, MIN, TIME_OF_MAX, TYPES
 
@@ -19,6 +20,11 @@ class Kept:
 
     numbers: tuple[tuple[str, str], ...]
     trajectories: tuple[str, ...]
+
+    @property
+    def extremes(self) -> bool:
+        """Whether anything is kept that is looked for at departures too."""
+        return any(how not in ("last", "mean") for _, how in self.numbers)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -36,11 +42,11 @@ def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
     """`known` maps the FMU's variables to their FMI types.  Without texts: the largest multipliers, and
     counts and times of departures.  Raises SimulationError with all problems at once."""
     if not texts:
-        texts = [f"{n}:max" for n in known if n.startswith("lambda.")]
-        texts += [f"{n}:last" for n in known if n.startswith("departure.") and n.count(".") == 2
-                  and n.endswith((".count", ".time"))]  # fmt: skip
+        texts = [f"{n}:max" for n in names.those(known, names.MULTIPLIER)]
+        events = names.those(known, names.DEPARTURES, names.DEPARTURE_TIME)
+        texts += [f"{n}:last" for n in events]
         if not texts:
-            texts = [f"{n}:last" for n in known if n.startswith("energy.")]
+            texts = [f"{n}:last" for n in known if names.read(n).head == names.ENERGY]
     numbers, trajectories, problems = [], [], []
     for text in dict.fromkeys(texts):
         name, sign, how = text.rpartition(":")

@@ -16,6 +16,7 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import names
 from ...errors import SimulationError
 from ...fmu.archive import version
 from ...fmu.compiler import find_compiler
@@ -138,7 +139,7 @@ def _sweep(
         tolerance=tolerance or 0.0,
         drive=drives[0],
         drives=drives[1],
-        events=_events(variables),
+        events=_events(variables) if kept.extremes else (),
         whole=bool(kept.trajectories),
     )
     facts = {
@@ -320,8 +321,9 @@ def _drives(
 
 def _events(variables: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """(count, time) of every kind of departure that the FMU reports."""
-    counts = [n for n in variables if n.startswith("departure.") and n.endswith(".count")]
-    pairs = [(n, n.removesuffix("count") + "time") for n in counts]
+    contacts = names.constraints(variables, names.DEPARTURES)
+    event = names.DEPARTURES, names.DEPARTURE_TIME
+    pairs = [(names.name(event[0], c), names.name(event[1], c)) for c in contacts]
     return tuple(p for p in pairs if p[1] in variables)
 
 

@@ -181,8 +181,8 @@ def dataset(
     for n in (*layout.kept.columns, "reached"):
         unit = "s" if n == "reached" else layout.unit(n)
         data[n] = (dims, table[n].to_numpy().reshape(shape), {"units": unit})
-    for n in ("status", "reason"):
-        data[n] = (dims, np.array(table[n].to_pylist(), dtype=object).astype(str).reshape(shape))
+    for n in ("status", "reason"):  # objects: of a fixed width, one long text would cost all runs
+        data[n] = (dims, table[n].to_numpy().reshape(shape))
     if trajectories is not None:
         coords["time"] = ("time", times, {"units": "s"})
         for k, n in enumerate(layout.kept.trajectories):

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ... import names
 from ...errors import SimulationError
 from ...fmu.claims import Claim
-from ...verification.simulate import Trajectory
+from ...verification.simulate import Trajectory, steps_of
 from .importer import Importer
 from .measure import wider
 from .reference import refer
@@ -49,7 +50,7 @@ def held_out(importer: Importer, claims: Sequence[Claim], cases: int = CASES) ->
         values = other_values(importer, scene, random.Random(k))
         reference = refer(importer, claims, values, second_opinion=False)
         run = importer.observe(built, values)
-        steps = int(run["solver.steps"][-1]) if "solver.steps" in (run.dtype.names or ()) else 0
+        steps = steps_of(run)
         errors = reference.errors(run)
         wide = reference.errors(
             importer.observe(replace(built, communication=wider(importer)), values)
@@ -76,7 +77,7 @@ def other_values(
         except SimulationError as error:
             reason = str(error)
             continue
-        contacts = [n for n in begun.dtype.names or () if n.startswith("contact.")]
+        contacts = names.those(begun.dtype.names or (), names.CONTACT)
         if all(begun[n][0] == scene[n][0] for n in contacts):
             return values
     raise SimulationError(
@@ -96,7 +97,7 @@ def _drawn(
     ]
     still = all(float(v.start) == 0 for v in starts)
     for v in importer.description.modelVariables:
-        if v.type != "Real" or v.start is None or v.name.startswith("solver."):
+        if v.type != "Real" or v.start is None or names.read(v.name).head == names.SOLVER:
             continue
         value = float(v.start)
         moved = value * (1 + share * chance.uniform(-1, 1))

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ... import names
 from ...errors import LagfmuError, SimulationError, VerificationError
 from ...fmu.claims import Claim
 from ...methods import FIXED_STEP, INTEGRATORS
-from ...verification.simulate import file_stem
+from ...verification.simulate import file_stem, steps_of
 from ...verification.verify import check_claim, claims_in
 from .front import front
 from .importer import Importer
@@ -109,14 +110,14 @@ class Tradeoff:
 
         What is below the reference's own error counts as that error.
         """
-        names = [q.name for q in self.known if q.group == group or q.name in group]
-        return max((max(row.errors[n], self.reference.own[n]) for n in names), default=0.0)
+        those = [q.name for q in self.known if q.group == group or q.name in group]
+        return max((max(row.errors[n], self.reference.own[n]) for n in those), default=0.0)
 
     @property
     def groups(self) -> tuple[str, ...]:
         """The groups that this FMU has quantities of and, for event times, that took place."""
         counts = {
-            q.name: self.reference.run[f"departure.{q.contact}.count"][-1]
+            q.name: self.reference.run[names.name(names.DEPARTURES, q.contact)][-1]
             for q in self.known
             if q.contact
         }
@@ -168,7 +169,7 @@ def measure(
     say = tick or (lambda *_: None)
     claims = _claims(fmu)
     with Importer(fmu) as importer:
-        if "solver.method" not in importer.variables:
+        if names.METHOD not in importer.variables:
             raise VerificationError(
                 f"{str(fmu)!r} has no parameter 'solver.method': it was built for a scene with one "
                 "method, and there is none to compare with (give the scene more of them in `methods`)"
@@ -178,9 +179,9 @@ def measure(
         say("reference", 0, 1)
         reference = refer(importer, claims, communication=min(plan.communications))
         rows, refused, cut = _errors(importer, reference, claims, plan, say)
-        names = [q.name for q in reference.known]
-        work = [partial(importer.seconds, r.setting, names) for r in rows]
-        work += [partial(importer.floor, h, names) for h in plan.communications]
+        read = [q.name for q in reference.known]
+        work = [partial(importer.seconds, r.setting, read) for r in rows]
+        work += [partial(importer.floor, h, read) for h in plan.communications]
         timed = take_turns(work, plan, say)
         floor = [float(np.median(s)) for s in timed[len(rows) :]]
         return Tradeoff(
@@ -279,7 +280,7 @@ def weigh(
         errors=errors,
         residual=residual(run),
         statements={c.name: c.error for c in checks if c.points},
-        steps=int(run["solver.steps"][-1]) if "solver.steps" in (run.dtype.names or ()) else 0,
+        steps=steps_of(run),
         below=tuple(n for n, e in errors.items() if e < reference.own[n]),
     )
 

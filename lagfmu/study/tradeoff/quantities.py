@@ -7,15 +7,14 @@ is zero throughout, up to rounding, is measured against the largest one of its g
 from __future__ import annotations
 
 import fnmatch
-import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ... import names
 from ...errors import SimulationError
-from ...model.parts import RESERVED
 from ...verification.simulate import Trajectory
 
 MULTIPLIER, FORCE, MOTION, EVENT = "lambda", "Q", "coordinates", "event time"
@@ -41,15 +40,15 @@ def quantities(description: Any) -> tuple[Quantity, ...]:
     units = {v.name: v.unit or "1" for v in reals if v.causality == "output"}
     known = {v.name for v in description.modelVariables}
     own = [n for n in units if _is_own(n, known)]
-    coordinates = [n for n in units if re.fullmatch(r"[A-Za-z_]\w*", n) and n not in own]
-    found = [Quantity(n, MULTIPLIER, units[n]) for n in units if n.startswith("lambda.")]
-    found += [Quantity(n, FORCE, units[n]) for n in units if re.fullmatch(r"Q\.\w+", n)]
+    moving = [n for n in names.those(units, names.VALUE) if not names.read(n).order]
+    coordinates = [n for n in moving if n not in own]
+    found = [Quantity(n, MULTIPLIER, units[n]) for n in names.those(units, names.MULTIPLIER)]
+    forces = names.those(units, names.FORCE)
+    found += [Quantity(n, FORCE, units[n]) for n in forces if not names.read(n).constraint]
     found += [Quantity(c, MOTION, units[c]) for c in coordinates]
     found += [Quantity(n, OWN, units[n]) for n in own]
-    for n in units:
-        parts = n.split(".")
-        if len(parts) == 3 and parts[0] == "departure" and parts[2] == "time":
-            found.append(Quantity(n, EVENT, units[n], parts[1]))
+    times = names.those(units, names.DEPARTURE_TIME)
+    found += [Quantity(n, EVENT, units[n], names.read(n).constraint) for n in times]
     return tuple(found)
 
 
@@ -58,10 +57,11 @@ def _is_own(name: str, known: Collection[str]) -> bool:
 
     A full FMU reports the velocity of each of its coordinates.
     """
-    full = any(n.startswith("der(") for n in known)
-    if "." in name or "(" in name:
-        return "(" not in name and name.split(".")[0] not in RESERVED
-    return full and f"der({name})" not in known
+    of = names.read(name)
+    if of.quantity != names.VALUE or of.order:
+        return of.head == names.OWN or of.head in names.OF_FRICTION
+    full = any(names.read(n).order for n in known)
+    return full and names.derivative(name) not in known
 
 
 def residual(run: Trajectory) -> float:
@@ -69,26 +69,27 @@ def residual(run: Trajectory) -> float:
 
     A contact acts while it is closed; what acts with a contact has a multiplier of zero otherwise.
     """
-    names = run.dtype.names or ()
-    contacts = {n.removeprefix("contact.") for n in names if n.startswith("contact.")}
+    known = run.dtype.names or ()
+    contacts = names.constraints(known, names.CONTACT)
     largest = 0.0
-    for name in (n.removeprefix("residual.") for n in names if n.startswith("residual.")):
+    for constraint in names.constraints(known, names.RESIDUAL):
         acts = np.ones(len(run), dtype=bool)
-        if name in contacts:
-            acts = run[f"contact.{name}"]
+        if constraint in contacts:
+            acts = run[names.name(names.CONTACT, constraint)]
         elif contacts:
-            acts = run[f"lambda.{name}"] != 0
-        largest = max(largest, float(np.abs(run[f"residual.{name}"])[acts].max(initial=0.0)))
+            acts = run[names.name(names.MULTIPLIER, constraint)] != 0
+        missed = np.abs(run[names.name(names.RESIDUAL, constraint)])
+        largest = max(largest, float(missed[acts].max(initial=0.0)))
     return largest
 
 
-def selected(known: Sequence[Quantity], names: Sequence[str]) -> tuple[Quantity, ...]:
+def selected(known: Sequence[Quantity], asked: Sequence[str]) -> tuple[Quantity, ...]:
     """Those that match a name, a pattern (Q.*) or a group; all without names.
 
     Raises SimulationError if a name matches nothing.
     """
     chosen: list[Quantity] = []
-    for name in names:
+    for name in asked:
         hits = [q for q in known if fnmatch.fnmatchcase(q.name, name) or q.group == name]
         if not hits:
             raise SimulationError(
@@ -97,7 +98,7 @@ def selected(known: Sequence[Quantity], names: Sequence[str]) -> tuple[Quantity,
                 f"{', '.join(repr(g) for g in GROUPS)}"
             )
         chosen += [q for q in hits if q not in chosen]
-    return tuple(chosen) if names else tuple(known)
+    return tuple(chosen) if asked else tuple(known)
 
 
 def magnitudes(known: Sequence[Quantity], run: Trajectory) -> dict[str, float]:

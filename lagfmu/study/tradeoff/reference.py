@@ -22,6 +22,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from ... import names
 from ...errors import SimulationError
 from ...fmu.claims import Claim
 from ...model.closed_form import output
@@ -63,7 +64,7 @@ class Reference:
         for q in self.known:
             right = self.values[q.name][rows]
             if q.contact is not None:
-                count = f"departure.{q.contact}.count"
+                count = names.name(names.DEPARTURES, q.contact)
                 if run[count][-1] != self.run[count][-1]:
                     found[q.name] = float("inf")  # an event that is missed, or one too many
                     continue
@@ -92,7 +93,7 @@ def refer(
 
     def tight(tolerance: float, width: float, longest: float) -> Trajectory:
         setting = Setting("dop853", tolerance, 0.0, width)
-        return importer.observe(setting, given | {"solver.maximum_step": longest}, end)
+        return importer.observe(setting, given | {names.MAXIMUM_STEP: longest}, end)
 
     run = tight(TIGHTEST, h, importer.step_size)
     others = [
@@ -146,13 +147,12 @@ def _shared(fine: Trajectory, run: Trajectory) -> tuple[NDArray[Any], NDArray[np
     rows = np.clip(np.searchsorted(times, run["time"]), 1, len(times) - 1)
     rows -= np.abs(times[rows - 1] - run["time"]) < np.abs(times[rows] - run["time"])
     alike = np.ones(len(run), dtype=bool)
-    for name in run.dtype.names or ():
-        if name.startswith("contact."):
-            differ = run[name] != fine[name][rows]
-            alone = differ.copy()
-            alone[1:] &= ~differ[:-1]
-            alone[:-1] &= ~differ[1:]
-            alike &= ~alone
+    for name in names.those(run.dtype.names or (), names.CONTACT):
+        differ = run[name] != fine[name][rows]
+        alone = differ.copy()
+        alone[1:] &= ~differ[:-1]
+        alone[:-1] &= ~differ[1:]
+        alike &= ~alone
     return rows, alike
 
 
@@ -178,12 +178,11 @@ def _in_time(
 ) -> list[tuple[str, Claim, NDArray[np.float64]]]:
     """(output, claim, expected values) for the closed forms that need time and start values only."""
     values = _numbers(importer, given)
-    names = run.dtype.names or ()
-    constant = {n for n in values if n not in names} | {"time"}
+    constant = values.keys() - set(run.dtype.names or ()) | {"time"}
 
     def explicit(e: Expr) -> bool:
         return all(
-            str(s) in constant or str(s).startswith("initial(") for s in sp.sympify(e).free_symbols
+            str(s) in constant or names.initially(str(s)) for s in sp.sympify(e).free_symbols
         )
 
     open_claims = [

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...methods import FIXED_STEP
+from ...names import METHOD, STEP
 
 ORDERS = {"rk4": 4, "rattle": 6}  # of convergence
 
@@ -35,8 +36,8 @@ class Setting:
     @property
     def values(self) -> dict[str, Any]:
         """The FMU's parameters; the tolerance goes through fmi2SetupExperiment instead."""
-        values: dict[str, Any] = {"solver.method": self.method} if self.method else {}
-        return values | {"solver.step": self.step} if self.step else values
+        values: dict[str, Any] = {METHOD: self.method} if self.method else {}
+        return values | {STEP: self.step} if self.step else values
 
     def __str__(self) -> str:
         return f"{self.method or 'as built'} {self.dial}, every {self.communication:.3g} s"

@@ -1,0 +1,18 @@
+"""Symbol -> identifier, in C as in Python: theta, der_theta, der2_theta, lambda_rod, level_2."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..names import VALUE, read
+
+
+def identifier(symbol: Any) -> str:
+    """A word for a symbol, which may be taken."""
+    text = str(symbol)
+    if text.startswith("level("):  # jumps.py
+        return f"level_{text[len('level(') : -1]}"
+    of = read(text)
+    if of.quantity == VALUE and of.order:
+        return f"der{of.order if of.order > 1 else ''}_{of.coordinate}"
+    return text.replace(".", "_")

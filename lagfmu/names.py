@@ -1,0 +1,128 @@
+"""The names of an FMU's variables: composed and read here, and nowhere else.  Imports nothing of lagfmu.
+
+A name says what its variable is of (FMI's structured naming): lambda.rod, Q.rod.x, departure.rod.velocity.x,
+der(x,2).  It travels inside python FMUs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+VALUE = (
+    "value"  # of a coordinate, an input, a parameter or an output of one word; or its derivative
+)
+OWN = "own"  # an output that the model names itself, in several words: bob.height
+MULTIPLIER, UNIQUE, RESIDUAL = "lambda", "unique", "residual"  # of a constraint
+FORCE = "Q"  # on a coordinate: of all constraints, or the share of one
+CONTACT, DEPARTURE = "contact", "departure"
+STICKS, MARGIN, POWER, SLIPPING = "sticks", "margin", "power", "slipping"  # of a friction
+SLIP = "slip"  # of a constraint that holds by friction
+DEPARTURES, DEPARTURE_TIME = "departure.count", "departure.time"
+SLIPS, SLIP_TIME = "slipping.count", "slipping.time"
+KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
+DISSIPATED = "energy.dissipated"
+ENERGY, SOLVER = "energy", "solver"
+ERROR = "error"  # how far off another variable may be: error.lambda.rod
+STEPS = "solver.steps"
+METHOD, TOLERANCE, STEP = "solver.method", "solver.tolerance", "solver.step"
+MAXIMUM_STEP, MAXIMUM_STEPS = "solver.maximum_step", "solver.maximum_steps"
+
+OF_ONE = (MULTIPLIER, UNIQUE, RESIDUAL, CONTACT, STICKS, MARGIN, POWER, SLIP)
+EVENTS = (DEPARTURE, SLIPPING)
+REACTIONS = (MULTIPLIER, FORCE)
+MODES = (CONTACT, STICKS)
+OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING)
+RESERVED = (  # what nothing of a model's can be called
+    *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
+    *("t", "time", "unique", "velocity"),
+)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a variable is of: one of the quantities above, the constraint (contact, friction), the
+    coordinate (input, parameter, output of the model's own), the order of the time derivative."""
+
+    quantity: str
+    constraint: str = ""
+    coordinate: str = ""
+    order: int = 0
+
+    @property
+    def name(self) -> str:
+        """As the FMU calls it."""
+        return name(self.quantity, self.constraint, self.coordinate, self.order)
+
+    @property
+    def head(self) -> str:
+        """The first word of the name where that is a kind: energy, departure, ...; else the quantity."""
+        return self.quantity.partition(".")[0]
+
+
+def name(quantity: str, constraint: str = "", coordinate: str = "", order: int = 0) -> str:
+    """The name of what a `Subject` with these fields is."""
+    if quantity in (VALUE, OWN):
+        return derivative(coordinate, order)
+    head, _, tail = quantity.partition(".")
+    words = (head, constraint, tail, "velocity" if order else "", coordinate)
+    return ".".join(word for word in words if word)
+
+
+def derivative(coordinate: str, order: int = 1) -> str:
+    """x, der(x), der(x,2), ..."""
+    return (coordinate, f"der({coordinate})", f"der({coordinate},{order})")[min(order, 2)]
+
+
+def motion(coordinates: Iterable[str]) -> list[str]:
+    """The coordinates, then their velocities."""
+    known = list(coordinates)
+    return [*known, *(derivative(q) for q in known)]
+
+
+def read(text: str) -> Subject:
+    """What a variable of that name is of."""
+    head, *rest = text.split(".")
+    if head in (ENERGY, SOLVER) and len(rest) == 1:
+        return Subject(text)
+    if head == ERROR and rest:
+        return Subject(head, "", ".".join(rest))
+    if head in EVENTS and len(rest) in (2, 3):
+        constraint, last, rate = rest[0], rest[-1], len(rest) - 2
+        if last in ("count", "time"):
+            return Subject(f"{head}.{last}", constraint)
+        return Subject(head, constraint, last, rate)
+    if head == FORCE and len(rest) in (1, 2):
+        return Subject(head, "".join(rest[:-1]), rest[-1])
+    if head in OF_ONE and len(rest) == 1:
+        return Subject(head, rest[0])
+    if rest:
+        return Subject(OWN, coordinate=text)
+    inner, _, order = text.removeprefix("der(").removesuffix(")").partition(",")
+    return Subject(VALUE, "", inner, 0 if inner == text else int(order or 1))
+
+
+def those(known: Iterable[str], *quantities: str) -> list[str]:
+    """The names, among those known, of these quantities."""
+    return [text for text in known if read(text).quantity in quantities]
+
+
+def constraints(known: Iterable[str], quantity: str) -> list[str]:
+    """The constraints (contacts, frictions) of which that quantity is known."""
+    return [read(text).constraint for text in those(known, quantity)]
+
+
+def coordinates(known: Iterable[str]) -> list[str]:
+    """Those whose acceleration is known."""
+    subjects = [read(text) for text in known]
+    return [s.coordinate for s in subjects if s.quantity == VALUE and s.order == 2]
+
+
+def initial(text: str) -> str:
+    """How closed forms call the value of a variable at the start."""
+    return f"initial({text})"
+
+
+def initially(symbol: str) -> str:
+    """The variable whose value at the start closed forms call so; empty if it is none."""
+    return symbol[len("initial(") : -1] if symbol.startswith("initial(") else ""

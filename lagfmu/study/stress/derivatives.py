@@ -1,0 +1,100 @@
+"""Directional derivatives: what every law of the model says of small changes.
+
+A law R(outputs, inputs, t) = 0 of the model (lagrange.py) holds beside a state as well as at it, so that
+along any direction
+
+    sum_k  dR/do_k  do_k = 0
+
+with the changes do_k that fmi2GetDirectionalDerivative names: nothing but the FMU's own values stands in
+it, and no difference quotient.  It may be off by WITHIN of the sum of the terms' magnitudes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from ...verification.verify import applies
+from .bench import Bench, Finding
+from .claims import Statement
+from .facts import Facts
+from .judge import Check
+from .player import table
+from .probe import Probe
+
+FAMILY = "derivatives"
+WITHIN = 1e-11
+PARTS = (1e-3, 0.13, 0.41, 0.77)  # of the default experiment
+KINKED = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside, sp.floor, sp.Piecewise)
+
+
+def probes(facts: Facts, quick: bool) -> list[Probe]:
+    """One, where the FMU has such derivatives and the laws are known."""
+    if not facts.laws or not facts.description.coSimulation.providesDirectionalDerivative:
+        return []
+    return [Probe(FAMILY, "along each state and input", _along_each, False)]
+
+
+@dataclass(frozen=True)
+class _Law:
+    """R's partial derivatives by the variables `moving`, of the variables `needs`."""
+
+    statement: Statement
+    moving: tuple[str, ...]
+    needs: tuple[str, ...]
+    slopes: Callable[..., Any]
+
+
+def _law(form: Statement, variables: set[str]) -> _Law | None:
+    """None where R has no derivative everywhere."""
+    R = sp.sympify(form.claim.actual) - sp.sympify(form.claim.expected)
+    symbols = sorted(R.free_symbols, key=str)
+    by = [s for s in symbols if str(s) in variables]
+    slopes = [] if R.has(*KINKED) else [R.diff(s) for s in by]
+    if not slopes or any(e.has(sp.Derivative, sp.Subs) for e in slopes):
+        return None
+    function = sp.lambdify(symbols, slopes, modules=["scipy", "numpy"], dummify=True)
+    return _Law(form, tuple(map(str, by)), tuple(map(str, symbols)), function)
+
+
+def _along_each(bench: Bench) -> Finding:
+    facts, player = bench.facts, bench.player
+    reals = [v.name for v in facts.outputs if v.type == "Real" and v.variability != "discrete"]
+    seeds = [s.name for s in (*facts.starts, *facts.inputs)]
+    forms = [_law(form, {*reals, *seeds}) for form in bench.forms if form.law]
+    known = {p.name: p.start for p in facts.parameters}
+    checks: list[Check] = []
+    player.begin({}, None)
+    for part in PARTS:
+        player.step(part * facts.stop_time - player.time)
+        rows = table(facts, 1)
+        values = player.read() | player.inputs() | {"time": player.time}
+        for name, value in values.items():
+            rows[name][0] = value
+        asked = [n for n in reals if _defined(n, values)]
+        laws = [x for x in forms if x is not None and {*x.moving} <= {*asked, *seeds}]
+        laws = [x for x in laws if applies(x.statement.claim, rows, known)[0]]
+        for seed in seeds:
+            references = player.references(asked), player.references([seed])
+            found = player.call("getDirectionalDerivative", *references, [1.0])
+            changes = dict.fromkeys(seeds, 0.0) | dict(zip(asked, found, strict=True)) | {seed: 1.0}
+            checks += [_missed(x, known | values, changes, seed) for x in laws]
+    return Finding(tuple(checks))
+
+
+def _defined(name: str, values: Mapping[str, Any]) -> bool:
+    """A multiplier that is not unique has no derivative."""
+    constraint = name.removeprefix("lambda.")
+    return name == constraint or bool(values[f"unique.{constraint}"])
+
+
+def _missed(law: _Law, values: Mapping[str, Any], changes: Mapping[str, float], seed: str) -> Check:
+    slopes = np.array(law.slopes(*(float(values[n]) for n in law.needs)), dtype=float)
+    terms = slopes * [changes[n] for n in law.moving]
+    allowed = WITHIN * float(np.abs(terms).sum()) + float(np.finfo(float).tiny)
+    what = f"{law.statement.claim.name} along {seed}"
+    return Check(what, abs(float(terms.sum())), allowed)

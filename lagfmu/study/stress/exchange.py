@@ -1,0 +1,74 @@
+"""Model exchange: an importer's own integrator has to come to the motion of the co-simulation.
+
+fmpy's CVODE at TOLERANCE moves the state between the events that it finds by the indicators; coordinates,
+velocities, lambda and departures are those of the default experiment at REACHED, about what a multistep
+method holds that knows no constraints and is started anew after each event.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import fmpy
+
+from ...fmu.session import RefusalError
+from .bench import Bench, Finding
+from .facts import Facts
+from .judge import Check
+from .parameters import departures
+from .player import table
+from .probe import Probe
+
+FAMILY = "model exchange"
+TOLERANCE, REACHED = 1e-9, 1e-7
+POINTS = 40
+
+
+def probes(facts: Facts, quick: bool) -> list[Probe]:
+    """One, where the FMU has both interfaces; a prescribed motion needs an importer that moves it."""
+    if facts.description.modelExchange is None or facts.motions:
+        return []
+    return [Probe(FAMILY, "the default experiment", _default, False)]
+
+
+def _default(bench: Bench) -> Finding:
+    facts = bench.facts
+    right = bench.run({}, bench.times(facts.stop_time, POINTS))
+    if right.refusal is not None:
+        raise right.refusal
+    found = _exchanged(bench)
+    rows = table(facts, len(found))
+    for name in rows.dtype.names or ():
+        rows[name] = found[name] if name in found.dtype.names else right.rows[name][: len(found)]
+    count = Check("points that were reached", float(len(right.rows) - len(rows)), 0.5)
+    other = replace(right, rows=rows, tolerance=REACHED)
+    growth = bench.amplification[-1] + 0 * right.rows["time"]
+    checks = bench.agreement(right, other, growth, "as in co-simulation", facts.stop_time)
+    return Finding((count, *checks, *departures(bench, right, other, float(growth[-1]))))
+
+
+def _exchanged(bench: Bench) -> Any:
+    said: list[str] = []
+
+    def log(_: Any, __: Any, status: int, ___: Any, message: bytes) -> None:
+        if status >= 2:
+            said.append(message.decode(errors="replace"))
+
+    try:
+        return fmpy.simulate_fmu(
+            str(bench.folder),
+            validate=False,
+            fmi_type="ModelExchange",
+            model_description=bench.facts.description,
+            stop_time=bench.facts.stop_time,
+            output_interval=bench.facts.stop_time / POINTS,
+            relative_tolerance=TOLERANCE,
+            record_events=False,
+            output=[v.name for v in bench.facts.outputs],
+            logger=log,
+        )
+    except Exception as error:
+        raise RefusalError("model exchange", 3, "; ".join(said) or str(error)) from None
+    finally:
+        bench.player.renew()  # fmpy's logger is one a process
