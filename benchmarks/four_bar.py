@@ -24,6 +24,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Conserved, Holonomic, Model, Parameter, Scene, derive, output
 from lagfmu.codegen.py.equations import lower
+from lagfmu.mechanics.form import Form
 
 OMEGA = 4.0  # [rad/s] the crank's first rate
 LENGTHS = (1.0, sqrt(5.0), 2.0)
@@ -151,7 +152,7 @@ def exact(t: NDArray[Any], harmonics: int = 512) -> NDArray[Any]:
         angle = angle - change
         if np.abs(change).max() < 1e-14 * np.abs(angle).max():
             break
-    system = lower(derive(model))
+    system = lower(Form(derive(model)))
     p = [float(q.value) for q in model.parameters]
     q, dq = _pose(angle)
     v = dq / slowness(angle)[:, None]

@@ -1,12 +1,11 @@
 """What does the native target cost?  Against SUNDIALS in C, the python target and SciPy, and by itself.
 
-    python benchmarks/native.py [--out DIR] [--rounds N] [pendulum|four-bar|python|rhs|growth|call|size ...]
+    python benchmarks/native.py [--out DIR] [--rounds N] [pendulum|four-bar|python|rhs|growth|call ...]
 
 pendulum, four-bar: error of lambda against cost at tolerances 1e-3 ... 1e-13, every program on the same
     generated model.c; cost at an error of 1e-6 and 1e-9, and the ratio to the better peer.
 python: the same two models by the python target and by SciPy on the index-1 equations.
 rhs: one right-hand side in ns.  growth: chains of 8 ... 512 links.  call: doStep and getReal.
-size: the archive of Hemisphere with every platform, and the time to build one for this machine.
 
 Needs gcc and SUNDIALS (Debian: libsundials-dev).  Programs run interleaved, N rounds; medians, of
 processor time, so that other load on the machine is not counted.  Errors are the largest over 100 samples
@@ -17,11 +16,9 @@ lambda, in microseconds a simulated second.  Writes to --out alone.
 from __future__ import annotations
 
 import argparse
-import importlib
 import math
 import os
 import statistics
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterable
@@ -32,12 +29,10 @@ import python_side
 from chain import chain
 from programs import (
     BUDGET,
-    HERE,
     STEP,
     STOP,
     Curve,
     algebra,
-    build,
     compiled,
     core,
     launch,
@@ -50,8 +45,9 @@ from programs import (
 )
 from sympy.core.cache import clear_cache
 
-from lagfmu import build_fmu, derive
+from lagfmu import derive
 from lagfmu.codegen.c.equations import model_source
+from lagfmu.mechanics.form import Form
 
 TOLERANCES = [10.0**-k for k in range(3, 14)]
 TARGETS = (1e-6, 1e-9)
@@ -205,7 +201,7 @@ def chain_costs(n: int, folder: Path) -> tuple[float, float, float, float, int]:
     moments = [time.process_time()]
     equations = derive(model)
     moments.append(time.process_time())
-    model_source(equations, None, "multipliers")
+    model_source(Form(equations))
     moments.append(time.process_time())
     written = write_problem(folder, equations)
     begun = os.times().children_user
@@ -250,36 +246,9 @@ def calls(out: Path, rounds: int) -> None:
         print(f"| {h:g} | " + cells([a, b, b - a, *parts]))
 
 
-def size(out: Path) -> None:
-    """Bytes of Hemisphere.fmu with all platforms; seconds of a build for this machine."""
-    module = importlib.import_module("hemisphere")
-    path = HERE.parent / "models" / "hemisphere.py"
-    try:
-        build(path, out / "all", "native", "--platforms", "all")
-        bytes_ = (out / "all" / "native" / "Hemisphere.fmu").stat().st_size
-        print(f"\nHemisphere.fmu, all platforms and sources: {bytes_ / 1e3:.1f} kB")
-    except subprocess.CalledProcessError:
-        print("\nHemisphere.fmu for all platforms: not built (no cross compiler)")
-    seconds = []
-    for _ in range(6):
-        begun = time.perf_counter()
-        build_fmu(
-            module.model,
-            out / "one",
-            module.scenes[0],
-            target="native",
-            platforms=["host"],
-            check=False,
-        )
-        seconds.append(time.perf_counter() - begun)
-    print(
-        f"build for this machine: {statistics.median(seconds[1:]):.2f} s, first {seconds[0]:.2f} s"
-    )
-
-
 def main() -> None:
     """Answer what is asked."""
-    every = ("pendulum", "four-bar", "python", "rhs", "growth", "call", "size")
+    every = ("pendulum", "four-bar", "python", "rhs", "growth", "call")
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("questions", nargs="*", help=f"of {', '.join(every)}; default: all")
     parser.add_argument("--out", type=Path, help="folder for what is built (default: temporary)")
@@ -301,8 +270,6 @@ def main() -> None:
             growth(out, asked.rounds)
         if "call" in questions:
             calls(out, asked.rounds)
-        if "size" in questions:
-            size(out)
 
 
 if __name__ == "__main__":

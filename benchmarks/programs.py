@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 import lagfmu
 from lagfmu.codegen.c.equations import model_source
-from lagfmu.fmu.compiler import FLAGS, find_compiler, host
+from lagfmu.fmu.compiler import FAST, FLAGS, find_compiler, host
 from lagfmu.mechanics.equations import EquationsOfMotion
+from lagfmu.mechanics.form import Form
 from lagfmu.methods import NUMBERS
 from lagfmu.prepare.prepare import Prepared, prepare
 
@@ -133,7 +134,7 @@ def write_problem(folder: Path, equations: EquationsOfMotion) -> list[Path]:
         f"const double PROBLEM_{name}[] = {{{', '.join(map(repr, values))}}};\n"
         for name, values in arrays.items()
     ]
-    (folder / "model.c").write_text(model_source(equations, None, "multipliers"))
+    (folder / "model.c").write_text(model_source(Form(equations)))
     (folder / "problem.c").write_text('#include "problem.h"\n\n' + "".join(lines))
     return [folder / "model.c", folder / "problem.c"]
 
@@ -194,7 +195,7 @@ def compiled(
         "-isystem",
         str(FMI),
     )
-    words = [*command, *FLAGS, *include, "-o", str(target), *map(str, sources), *options]
+    words = [*command, *FLAGS, FAST, *include, "-o", str(target), *map(str, sources), *options]
     libraries = [] if "-c" in options else ["-lm"]
     subprocess.run([*words, *libraries], check=True, timeout=600)
     return target

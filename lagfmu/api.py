@@ -15,7 +15,7 @@ from rich.console import Console
 
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, find_compiler, host
-from .fmu.write import put, put_figures, write
+from .fmu.write import put, write
 from .live.playable import playable
 from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
@@ -147,10 +147,9 @@ def package(
     path = write(prepared, out, closed_forms, target, platforms, choice, live)
     runs_here = target == "python" or host() in chosen(platforms)
     found = verify_fmu(path) if check and runs_here else None
-    if found is not None:
-        put_figures(path, prepared, found.rows(), target, choice, page)
-    if reference and runs_here:
-        put(path, layered(path, found))
+    more = layered(path, found) if reference and runs_here else {}
+    if found is not None or more:
+        put(path, more, found.rows() if found is not None else ())
     return Built(path, found)
 
 

@@ -60,3 +60,7 @@ class VerificationError(LagfmuError):
 
 class SimulationError(LagfmuError):
     """A simulation that cannot go on; the message names the physical or numerical cause."""
+
+
+class SettingError(SimulationError):
+    """A name that the FMU does not have, or a value that it does not take."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 VALUE = (
     "value"  # of a coordinate, an input, a parameter or an output of one word; or its derivative
@@ -34,8 +35,8 @@ REACTIONS = (MULTIPLIER, FORCE)
 MODES = (CONTACT, STICKS)
 OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING)
 RESERVED = (  # what nothing of a model's can be called
-    *("Q", "contact", "count", "departure", "der", "energy", "lambda", "residual", "solver"),
-    *("t", "time", "unique", "velocity"),
+    *("Q", "contact", "count", "departure", "der", "energy", "error", "lambda", "residual"),
+    *("solver", "t", "time", "unique", "velocity"),
 )
 
 
@@ -60,6 +61,7 @@ class Subject:
         return self.quantity.partition(".")[0]
 
 
+@lru_cache(maxsize=4096)  # the python target asks at every communication point
 def name(quantity: str, constraint: str = "", coordinate: str = "", order: int = 0) -> str:
     """The name of what a `Subject` with these fields is."""
     if quantity in (VALUE, OWN):
@@ -100,6 +102,17 @@ def read(text: str) -> Subject:
         return Subject(OWN, coordinate=text)
     inner, _, order = text.removeprefix("der(").removesuffix(")").partition(",")
     return Subject(VALUE, "", inner, 0 if inner == text else int(order or 1))
+
+
+def bar(of: str) -> str:
+    """The error bar of a variable."""
+    return name(ERROR, "", of)
+
+
+def barred(text: str) -> str:
+    """The variable whose error bar it is; empty if it is none."""
+    found = read(text)
+    return found.coordinate if found.quantity == ERROR else ""
 
 
 def those(known: Iterable[str], *quantities: str) -> list[str]:

@@ -32,7 +32,8 @@ from lagfmu.codegen.py.equations import lower
 from lagfmu.errors import DerivationError
 from lagfmu.mechanics.differential import Differential
 from lagfmu.mechanics.equations import TIME, EquationsOfMotion
-from lagfmu.mechanics.formulations.minimal import Reduction, reduce
+from lagfmu.mechanics.form import Form
+from lagfmu.mechanics.formulations.minimal import reduce
 from lagfmu.model.spline import SplineBase
 from lagfmu.prepare.prepare import Prepared
 from lagfmu.solver.system import System
@@ -134,21 +135,20 @@ class Native:
 class Case:
     """A model as symbols, as the Python twin and as compiled C."""
 
-    def __init__(
-        self,
-        eom: EquationsOfMotion,
-        reduction: Reduction | None,
-        formulation: str,
-        folder: Path,
-    ) -> None:
-        self.eom, self.reduction, self.formulation = eom, reduction, formulation
-        self.source = model_source(eom, reduction, formulation)
+    def __init__(self, form: Form, folder: Path) -> None:
+        self.form = form
+        self.eom, self.reduction, self.formulation = (
+            form.equations,
+            form.reduction,
+            form.formulation,
+        )
+        self.source = model_source(self.form)
         self.native = Native(compile_library(folder, ("interval.c",), self.source + CALLS))
 
     @cached_property
     def system(self) -> System:
         """The Python twin."""
-        return lower(self.eom, self.reduction, self.formulation)
+        return lower(self.form)
 
     def systems(self) -> list[tuple[int, EquationsOfMotion, System]]:
         """(pick, symbols, twin) of the stepped system, and of the full one behind it."""
@@ -169,7 +169,7 @@ def case(
     def get(name: str) -> Case:
         if name not in made:
             p = prepared(name)
-            made[name] = Case(p.equations, p.reduction, p.scene.formulation, folder)
+            made[name] = Case(p.form, folder)
         return made[name]
 
     return get
@@ -510,7 +510,7 @@ def test_the_pendulum_reads_like_the_book(case: Callable[[str], Case]) -> None:
 def made(model: Model, folder: Path, formulation: str = "multipliers") -> Case:
     eom = derive(model)
     reduction = reduce(eom) if formulation == "minimal" else None
-    return Case(eom, reduction, formulation, folder)
+    return Case(Form(eom, reduction, formulation), folder)
 
 
 def checked(one: Case, seeds: Sequence[int] = (1, 2, 3)) -> None:
@@ -536,7 +536,7 @@ def oscillator(force: Any, c: Any = None) -> EquationsOfMotion:
 
 
 def pushed(force: Any, folder: Path, c: Any = None) -> Case:
-    return Case(oscillator(force, c), None, "multipliers", folder)
+    return Case(Form(oscillator(force, c)), folder)
 
 
 x = dynamicsymbols("x")
@@ -593,7 +593,7 @@ def test_no_warning_from_clang(tmp_path: Path, target: str) -> None:
     if command is None:
         pytest.skip("ziglang is not installed")
     file = tmp_path / "model.c"
-    file.write_text(model_source(derive(names_model()), None, "multipliers"), encoding="utf-8")
+    file.write_text(model_source(Form(derive(names_model()))), encoding="utf-8")
     options = [*FLAGS, "-Werror", *INCLUDES, *(["-target", target] if target else [])]
     result = subprocess.run(
         [*command, *options, "-c", str(file), "-o", str(tmp_path / "model.o")],
@@ -681,7 +681,7 @@ def test_numbers_outside_doubles_are_refused(bad: Any) -> None:
     """10^400 and 10^-400 have no double: they are named, not silently inf or 0."""
     eom = oscillator(sp.sin(x) + bad * x)
     with pytest.raises(DerivationError, match=r"outside the range of double precision"):
-        model_source(eom, None, "multipliers")
+        model_source(Form(eom))
 
 
 POWERS = [
@@ -739,7 +739,7 @@ def test_functions_without_counterpart_are_refused(expression: Any, word: str) -
     """A Bessel function has no counterpart in C99: the message names it and the remedy."""
     eom = oscillator(expression)
     with pytest.raises(DerivationError, match=word) as caught:
-        model_source(eom, None, "multipliers")
+        model_source(Form(eom))
     assert "cannot be written as numeric code" in str(caught.value)
 
 
@@ -854,7 +854,7 @@ def bodies(text: str) -> list[int]:
 
 def test_code_grows_linearly_and_in_blocks(tmp_path: Path) -> None:
     """Twice the links, twice the text; and no function grows beyond a bounded block."""
-    texts = {n: model_source(derive(chain(n)), None, "multipliers") for n in (16, 32, 64)}
+    texts = {n: model_source(Form(derive(chain(n)))) for n in (16, 32, 64)}
     for half, whole in ((16, 32), (32, 64)):
         assert len(texts[whole]) < 2.1 * len(texts[half])
         assert sum(bodies(texts[whole])) < 2.1 * sum(bodies(texts[half]))
@@ -916,9 +916,9 @@ for path in sys.argv[1:]:
     file = load(Path(path))
     for scene in file.scenes:
         p = prepare(file.model, scene)
-        digest.update(model_source(p.equations, p.reduction, p.formulation).encode())
+        digest.update(model_source(p.form).encode())
         digest.update(
-            variables_source(p.table, p.equations, p.reduction, scene, p.system).encode()
+            variables_source(p.table, p.form, scene, p.system).encode()
         )
 print(digest.hexdigest())
 """

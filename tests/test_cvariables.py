@@ -72,8 +72,8 @@ def table(
     def get(name: str) -> tuple[Prepared, Any, list[CVariable]]:
         if name not in made:
             p = prepared(name)
-            text = variables_source(p.table, p.equations, p.reduction, p.scene, p.system)
-            model = model_source(p.equations, p.reduction, p.scene.formulation)
+            text = variables_source(p.table, p.form, p.scene, p.system)
+            model = model_source(p.form)
             library = compile_library(folder, ("interval.c",), model + text, [f"-I{folder}"])
             count = ctypes.c_int.in_dll(library, "VARIABLE_COUNT").value
             rows = (CVariable * count).in_dll(library, "VARIABLES")

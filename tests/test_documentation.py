@@ -6,6 +6,7 @@ import html
 import io
 import random
 import re
+from dataclasses import replace
 
 import pytest
 import sympy as sp
@@ -15,8 +16,9 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter
 from lagfmu.mechanics.equations import derive
+from lagfmu.mechanics.form import Form
 from lagfmu.model.scene import Scene
-from lagfmu.page.documentation import page
+from lagfmu.page.documentation import page, with_figures
 from lagfmu.page.text import show
 from lagfmu.page.typeset import Notation, name_latex, name_text, typeset
 from lagfmu.prepare.prepare import Prepared, prepare
@@ -71,7 +73,7 @@ def prepared() -> Prepared:
 
 @pytest.fixture(scope="module")
 def text(prepared: Prepared) -> str:
-    return page(prepared, FIGURES)
+    return with_figures(page(prepared), FIGURES)
 
 
 def read(text: str, notation: Notation) -> sp.Expr:
@@ -90,7 +92,7 @@ def read(text: str, notation: Notation) -> sp.Expr:
 def test_printed_equations_are_those_that_are_integrated(model):
     """Read back, they say M v' = F + G^T lambda, Q = G^T lambda and G v' = gamma."""
     eom = derive(model)
-    sections = {section.title: section.equations for section in typeset(eom)}
+    sections = {section.title: section.equations for section in typeset(Form(eom))}
     vdot = eom.vdot
     generator = random.Random(3)
     notation = Notation(eom)
@@ -149,7 +151,7 @@ def test_page_needs_no_other_file(text):
 
 def test_equations_are_mathematics_for_the_browser(text, prepared):
     """Each equation is a <math> element, and its text stands beside it for screen readers."""
-    sections = typeset(prepared.equations, prepared.reduction, "nullspace")
+    sections = typeset(replace(prepared.form, formulation="nullspace"))
     equations = [e for section in sections for e in section.equations]
     assert text.count("<math") == len(equations)
     assert "\\" not in text.partition("</style>")[2]
@@ -160,7 +162,7 @@ def test_equations_are_mathematics_for_the_browser(text, prepared):
 def test_page_is_the_same_each_time(text):
     """Same model, same bytes."""
     again = prepare(model, Scene("CartScene", formulation="nullspace"))
-    assert page(again, FIGURES) == text
+    assert with_figures(page(again), FIGURES) == text
 
 
 def test_show_tells_classes_freedoms_units_and_projected_starts():

@@ -51,7 +51,7 @@ def use(one: Single, exchange: bool) -> None:
     one.call("SetFMUstate", one.good)
 
 
-def attack(path: str, folder: str, kind: str, seed: int) -> None:
+def attack(path: str, folder: str, kind: str, seed: int, count: int = 500) -> None:
     """In a process of its own: hostile words at every place of states of each phase of a life."""
     import ctypes
 
@@ -74,7 +74,7 @@ def attack(path: str, folder: str, kind: str, seed: int) -> None:
     for moment, saved in lives:
         attacks = [(k, struct.pack("=i", i)) for k in range(HEAD, len(saved), 4) for i in INTS]
         attacks += [(k, struct.pack("=d", x)) for k in range(HEAD, len(saved), 8) for x in DOUBLES]
-        for offset, word in chance.sample(attacks, 500):
+        for offset, word in chance.sample(attacks, count):
             state = ctypes.c_void_p()
             data = forged(saved, offset, word)
             if one.call("DeSerializeFMUstate", data, len(data), ctypes.byref(state)) != OK:
@@ -188,4 +188,4 @@ def test_bytes_nested_without_end_are_refused(python_fmu):
 
 
 if __name__ == "__main__":
-    attack(*sys.argv[1:4], int(sys.argv[4]))
+    attack(*sys.argv[1:4], *map(int, sys.argv[4:]))

@@ -24,13 +24,13 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.fmu.claims import claims_of
+from lagfmu.fmu.closed_forms import carried
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress.lagrange import lagrange
-from lagfmu.verification.verify import check_claim
+from lagfmu.verification.verify import check_closed_form
 
 MODELS = Path(__file__).parent.parent / "models"
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -75,10 +75,10 @@ def misses(name: str, result: Any, values: dict[str, float], tolerance: float) -
     file = load(MODELS / f"{FILES[name]}.py")
     known = {str(p.symbol): p.value for p in file.model.parameters} | values
     found = {}
-    for claim in claims_of(scene_of(name), file.closed_forms):
-        check = check_claim(claim, result, known, tolerance)
+    for closed_form in carried(scene_of(name), file.closed_forms):
+        check = check_closed_form(closed_form, result, known, tolerance)
         if check.points:
-            found[claim.name] = check.error / check.allowed
+            found[closed_form.name] = check.error / check.allowed
     return found
 
 
@@ -114,7 +114,7 @@ def test_each_motion_is_that_of_its_closed_forms(
         assert all(miss < 1 for miss in found.values()), (values, found)
         reached |= found.keys()
     file = load(MODELS / f"{FILES[name]}.py")
-    assert reached == {c.name for c in claims_of(scene_of(name), file.closed_forms)}
+    assert reached == {c.name for c in carried(scene_of(name), file.closed_forms)}
 
 
 @pytest.mark.parametrize("name", sorted(RUNS))
@@ -147,14 +147,14 @@ def test_reported_values_obey_lagranges_and_coulombs_laws_to_rounding(
     file = load(MODELS / f"{FILES[name]}.py")
     prepared = prepare(file.model, scene_of(name))
     laws = lagrange(file.model, frozenset(v.name for v in prepared.table.variables))
-    claims = claims_of(scene_of(name), laws)
-    assert any(c.name == "cone of grip" for c in claims)
+    closed_forms = carried(scene_of(name), laws)
+    assert any(c.name == "cone of grip" for c in closed_forms)
     for values in RUNS[name]:
         result = simulate(rubbing(name), start_values=values, step_size=0.0137)
         known = {str(p.symbol): p.value for p in file.model.parameters} | values
-        for claim in claims:
-            check = check_claim(claim, result, known, 1e-300)
-            assert check.error <= check.allowed, claim.name
+        for closed_form in closed_forms:
+            check = check_closed_form(closed_form, result, known, 1e-300)
+            assert check.error <= check.allowed, closed_form.name
 
 
 def test_time_of_each_slip_is_located_to_rounding(rubbing: Build) -> None:
@@ -228,9 +228,23 @@ def test_a_friction_that_shall_not_slip_is_the_plain_constraint() -> None:
     assert not names & {"mu_s", "mu_k", "sticks.grip", "slip.rolling", "energy.dissipated"}
 
 
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_the_log_tells_when_a_friction_slips_and_that_it_sticks(
+    rubbing: Build, target: str
+) -> None:
+    """Category logEvents, as the departures of contacts: the block rides on the belt, slips, rides again."""
+    with instance(rubbing("Belt", target)) as one:
+        one.start()
+        for _ in range(8):
+            one.step(0.1)
+        told = [text for _, category, text in one.log if category == "logEvents"]
+        slipped = f"friction grip began to slip at t = {one.get('slipping.grip.time')!r} s"
+        assert told == [slipped, "friction grip sticks"]
+
+
 # ------------------------------------------------------------------ what is refused
 
-x, y, u = dynamicsymbols("x y u")
+x, y, z, u = dynamicsymbols("x y z u")
 m, mu = symbols("m mu", positive=True)
 G = symbols("g", positive=True)
 
@@ -239,8 +253,8 @@ def block(*constraints: Any, **more: Any) -> Model:
     """A block on a table, pushed by nothing."""
     return Model(
         name="Block",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * G * y,
-        coordinates={x: "m", y: "m"},
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * G * y,
+        coordinates={x: "m", y: "m", z: "m"},
         constraints=[
             Contact("table", y),
             Nonholonomic("rest", x.diff()),
@@ -311,6 +325,13 @@ WRONG = {
             Friction("other", of=["rest"], normal=N, static=mu),
         ],
         "belongs to the frictions 'grip' and 'other'",
+    ),
+    "rows that are not perpendicular": (
+        [
+            Nonholonomic("slant", x.diff() + z.diff()),
+            Friction("grip", of=["rest", "slant"], normal=N, static=mu),
+        ],
+        r"'rest' and 'slant' are not perpendicular \(the product of their directions is 1\)",
     ),
     "an unknown symbol": (
         [Friction("grip", of=["rest"], normal=N, static=symbols("nu"))],

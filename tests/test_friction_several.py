@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
+from runs import simulate_fmu
 from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -220,6 +220,27 @@ def test_painleve_is_refused_by_name_and_only_there(
         assert start() == pytest.approx(g / inner, rel=1e-10)
 
 
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_painleve_is_looked_for_with_each_foot_in_the_air(
+    native: Make, target: str, way: int
+) -> None:
+    """On both feet sliding is well posed for any mu (det B = det K); on the front one alone it is up to
+    mu = (1/m + a^2/J) J/(a h) = 2.6, and beyond that there may be two solutions: refused."""
+    angle = {"alpha": 0.0, "der(x)": 1.0 * way}
+
+    def start(friction: float) -> np.ndarray:
+        run = {"stop_time": 1e-3, "step_size": 1e-3, "start_values": {**angle, "mu": friction}}
+        if target == "native":
+            return simulate(native(feet), **run)
+        return simulate(feet(), scene=Scene("Feet"), **run)
+
+    assert start(1.9)["der(x,2)"][0] == pytest.approx(-way * 1.9 * g, rel=1e-10)
+    assert start(2.59)["contact.low"][0] != start(2.59)["contact.up"][0]  # it tips over
+    with pytest.raises(SimulationError, match="has no acceleration, or several"):
+        start(2.61)
+
+
 @pytest.mark.parametrize(
     ("restitution", "friction"), [(0.0, 0.3), (0.5, 0.3), (0.0, 0.1), (1.0, 0.05)]
 )
@@ -262,8 +283,8 @@ def test_model_exchange_tells_the_same_motion(native: Make, name: str) -> None:
     path = str(native(model))
     run = {"stop_time": 1.5, "output_interval": 0.05, "relative_tolerance": 1e-9}
     outputs = ["x" if name != "rough_hemisphere" else "theta", "sticks.grip", "slipping.grip.count"]
-    ours = fmpy.simulate_fmu(path, fmi_type="CoSimulation", output=outputs, **run)
-    theirs = fmpy.simulate_fmu(path, fmi_type="ModelExchange", output=outputs, **run)
+    ours = simulate_fmu(path, fmi_type="CoSimulation", output=outputs, **run)
+    theirs = simulate_fmu(path, fmi_type="ModelExchange", output=outputs, **run)
     at = {round(float(t), 9): k for k, t in enumerate(theirs["time"])}  # the last at an event
     pairs = [(k, at[round(float(t), 9)]) for k, t in enumerate(ours["time"])]
     for column in outputs:

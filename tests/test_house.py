@@ -79,8 +79,8 @@ def test_the_rooms_can_be_counted() -> None:
 
 @pytest.mark.parametrize("floor", FLOORS)
 def test_the_runtime_stands_in_layers(floor: str) -> None:
-    """A C file includes headers of its own floor and of those below, and no two files share a name: in an
-    FMU's sources/ they lie side by side."""
+    """A C file includes headers of its own floor and of those below, and no two files share a name: they
+    are compiled side by side."""
     place = {p.name: p.parent.name for p in ROOT.glob("runtime/*/*.[ch]")}
     assert len(place) == len(list(ROOT.glob("runtime/*/*.[ch]")))
     for path in ROOT.glob(f"runtime/{floor}/*.[ch]"):

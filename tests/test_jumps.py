@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-import fmpy
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from sympy import Abs, Heaviside, Max, Mod, Piecewise, cos, floor, pi, sign, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -14,6 +14,7 @@ from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu
 from lagfmu.errors import ModelError
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.mechanics.equations import derive
+from lagfmu.mechanics.form import Form
 from lagfmu.mechanics.jumps import jumps_of, with_jumps
 from lagfmu.prepare.prepare import prepare
 
@@ -177,7 +178,7 @@ def test_model_exchange_stops_at_the_jumps(own, target, name, stop, velocity):
     stairs, and x' = +2 m/s at the bottom of the valley on the way back."""
     if target == "python":
         pytest.skip("python FMUs have no model exchange")
-    run = fmpy.simulate_fmu(
+    run = simulate_fmu(
         str(own(name)),
         fmi_type="ModelExchange",
         stop_time=stop,
@@ -241,7 +242,7 @@ def test_a_kink_is_no_jump(force, lagrangian):
 def test_surfaces_of_jumps_are_found(force, surfaces):
     """h of each jump, up to its sign, in position, time and inputs."""
     eom = with_jumps(derive(cart("Jumps", force)))
-    found = {s.h for s in jumps_of(eom).surfaces}
+    found = {s.h for s in jumps_of(Form(eom)).surfaces}
     expected = {s.xreplace(eom.symbols) for s in surfaces}
     assert {h if h in expected else -h for h in found} == expected
 

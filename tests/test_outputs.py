@@ -135,7 +135,7 @@ def test_what_needs_no_lambda_needs_no_solution_for_it():
     model = pendulum(outputs=[TENSION, HEIGHT, SPEED], embedding=embedding)
     made = prepare(model, Scene("Height", outputs=["bob.height", "bob.speed"]))
     assert made.formulation == "minimal"
-    assert made.coded.bare
+    assert made.coded.equations.bare
     run = simulate(made, 0.5, 0.1)
     energy = 9.81 * run["bob.height"] + run["bob.speed"] ** 2 / 2
     np.testing.assert_allclose(energy, energy[0], rtol=1e-7)

@@ -3,6 +3,8 @@ it refuses a run."""
 
 from __future__ import annotations
 
+import json
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -148,6 +150,24 @@ def test_a_python_fmu_has_no_sources_to_compile(
     assert result.exit_code == 1
     assert "--target native" in result.stderr
     assert not (tmp_path / "p.html").exists()
+
+
+def test_a_page_shows_what_is_asked_for(native_fmu: Callable[[str], Path], tmp_path: Path) -> None:
+    """--add-output and --outputs as in build: the pull of the rod m (g cos(theta) + L omega^2) beside lambda,
+    of which it is -2 L lambda; of an FMU they are refused."""
+    model = str(Path(__file__).parent.parent / "models" / "pendulum.py")
+    out = tmp_path / "pull.html"
+    words = ["--add-output", "pull = -2*L*lambda.rod [N]", "--outputs", "pull,lambda.rod"]
+    result = CliRunner().invoke(app, ["page", model, *words, "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    facts = json.loads(re.search(r'id="facts"[^>]*>(.*?)</script>', out.read_text(), re.DOTALL)[1])
+    columns = [v["name"] for v in facts["variables"] if v["column"]]
+    assert {"pull", "lambda.rod"} <= set(columns)
+    assert "energy.total" not in columns
+    fmu = str(native_fmu("Hemisphere"))
+    result = CliRunner().invoke(app, ["page", fmu, *words, "--out", str(out)])
+    assert result.exit_code == 1
+    assert "--outputs and --add-output" in result.stderr
 
 
 def test_without_zig_the_message_says_what_to_do(

@@ -11,6 +11,8 @@ from xml.etree import ElementTree as ET
 import pytest
 import replay
 from conftest import MODELS
+from junitparser import JUnitXml
+from lxml import etree
 from sympy import symbols
 from typer.testing import CliRunner
 
@@ -64,6 +66,11 @@ def test_the_exit_code_is_the_worst_of_all(hemisphere, wrong, tmp_path):
     assert run("verify", hemisphere, "--rtol", "1e-3")[0] == 2
     assert run("verify", hemisphere, "--no-such-option")[0] == 2
     assert run("verify", hemisphere, "--reference", tmp_path / "none.csv")[0] == 2
+    code, text = run("verify", hemisphere, "--set", "thta=1", "--json", tmp_path / "out.json")
+    assert code == 2
+    assert "did you mean 'theta'" in text
+    assert json.loads((tmp_path / "out.json").read_text())[0]["verdict"] == "wrong usage"
+    assert run("verify", hemisphere, missing, "--set", "thta=1")[0] == 3
 
 
 def test_a_suite_an_fmu_and_a_case_a_statement(hemisphere, wrong, tmp_path):
@@ -92,6 +99,48 @@ def test_a_suite_an_fmu_and_a_case_a_statement(hemisphere, wrong, tmp_path):
     assert statements["lambda.floor"]["error"] == pytest.approx(0.5)
     assert "der(theta,2)" in found[0]["uncovered_outputs"]
     assert "lambda.surface" not in found[0]["uncovered_outputs"]
+
+
+JUNIT = """
+<grammar xmlns="http://relaxng.org/ns/structure/1.0"
+         datatypeLibrary="http://www.w3.org/2001/XMLSchema-datatypes">
+  <start><element name="testsuites"><ref name="counts"/><zeroOrMore><element name="testsuite">
+    <ref name="counts"/>
+    <optional><element name="properties"><oneOrMore><element name="property">
+      <attribute name="name"/><attribute name="value"/></element></oneOrMore></element></optional>
+    <zeroOrMore><element name="testcase">
+      <attribute name="name"/><attribute name="classname"/><ref name="time"/>
+      <optional><choice>
+        <element name="skipped"><ref name="told"/></element>
+        <element name="failure"><ref name="told"/></element>
+        <element name="error"><ref name="told"/></element>
+      </choice></optional>
+    </element></zeroOrMore></element></zeroOrMore></element></start>
+  <define name="counts">
+    <attribute name="name"/><ref name="time"/>
+    <attribute name="tests"><data type="nonNegativeInteger"/></attribute>
+    <attribute name="failures"><data type="nonNegativeInteger"/></attribute>
+    <attribute name="errors"><data type="nonNegativeInteger"/></attribute>
+    <optional><attribute name="skipped"><data type="nonNegativeInteger"/></attribute></optional>
+  </define>
+  <define name="time"><attribute name="time"><data type="decimal"/></attribute></define>
+  <define name="told"><optional><attribute name="type"/></optional><attribute name="message"/><text/></define>
+</grammar>"""
+
+
+def test_the_xml_keeps_the_rules_of_junit(hemisphere, wrong, tmp_path):
+    """Written down from what the schemas of Jenkins' xUnit plugin and of Apache Ant agree on: which elements
+    and attributes stand where, in which order, with numbers where they count.  One FMU that holds, one that
+    fails (with a character that XML does not know as it is in its folder), one that is not there."""
+    xml, odd = tmp_path / "out.xml", tmp_path / "a<&b" / "wrong.fmu"
+    odd.parent.mkdir()
+    shutil.copy(wrong, odd)
+    run("verify", hemisphere, odd, tmp_path / "gone.fmu", "--junit", xml)
+    rules = etree.RelaxNG(etree.fromstring(JUNIT))
+    rules.assertValid(etree.parse(str(xml)))
+    read = JUnitXml.fromfile(str(xml))
+    assert (read.failures, read.errors) == (1, 1)
+    assert [suite.name for suite in read][1] == str(odd)
 
 
 def test_a_run_is_held_against_a_reference(hemisphere, tmp_path):
@@ -143,7 +192,7 @@ def test_a_column_that_the_fmu_does_not_have_is_told(hemisphere, tmp_path):
     path = tmp_path / "other.csv"
     path.write_text("time,phi\n0,1\n1,1\n")
     code, output = run("verify", hemisphere, "--reference", path)
-    assert code == 3
+    assert code == 2
     assert "'phi' is no output" in output
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from conftest import FILES
 from linkages import FOUR_BAR, TIME, pinned_rod, rods
-from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compile_library, compiler
+from runtime import FLAGS, INCLUDES, RUNTIME_FILES, SANITIZE, compile_library, compiler, objects
 from sympy import sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_euler_parameters import top
@@ -27,6 +27,7 @@ from lagfmu.codegen.c.equations import model_source
 from lagfmu.codegen.py.equations import lower
 from lagfmu.errors import ModelError
 from lagfmu.mechanics.equations import derive
+from lagfmu.mechanics.form import Form
 from lagfmu.prepare.prepare import Prepared, prepare
 from lagfmu.solver import initial
 from lagfmu.solver.contacts import complementary_modes
@@ -187,7 +188,7 @@ def bench(runtime: ctypes.CDLL, folder: Path, prepared: Any) -> Any:
                 one = prepared(model)
             else:
                 one = prepare(model, Scene(model.name, formulation=formulation))
-            text = model_source(one.equations, one.reduction, one.scene.formulation)
+            text = model_source(one.form)
             keep[name] = compile_library(folder, ["interval.c"], text), one
         library, one = keep[name]
         made.append(Bench(runtime, c_void_p.in_dll(library, "MODEL_SYSTEM"), one))
@@ -400,7 +401,7 @@ def test_constraints_that_no_velocity_satisfies_are_still_refused(bench):
     )
     with pytest.raises(ModelError, match="contradict each other"):
         prepare(model)
-    system = lower(derive(model))
+    system = lower(Form(derive(model)))
     with pytest.raises(StartFailureError, match="no velocities satisfy"):
         initial.start(system, Settings(), 0.0, [0, 0], [0, 1], [], [2.0, 1e-3])
 
@@ -1019,8 +1020,6 @@ def test_inputs_that_change_drop_what_lies_ahead(bench):
 
 # --------------------------------------------------------------------------- memory
 
-SANITIZE = ("-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-
 DRIVER = """
 #include <stdio.h>
 
@@ -1066,32 +1065,20 @@ int main(int count, char **values) {
 """
 
 
-def sanitizing_compiler(*arguments: str) -> None:
-    command = [compiler(), *FLAGS, *SANITIZE, "-Werror", *INCLUDES, *arguments]
-    subprocess.run(command, check=True, timeout=300)
-
-
-@pytest.fixture(scope="module")
-def sanitized(folder: Path) -> Path:
-    """The runtime as a library, not to be loaded into Python, which is no sanitized program."""
-    target = folder / "sanitized.so"
-    files = [str(RUNTIME_FILES[name]) for name in SOURCES]
-    sanitizing_compiler("-shared", "-fPIC", "-o", str(target), *files)
-    return target
-
-
 @pytest.mark.parametrize("name", ["Hemisphere", "PendulumAngle", "Atwood", "KnifeEdge"])
-def test_no_byte_outside_the_arrays_is_touched(name, folder, prepared, sanitized):
+def test_no_byte_outside_the_arrays_is_touched(name, folder, prepared):
     """Address and undefined-behaviour sanitizers find nothing from the start to the last mode."""
     one = prepared(name)
     q, v, _ = defaults(one.system, one.table)
     p = [x.start for x in one.table.variables if x.role == "parameter"]
-    text = model_source(one.equations, one.reduction, one.scene.formulation)
+    text = model_source(one.form)
     (folder / f"{name}.c").write_text(text, encoding="utf-8")
     (folder / f"{name}_main.c").write_text(BENCH.read_text("utf-8") + DRIVER, encoding="utf-8")
     program = folder / name
-    parts = [str(folder / f"{name}.c"), str(folder / f"{name}_main.c"), str(sanitized), "-lm"]
-    sanitizing_compiler("-o", str(program), *parts)
+    parts = [str(folder / f"{name}.c"), str(folder / f"{name}_main.c")]
+    runtime = objects([RUNTIME_FILES[file] for file in SOURCES], SANITIZE)
+    command = [compiler(), *FLAGS, *SANITIZE, "-Werror", *INCLUDES, *parts, *runtime]
+    subprocess.run([*command, "-o", str(program), "-lm"], check=True, timeout=300)
     arguments = [repr(float(a)) for a in (*q, *v, *p)]
     done = subprocess.run([str(program), *arguments], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr

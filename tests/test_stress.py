@@ -26,7 +26,7 @@ from lagfmu.fmu.session import RefusalError
 from lagfmu.model.model import name_of
 from lagfmu.study.stress import worker
 from lagfmu.study.stress.bench import Bench, Finding
-from lagfmu.study.stress.claims import magnitude
+from lagfmu.study.stress.closed_forms import magnitude
 from lagfmu.study.stress.judge import Check, first_landing
 from lagfmu.study.stress.lagrange import lay_beside
 from lagfmu.study.stress.probe import (
@@ -143,7 +143,7 @@ def test_lagranges_equations_hold_at_every_tolerance(lawful, prepared, name):
     with Bench(lawful(name), quick=True) as one:
         run = one.run({}, one.times(one.facts.stop_time), 1e-1)
         checks = {c.what: c for c in one.checks(run)}
-        laws = [checks[claim.name] for claim in one.facts.laws]
+        laws = [checks[closed_form.name] for closed_form in one.facts.laws]
         names = {c.what for c in laws}
         for q in prepared(name).model.coordinates:
             assert f"Lagrange's equation of {name_of(q)}" in names

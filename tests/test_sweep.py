@@ -433,7 +433,7 @@ def test_a_cluster_gives_the_same_numbers_even_if_its_workers_die(hemisphere, tm
 def test_a_scheduler_that_does_not_answer_is_told(hemisphere, monkeypatch):
     """Nobody listens there."""
     pytest.importorskip("distributed")
-    monkeypatch.setattr(engine, "PATIENCE", "1s")
+    monkeypatch.setattr(engine, "PATIENCE", 1)
     with pytest.raises(
         SimulationError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
     ):

@@ -10,6 +10,7 @@ import re
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ from lagfmu.study.tradeoff.report import table
 from lagfmu.study.tradeoff.search import Clock, Walk, coarsest
 from lagfmu.study.tradeoff.setting import Setting, dials, tolerances
 from lagfmu.study.tradeoff.survey import formulations, survey
-from lagfmu.verification.verify import claims_in, verify
+from lagfmu.verification.verify import closed_forms_in, verify
 
 MODELS = Path(__file__).parent.parent / "models"
 PENDULUM = load(MODELS / "pendulum.py")
@@ -124,8 +125,8 @@ def test_a_closed_form_in_the_state_becomes_one_in_time(fmu):
     """lambda(phi) of the knife edge and phi = omega t give lambda = -2 m g sin(alpha) sin(omega t)."""
     path = fmu("KnifeEdge")
     with Importer(path) as importer:
-        found = refer(importer, claims_in(path), {"phi": 0.3}, 0.1, 1.0)
-        plain = refer(importer, claims_in(path), None, 0.1, 1.0)
+        found = refer(importer, closed_forms_in(path), {"phi": 0.3}, 0.1, 1.0)
+        plain = refer(importer, closed_forms_in(path), None, 0.1, 1.0)
     expected = -2 * 9.81 * 0.5 * np.sin(plain.run["time"])
     assert found.source["lambda.edge"] == plain.source["lambda.edge"] == "closed form in time"
     assert plain.values["lambda.edge"] == pytest.approx(expected, abs=1e-14)
@@ -168,7 +169,7 @@ def test_a_missed_event_is_an_infinite_error(fmu):
     """A run without the departure, or with one too many, has no right time of it."""
     path = fmu("Hemisphere")
     with Importer(path) as importer:
-        reference = refer(importer, claims_in(path), communication=0.1)
+        reference = refer(importer, closed_forms_in(path), communication=0.1)
         run = importer.observe(Setting("dop853", 1e-6, 0.0, 0.1))
     assert reference.errors(run)["departure.surface.time"] < 1e-6
     run["departure.surface.count"] = 0
@@ -236,6 +237,26 @@ def test_the_command_writes_table_files_and_figure(tmp_path):
     assert float(rows[0]["error(lambda.link)"]) == data["rows"][0]["errors"]["lambda.link"]
     assert (out / "python" / "Link.png").stat().st_size > 1e4
     assert (out / "python" / "Link.svg").read_text().count("<svg") == 1
+
+
+def test_a_pipeline_reads_what_was_measured(tmp_path):
+    """A case a setting, which fails where a closed form does not hold at its tolerance: a link that is said
+    to pull twice as hard as it does: exit code 1.  3 for a missing file, 2 for a method that is none."""
+    model, xml, data = tmp_path / "link.py", tmp_path / "out.xml", tmp_path / "out.json"
+    model.write_text(SMALL.replace("WRONG", "-2"))
+    words = ["tradeoff", model, "--scene", "Link", "--out", tmp_path / "out", "--repeats", 1]
+    words += ["--tolerance", 1e-4, "--method", "dop853", "--method", "rk4", "--step-size", 0.05]
+    lagfmu(*words, "--junit", xml, "--json", data, code=1)
+    suite = ET.parse(xml).getroot().find("testsuite")
+    failed = [c.get("name") for c in suite.findall("testcase[failure]")]
+    assert failed == ["dop853 1e-4, every 0.05 s"]
+    assert "lambda" in suite.find("testcase/failure").get("message")
+    (found,) = json.loads(data.read_text())
+    assert found["verdict"] == "fail"
+    assert int(suite.get("tests")) == len(found["rows"]) > 1
+    text = lagfmu("tradeoff", tmp_path / "gone.fmu", "--out", tmp_path / "out", code=3)
+    assert "there is no such file" in text
+    assert "expected one of dop853, rk4" in lagfmu("tradeoff", model, "--method", "rk45", code=2)
 
 
 def test_the_table_fits_80_columns_whole(swing):

@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ..api import package
-from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
+from ..errors import CannotStartError, LagfmuError, SettingError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
@@ -30,17 +30,20 @@ from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.goal import parse
 from ..model.library import known, new
+from ..model.model import Model
 from ..model.scene import Scene
 from ..names import METHOD
 from ..page.text import show as show_prepared
 from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
-from ..study.stress.report import all_as_json
+from ..study.stress.report import all_as_json as probed_as_json
 from ..study.tradeoff.page import section
+from ..study.tradeoff.report import all_as_json as measured_as_json
 from ..verification.crosscheck import as_csv, write_crosscheck
-from ..verification.pipeline import as_junit, exit_code
+from ..verification.pipeline import WRONG_USAGE, Suite, UsageError, as_junit, exit_code
 from ..verification.plot import plot
 from ..verification.reference import read_table
+from ..verification.report import as_json
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification
 from .film import film
@@ -49,6 +52,7 @@ from .options import (
     Arguments,
     Contacts,
     Derivatives,
+    ErrorBars,
     Fixed,
     Formulation,
     Frictions,
@@ -64,7 +68,7 @@ from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
 from .tradeoff import chosen_for, compare
-from .verify import examine, write_reports
+from .verify import examine
 
 app = typer.Typer(
     help="Lagrange's equations with multipliers, from SymPy to FMUs that report forces of constraint.",
@@ -113,11 +117,13 @@ StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")
 InputFile = Annotated[
     Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
 ]
+JsonFile = Annotated[Path | None, typer.Option(help="Write everything as JSON.")]
+JunitFile = Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")]
 
 
 @contextlib.contextmanager
 def _plainly() -> Iterator[None]:
-    """Warnings and errors as one message each; exit status 1 after an error."""
+    """Warnings and errors as one message each; exit status 1 after an error, 2 after wrong usage."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -126,7 +132,8 @@ def _plainly() -> Iterator[None]:
             errors.print(
                 f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
             )
-            raise typer.Exit(getattr(error, "code", 1)) from None
+            misused = isinstance(error, (UsageError, SettingError))
+            raise typer.Exit(WRONG_USAGE if misused else 1) from None
         except OSError as error:  # of temporary files; for what the user names see its own errors
             where = error.filename or tempfile.gettempdir()
             errors.print(
@@ -192,6 +199,7 @@ def build(
     formulation: Formulation = None,
     derivatives: Derivatives = None,
     reals_only: RealsOnly = None,
+    error_bars: ErrorBars = None,
     name: Name = None,
     add_output: AddOutput = None,
 ) -> None:
@@ -205,7 +213,7 @@ def build(
         "name": name,
     }
     needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    needs |= {"reals_only": reals_only}
+    needs |= {"reals_only": reals_only, "error_bars": error_bars}
     narrowing = (outputs, fixed, inputs, contacts, frictions, methods, method, reals_only)
     failed = False
     kind = target.value
@@ -301,6 +309,7 @@ def show(
     formulation: Formulation = None,
     derivatives: Derivatives = None,
     reals_only: RealsOnly = None,
+    error_bars: ErrorBars = None,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
@@ -310,7 +319,7 @@ def show(
     needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
     needs |= {"frictions": frictions, "contacts": contacts, "methods": methods, "method": method}
     needs |= {"formulation": formulation, "derivatives": derivatives}
-    needs |= {"reals_only": reals_only}
+    needs |= {"reals_only": reals_only, "error_bars": error_bars}
     with _plainly():
         file = _load(model, add_output, arguments)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
@@ -341,8 +350,8 @@ def verify_command(
         ),
     ] = None,
     atol: Annotated[float, typer.Option(help="Allowed besides, in the column's unit.")] = 0.0,
-    json: Annotated[Path | None, typer.Option(help="Write everything as JSON.")] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")] = None,
+    json: JsonFile = None,
+    junit: JunitFile = None,
 ) -> None:
     """Simulate FMUs through fmpy and hold them against the closed forms that they carry.
 
@@ -360,15 +369,10 @@ def verify_command(
             rtol or (),
             atol,
         )
-        write_reports(done, json, junit)
         for one in done:
             if one.found is not None:
                 _print(one.found)
-            else:
-                errors.print(
-                    f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
-                )
-    raise typer.Exit(exit_code([d.suite for d in done]))
+        _finish("verify", [one.suite for one in done], as_json(done), json, junit)
 
 
 @app.command(name="reference")
@@ -409,6 +413,7 @@ def simulate_command(
         typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
     ] = None,
     inputs: InputFile = None,
+    error_bars: ErrorBars = None,
     add_output: AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest."""
@@ -416,7 +421,8 @@ def simulate_command(
         source: Any = target
         if target.suffix == ".py":
             file = _load(target, add_output, arguments)
-            source = prepare(file.model, _chosen(file, None if scene is None else [scene])[0])
+            chosen = _chosen(file, None if scene is None else [scene])
+            source = prepare(file.model, narrowed(chosen, error_bars=error_bars)[0])
             name = source.scene.name
             variables = source.table.variables
             units = {v.name: v.unit.name for v in variables if v.unit is not None}
@@ -436,7 +442,14 @@ def simulate_command(
         with console.status(f"simulating {name}"):
             signals = None if inputs is None else read_table(inputs)
             result = simulate(
-                source, stop_time, step_size, tolerance, given, signals, besides=besides
+                source,
+                stop_time,
+                step_size,
+                tolerance,
+                given,
+                signals,
+                besides=besides,
+                error_bars=bool(error_bars),
             )
         _print_last(name, result, units, variable or ())
         if csv is not None:
@@ -462,16 +475,29 @@ def page(
         Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    outputs: Outputs = None,
+    fixed: Fixed = None,
+    inputs: Inputs = None,
+    add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
+    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
+    given = {"scene": scene, **needs, "add-output": add_output}
     with _plainly():
+        source: Model | Path = target
         chosen = None
         if target.suffix == ".py":
-            chosen = _chosen(load(target), None if scene is None else [scene])[0]
-        elif scene is not None:
-            raise LagfmuError(f"--scene {scene}: an FMU is one scene; leave it out")
+            file = _load(target, add_output)
+            source = file.model
+            scenes = _chosen(file, None if scene is None else [scene])
+            chosen = narrowed(scenes[:1], **needs)[0]
+        elif said := [f"--{n}" for n, value in given.items() if value is not None]:
+            raise LagfmuError(
+                f"{' and '.join(said)}: an FMU is one scene with outputs of its own; leave it out, or "
+                "make the page from the model file"
+            )
         with console.status("compiling to WebAssembly"):
-            path = write_page(target, out, chosen)
+            path = write_page(source, out, chosen)
         console.print(
             f"[green]wrote[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
             soft_wrap=True,
@@ -507,10 +533,16 @@ def tradeoff(
         bool,
         typer.Option("--full", help="The whole grid: minutes instead of half a minute an FMU."),
     ] = False,
+    json: JsonFile = None,
+    junit: JunitFile = None,
 ) -> None:
-    """Measure error against wall time over methods, tolerances and communication steps."""
+    """Measure error against wall time over methods, tolerances and communication steps.
+
+    Exit codes: 0 closed forms hold at every tolerance, 1 one does not, 2 wrong usage, 3 an FMU could not be
+    built or run.
+    """
     with _plainly():
-        compare(
+        done = compare(
             targets,
             out,
             console,
@@ -522,6 +554,7 @@ def tradeoff(
             scene or (),
             full,
         )
+        _finish("tradeoff", [one.suite for one in done], measured_as_json(done), json, junit)
 
 
 @app.command()
@@ -536,8 +569,8 @@ def stress(
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Some of the probes only.")] = False,
     limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = LIMIT,
-    json: Annotated[Path | None, typer.Option(help="Write everything as JSON.")] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")] = None,
+    json: JsonFile = None,
+    junit: JunitFile = None,
 ) -> None:
     """Push FMUs to the extremes: each row is right, refused with a clear message, or wrong.
 
@@ -545,16 +578,23 @@ def stress(
     """
     with _plainly():
         done = stress_fmus(targets, out, console, target.value, scene or (), quick, limit)
-        if json is not None:
-            write_whole(json, all_as_json(done).encode())
-        if junit is not None:
-            write_whole(junit, as_junit("lagfmu stress", [t.suite for t in done]))
-        for one in done:
-            if one.error:
-                errors.print(
-                    f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
-                )
-    raise typer.Exit(exit_code([t.suite for t in done]))
+        _finish("stress", [one.suite for one in done], probed_as_json(done), json, junit)
+
+
+def _finish(
+    command: str, suites: Sequence[Suite], text: str, json: Path | None, junit: Path | None
+) -> None:
+    """Write what a pipeline reads, say what could not be run, and end with the exit code."""
+    if json is not None:
+        write_whole(json, text.encode())
+    if junit is not None:
+        write_whole(junit, as_junit(f"lagfmu {command}", suites))
+    for suite in suites:
+        if suite.error:
+            errors.print(
+                f"[bold red]error:[/] {escape(suite.error)}", highlight=False, soft_wrap=True
+            )
+    raise typer.Exit(exit_code(suites))
 
 
 def _load(path: Path, added: list[str] | None, arguments: list[str] | None) -> ModelFile:
@@ -660,12 +700,12 @@ def _assignments(texts: list[str] | None) -> dict[str, Any]:
     for text in texts or []:
         name, sign, value = (part.strip() for part in text.partition("="))
         if not sign or not name:
-            raise SimulationError(f"--set {text!r}: expected NAME=VALUE, e.g. --set theta=0.5")
+            raise UsageError(f"--set {text!r}: expected NAME=VALUE, e.g. --set theta=0.5")
         try:
             values[name] = float(value)
         except ValueError:
             if name != METHOD:
-                raise SimulationError(f"--set {text!r}: {value!r} is no number") from None
+                raise UsageError(f"--set {text!r}: {value!r} is no number") from None
             values[name] = value
     return values
 
@@ -677,7 +717,7 @@ def _print(found: Verification) -> None:
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
         table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
     print_whole(console, table)
-    if not found.claims:
+    if not found.closed_forms:
         console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
     for check in found.checks:
         if not check.passed and check.detail:

@@ -74,6 +74,14 @@ RealsOnly = Annotated[
         rich_help_panel="What the scene needs",
     ),
 ]
+ErrorBars = Annotated[
+    bool | None,
+    typer.Option(
+        "--error-bars",
+        help="Outputs error.NAME: an estimate of how far this run may be off. Co-simulation only.",
+        rich_help_panel="What the scene needs",
+    ),
+]
 Name = Annotated[
     str | None,
     typer.Option(help="Another name for the FMU.", rich_help_panel="What the scene needs"),
@@ -92,6 +100,7 @@ def narrowed(
     formulation: str | None = None,
     derivatives: bool | None = None,
     reals_only: bool | None = None,
+    error_bars: bool | None = None,
     name: str | None = None,
     accuracy: str | None = None,
 ) -> list[Scene]:
@@ -110,7 +119,7 @@ def narrowed(
     if methods is not None:
         said["methods"] = _split(methods)
     single = {"method": method, "formulation": formulation, "derivatives": derivatives}
-    single |= {"reals_only": reals_only}
+    single |= {"reals_only": reals_only, "error_bars": error_bars}
     single |= {"name": name, "accuracy": accuracy}
     said |= {k: v for k, v in single.items() if v is not None}
     return [replace(s, **said) for s in scenes]

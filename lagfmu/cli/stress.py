@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from rich.markup import escape
 
 from ..errors import BuildError, LagfmuError
 from ..fmu.write import write, write_whole
-from ..model.file import ModelFile, load
+from ..model.file import ModelFile
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
@@ -32,6 +32,7 @@ from ..study.stress.report import MEANING, Stressed, Tried, as_json, as_markdown
 from ..study.stress.summary import as_summary
 from ..verification.pipeline import UsageError
 from .tradeoff import progress
+from .works import works
 
 LIMIT = 60.0  # [s] for one probe
 START = 120.0  # [s] for the process to begin with the first one
@@ -57,12 +58,12 @@ def stress(
     if not console.is_terminal:
         console = Console(file=console.file, width=WIDTH)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        for path in paths:
-            for name, make in _works(path, scenes, Path(folder) / target, target, console):
-                try:
-                    tried.append(Tried(name, _one(make(), out, console, quick, limit)))
-                except LagfmuError as error:
-                    tried.append(Tried(name, None, str(error)))
+        made = partial(build, folder=Path(folder) / target, target=target, console=console)
+        for name, make in works(paths, scenes, made):
+            try:
+                tried.append(Tried(name, _one(make(), out, console, quick, limit)))
+            except LagfmuError as error:
+                tried.append(Tried(name, None, str(error)))
     if not tried:
         raise UsageError(f"no FMU is called {', '.join(scenes) or 'anything'}")
     found = [t.found for t in tried if t.found is not None]
@@ -79,28 +80,6 @@ def _file(found: Sequence[Stressed], out: Path, console: Console) -> None:
         path = out / f"{target}.md"
         write_whole(path, as_summary([f for f in found if f.target == target]).encode())
         console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
-
-
-def _works(
-    path: Path, scenes: Sequence[str], folder: Path, target: str, console: Console
-) -> Iterator[tuple[str, Callable[[], Path]]]:
-    """What is to be probed, by name, and what makes its FMU."""
-    if path.suffix != ".py":
-        yield str(path), lambda: path
-        return
-    try:
-        file = load(path)
-    except LagfmuError as error:
-        problem = error
-
-        def refuse() -> Path:
-            raise problem
-
-        yield str(path), refuse
-        return
-    for scene in file.scenes:
-        if not scenes or scene.name in scenes:
-            yield f"{path} ({scene.name})", partial(build, file, scene, folder, target, console)
 
 
 def build(file: ModelFile, scene: Scene, folder: Path, target: str, console: Console) -> Path:

@@ -12,11 +12,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
-from ..errors import BuildError, LagfmuError
+from ..errors import LagfmuError
 from ..fmu.compiler import find_compiler
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
-from ..model.file import ModelFile, load
+from ..model.file import ModelFile
 from ..model.goal import Goal
 from ..model.model import Model
 from ..model.scene import Scene
@@ -25,8 +25,10 @@ from ..study.tradeoff.choose import Choice, choose
 from ..study.tradeoff.figure import draw
 from ..study.tradeoff.importer import Importer
 from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure, quick_plan
-from ..study.tradeoff.report import as_csv, as_json, digits, remarks, summary, table
+from ..study.tradeoff.report import Measured, as_csv, as_json, digits, remarks, summary, table
+from ..verification.pipeline import UsageError
 from .terminal import print_whole
+from .works import works
 
 
 @contextlib.contextmanager
@@ -63,26 +65,30 @@ def compare(
     repeats: int | None = None,
     scenes: Sequence[str] = (),
     full: bool = False,
-) -> list[Tradeoff]:
+) -> list[Measured]:
     """Measure model files and FMUs, print tables, write OUT/TARGET/NAME.json, .csv, .svg and .png.
 
     Without a `target` native FMUs where there is a compiler, else python ones; `full`: the whole grid.
-
-    Raises LagfmuError with the causes for what cannot be built or run, when the rest is done.
+    What cannot be built or run does not keep the others from it.  Raises UsageError.
     """
     wrong = [m for m in methods if m not in INTEGRATORS]
     if wrong:
-        raise BuildError("; ".join(unknown(m, INTEGRATORS) for m in wrong))
+        raise UsageError("; ".join(unknown(m, INTEGRATORS) for m in wrong))
     numbers = [*communications, *tolerances, *([] if repeats is None else [repeats])]
     if not all(0 < x < float("inf") for x in numbers):
-        raise BuildError("communication steps, tolerances and repeats must be positive numbers")
+        raise UsageError("communication steps, tolerances and repeats must be positive numbers")
     kind = target or ("python" if find_compiler() is None else "native")
-    found: list[Tradeoff] = []
-    problems: list[str] = []
+    done: list[Measured] = []
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        for item in _work(paths, scenes):
+
+        def build(file: ModelFile, scene: Scene) -> Path:
+            with console.status(f"building {scene.name}"):
+                prepared = prepare(file.model, scene)
+                return write(prepared, Path(folder) / kind, file.closed_forms, target=kind)
+
+        for name, make in works(paths, scenes, build):
             try:
-                fmu = _fmu(item, Path(folder), kind, console)
+                fmu = make()
                 with Importer(fmu) as importer:
                     plan = default_plan(importer) if full else quick_plan(importer)
                 if communications:
@@ -91,14 +97,15 @@ def compare(
                     plan = replace(plan, tolerances=tuple(sorted(set(tolerances), reverse=True)))
                 if methods:
                     plan = replace(plan, methods=tuple(methods))
-                found.append(_one(fmu, plan, repeats, out, console))
+                done.append(Measured(name, _one(fmu, plan, repeats, out, console)))
             except LagfmuError as error:
-                problems.append(str(error))  # the others are measured all the same
+                done.append(Measured(name, None, str(error)))
+    if not done:
+        raise UsageError(f"no FMU is called {', '.join(scenes)}")
+    found = [m.found for m in done if m.found is not None]
     if len(found) > 1:
         print_whole(console, summary(found))
-    if problems:
-        raise BuildError("\n".join(problems))
-    return found
+    return done
 
 
 def _one(fmu: Path, plan: Plan, repeats: int | None, out: Path, console: Console) -> Tradeoff:
@@ -114,28 +121,6 @@ def _one(fmu: Path, plan: Plan, repeats: int | None, out: Path, console: Console
     draw(one, [stem.with_suffix(".svg"), stem.with_suffix(".png")])
     console.print(f"[green]wrote[/] {escape(str(stem))}.json, .csv, .svg, .png", soft_wrap=True)
     return one
-
-
-def _work(paths: Sequence[Path], scenes: Sequence[str]) -> list[Path | tuple[ModelFile, Scene]]:
-    """The FMUs among the paths, and what is to be built of the model files among them."""
-    work: list[Path | tuple[ModelFile, Scene]] = []
-    for path in paths:
-        if path.suffix == ".py":
-            file = load(path)
-            work += [(file, s) for s in file.scenes if not scenes or s.name in scenes]
-        else:
-            work.append(path)
-    if not work:
-        raise BuildError(f"no FMU is called {', '.join(scenes)}")
-    return work
-
-
-def _fmu(item: Path | tuple[ModelFile, Scene], folder: Path, target: str, console: Console) -> Path:
-    if isinstance(item, Path):
-        return item
-    file, scene = item
-    with console.status(f"building {scene.name}"):
-        return write(prepare(file.model, scene), folder / target, file.closed_forms, target=target)
 
 
 def chosen_for(file: ModelFile, scene: Scene, goal: Goal, target: str, console: Console) -> Choice:

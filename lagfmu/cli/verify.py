@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import SimulationError, VerificationError
-from ..fmu.write import write_whole
-from ..verification.pipeline import UsageError, as_junit
+from ..errors import SettingError, SimulationError, VerificationError
+from ..verification.pipeline import UsageError
 from ..verification.reference import Reference, read_table
-from ..verification.report import Examined, as_json
+from ..verification.report import Examined
 from ..verification.verify import verify
 
 
@@ -59,15 +58,8 @@ def examine(
         try:
             found = verify(fmu, values, stop_time, step_size, tolerance, signals, table)
         except (SimulationError, VerificationError) as error:
-            done.append(Examined(str(fmu), None, str(error)))
+            misused = isinstance(error, SettingError)
+            done.append(Examined(str(fmu), None, str(error), misused))
         else:
             done.append(Examined(str(fmu), found))
     return done
-
-
-def write_reports(examined: Sequence[Examined], json: Path | None, junit: Path | None) -> None:
-    """The files that were asked for."""
-    if json is not None:
-        write_whole(json, as_json(examined).encode())
-    if junit is not None:
-        write_whole(junit, as_junit("lagfmu verify", [e.suite for e in examined]))

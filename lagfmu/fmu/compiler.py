@@ -29,7 +29,6 @@ HOST, ALL = "host", "all"
 TIMEOUT = 600  # seconds for one call of the compiler
 FLAGS = (
     "-std=c99",
-    "-O2",
     "-fPIC",
     "-fvisibility=hidden",
     "-ffp-contract=off",  # the same rounding everywhere
@@ -41,6 +40,15 @@ FLAGS = (
     "-fno-tree-slp-vectorize",
     "-g0",
 )
+FAST = "-O2"
+SMALL = ("-Os", "-Xclang", "-Oz")  # zig takes -Oz for -Os, which clang packs 7 % worse
+HOT = {  # where the time of a step and of a communication point goes; all else is compiled for size
+    *("model.c", "mechanism.c", "project.c", "friction.c"),
+    *("linear.c", "schur.c", "ldlt.c", "kkt.c", "lu.c"),
+    *("dop853.c", "rk4.c", "radau5.c", "rattle.c", "step_size.c", "stiffness.c"),
+    *("leg.c", "advance.c", "observe.c", "outputs.c", "indicators.c", "looks.c"),
+    "lagfmu.c",  # the runtime in one file
+}
 
 SHARED = ("-shared", "-s", "-Os")  # -Os is for what the compiler adds of its own
 NO_UNWINDING = (
@@ -233,8 +241,11 @@ def _objects_folder(compiler: Compiler, target: str, runtime: Mapping[str, bytes
     for part in (
         compiler.identity.encode(),
         target.encode(),
-        *(f.encode() for f in _flags(target)),
-        *(part for f, content in sorted(runtime.items()) for part in (f.encode(), content)),
+        *(
+            part
+            for file, content in sorted(runtime.items())
+            for part in (file.encode(), *map(str.encode, _flags(compiler, target, file)), content)
+        ),
     ):
         digest.update(len(part).to_bytes(8, "big") + part)
     return _cache() / f"{target or 'host'}-{digest.hexdigest()[:24]}"
@@ -266,11 +277,12 @@ def _link_flags(target: str, library: str) -> list[str]:
 
 
 def _compile(compiler: Compiler, target: str, file: str, made: str, folder: str) -> None:
-    _run(compiler, target, [*_flags(target), "-c", file, "-o", made], folder)
+    _run(compiler, target, [*_flags(compiler, target, file), "-c", file, "-o", made], folder)
 
 
-def _flags(target: str) -> tuple[str, ...]:
-    flags: tuple[str, ...] = FLAGS if _suffix(target) == ".dll" else (*FLAGS, *NO_UNWINDING)
+def _flags(compiler: Compiler, target: str, file: str) -> tuple[str, ...]:
+    speed = (FAST,) if file in HOT else SMALL if compiler.cross else SMALL[:1]
+    flags = (*FLAGS, *speed) if _suffix(target) == ".dll" else (*FLAGS, *speed, *NO_UNWINDING)
     if _suffix(target) == WASM.suffix:
         flags = tuple(f for f in flags if f != "-fPIC")
     return (*flags, "-fno-sanitize=undefined") if target else flags

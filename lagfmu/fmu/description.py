@@ -27,7 +27,7 @@ LOG_CATEGORIES = {
     "logStatusDiscard": "communication steps that could not be done, and why",
     "logStatusError": "illegal calls and values that were refused",
     "logStatusFatal": "errors after which the instance cannot be used",
-    "logEvents": "contacts that open or close, with time; a change of the integrator",
+    "logEvents": "contacts that open or close, frictions that slip or stick; a change of the integrator",
     "logAll": "all messages",
 }
 

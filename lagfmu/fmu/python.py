@@ -14,14 +14,12 @@ from typing import Any
 
 from pythonfmu.builder import FmuBuilder
 
-from ..codegen.py.equations import source
 from ..codegen.py.parts import files_left_out, files_of_its_own
 from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
-from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.formulations.minimal import Reduction
 from ..methods import IN_PYTHON, NUMBERS
 from ..model.scene import Scene
+from ..prepare.prepare import Prepared
 from ..solver.system import System
 from .archive import pack, version
 from .description import model_description
@@ -71,33 +69,27 @@ class {name}(Fmi2Slave):
     default_method = {method!r}
     default_step = {step!r}
     identity = {identity!r}
-'''
+{bars}'''
 
 
-def build(
-    eom: EquationsOfMotion,
-    reduction: Reduction | None,
-    scene: Scene,
-    table: VariableTable,
-    system: System,
-    extra: Mapping[str, bytes],
-) -> bytes:
+def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
+    scene = prepared.scene
     if scene.method not in IN_PYTHON:
         raise BuildError(
             f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
             f"{', '.join(IN_PYTHON)}, or the target native"
         )
     methods = tuple(m for m in scene.selectable if m in IN_PYTHON)
-    table = table.offering(methods)
-    runtime = _runtime(scene, system, bool(eom.model.splines))
+    table = prepared.table.offering(methods)
+    runtime = _runtime(scene, prepared.system, bool(prepared.model.splines))
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
-    text = _script(eom, reduction, scene, table, package, methods)
+    text = _script(prepared, table, package, methods)
     module = f"{scene.name}_{_digest(text.encode())}"
     description = model_description(
         table,
         scene,
-        eom.model,
+        prepared.model,
         f"lagfmu {version()}",
         {"CoSimulation": {"modelIdentifier": scene.name, **CAPABILITIES}},
         text.encode(),
@@ -120,16 +112,9 @@ def build(
     return pack(contents)
 
 
-def _script(
-    eom: EquationsOfMotion,
-    reduction: Reduction | None,
-    scene: Scene,
-    table: VariableTable,
-    package: str,
-    methods: Sequence[str],
-) -> str:
+def _script(prepared: Prepared, table: VariableTable, package: str, methods: Sequence[str]) -> str:
+    scene, equations = prepared.scene, prepared.text
     rows = "".join(f"    {_row(v)!r},\n" for v in table.variables)
-    equations = source(eom, reduction, scene.formulation or "multipliers")
     words = ["Embedding", "Friction", "Lookups", "Own", "Row", "System"]
     vocabulary = f"from {package}.fmu.entry import {', '.join(words)}"
     if "interval." in equations:
@@ -147,8 +132,16 @@ def _script(
         numbers={NUMBERS[m]: m for m in methods},
         method=scene.method,
         step=scene.step,
+        bars=_bars(table),
         identity=f"{scene.name} {_digest(equations.encode(), rows.encode(), package.encode())}",
     )
+
+
+def _bars(table: VariableTable) -> str:
+    """The references of the error bars, and those of the variables whose bars they are."""
+    position = {v.name: k for k, v in enumerate(table.variables)}
+    found = tuple((position[v.name], position[v.bar_of]) for v in table.variables if v.bar_of)
+    return f"    barred = {found!r}\n" if found else ""
 
 
 def _row(v: Variable) -> tuple[Any, ...]:

@@ -22,6 +22,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from .. import names
+from ..solver import at_bars
 from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
@@ -75,6 +76,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     default_method: str
     default_step: float
     identity: str
+    barred: Sequence[
+        tuple[int, int]
+    ] = ()  # references of error bars, and of the variables that have them
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -82,7 +86,12 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         end_once(self)
         self.values: list[Any] = [v[3] for v in self.variables]
         self.names = [v[0] for v in self.variables]
-        self.outputs = [k for k, v in enumerate(self.variables) if v[2] in ("output", "start")]
+        bars = {bar for bar, _ in self.barred}
+        self.outputs = [
+            k for k, v in enumerate(self.variables) if v[2] in ("output", "start") and k not in bars
+        ]
+        self.with_bars = [self.names[k] for _, k in self.barred]
+        self.bars: Any = None
         roles = [v[2] for v in self.variables]
         self.parameters = [k for k, role in enumerate(roles) if role == "parameter"]
         self.inputs = [k for k, role in enumerate(roles) if role in ("input", "estimate")]
@@ -139,25 +148,36 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         A prescribed motion goes on by its derivatives until it is set again, so that what is read
         after the step belongs to the time at its end.
         """
-        before, values = self.state, list(self.values)
+        before, values, bars = self.state, list(self.values), self.bars
         past, fresh = self.past, set(self.fresh)
+        told = ""
         try:
             before = self._checked(current_time, step_size)
             u = self._driven(before.t)
             self._warn_of_rates(u, before.span)
-            self.state = advance(
-                self.system, self.settings, before, u, self.p, current_time + step_size
-            )
+            end, settings = current_time + step_size, self.settings
+            if self.barred:
+                if before.t == self.start_time:  # its magnitudes
+                    self.observed = None
+                    self._outputs(keep=True)
+                    bars = self.bars
+                settings, self.coarse = at_bars.paired_settings(settings, before, end)
+            after_step = at_bars.after_step if self.barred else None
+            self.state = advance(self.system, settings, before, u, self.p, end, after_step)
+            if self.barred:
+                self.bars, told = at_bars.followed(self.system, self.coarse, bars, u, self.p, end)
             self.expected = self.system.inputs_at(u, self.state.t - before.t)
             for k, value in zip(self.inputs, self.expected, strict=True):
                 self.values[k] = value
             self.observed = None
-            self._outputs()
+            self._outputs(keep=True)
         except StepFailureError as error:
-            self.state, self.values, self.observed = before, values, None
+            self.state, self.values, self.observed, self.bars = before, values, None, bars
             self.past, self.fresh = past, fresh
             self.log(str(error), Fmi2Status.discard, "logStatusDiscard")
             return False
+        if told:
+            self._warn(told)
         self._warn_of_tables()
         self._report_events(before, self.state)
         self._report_method(before, self.state)
@@ -335,8 +355,9 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         row = self._outputs()
         return [row[vr] for vr in vrs]
 
-    def _outputs(self) -> list[Any]:
-        """All values by reference, the outputs solved anew where something was set or moved."""
+    def _outputs(self, keep: bool = False) -> list[Any]:
+        """All values by reference, the outputs solved anew where something was set or moved; `keep`: error
+        bars are no smaller from here on."""
         if self.observed is None:
             if self.state is None:
                 self._initialize()
@@ -345,8 +366,23 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             row = list(self.values)
             for k in self.outputs:
                 row[k] = seen[self.names[k]]
+            if self.barred:
+                bars, found = self._widened(self.state, seen)
+                self.bars = bars if keep or bars.state is None else self.bars
+                for (k, _), value in zip(self.barred, found, strict=True):
+                    row[k] = value
             self.observed = row
         return self.observed
+
+    def _widened(self, state: State, seen: Values) -> tuple[Any, list[float]]:
+        """The error bars with the present differences in them, and their values."""
+        u, now = self._values(self.inputs), (state, seen)
+        bars, found, told = at_bars.widened(
+            self.system, self.coarse, self.bars, self.with_bars, now, u, self.p
+        )
+        if told:
+            self._warn(told)
+        return bars, found
 
     def _values(self, references: list[int]) -> list[float]:
         return [self.values[k] for k in references]
@@ -380,6 +416,14 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             else:
                 self._warn(str(moved))
         self.state, self.observed = found.state, None
+        if self.barred:
+            self.bars = at_bars.begun(found.state, self.with_bars)
+            self.coarse = at_bars.paired_settings(self.settings, found.state, found.state.t)[1]
+            told = at_bars.halved(self.settings, found.state)
+            if told and self.settings.step:
+                self._warn(told)
+            elif told:
+                self.log(told, Fmi2Status.ok, "logEvents")
 
     def _rank(self, name: str) -> int:
         """Who said a start value: the importer if it differs from what is described, the model, nobody."""
@@ -399,6 +443,13 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                 )
             elif after.closed[c] and not before.closed[c]:
                 self.log(f"contact {name} closed", Fmi2Status.ok, "logEvents")
+        for i, friction in enumerate(self.system.frictions):
+            name, latest = friction.name, after.slippings[i]
+            if latest.count != before.slippings[i].count:
+                told = f"friction {name} began to slip at t = {latest.time!r} s"
+                self.log(told, Fmi2Status.ok, "logEvents")
+            elif after.slides[i].sticks and not before.slides[i].sticks:
+                self.log(f"friction {name} sticks", Fmi2Status.ok, "logEvents")
 
     # -------------------------------------------------------------- saved states
 
@@ -413,6 +464,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             "settings": None if settings is None else asdict(settings),
             "state": None if self.state is None else self.state.to_json(),
             "past": [list(self.past.points), sorted(self.fresh)],
+            "bars": None if None in (self.bars, self.state) else at_bars.to_list(self.bars),
         }
 
     @guarded
@@ -424,16 +476,28 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         try:
             kept = self._checked_state(state)
             restored_past(self.system, state.get("past"))
+            bars = self._checked_bars(state["bars"], kept[-1])
         except (ValueError, TypeError, KeyError) as error:
             raise Refused(f"the saved state is none of this FMU's: {error}") from None
         self.past, fresh = restored_past(self.system, state.get("past"))
         self.fresh = set(fresh)
         self.values, self.running, experiment, settings, self.state = kept
+        self.bars = bars
         self.start_time, self.stop_time, self.tolerance = experiment
         if settings is not None:
             self.settings = settings
+        if self.bars is not None and self.state is not None:
+            self.coarse = at_bars.paired_settings(self.settings, self.state, self.state.t)[1]
         self.p = self._values(self.parameters)
         self.observed = None
+
+    def _checked_bars(self, raw: Any, state: State | None) -> Any:
+        """The error bars that were saved, or None before the start.  Raises ValueError."""
+        if not self.barred or state is None:
+            if raw is not None:
+                raise ValueError("it has error bars")
+            return None
+        return at_bars.restored_bars(self.system, raw, len(self.barred), state)
 
     def _checked_state(self, state: dict[str, Any]) -> tuple[Any, ...]:
         """Everything that was read is what this FMU can have saved.  Raises ValueError."""

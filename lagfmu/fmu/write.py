@@ -11,13 +11,13 @@ from pathlib import Path
 
 from ..errors import BuildError
 from ..model.closed_form import ClosedForm, Conserved
-from ..page.documentation import page
+from ..page.documentation import page, with_figures
 from ..page.picture import IN_FMU, as_bytes, picture_of
 from ..prepare.prepare import Prepared
 from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
-from .claims import pack_closed_forms
+from .closed_forms import pack_closed_forms
 from .compiler import HOST
 
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
@@ -47,7 +47,7 @@ def write(
     tell(prepared.structure.start.moved)
     prepared = _as_built(prepared, target)
     extra = {
-        PAGE: page(prepared, choice=choice, live=bool(live)).encode(),
+        PAGE: page(prepared, choice, bool(live)).encode(),
         "resources/lagfmu.json": pack_closed_forms(
             prepared.scene,
             closed_forms,
@@ -62,9 +62,10 @@ def write(
     picture = picture_of(prepared)
     if picture is not None:
         extra[IN_FMU] = as_bytes(picture)
-    equations = (prepared.coded, prepared.coded_reduction)
-    made = (*equations, prepared.scene, prepared.table, prepared.system, extra)
-    content = native.build(*made, platforms) if target == "native" else python.build(*made)
+    if target == "native":
+        content = native.build(prepared, extra, platforms)
+    else:
+        content = python.build(prepared, extra)
     path = Path(out)
     if path.suffix != ".fmu":
         path = path / f"{prepared.scene.name}.fmu"
@@ -72,23 +73,13 @@ def write(
     return path
 
 
-def put_figures(
-    path: Path,
-    prepared: Prepared,
-    figures: Sequence[tuple[str, ...]],
-    target: str,
-    choice: str = "",
-    live: bool = False,
-) -> None:
-    """Put verification results into the page of an FMU that stands at `path`; nothing else changes."""
-    put(path, {PAGE: page(_as_built(prepared, target), figures, choice, live).encode()})
-
-
-def put(path: Path, more: Mapping[str, bytes]) -> None:
-    """Put files into an FMU that stands at `path`, or replace them."""
+def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]] = ()) -> None:
+    """Put files, and the figures of a verification, into an FMU that stands at `path`."""
     with zipfile.ZipFile(path) as archive:
-        contents = {name: archive.read(name) for name in archive.namelist()}
-    write_whole(path, pack(contents | dict(more)))
+        contents = {name: archive.read(name) for name in archive.namelist()} | dict(more)
+    if figures:
+        contents[PAGE] = with_figures(contents[PAGE].decode(), figures).encode()
+    write_whole(path, pack(contents))
 
 
 def _as_built(prepared: Prepared, target: str) -> Prepared:

@@ -1,4 +1,4 @@
-"""(equations, scene) -> the FMU's variable table.
+"""(form, scene) -> the FMU's variable table.
 
 Names, order, references, causality, units, start values and dependencies are decided here only.
 """
@@ -15,8 +15,8 @@ import sympy as sp
 from .. import names
 from ..errors import ModelError
 from ..mechanics.coupling import coupled
-from ..mechanics.equations import EquationsOfMotion, symbols_of
-from ..mechanics.formulations.minimal import Reduction
+from ..mechanics.equations import symbols_of
+from ..mechanics.form import Form
 from ..methods import FIXED_STEP, described
 from ..model.model import Contact, Nonholonomic, name_of
 from ..model.scene import Scene
@@ -39,13 +39,14 @@ from .variables import Value, Variable, VariableTable
 
 Expr = Any
 SPEED = METRE / SECOND
+BARRED = (  # what has an error bar, besides coordinates, velocities and outputs of one word
+    *(names.MULTIPLIER, names.FORCE, names.OWN, names.DEPARTURE_TIME, names.SLIP_TIME),
+)
 
 
-def variable_table(
-    eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene
-) -> VariableTable:
+def variable_table(form: Form, scene: Scene) -> VariableTable:
     """All variables of the FMU.  Raises ModelError if names collide or a unit cannot be written."""
-    builder = _Builder(eom, reduction, scene)
+    builder = _Builder(form, scene)
     table = builder.table()
     if scene.reals_only:
         table = table.as_reals()
@@ -57,7 +58,7 @@ def variable_table(
                 "express: write the constraint in another power"
             )
     if problems:
-        raise ModelError(eom.model.name, problems)
+        raise ModelError(form.equations.model.name, problems)
     return table
 
 
@@ -79,11 +80,12 @@ def _collisions(known: Sequence[str]) -> list[str]:
 
 
 class _Builder:
-    def __init__(self, eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene) -> None:
+    def __init__(self, form: Form, scene: Scene) -> None:
+        eom, reduction = form.equations, form.reduction
         self.eom, self.reduction, self.scene = eom, reduction, scene
         self.model = eom.model
         self.units = eom.units
-        self.stepped = eom if reduction is None else reduction.reduced
+        self.stepped = form.stepped
         self.into = {}
         if reduction is not None:
             self.into = dict(zip((*eom.q, *eom.v), (*reduction.phi, *reduction.vel), strict=True))
@@ -233,6 +235,8 @@ class _Builder:
             *self.friction_outputs(),
             self.output(Subject(names.STEPS), "internal steps taken so far", None, (), "Integer"),
         ]
+        if self.scene.error_bars:
+            variables += self.error_bars(variables)
         n = len(self.state_names) // 2
         q = self.state_names[:n]
         derivatives = [derivative(c, k) for c in q for k in (1, 2)]
@@ -489,6 +493,20 @@ class _Builder:
             text = "energy that frictions and impacts dissipated so far (Model Exchange: impacts)"
             variables.append(self.output(Subject(names.DISSIPATED), text, ENERGY, ()))
         return variables
+
+    def error_bars(self, variables: Iterable[Variable]) -> list[Variable]:
+        """One for each lambda, Q, coordinate, velocity, own output, and time of an event."""
+        text = (
+            "error bar of {}: an estimate of how far it may be off, by a run at a coarser tolerance"
+        )
+        return [
+            self.output(
+                Subject(names.ERROR, "", v.name), text.format(v.name), v.unit, (), discrete=True
+            )
+            for v in variables
+            if v.of.quantity in BARRED
+            or (v.of.quantity == names.VALUE and v.of.order < 2 and v.role in ("output", "start"))
+        ]
 
     def _event(self, quantity: str, of: str, what: str) -> list[Variable]:
         """How often it happened; time, coordinates and velocities when it did so last."""

@@ -53,6 +53,11 @@ class Variable:
         """As the FMU calls it."""
         return self.of.name
 
+    @property
+    def bar_of(self) -> str:
+        """The variable whose error bar it is; empty if it is none."""
+        return self.of.coordinate if self.of.quantity == names.ERROR else ""
+
 
 @dataclass(frozen=True)
 class VariableTable:

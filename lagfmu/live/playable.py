@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..codegen.c.amalgam import SOURCE
 from ..errors import BuildError
 from ..fmu.native import IDENTITY, sources_of
 from ..fmu.write import PAGE
@@ -45,7 +46,7 @@ def playable(target: Prepared | Path) -> Playable:
     Raises BuildError without ziglang, and for an FMU that holds no C sources.
     """
     told = told_by(target)
-    if not {"model.c", "variables.c", "fmi2.c"} <= told.sources.keys():
+    if not {"model.c", "variables.c", SOURCE} <= told.sources.keys():
         raise BuildError(
             f"{str(target)!r} holds no C sources of lagfmu, which a page is compiled from: build it with "
             "--target native, or make the page from the model file"
@@ -57,15 +58,12 @@ def playable(target: Prepared | Path) -> Playable:
 
 
 def _told_by_prepared(prepared: Prepared) -> Told:
-    made = sources_of(
-        prepared.coded, prepared.coded_reduction, prepared.scene, prepared.table, prepared.system
-    )
+    made = sources_of(prepared)
     sections: list[Section] = [
         (s.title, s.remark, [(e.label, safe_mathml(mathml(e.latex)), e.text) for e in s.equations])
-        for s in typeset(prepared.equations, prepared.reduction, prepared.formulation)
+        for s in typeset(prepared.form)
     ]
-    sources = {**made.runtime, **made.generated}
-    return Told(made.description, sections, picture_of(prepared), sources)
+    return Told(made.description, sections, picture_of(prepared), made.shipped)
 
 
 def _told_by_fmu(path: Path) -> Told:

@@ -13,7 +13,7 @@ from ..model.model import Contact, Model, Parameter, name_of
 from ..model.scene import Scene
 from ..model.selection import select
 from .equations import TIME, EquationsOfMotion
-from .formulations.minimal import Reduction
+from .form import Form
 
 Expr = Any
 
@@ -95,16 +95,20 @@ def _settled(e: Expr) -> Expr:
     )
 
 
-def folded_reduction(reduction: Reduction, numbers: Mapping[Expr, Expr]) -> Reduction:
-    """The same for the minimal formulation."""
+def folded_form(form: Form, numbers: Mapping[Expr, Expr]) -> Form:
+    """The same of a form."""
     if not numbers:
-        return reduction
-    return replace(
+        return form
+    equations, reduction = folded(form.equations, numbers), form.reduction
+    if reduction is None:
+        return replace(form, equations=equations)
+    reduction = replace(
         reduction,
         phi=tuple(_settled(e.xreplace(numbers)) for e in reduction.phi),
         vel=tuple(_settled(e.xreplace(numbers)) for e in reduction.vel),
         reduced=folded(reduction.reduced, numbers),
     )
+    return replace(form, equations=equations, reduction=reduction)
 
 
 def values(symbols: Iterable[Expr], model: Model) -> dict[Expr, Expr]:
@@ -113,8 +117,9 @@ def values(symbols: Iterable[Expr], model: Model) -> dict[Expr, Expr]:
     return {p.symbol: _number(float(p.value)) for p in model.parameters if p.symbol in wanted}
 
 
-def idle(eom: EquationsOfMotion, reduction: Reduction | None) -> list[Expr]:
+def idle(form: Form) -> list[Expr]:
     """Parameters on which nothing that is left depends."""
+    eom, reduction = form.equations, form.reduction
     flat = _expressions(eom)
     if reduction is not None:
         flat += [*reduction.phi, *reduction.vel, *_expressions(reduction.reduced)]

@@ -23,7 +23,7 @@ from sympy.printing.precedence import precedence
 
 from ..errors import ModelError
 from .equations import TIME, EquationsOfMotion
-from .formulations.minimal import Reduction
+from .form import Form
 
 Expr = Any
 SAMPLES = 6  # points of a surface at which a jump is looked for
@@ -253,8 +253,9 @@ def _number(e: Expr, values: Mapping[Expr, Expr]) -> Expr | None:
     return found if found.is_Number and found.is_finite else None
 
 
-def jumps_of(eom: EquationsOfMotion, reduction: Reduction | None = None) -> Jumps:
+def jumps_of(form: Form) -> Jumps:
     """The jumps that are left in the equations, with their surfaces in the coordinates that are stepped."""
+    eom, reduction = form.equations, form.reduction
     found: dict[Expr, Surface] = {}
     inside = {}
     if reduction is not None:
@@ -283,16 +284,14 @@ def level(number: Expr) -> Expr:
     return sp.Symbol(f"level({int(number) + 1})", real=True)
 
 
-def levelled(
-    eom: EquationsOfMotion, reduction: Reduction | None
-) -> tuple[EquationsOfMotion, Reduction | None, Jumps]:
+def levelled(form: Form) -> tuple[Form, Jumps]:
     """The same for numeric code: what is held is the symbol of its level, which stands behind the inputs."""
-    jumps = jumps_of(eom, reduction)
+    jumps, reduction = jumps_of(form), form.reduction
     if not jumps.levels:
-        return eom, reduction, jumps
+        return form, jumps
     if reduction is not None:
         reduction = replace(reduction, reduced=_levelled(reduction.reduced, jumps))
-    return _levelled(eom, jumps), reduction, jumps
+    return replace(form, equations=_levelled(form.equations, jumps), reduction=reduction), jumps
 
 
 def _levelled(eom: EquationsOfMotion, jumps: Jumps) -> EquationsOfMotion:

@@ -23,7 +23,7 @@ from ..model.selection import select
 from ..names import derivative
 from .coupling import coupled
 from .equations import EquationsOfMotion, symbols_of
-from .formulations.minimal import Reduction
+from .form import Form
 
 Expr = Any
 Indices = frozenset[int]
@@ -47,14 +47,12 @@ def held(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> Equations
     return replace(eom, constraints=tuple(hold(c) for c in eom.constraints))
 
 
-def needed(
-    eom: EquationsOfMotion, reduction: Reduction | None, outputs: Collection[str]
-) -> tuple[Indices, Indices]:
+def needed(form: Form, outputs: Collection[str]) -> tuple[Indices, Indices]:
     """Coordinates and constraint rows on which the outputs depend, by position.
 
     Raises ModelError if there are none.
     """
-    of = subjects(eom, reduction)
+    eom, of = form.equations, subjects(form)
     coordinates: set[int] = set()
     rows: set[int] = set()
     for name in outputs:
@@ -82,10 +80,9 @@ def needed(
     return frozenset(coordinates), frozenset(rows)
 
 
-def subjects(
-    eom: EquationsOfMotion, reduction: Reduction | None
-) -> dict[str, tuple[Indices, Indices]]:
+def subjects(form: Form) -> dict[str, tuple[Indices, Indices]]:
     """Name of an output -> the coordinates and rows that it is of."""
+    eom, reduction = form.equations, form.reduction
     found: dict[str, tuple[Indices, Indices]] = {}
     for j, q in enumerate(eom.q):
         for name in (*_motion(q), names.name(names.FORCE, "", str(q))):
@@ -234,37 +231,39 @@ def silent(eom: EquationsOfMotion, outputs: Collection[str]) -> EquationsOfMotio
     )
 
 
-def read_only(
-    eom: EquationsOfMotion, reduction: Reduction, outputs: Collection[str]
-) -> tuple[EquationsOfMotion, Reduction | None]:
+def read_only(form: Form, outputs: Collection[str]) -> Form:
     """Of the full equations, what is read where nothing that they are solved for is asked for.
 
     Unchanged if an output needs lambda, Q, a residual or a dependent acceleration.  If only the
     stepped coordinates are read, their equations are all there is.
     """
+    eom, reduction = form.equations, form.reduction
+    if reduction is None:
+        return form
     stepped = {derivative(str(s), 2) for s in reduction.s}
     solved = {derivative(str(q), 2) for q in eom.q} - stepped
     reactions = {*eom.vdot, *eom.lam, *eom.Q}
     solved |= {o.name for o in eom.outputs if symbols_of(o) & reactions}
     if names.those(outputs, *SOLVED) or solved & set(outputs):
-        return eom, reduction
+        return form
     of_s = {name for s in reduction.s for name in _motion(s)}
-    of = subjects(eom, reduction)
+    of = subjects(form)
     wanted: set[int] = set()
     for name in set(outputs) - of_s:
         wanted |= of.get(name, (NONE, NONE))[0]
     js = sorted(wanted)
     if not js:
         own = replace(reduction.reduced, constraints=reduction.constraints, outputs=eom.outputs)
-        return silent(own, outputs), None
+        return replace(form, equations=silent(own, outputs), reduction=None)
     rates = [n for n in outputs if names.read(n).order or names.read(n).quantity in ENERGIES]
     rates += [o.name for o in eom.outputs if o.name in outputs and symbols_of(o) & set(eom.v)]
     moving = bool(set(rates) - of_s)  # of what is read, velocities are asked for
     nothing = sp.ImmutableSparseMatrix(len(js), len(js), {})
     zeros = (sp.S.Zero,) * len(js)
-    return (
-        replace(only(eom, js, ()), M=nothing, F=zeros, bare=True),
-        replace(
+    return replace(
+        form,
+        equations=replace(only(eom, js, ()), M=nothing, F=zeros, bare=True),
+        reduction=replace(
             reduction,
             phi=tuple(reduction.phi[j] for j in js),
             vel=tuple(reduction.vel[j] if moving else sp.S.Zero for j in js),

@@ -1,4 +1,4 @@
-"""What is wrong with the frictions of a model, in words; a model in which some of them never slip.
+"""What is wrong with the frictions of a model, in words.
 
 A friction limits the multipliers of one or two constraints, each a force in newtons, by a normal force that
 is linear in multipliers of other constraints.
@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
-from typing import Any, TypeVar
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -18,12 +16,11 @@ from sympy.physics.mechanics import dynamicsymbols
 from ..errors import UnitError
 from .parts import NAME, Contact, Expr, Friction, ModelFields, Nonholonomic, name_of
 from .reactions import is_reaction, multiplier, reactions_in
-from .selection import select
 from .units import ONE, Unit, check_dimension, parse_unit, plain
 
 MOST_ROWS = 2  # tangential directions of a surface
 NEWTON = parse_unit("N", "a force")
-Fields = TypeVar("Fields", bound=ModelFields)
+METRE = parse_unit("m", "a length")
 
 
 def split(constraints: Iterable[object]) -> tuple[tuple[object, ...], tuple[Friction, ...]]:
@@ -31,65 +28,6 @@ def split(constraints: Iterable[object]) -> tuple[tuple[object, ...], tuple[Fric
     items = tuple(constraints)
     rest = tuple(c for c in items if not isinstance(c, Friction))
     return rest, tuple(c for c in items if isinstance(c, Friction))
-
-
-def stuck(model: Fields, slipping: Sequence[str], problems: list[str]) -> Fields:
-    """The model in which only the frictions `slipping` (names or patterns) may slip.
-
-    What the others limit holds always, or while the one contact is closed that presses it; parameters that
-    stand in those frictions alone go with them.
-    """
-    may = select(slipping, [f.name for f in model.frictions], "friction", problems)
-    gone = [f for f in model.frictions if f.name not in may]
-    if not gone:
-        return model
-    gates: dict[str, str] = {}
-    contacts = {multiplier(c.name): c.name for c in model.constraints if isinstance(c, Contact)}
-    for f in gone:
-        normal = sp.sympify(f.normal)
-        pressing = [name for symbol, name in contacts.items() if normal.has(symbol)]
-        gates |= {name: pressing[0] for name in f.of if pressing}
-        rough = [name for name in f.of if not isinstance(_row(model, name), Nonholonomic)]
-        if len(pressing) > 1 or (pressing and rough):
-            problems.append(
-                f"the friction {f.name!r} shall not slip, but {', '.join(map(repr, f.of))} acts with "
-                f"{' and '.join(map(repr, pressing))}: that can be said of a Nonholonomic constraint and "
-                f"one contact alone (while_closed); name it in `frictions`"
-            )
-    if problems:
-        return model
-    kept = tuple(f for f in model.frictions if f.name in may)
-    rest = {f.name: getattr(model, f.name) for f in fields(model)} | {"frictions": kept}
-    used = _symbols([v for name, v in rest.items() if name != "parameters"])
-    idle = _symbols(gone) - used
-    return replace(
-        model,
-        frictions=kept,
-        constraints=tuple(
-            replace(c, while_closed=gates[c.name])
-            if c.name in gates and isinstance(c, Nonholonomic)
-            else c
-            for c in model.constraints
-        ),
-        parameters=tuple(p for p in model.parameters if p.symbol not in idle),
-    )
-
-
-def _row(model: ModelFields, name: str) -> object:
-    return next(c for c in model.constraints if c.name == name)
-
-
-def _symbols(x: Any) -> set[Expr]:
-    """The symbols in everything that a model holds."""
-    if isinstance(x, sp.Basic):
-        return set(x.free_symbols)
-    if isinstance(x, Mapping):
-        return _symbols([*x.keys(), *x.values()])
-    if is_dataclass(x) and not isinstance(x, type):
-        return _symbols([getattr(x, f.name) for f in fields(x)])
-    if isinstance(x, list | tuple):
-        return set().union(*map(_symbols, x)) if x else set()
-    return set()
 
 
 def check_kinds(model: ModelFields, problems: list[str]) -> None:
@@ -135,7 +73,10 @@ def check_frictions(
     problems: list[str] = []
     owner: dict[str, str] = {}
     for f in model.frictions:
+        before = len(problems)
         _check_rows(model, f, owner, reactions, problems)
+        if len(problems) == before:
+            _check_directions(model, f, units, problems)
     for f in model.frictions:
         _check_normal(model, f, owner, units, reactions, problems)
         _check_coefficients(model, f, units, problems)
@@ -194,6 +135,43 @@ def _check_rows(
                 f"{plain(sp.sympify(f.normal))} is not of that contact: use "
                 f"normal=multiplier({gate!r}), or leave while_closed out"
             )
+
+
+def _check_directions(
+    model: ModelFields, f: Friction, units: Mapping[Expr, Unit], problems: list[str]
+) -> None:
+    """Two rows are velocities of one point along perpendicular directions.
+
+    That can be seen where they hold lengths x, y of which the Lagrangian has m (x'^2 + y'^2)/2: these are
+    Cartesian, and the product of the directions is that of the coefficients.
+    """
+    known = {c.name: c for c in model.constraints}
+    rows = [sp.sympify(known[name].expression) for name in f.of if name in known]
+    if len(rows) != MOST_ROWS or len(rows) != len(f.of):
+        return
+    t = dynamicsymbols._t
+    rates = [q.diff(t) for q in model.coordinates]
+    rows = [
+        row if isinstance(known[name], Nonholonomic) else row.diff(t)
+        for name, row in zip(f.of, rows, strict=True)
+    ]
+    straight = [
+        v
+        for q, v in zip(model.coordinates, rates, strict=True)
+        if units[q].same_dimension(METRE) and any(row.has(v) for row in rows)
+    ]
+    L = model.energy_expression
+    masses = {(a, b): sp.simplify(L.diff(a, b)) for a in straight for b in straight}
+    equal = {masses[v, v] for v in straight}
+    if len(equal) != 1 or any(masses[a, b] != 0 for a in straight for b in straight if a != b):
+        return
+    product = sp.simplify(sum(rows[0].diff(v) * rows[1].diff(v) for v in straight))
+    if product != 0:
+        problems.append(
+            f"friction {f.name!r}: {f.of[0]!r} and {f.of[1]!r} are not perpendicular (the product of "
+            f"their directions is {plain(product)}), so that their multipliers are no components of one "
+            "force: write the slip velocities along two perpendicular directions"
+        )
 
 
 def _check_normal(

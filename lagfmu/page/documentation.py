@@ -33,6 +33,7 @@ MEANING = {
     "minimal": "Dependent coordinates are eliminated: only the independent ones are integrated, the "
     "constraints hold by construction, and λ is recovered from the full equations at each state.",
 }
+LINK, FIGURES = "<!-- link to the figures -->", "<!-- figures of a verification -->"
 KINDS = {Holonomic: "holonomic", Nonholonomic: "nonholonomic (Pfaffian)", Contact: "contact"}
 GROUPS = (
     ("Parameters", "Set them before initialization."),
@@ -77,20 +78,20 @@ class Row:
 
 def page(
     prepared: Prepared,
-    figures: Sequence[tuple[str, ...]] = (),
     choice: str = "",
     live: bool = False,
 ) -> str:
     """The HTML page of an FMU.
 
-    `figures` are rows (closed form, largest error, allowed, verdict) of a verification; `choice` is the
-    section on how its solver settings were chosen, in HTML (tradeoff/page.py).  `live`: the page in
-    which the FMU runs stands beside it.
+    `choice` is the section on how its solver settings were chosen, in HTML (tradeoff/page.py).  `live`:
+    the page in which the FMU runs stands beside it.
     """
     model, structure, table = prepared.model, prepared.structure, prepared.table
     acting, whole = prepared.equations.constraints, prepared.whole
-    sections = typeset(prepared.equations, prepared.reduction, prepared.formulation)
-    return _template().render(
+    sections = typeset(prepared.form)
+    return _template("documentation").render(
+        link=Markup(LINK),
+        figures=Markup(FIGURES),
         name=prepared.scene.name,
         live=live,
         model=model,
@@ -125,7 +126,6 @@ def page(
         inputs=[v.name for v in table.variables if v.causality == "input"],
         prescribed=bool(prepared.system.prescribed),
         tolerance=f"{prepared.scene.tolerance:g}",
-        figures=figures,
         saved=savings(prepared),
         choice=Markup(choice),
     )
@@ -160,9 +160,16 @@ def _group(v: Variable) -> str:
     return by_role.get(v.role) or TITLES.get(v.of.head, "Motion")
 
 
+def with_figures(text: str, figures: Sequence[tuple[str, ...]]) -> str:
+    """The page with rows (closed form, largest error, allowed, verdict) of a verification in their place."""
+    link = '<li><a href="#verification">Verification</a></li>'
+    found = _template("verification").render(figures=figures)
+    return text.replace(LINK, link).replace(FIGURES, found.rstrip())
+
+
 @cache
-def _template() -> jinja2.Template:
-    text = files("lagfmu").joinpath("page/documentation.html.j2").read_text(encoding="utf-8")
+def _template(name: str) -> jinja2.Template:
+    text = files("lagfmu").joinpath(f"page/{name}.html.j2").read_text(encoding="utf-8")
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )

@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 
 from ..mechanics.equations import EquationsOfMotion, derive
+from ..mechanics.form import Form
 from ..mechanics.integrability.classify import Classification
 from ..model.model import Model
 from .documentation import mathml
@@ -30,7 +31,7 @@ def latex(thing: Any) -> str:
 @html.register
 def _(equations: EquationsOfMotion) -> str:
     parts = [f"<h4>{escape(equations.model.name)}</h4>"]
-    for section in typeset(equations):
+    for section in typeset(Form(equations)):
         if section.equations:
             rows = "".join(
                 f"<tr><td>{escape(e.label)}</td><td style='text-align:left'>{mathml(e.latex)}</td></tr>"
@@ -42,7 +43,7 @@ def _(equations: EquationsOfMotion) -> str:
 
 @latex.register
 def _(equations: EquationsOfMotion) -> str:
-    lines = [e.latex for section in typeset(equations) for e in section.equations]
+    lines = [e.latex for section in typeset(Form(equations)) for e in section.equations]
     return "$$\\begin{gathered}" + " \\\\ ".join(lines) + "\\end{gathered}$$"
 
 

@@ -11,7 +11,6 @@ import sympy as sp
 from ..codegen.c.elimination import plan
 from ..codegen.c.equations import model_source
 from ..codegen.c.parts import needs_tangents
-from ..codegen.py.equations import source
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.fold import idle as idle_parameters
 from ..model.units import Unit
@@ -70,28 +69,25 @@ def savings(prepared: Prepared) -> Savings | None:
     whole = prepared.asked.whole
     if whole == prepared.asked:
         return None
-    full = prepare(prepared.model, whole)
+    full = prepare(prepared.model, whole, prepared.derived)
     return Savings(cost(full), cost(prepared), tuple(_left_out(full, prepared)))
 
 
 def cost(prepared: Prepared) -> Cost:
     """Counted on the equations that code is printed from."""
-    eom, reduction = prepared.coded, prepared.coded_reduction
-    stepped = eom if reduction is None else reduction.reduced
-    made = (eom, reduction, prepared.formulation)
+    form, stepped = prepared.coded, prepared.coded.stepped
+    tangents = needs_tangents(prepared.scene, prepared.system)
     return Cost(
         outputs=len(prepared.table.outputs),
-        parameters=len(eom.p),
-        inputs=len(eom.u),
+        parameters=len(form.equations.p),
+        inputs=len(form.equations.u),
         coordinates=stepped.n,
         constraints=stepped.m,
         contacts=len(prepared.system.contacts),
         methods=len(prepared.scene.selectable),
         operations=operations(stepped),
-        python_bytes=len(source(*made).encode()),
-        native_bytes=len(
-            model_source(*made, needs_tangents(prepared.scene, prepared.system)).encode()
-        ),
+        python_bytes=len(prepared.text.encode()),
+        native_bytes=len(model_source(form, tangents).encode()),
     )
 
 
@@ -116,7 +112,7 @@ def operations(eom: EquationsOfMotion) -> int:
 
 
 def _left_out(full: Prepared, prepared: Prepared) -> Iterable[str]:
-    scene, eom = prepared.scene, prepared.coded
+    scene, eom = prepared.scene, prepared.coded.equations
     derived = full.equations
     if prepared.formulation != full.formulation:
         chosen = "dependent coordinates are eliminated"
@@ -153,7 +149,7 @@ def _left_out(full: Prepared, prepared: Prepared) -> Iterable[str]:
 
 def _numbers(prepared: Prepared) -> list[tuple[str, list[str]]]:
     """Parameters that are numbers: those that the scene fixes, and those that nothing depends on."""
-    idle = {str(p) for p in idle_parameters(prepared.equations, prepared.reduction)}
+    idle = {str(p) for p in idle_parameters(prepared.form)}
     names = [str(p) for p in prepared.equations.p if str(p) in prepared.numbers]
     return [
         ("parameters that are numbers in the code", [n for n in names if n not in idle]),

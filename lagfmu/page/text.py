@@ -67,7 +67,7 @@ def show_equations(prepared: Prepared | Derived, console: Console) -> None:
         console.print(Text(model.description))
     console.print(Text(f"formulation: {scene.formulation}", style="dim"))
 
-    for section in typeset(prepared.equations, prepared.reduction, prepared.formulation):
+    for section in typeset(prepared.form):
         if section.equations:
             _heading(console, section.title)
         width = max((len(e.label) for e in section.equations), default=0)
@@ -180,8 +180,7 @@ def _units(prepared: Prepared) -> Table:
         table.add_column(column, overflow="fold")
     eom = prepared.equations
     names = [str(q) for q in eom.q]
-    if prepared.reduction is not None:
-        names += [str(s) for s in prepared.reduction.s if s not in eom.q]
+    names += [str(s) for s in prepared.form.stepped.q if s not in eom.q]
     reported = prepared.table.those(MULTIPLIER, FORCE, OWN)
     found = [prepared.table[name] for name in names if name in prepared.table]
     for v in (*found, *(v for v in reported if not (v.of.constraint and v.of.coordinate))):

@@ -22,6 +22,7 @@ from sympy.printing.str import StrPrinter
 
 from ..mechanics import shorter
 from ..mechanics.equations import TIME, EquationsOfMotion
+from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.formulations.nullspace import lambda_free, largest_group
 from ..model.model import Contact, Nonholonomic
@@ -58,15 +59,14 @@ class Section:
     equations: tuple[Equation, ...]
 
 
-def typeset(
-    eom: EquationsOfMotion, reduction: Reduction | None = None, formulation: str = "multipliers"
-) -> tuple[Section, ...]:
+def typeset(form: Form) -> tuple[Section, ...]:
     """The equations of a model in a formulation, ready for reading."""
+    eom, reduction = form.equations, form.reduction
     page = _Typesetter(eom, reduction)
     sections = [page.energies(), page.lagrange()]
     if eom.m:
         sections += [page.constraints(), page.forces(), page.accelerations()]
-    if formulation == "nullspace" and eom.m:
+    if form.formulation == "nullspace" and eom.m:
         sections.append(page.without_lambda())
     if reduction is not None:
         sections += [page.embedding(reduction), page.reduced(reduction)]

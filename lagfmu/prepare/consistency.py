@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import DerivationError, ModelError
 from ..interface.variables import VariableTable
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.formulations.minimal import Reduction
+from ..mechanics.form import Form
 from ..names import derivative
 from ..solver.afar import project_from_afar
 from ..solver.failure import OmittedStartError, StepFailureError
@@ -151,12 +151,15 @@ def check_held(
         )
 
 
-def check_embedding(eom: EquationsOfMotion, reduction: Reduction) -> None:
+def check_embedding(form: Form) -> None:
     """An embedding q = phi(s) takes away as many coordinates as it satisfies constraints.
 
     If it took more, it would hold the system where no constraint does, and the forces that hold it would
     be missing from lambda.  Raises DerivationError naming the constraints that it violates.
     """
+    eom, reduction = form.equations, form.reduction
+    if reduction is None:
+        return
     taken, satisfied = eom.n - len(reduction.s), eom.m - len(reduction.rows)
     if taken <= satisfied:
         return

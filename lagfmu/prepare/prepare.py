@@ -5,18 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..codegen.py.equations import lower
+from .. import names
+from ..codegen.py.equations import compile_system, lower, source
 from ..errors import CannotStartError, DerivationError, ModelError
 from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import fold, prune
 from ..mechanics.equations import EquationsOfMotion, derive
-from ..mechanics.formulations.minimal import Reduction, reduce
+from ..mechanics.form import Form
+from ..mechanics.formulations.minimal import reduce
 from ..mechanics.jumps import with_jumps
-from ..model.frictions import stuck
 from ..model.model import Contact, Model, name_of
 from ..model.scene import Scene
 from ..model.selection import select
+from ..model.stuck import stuck
 from ..solver.system import System
 from .consistency import Structure, check_embedding, check_held, examine
 
@@ -27,48 +29,52 @@ class Derived:
 
     model: Model
     scene: Scene
-    equations: EquationsOfMotion
-    reduction: Reduction | None
+    form: Form
     whole: VariableTable
 
     @property
-    def formulation(self) -> str:
-        """The formulation that the scene has in the end."""
-        return self.scene.formulation or "multipliers"
+    def equations(self) -> EquationsOfMotion:
+        """Those of the scene."""
+        return self.form.equations
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """All that is known about a model in a scene before anything is packaged.
+    """All that is known about a model in a scene before anything is packaged, each thing made once.
 
-    `equations` and `reduction` are those of the scene, in symbols, for people to read; `coded` and
-    `coded_reduction` are what code is printed from: numbers put in, and of the full equations only
-    what is read.  `whole` are all variables of the first, `table` those of the FMU.  For a scene that
-    asks for everything they are the same.  `asked` is the scene as it was given, `scene` the same with
-    its formulation.
+    `form` is that of the scene, in symbols, for people to read; `coded` is what code is printed from:
+    numbers put in, and of the full equations only what is read; `text` is its Python, `system` what that
+    defines.  `whole` are all variables of the first, `table` those of the FMU.  For a scene that asks for
+    everything they are the same.  `asked` is the scene as it was given, `scene` the same with its
+    formulation; `derived` are the equations of the model, whatever the scene.
     """
 
     model: Model
     asked: Scene
     scene: Scene
-    equations: EquationsOfMotion
-    reduction: Reduction | None
-    coded: EquationsOfMotion
-    coded_reduction: Reduction | None
+    form: Form
+    coded: Form
     whole: VariableTable
     table: VariableTable
+    text: str
     system: System
     structure: Structure
+    derived: EquationsOfMotion
+
+    @property
+    def equations(self) -> EquationsOfMotion:
+        """Those of the scene."""
+        return self.form.equations
 
     @property
     def formulation(self) -> str:
         """The formulation that the scene has in the end."""
-        return self.scene.formulation or "multipliers"
+        return self.form.formulation
 
     @property
     def numbers(self) -> dict[str, Any]:
         """The values of the parameters and inputs that are numbers in the code, by name."""
-        return {str(s): n for s, n in self.coded.numbers.items()}
+        return {str(s): n for s, n in self.coded.equations.numbers.items()}
 
     @property
     def held(self) -> tuple[str, ...]:
@@ -78,68 +84,95 @@ class Prepared:
         return tuple(c.name for c in acting if c.name in contacts and not isinstance(c, Contact))
 
 
-def prepare(model: Model, scene: Scene | None = None) -> Prepared:
-    """Derive, prune, reduce, lower and examine.  Raises ModelError or DerivationError."""
+def prepare(
+    model: Model, scene: Scene | None = None, derived: EquationsOfMotion | None = None
+) -> Prepared:
+    """Derive, prune, reduce, lower and examine.  Raises ModelError or DerivationError.
+
+    `derived`: the equations of the model, where they are known from another scene.
+    """
     asked = scene = scene or Scene(model.name)
     problems: list[str] = []
     model = stuck(model, scene.frictions, problems)
     if problems:
         raise ModelError(scene.name, problems)
-    derived = with_jumps(derive(model))
+    if derived is None or derived.model is not model:
+        derived = with_jumps(derive(model))
     equations = prune.held(derived, scene, problems)
     numbers = fold.numbers_of(derived, scene, problems)
-    scene, reduction, outputs = _asked(equations, scene, problems)
+    laid = Laid()
+    scene, form, outputs = _asked(equations, scene, problems, laid)
     if problems:
         raise ModelError(scene.name, problems)
     if equations is not derived:
         may_open = {c.name for c in equations.constraints if isinstance(c, Contact)}
-        every = variable_table(derived, None, scene)
-        check_held(derived, every, lower(derived), numbers, may_open)
-    coded, coded_reduction = equations, reduction
+        every = Form(derived)
+        check_held(derived, laid.table(every, scene), lower(every), numbers, may_open)
+    coded = form
     if not scene.complete:
-        coordinates, rows = prune.needed(fold.folded(equations, numbers), reduction, outputs)
+        coordinates, rows = prune.needed(_with_numbers(form, numbers), outputs)
         equations = prune.only(equations, coordinates, rows)
-        if reduction is not None and equations is not coded:
+        reduction = form.reduction
+        if reduction is not None and equations is not form.equations:
             reduction = reduce(equations)
         asked_for = tuple(o for o in equations.outputs if o.name in outputs)
         if asked_for != equations.outputs:
             equations = replace(equations, outputs=asked_for)
-        coded, coded_reduction = prune.silent(equations, outputs), reduction
-        if coded_reduction is not None:
-            coded, coded_reduction = prune.read_only(coded, coded_reduction, outputs)
-        numbers |= fold.values(fold.idle(fold.folded(coded, numbers), coded_reduction), model)
-        if scene.method == "auto" and scene.methods is None and not fold.damped(coded, numbers):
+        form = replace(form, equations=equations, reduction=reduction)
+        coded = replace(form, equations=prune.silent(equations, outputs))
+        coded = prune.read_only(coded, outputs)
+        numbers |= fold.values(fold.idle(_with_numbers(coded, numbers)), model)
+        damped = fold.damped(coded.equations, numbers)
+        if scene.method == "auto" and scene.methods is None and not damped:
             scene = replace(scene, method="dop853")
-    coded = fold.folded(coded, numbers)
-    if coded_reduction is not None:
-        coded_reduction = fold.folded_reduction(coded_reduction, numbers)
-    if reduction is not None:
-        check_embedding(equations, reduction)
-    table = variable_table(coded, coded_reduction, scene)
-    system = lower(coded, coded_reduction, scene.formulation or "multipliers")
+    coded = fold.folded_form(coded, numbers)
+    check_embedding(form)
+    table, text = laid.table(coded, scene), source(coded)
+    system = compile_system(text)
     whole, lowered = table, system
-    if coded is not equations:  # rank and start before anything was left out of the code
-        whole = variable_table(equations, reduction, scene)
-        lowered = lower(equations, reduction, scene.formulation or "multipliers")
+    if coded is not form:  # rank and start before anything was left out of the code
+        whole, lowered = laid.table(form, scene), lower(form)
     try:
-        structure = examine(equations, whole, lowered, numbers)
+        structure = examine(form.equations, whole, lowered, numbers)
     except ModelError as error:
-        known = Derived(model, scene, equations, reduction, whole)
-        problems = [*error.problems, *_resting_motions(equations)]
+        problems = [*error.problems, *_resting_motions(form.equations)]
+        known = Derived(model, scene, form, whole)
         raise CannotStartError(error.name, problems, known) from error
     return Prepared(
         model=model,
         asked=asked,
         scene=scene,
-        equations=equations,
-        reduction=reduction,
+        form=form,
         coded=coded,
-        coded_reduction=coded_reduction,
         whole=whole,
         table=table.keeping(outputs),
+        text=text,
         system=system,
         structure=structure,
+        derived=derived,
     )
+
+
+def _with_numbers(form: Form, numbers: dict[Any, Any]) -> Form:
+    """With numbers in the equations, for asking what depends on what."""
+    return replace(form, equations=fold.folded(form.equations, numbers))
+
+
+class Laid:
+    """The variable tables of forms in scenes, each laid once."""
+
+    def __init__(self) -> None:
+        self.known: list[tuple[Form, Scene, VariableTable]] = []
+
+    def table(self, form: Form, scene: Scene) -> VariableTable:
+        """See interface/table.py."""
+        for other, there, table in self.known:
+            same = other.equations is form.equations and other.reduction is form.reduction
+            if same and there == scene:
+                return table
+        table = variable_table(form, scene)
+        self.known.append((form, scene, table))
+        return table
 
 
 def _resting_motions(eom: EquationsOfMotion) -> list[str]:
@@ -153,29 +186,27 @@ def _resting_motions(eom: EquationsOfMotion) -> list[str]:
 
 
 def _asked(
-    eom: EquationsOfMotion, scene: Scene, problems: list[str]
-) -> tuple[Scene, Reduction | None, tuple[str, ...]]:
-    """The scene with its formulation, the reduction to it, and the outputs by name."""
+    eom: EquationsOfMotion, scene: Scene, problems: list[str], laid: Laid
+) -> tuple[Scene, Form, tuple[str, ...]]:
+    """The scene with its formulation, the form that this gives, and the outputs by name."""
     if eom.frictions:
         problems += _refused_with_friction(eom, scene)
-        scene = replace(scene, formulation=scene.formulation or "multipliers")
-        return scene, None, _outputs(eom, None, scene, problems)
-    if scene.formulation is not None:
-        reduction = reduce(eom) if scene.formulation == "minimal" else None
-        return scene, reduction, _outputs(eom, reduction, scene, problems)
-    chosen = replace(scene, formulation="multipliers")
-    if not scene.complete:
+    chosen = replace(scene, formulation=scene.formulation or "multipliers")
+    form = Form(eom, None, chosen.formulation or "multipliers")
+    if form.formulation == "minimal" and not eom.frictions:
+        form = replace(form, reduction=reduce(eom))
+    elif scene.formulation is None and not scene.complete and not eom.frictions:
         try:
-            reduction = reduce(eom)
+            reduced = Form(eom, reduce(eom), "minimal")
         except DerivationError:
-            reduction = None
-        if reduction is not None and not reduction.rows:
+            reduced = form
+        if reduced.reduction is not None and not reduced.reduction.rows:
             ignored: list[str] = []
-            outputs = _outputs(eom, reduction, scene, ignored)
-            reads_only = prune.read_only(eom, reduction, outputs)[0] is not eom
-            if reads_only and not ignored:
-                return replace(scene, formulation="minimal"), reduction, outputs
-    return chosen, None, _outputs(eom, None, chosen, problems)
+            least = replace(scene, formulation="minimal")
+            outputs = _outputs(laid.table(reduced, least), scene, ignored)
+            if prune.read_only(reduced, outputs) is not reduced and not ignored:
+                return least, reduced, outputs
+    return chosen, form, _outputs(laid.table(form, chosen), scene, problems)
 
 
 def _refused_with_friction(eom: EquationsOfMotion, scene: Scene) -> list[str]:
@@ -195,8 +226,9 @@ def _refused_with_friction(eom: EquationsOfMotion, scene: Scene) -> list[str]:
     return problems
 
 
-def _outputs(
-    eom: EquationsOfMotion, reduction: Reduction | None, scene: Scene, problems: list[str]
-) -> tuple[str, ...]:
-    known = [v.name for v in variable_table(eom, reduction, scene).outputs]
-    return select(scene.outputs, known, "output", problems)
+def _outputs(table: VariableTable, scene: Scene, problems: list[str]) -> tuple[str, ...]:
+    known = [v.name for v in table.outputs]
+    found = set(select(scene.outputs, known, "output", problems))
+    found |= {names.barred(name) for name in found}  # a bar is of an output, ...
+    found |= {names.bar(name) for name in found}  # ... and an output has its own
+    return tuple(name for name in known if name in found)

@@ -14,7 +14,7 @@ from .failure import StepFailureError
 from .indicators import indicators, is_watched
 from .instant import Instant
 from .jumps import levels_at, passed
-from .leg import Leg
+from .leg import AfterStep, Leg
 from .magnitudes import complete, is_incomplete
 from .motion import project
 from .state import Settings, State
@@ -34,8 +34,13 @@ def advance(
     u: Sequence[float],
     p: Sequence[float],
     t_end: float,
+    after_step: AfterStep | None = None,
 ) -> State:
-    """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was."""
+    """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was.
+
+    `after_step`: with error bars (bars.py), what is done to the integrator after a step, and adds to
+    State.local.
+    """
     begun = state.t
     events: collections.deque[float] = collections.deque(maxlen=CHATTER)
     if not np.isfinite(t_end) or t_end <= state.t:
@@ -61,7 +66,7 @@ def advance(
             state = complete(at, settings, state, t_end - state.t)
         headway = Headway(settings, begun, t_end, state.rate)
         while state.t < t_end:
-            leg = Leg(system, settings, state, u, p, begun)
+            leg = Leg(system, settings, state, u, p, begun, after_step)
             state = _travel(leg, state, t_end, headway)
             events.append(state.t)
             if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
@@ -111,7 +116,7 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
         raise StepFailureError(leg.cause)
     solver = leg.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
-    steps, choice = state.steps, state.choice
+    steps, choice, local = state.steps, state.choice, state.local
     watch, lost = is_watched(leg.system), state.dissipated
     before = indicators(leg, state.t, y) if watch else np.zeros(0)
     while True:
@@ -119,6 +124,9 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
         offered = solver.h_abs
         try:
             leg.step(solver)
+            if leg.after_step is not None:
+                more = leg.after_step(solver, state)
+                local = local[0] + more[0], local[1] + more[1]
             y1 = leg.project(solver.t, solver.y)
             if not (
                 leg.system.prescribed and t0 == leg.begun
@@ -138,7 +146,9 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
                 step = offered
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)
-                here = replace(state, step=step, steps=steps, armed=tuple(armed), choice=choice)
+                here = replace(
+                    state, step=step, steps=steps, armed=tuple(armed), choice=choice, local=local
+                )
                 if leg.system.frictions:
                     lost += at_slides.dissipated(leg, solver.dense_output(), t0, event[0])
                     here = replace(here, slides=leg.state.slides, dissipated=lost)
@@ -164,6 +174,7 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
                 choice=choice,
                 slides=leg.state.slides,
                 dissipated=lost,
+                local=local,
             )
         solver.y, solver.f = y1, leg.accept(solver.t, y1)
         if leg.auto and leg.settings.method == "dop853":
@@ -184,7 +195,7 @@ def _meet(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: dict[in
         state = replace(
             state, t=t, q=tuple(y0[:n].tolist()), v=tuple(y0[n:].tolist()), levels=levels
         )
-        leg = Leg(leg.system, leg.settings, state, leg.u, leg.p, leg.begun)
+        leg = replace(leg, state=state)
     if not (contacts or leg.system.frictions):
         return state
     return at_contacts.switched(leg, state, t0, y0, t, [k for k in left if k not in jumps])

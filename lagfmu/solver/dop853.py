@@ -104,6 +104,10 @@ class Dop853(DOP853):  # type: ignore[misc]
             self._dense = self._dense_output_impl()
         return self._dense
 
+    def estimated_error(self, h: float) -> Vector:
+        """Of the step of h [s] just taken: estimates of order 5 and 3 make one of order 8 (eq. II.10.17)."""
+        return self._estimate_error(self.K, h)  # type: ignore[no-any-return]
+
     def last_stage(self, y0: Vector) -> tuple[Vector, Vector]:
         """Argument and rate of change of the stage at the end of the step from y0."""
         h, k = self.h_previous, len(self.A) - 1

@@ -27,12 +27,12 @@ from numpy.typing import NDArray
 
 from .failure import StepFailureError
 from .instant import Instant, Motion
+from .painleve import check_opened, check_solvable
 from .share import best_share
 from .solution import Solution
 from .state import Slide
 from .system import Matrix, System, Vector
 
-SAFE = 1e-9  # 1 + A below this counts as not positive
 Method = Callable[[Matrix, Vector, Matrix, Vector], Solution]
 
 
@@ -150,13 +150,25 @@ def motion_with_friction(
             pushed.append(wide)
         mu = now.kinetic[sliding]
         A = sign[sliding, None] * (now.C[sliding] @ np.array(pushed).T) * mu
-        _check_solvable(at, sliding, A)
+        check_solvable(at, sliding, A)
         N = np.linalg.solve(
             np.eye(len(sliding)) + A, sign[sliding] * (now.load[sliding] + now.C[sliding] @ lam)
         )
         x = x - (mu * N) @ np.array(answers)
         lam = lam - (mu * N) @ np.array(pushed)
         normal[sliding] = N
+        share = np.array(pushed).T * mu  # of the multipliers to a unit normal force
+
+        def unit(k: int) -> Vector:
+            """Multipliers to a unit acceleration of the row k, of those in `rows`."""
+            wide = np.zeros(system.m)
+            along = np.array([float(r == k) for r in rows])
+            wide[rows] = method(M, np.zeros(system.n), G[rows], along).lam
+            return wide
+
+        check_opened(
+            at, sliding, rows, unique, A, share, sign[sliding, None] * now.C[sliding], unit
+        )
         for i, strength in zip(sliding, mu * N, strict=True):
             mine = list(system.frictions[i].rows)
             lam[mine] = -strength * towards[i][: len(mine)]
@@ -179,26 +191,3 @@ def motion_with_friction(
         tangential[i, : len(f.rows)] = lam[list(f.rows)]
     press = Press(normal, now.static, slip, tangential, on, reserve)
     return Motion(M, F, G, nu, gamma, x, lam, unique, press)
-
-
-def _check_solvable(at: Instant, sliding: Sequence[int], A: Matrix) -> None:
-    """Raises StepFailureError where sliding has no acceleration or several (Painleve)."""
-    for place, i in enumerate(sliding):
-        own = A[place, place]
-        least = 1 + own if at.system.frictions[i].gated else 1 - abs(own)
-        if not least > SAFE:
-            raise paradox(at, [i], least)
-    if len(sliding) > 1:
-        determinant = float(np.linalg.det(np.eye(len(sliding)) + A))
-        if not determinant > SAFE:
-            raise paradox(at, sliding, determinant)
-
-
-def paradox(at: Instant, frictions: Sequence[int], value: float) -> StepFailureError:
-    """The refusal of a sliding problem without one solution."""
-    names = ", ".join(repr(at.system.frictions[i].name) for i in frictions)
-    return StepFailureError(
-        f"friction {names}: sliding has no acceleration, or several, at t = {float(at.t)!r} s (Painleve's "
-        f"paradox: the normal force would drive itself, 1 + A = {value:.3g}, expected above 0): use a "
-        "smaller coefficient of friction, or let the bodies deform (a spring in the contact)"
-    )

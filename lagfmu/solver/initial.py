@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..names import motion
 from . import at_contacts, at_slides
 from .afar import project_from_afar, velocities_from_afar
 from .failure import StartFailureError, StepFailureError
@@ -247,13 +248,13 @@ def _moved(
     system: System, q0: Vector, v0: Vector, state: State, rank: Sequence[int]
 ) -> tuple[Moved, ...]:
     n = system.n
-    names = [*system.coordinates, *(f"der({c})" for c in system.coordinates)]
+    states = motion(system.coordinates)
     given, used = np.concatenate([q0, v0]), np.array(state.q + state.v)
     unit = np.maximum(np.array(state.size + state.scale[n:]), np.abs(given))
     size = np.array(state.size)
     whole = np.maximum(np.concatenate([size, size * state.rate]), np.abs(given))
     return tuple(
-        Moved(names[i], float(given[i]), float(used[i]), rank[i], float(whole[i]))
+        Moved(states[i], float(given[i]), float(used[i]), rank[i], float(whole[i]))
         for i in range(2 * n)
         # a velocity that is rounding of the motion's own has not moved
         if abs(given[i] - used[i]) > max(1e-12 * unit[i], 4 * EPS * whole[i])

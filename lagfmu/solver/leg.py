@@ -8,7 +8,7 @@ as an ordinary differential equation, and its projection onto f = 0 and G v = nu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,11 +28,13 @@ FAR, LEAST_FAR = 1e3, 1e-6  # how far a projection may move the state: in tolera
 HOPELESS = 1.0  # error of one rk4 step, relative to the state, at which it means nothing
 SHIFT = 2.0**-26  # of a size, for a difference quotient: half of a double's digits
 FEWEST_STEPS = 100  # rk4's steps in one natural time of the motion, unless solver.step is set
+AfterStep = Callable[[Any, State], tuple[float, float]]
 
 
 @dataclass
 class Leg:
-    """From one event to the next; `begun` [s]: the communication step began, from which inputs run on."""
+    """From one event to the next; `begun` [s]: the communication step began, from which inputs run on;
+    `after_step`: see advance()."""
 
     system: System
     settings: Settings
@@ -40,6 +42,7 @@ class Leg:
     u: Sequence[float]
     p: Sequence[float]
     begun: float
+    after_step: AfterStep | None = None
 
     def __post_init__(self) -> None:
         self.rows = self.system.active(self.state.closed)

@@ -1,4 +1,4 @@
-"""A state -> everything that the FMU reports, by the names that table.py gave."""
+"""A state -> everything that the FMU reports, by name."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .. import names
+from ..names import derivative
 from . import at_slides
 from .failure import StepFailureError, plain
 from .instant import Instant
@@ -42,7 +44,7 @@ def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float
     full, q, v = expand(system, state.t, np.array(state.q), np.array(state.v), u, p)
     for name, x, xdot in zip(full.coordinates, q.tolist(), v.tolist(), strict=True):
         values[name] = x
-        values[f"der({name})"] = xdot
+        values[derivative(name)] = xdot
     if full.dynamics is not None:
         values |= _solved(system, full, state, q, v, u, p)
     if system.embedding is not None:
@@ -51,18 +53,18 @@ def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float
         reduced = motion(stepped, np.array(state.q), np.array(state.v), acting)
         for j, name in enumerate(system.coordinates):
             values.setdefault(name, state.q[j])
-            values.setdefault(f"der({name})", state.v[j])
-            values.setdefault(f"der({name},2)", float(reduced.vdot[j]))
+            values.setdefault(derivative(name), state.v[j])
+            values.setdefault(derivative(name, 2), float(reduced.vdot[j]))
     if full.energies is not None:
         kinetic, potential = full.energies(state.t, q.tolist(), v.tolist(), u, p)
-        values["energy.kinetic"] = float(kinetic)
-        values["energy.potential"] = float(potential)
-        values["energy.total"] = float(kinetic + potential)
+        values[names.KINETIC] = float(kinetic)
+        values[names.POTENTIAL] = float(potential)
+        values[names.TOTAL] = float(kinetic + potential)
     if full.outputs:
         values |= _own(full, state.t, values, q, v, u, p)
     for c, k in enumerate(system.contacts):
         values |= _contact(system, state, c, system.rows[k].name, u, p)
-    values["solver.steps"] = state.steps
+    values[names.STEPS] = state.steps
     return values
 
 
@@ -84,24 +86,25 @@ def _solved(
     if system.frictions:
         values |= at_slides.observed(system, state, now)
     for name, a in zip(full.coordinates, now.vdot.tolist(), strict=True):
-        values[f"der({name},2)"] = a
+        values[derivative(name, 2)] = a
     f, lam, unique = at.residual(q), now.lam.tolist(), now.unique.tolist()
     slip = now.G @ v - now.nu
     kept = {row.name: level for row, level in zip(system.rows, state.offset, strict=True)}
     for k, row in enumerate(full.rows):
-        values[f"lambda.{row.name}"] = lam[k]
-        values[f"unique.{row.name}"] = unique[k]
+        values[names.name(names.MULTIPLIER, row.name)] = lam[k]
+        values[names.name(names.UNIQUE, row.name)] = unique[k]
         miss = (
             slip[k]
             if row.kind == NONHOLONOMIC or row.friction is not None
             else f[k] - kept.get(row.name, 0.0)
         )
-        values[f"residual.{row.name}"] = float(miss)
+        values[names.name(names.RESIDUAL, row.name)] = float(miss)
     share = now.G * now.lam[:, None]
     for name, Q in zip(full.coordinates, share.sum(axis=0).tolist(), strict=True):
-        values[f"Q.{name}"] = Q
+        values[names.name(names.FORCE, "", name)] = Q
     for k, j in zip(*full.jacobian, strict=True):
-        values[f"Q.{full.rows[k].name}.{full.coordinates[j]}"] = float(share[k, j])
+        name = names.name(names.FORCE, full.rows[k].name, full.coordinates[j])
+        values[name] = float(share[k, j])
     return values
 
 
@@ -115,14 +118,9 @@ def _own(
     p: Sequence[float],
 ) -> Values:
     """The outputs of the model's own, from what is solved for at this state."""
-    vdot, lam, Q = (
-        [values.get(f"{head}{name}{tail}", 0.0) for name in of]
-        for head, of, tail in (
-            ("der(", full.coordinates, ",2)"),
-            ("lambda.", [row.name for row in full.rows], ""),
-            ("Q.", full.coordinates, ""),
-        )
-    )
+    lam = [values.get(names.name(names.MULTIPLIER, row.name), 0.0) for row in full.rows]
+    vdot = [values.get(derivative(name, 2), 0.0) for name in full.coordinates]
+    Q = [values.get(names.name(names.FORCE, "", name), 0.0) for name in full.coordinates]
     state = (t, q.tolist(), v.tolist(), vdot, u, p, lam, Q)
     found: Values = {}
     for own in full.outputs:
@@ -157,9 +155,9 @@ def _contact(
 ) -> Values:
     latest = state.departures[c]
     values: Values = {
-        f"contact.{name}": state.closed[c],
-        f"departure.{name}.count": latest.count,
-        f"departure.{name}.time": latest.time,
+        names.name(names.CONTACT, name): state.closed[c],
+        names.name(names.DEPARTURES, name): latest.count,
+        names.name(names.DEPARTURE_TIME, name): latest.time,
     }
     q, v = np.array(latest.q), np.array(latest.v)
     full = system if system.embedding is None else system.embedding.full
@@ -168,6 +166,6 @@ def _contact(
     else:
         q = v = np.zeros(full.n)
     for j, coordinate in enumerate(full.coordinates):
-        values[f"departure.{name}.{coordinate}"] = float(q[j])
-        values[f"departure.{name}.velocity.{coordinate}"] = float(v[j])
+        values[names.name(names.DEPARTURE, name, coordinate)] = float(q[j])
+        values[names.name(names.DEPARTURE, name, coordinate, 1)] = float(v[j])
     return values

@@ -17,7 +17,10 @@ from .stiffness import LATEST, MOST, Choice
 from .system import System
 
 MOST_COUNTED = 2**53
-POSITIVE = ("scale", "size", "gap", "rate", "step", "span", "longest", "product", "ratio", "noise")
+POSITIVE = (
+    *("scale", "size", "gap", "rate", "step", "span", "longest", "product", "ratio", "noise"),
+    "local",
+)
 UNBOUNDED = ("step", "rate", "longest", "product", "ratio", "span")  # may be infinite
 MOST_OF = {"failures": MOST, "retries": LATEST}
 
@@ -32,7 +35,7 @@ def restored(system: System, text: Any) -> State:
     n, contacts = system.n, len(system.contacts)
     lengths = {"q": n, "v": n, "size": n, "scale": 2 * n, "offset": system.m}
     lengths |= dict.fromkeys(("closed", "armed", "gap", "departures"), contacts)
-    lengths["levels"] = len(system.floors)
+    lengths |= {"levels": len(system.floors), "local": 2}
     lengths |= dict.fromkeys(("slides", "slippings"), len(system.frictions))
     for name, length in lengths.items():
         if len(raw[name]) != length:

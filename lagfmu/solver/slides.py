@@ -17,11 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from .. import names
 from .failure import StepFailureError
-from .friction import heading, loaded, paradox, slip_velocity
+from .friction import heading, loaded, slip_velocity
 from .instant import Instant, Motion
 from .leg import Leg
 from .motion import motion
+from .painleve import paradox
 from .ranges import Range, first_of_frictions
 from .state import Departure, Slide, State
 from .system import Matrix, System, Vector
@@ -419,23 +421,23 @@ def _lost(M: Matrix, G: Matrix, nu: Vector, before: Vector, after: Vector) -> fl
 
 
 def observed(system: System, state: State, now: Motion) -> dict[str, float | int | bool]:
-    """What frictions report, by the names of table.py."""
+    """What frictions report, by name."""
     press, work = now.press, power(now)
-    values: dict[str, float | int | bool] = {"energy.dissipated": state.dissipated}
+    values: dict[str, float | int | bool] = {names.DISSIPATED: state.dissipated}
     for i, (f, slide) in enumerate(zip(system.frictions, state.slides, strict=True)):
         on = bool(press.loaded[i])
         force = float(np.hypot(*press.tangential[i]))
-        values[f"sticks.{f.name}"] = on and slide.sticks
+        values[names.name(names.STICKS, f.name)] = on and slide.sticks
         for j, k in enumerate(f.rows):
-            values[f"slip.{system.rows[k].name}"] = float(press.slip[i, j])
-        values[f"margin.{f.name}"] = float(press.static[i] * press.normal[i]) - force
-        values[f"power.{f.name}"] = 0.0 if slide.sticks else float(work[i])
+            values[names.name(names.SLIP, system.rows[k].name)] = float(press.slip[i, j])
+        values[names.name(names.MARGIN, f.name)] = float(press.static[i] * press.normal[i]) - force
+        values[names.name(names.POWER, f.name)] = 0.0 if slide.sticks else float(work[i])
         latest = state.slippings[i]
-        values[f"slipping.{f.name}.count"] = latest.count
-        values[f"slipping.{f.name}.time"] = latest.time
+        values[names.name(names.SLIPS, f.name)] = latest.count
+        values[names.name(names.SLIP_TIME, f.name)] = latest.time
         for j, name in enumerate(system.coordinates):
-            values[f"slipping.{f.name}.{name}"] = latest.q[j]
-            values[f"slipping.{f.name}.velocity.{name}"] = latest.v[j]
+            values[names.name(names.SLIPPING, f.name, name)] = latest.q[j]
+            values[names.name(names.SLIPPING, f.name, name, 1)] = latest.v[j]
     return values
 
 

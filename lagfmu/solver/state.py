@@ -63,7 +63,8 @@ class State:
     led to t (0: none); rate [1/s]: the motion's
     natural rate at the start; choice: what `auto` remembers; levels: those of jumps (jumps.py);
     slides, slippings: one entry a friction, how it stands and its latest start of slipping; dissipated
-    [J]: by frictions and impacts so far.
+    [J]: by frictions and impacts so far; strikes: contacts that were struck so far;
+    local: with error bars, the sums of local errors of explicit and implicit methods (bars.py).
     """
 
     t: float
@@ -84,6 +85,8 @@ class State:
     slides: tuple[Slide, ...] = ()
     slippings: tuple[Departure, ...] = ()
     dissipated: float = 0.0
+    strikes: int = 0
+    local: tuple[float, float] = (0.0, 0.0)
     levels: tuple[float, ...] = ()
 
     def to_json(self) -> str:

@@ -112,6 +112,7 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list
         armed=tuple(a and c not in contacts and c not in struck for c, a in enumerate(state.armed)),
         offset=tuple(offset.tolist()),
         departures=tuple(departures),
+        strikes=state.strikes + len({*struck, *landing}),
     )
 
 

@@ -10,12 +10,11 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 from ..errors import LagfmuError
 
 HOLDS, FAILS, WRONG_USAGE, NOT_RUN = 0, 1, 2, 3  # exit codes
+VERDICTS = ("pass", "fail", "wrong usage", "not run")
 
 
 class UsageError(LagfmuError):
     """A command that cannot be meant."""
-
-    code = WRONG_USAGE
 
 
 @dataclass(frozen=True)
@@ -31,18 +30,19 @@ class Case:
 
 @dataclass(frozen=True)
 class Suite:
-    """The statements about one FMU; `error`: why it could not be run."""
+    """The statements about one FMU; `error`: why it could not be run, or (`misused`) was not."""
 
     name: str
     cases: Sequence[Case]
     error: str = ""
     properties: Mapping[str, str] = field(default_factory=dict)
+    misused: bool = False
 
     @property
     def code(self) -> int:
         """The exit code that this FMU alone would give; nothing known is no success."""
         if self.error:
-            return NOT_RUN
+            return WRONG_USAGE if self.misused else NOT_RUN
         known = [c for c in self.cases if not c.skipped]
         return FAILS if not known or any(c.failure for c in known) else HOLDS
 
@@ -61,7 +61,7 @@ def as_junit(command: str, suites: Sequence[Suite]) -> bytes:
             suite.add_property(name, value)
         if s.error:
             case = TestCase("runs", s.name, 0.0)
-            case.result = [Error(s.error, "not run")]
+            case.result = [Error(s.error, VERDICTS[s.code])]
             suite.add_testcase(case)
         for c in s.cases:
             case = TestCase(c.name, c.group, round(c.seconds, 6))

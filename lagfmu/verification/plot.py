@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import names
 from ..errors import BuildError
 from .simulate import Trajectory
@@ -104,6 +106,7 @@ def panels(
                     label=n,
                     linewidth=1.8,
                 )
+                _band(axis, result, n, COLOURS[colour])
             axis.set_ylabel(unit if unit != "1" else "")
             axis.margins(x=0)
             _mark_departures(axis, result, known, named=axis is axes[0, 0])
@@ -117,6 +120,31 @@ def panels(
             )
         axes[-1, 0].set_xlabel("time in s")
         yield figure, list(axes[:, 0])
+
+
+def _band(axis: Any, result: Trajectory, name: str, colour: str) -> None:
+    """The error bars of a curve as a band about it; where they are infinite, hatched from bottom to top."""
+    if names.bar(name) not in (result.dtype.names or ()):
+        return
+    time, value, bar = result["time"], result[name], result[names.bar(name)]
+    known = bar < np.finfo(float).max
+    bar = np.where(known, bar, 0.0)
+    axis.fill_between(
+        time, value - bar, value + bar, where=known, color=colour, alpha=0.25, linewidth=0
+    )
+    if not known.all():
+        axis.fill_between(
+            time,
+            0,
+            1,
+            where=~known,
+            transform=axis.get_xaxis_transform(),
+            facecolor="none",
+            edgecolor=colour,
+            alpha=0.3,
+            hatch="//",
+            linewidth=0,
+        )
 
 
 def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SimulationError, VerificationError
+from ..errors import SettingError, SimulationError
 from .simulate import Trajectory
 from .verify import Check
 
@@ -31,12 +31,12 @@ class Reference:
     own: Mapping[str, float] = field(default_factory=dict)
 
     def checks(self, result: Trajectory) -> list[Check]:
-        """One statement a column.  Raises VerificationError for columns that the FMU does not have."""
+        """One statement a column.  Raises SettingError for columns that the FMU does not have."""
         names = [n for n in self.table.dtype.names or () if n != "time"]
         known = result.dtype.names or ()
         unknown = [n for n in (*names, *self.own) if n not in known]
         if unknown:
-            raise VerificationError(
+            raise SettingError(
                 f"reference: {', '.join(map(repr, unknown))} is no output of the FMU, expected some of "
                 f"{', '.join(n for n in known if n != 'time')}"
             )

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .pipeline import Case, Suite
+from .pipeline import VERDICTS, Case, Suite
 from .verify import Check, Verification
 
 
@@ -19,12 +19,13 @@ class Examined:
     file: str
     found: Verification | None
     error: str = ""
+    misused: bool = False  # not run because of what was asked for
 
     @property
     def suite(self) -> Suite:
         """A case a statement."""
         if self.found is None:
-            return Suite(self.file, (), self.error)
+            return Suite(self.file, (), self.error, misused=self.misused)
         name, seconds = (
             self.found.name,
             self.found.seconds,
@@ -45,7 +46,7 @@ def as_json(examined: Sequence[Examined]) -> str:
         {
             "file": e.file,
             "name": None if e.found is None else e.found.name,
-            "verdict": ("pass", "fail", "", "not run")[e.suite.code],
+            "verdict": VERDICTS[e.suite.code],
             "error": e.error or None,
             "simulated_s": None if e.found is None else e.found.simulated,
             "wall_s": None if e.found is None else e.found.seconds,

@@ -5,9 +5,10 @@ from __future__ import annotations
 import difflib
 import os
 import re
+import warnings
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,13 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from .. import names
-from ..errors import SimulationError, VerificationError
+from ..errors import SettingError, SimulationError, VerificationError
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import ranks, tell
+from ..solver import bars as companion
 from ..solver.advance import advance
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
@@ -38,6 +40,10 @@ MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
 
+class ErrorBarWarning(UserWarning):
+    """Error bars that are lost, or that a method of fixed steps pays for with shorter ones."""
+
+
 def simulate(
     target: Model | Prepared | str | os.PathLike[str],
     stop_time: float | None = None,
@@ -47,6 +53,7 @@ def simulate(
     inputs: Trajectory | None = None,
     scene: Scene | None = None,
     besides: Sequence[str] = (),
+    error_bars: bool = False,
 ) -> Result:
     """Outputs at every communication point, as a structured array with the FMU's variable names and units.
 
@@ -54,30 +61,45 @@ def simulate(
     fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
     values; `inputs` is a structured array with 'time' and one field an input, interpolated linearly.
     What is left out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables
-    and inputs to be recorded too.
+    and inputs to be recorded too.  `error_bars`: a model's outputs have `error.NAME` beside them
+    (docs/error_bars.md), as those of an FMU have that was built with them.
 
-    Warns of each start value that is moved onto the constraints (starts.py).  Raises ModelError for a model
+    Warns of each start value that is moved onto the constraints (starts.py), and of error bars that are
+    lost.  Raises ModelError for a model
     that cannot start, SimulationError if a step fails, and
     VerificationError for a file that is no FMU.
     """
     values = dict(start_values or {})
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
         if number is not None and not 0 < number < np.inf:
-            raise SimulationError(f"{what} = {number!r} s, expected a positive number")
+            raise SettingError(f"{what} = {number!r} s, expected a positive number")
     if tolerance is not None and not 0 < tolerance < np.inf:
-        raise SimulationError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+        raise SettingError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
     if isinstance(target, Model):
         target = prepare(target, scene)
+    if isinstance(target, Prepared) and error_bars and not target.asked.error_bars:
+        target = prepare(target.model, replace(target.asked, error_bars=True))
     if isinstance(target, Prepared):
         table = _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
         every = target.table.variables
         units = {v.name: v.unit.name for v in every if v.unit is not None}
         return Result(table, units, target.scene.name)
     path = Path(target)
-    table = _simulate_fmu(path, stop_time, step_size, tolerance, values, inputs, besides)
     description = read_description(path)
+    if error_bars and not has_error_bars(description.modelVariables):
+        raise SimulationError(
+            f"{str(path)!r} was built without error bars: build it with Scene(error_bars=True), or with "
+            "lagfmu build --error-bars"
+        )
+    table = _simulate_fmu(path, stop_time, step_size, tolerance, values, inputs, besides)
     units = {v.name: v.unit for v in description.modelVariables if v.unit}
     return Result(table, units, description.modelName)
+
+
+def has_error_bars(variables: Sequence[Any]) -> bool:
+    """True if one of the variables, a table's or fmpy's, is the error bar of another."""
+    known = {v.name for v in variables}
+    return any(names.barred(n) in known for n in known)
 
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
@@ -153,6 +175,11 @@ def _simulate_model(
         _check_values(scene.name, limits, {v.name: x for v, x in zip(drives, u, strict=True)})
         return u
 
+    def warn(text: str) -> None:
+        if text:
+            warnings.warn(text, ErrorBarWarning, stacklevel=4)
+
+    with_bars = [v.bar_of for v in table.variables if v.bar_of]
     fed = () if inputs is None else signals.dtype.names
     past = Past()
     times = communication_points(stop_time or scene.stop_time, step_size or scene.step_size)
@@ -168,6 +195,9 @@ def _simulate_model(
         begun = start(system, settings, 0.0, q, v, u, p, ranks(system, table, values))
         tell(begun.moved)
         state = begun.state
+        bars = companion.begun(state, with_bars)
+        if with_bars:
+            warn(companion.halved(settings, state) if settings.step else "")
         for k, t in enumerate(times):
             if k:
                 given = drive(state.t)  # held over the step, as an importer of the FMU does
@@ -175,10 +205,21 @@ def _simulate_model(
                     u[i] = u[i] if d.role == "estimate" or d.name not in fed else given[i]
                 was_set = [drives[i].name in fed for i in system.estimated]
                 u, past = estimated(system, past, state.t, u, was_set)
-                moved = advance(system, settings, state, u, p, float(t))
+                fine, coarse = settings, settings
+                if with_bars:
+                    fine, coarse = companion.paired_settings(settings, state, float(t))
+                    bars, lost = companion.followed(system, coarse, bars, u, p, float(t))
+                    warn(lost)
+                noted = companion.after_step if with_bars else None
+                moved = advance(system, fine, state, u, p, float(t), noted)
                 u = system.inputs_at(u, moved.t - state.t)
                 state = moved
             seen = observe(system, state, u, p)
+            if with_bars:
+                now = (state, seen)
+                bars, found, lost = companion.widened(system, settings, bars, with_bars, now, u, p)
+                warn(lost)
+                seen |= {names.bar(n): x for n, x in zip(with_bars, found, strict=True)}
             driven = dict(zip((d.name for d in drives), u, strict=True))
             result[k] = (t, *(driven[o.name] if o in drives else seen[o.name] for o in read))
     except StepFailureError as error:
@@ -220,7 +261,7 @@ def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[
         elif v.positive and not value > 0:
             problems.append(f"{name!r} = {value!r}, expected a positive number")
     if problems:
-        raise SimulationError(f"{what}: " + "; ".join(problems))
+        raise SettingError(f"{what}: " + "; ".join(problems))
 
 
 def items_of(variable: Any) -> dict[str, int]:

@@ -16,6 +16,7 @@ import sympy as sp
 
 from ...mechanics.differential import Differential
 from ...mechanics.equations import TIME, EquationsOfMotion, FrictionLaw
+from ...mechanics.form import Form
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
@@ -42,23 +43,20 @@ HEAD = """/* model.c -- {name}{description}
 """
 
 
-def model_source(
-    eom: EquationsOfMotion,
-    reduction: Reduction | None,
-    formulation: str,
-    tangents: bool = True,
-) -> str:
-    """C text that defines MODEL_SYSTEM, the numeric form of the equations in the given formulation.
+def model_source(form: Form, tangents: bool = True) -> str:
+    """C text that defines MODEL_SYSTEM, the numeric form of the equations.
 
     `tangents`: with the derivatives that directional derivatives and radau5 need.
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
-    eom, reduction, jumps = levelled(eom, reduction)
-    eom = _in_reals(eom)
+    form, jumps = levelled(form)
+    eom, reduction = _in_reals(form.equations), form.reduction
     index = _index("coordinates", eom.q) + _index("constraints", [c.name for c in eom.constraints])
     if reduction is None:
-        text = _System(eom, "", formulation, tangents, jumps=jumps).text() + _pointer("equations")
+        text = _System(eom, "", form.formulation, tangents, jumps=jumps).text() + _pointer(
+            "equations"
+        )
     else:
         reduced = _in_reals(reduction.reduced)
         index += _index("coordinates that are stepped", reduced.q)

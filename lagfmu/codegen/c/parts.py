@@ -15,7 +15,8 @@ AT_CONTACTS = {
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }
-FRICTION = ("friction.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
+COMPANION = ("bars.c", "companion.c")  # behind ERROR_BARS of variables.c
+FRICTION = ("friction.c", "painleve.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
 NO_RUNGS = """
 #include "dependent.h"
 
@@ -45,7 +46,8 @@ const Parts PARTS = {{
 def parts_source(scene: Scene, system: System) -> str | None:
     """C text that defines PARTS; None if nothing is left out, as in the runtime's own parts.c."""
     found, contacts = scene.integrators, bool(system.contacts or system.frictions)
-    if system.frictions and set(scene.selectable) == set(METHODS):
+    everything = system.frictions and set(scene.selectable) == set(METHODS)
+    if everything and not scene.error_bars:
         return None
     menu = {m: m for m in found}
     if "auto" in scene.selectable:
@@ -53,12 +55,17 @@ def parts_source(scene: Scene, system: System) -> str | None:
     rows = [
         f"    .methods[{place.upper()}] = &{menu[place]},\n" for place in METHODS if place in menu
     ]
-    rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
+    rows += [
+        f"    .{method}_{part} = {method}_{part},\n"
+        for method, part in _own(found, scene.error_bars)
+    ]
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
+    rows += ["    .after_step = companion_after_step,\n"] if scene.error_bars else []
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
+    what += ", error bars" if scene.error_bars else ""
     rungs = "" if system.is_constrained else NO_RUNGS
     return HEAD.format(name=scene.name, what=what, rungs=rungs) + "".join(rows) + "};\n"
 
@@ -76,6 +83,8 @@ def files_left_out(scene: Scene, system: System) -> frozenset[str]:
     gone = {f"{m}.c" for m in INTEGRATORS if m not in scene.integrators}
     if not system.frictions:
         gone |= {*FRICTION}
+    if not scene.error_bars:
+        gone |= {*COMPANION}
     if not is_watched(system):
         gone |= {*AT_EVENTS.values(), *BEHIND_EVENTS}
     if not (system.contacts or system.frictions):
@@ -85,6 +94,7 @@ def files_left_out(scene: Scene, system: System) -> frozenset[str]:
     return frozenset(gone)
 
 
-def _own(found: tuple[str, ...]) -> list[tuple[str, str]]:
+def _own(found: tuple[str, ...], error_bars: bool) -> list[tuple[str, str]]:
     """Functions of one method that the others do not have."""
-    return [(m, part) for m, part in (("rk4", "error"), ("rattle", "step")) if m in found]
+    parts = [("rk4", "error"), ("rattle", "step"), *([("dop853", "error")] * error_bars)]
+    return [(m, part) for m, part in parts if m in found]

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Sequence
 
 from ... import names
 from ...interface.variables import Variable, VariableTable
-from ...mechanics.equations import EquationsOfMotion
-from ...mechanics.formulations.minimal import Reduction
+from ...mechanics.form import Form
 from ...model.scene import Scene
+from ...solver.bars import COARSER, MARGIN, ROUNDING
 from ...solver.system import System
 from .printer import string
 
@@ -23,6 +23,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include <math.h>
 #include <stddef.h>
 
+#include "bars.h"
 #include "identity.h"
 #include "state.h"
 #include "variables.h"
@@ -36,21 +37,24 @@ const char *const MODEL_IDENTIFIER = {identifier};
 const char *const MODEL_GUID = LAGFMU_GUID;
 const double DEFAULT_TOLERANCE = {tolerance};
 const int DEFAULT_METHOD = {method};
+{bars}"""
+NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
+WITH_BARS = f"""const ErrorBars *const ERROR_BARS = &BARS;
+const double BAR_COARSER = {COARSER!r}, BAR_MARGIN = {MARGIN!r}, BAR_ROUNDING = {ROUNDING!r};
 """
 
 
-def variables_source(
-    table: VariableTable,
-    eom: EquationsOfMotion,
-    reduction: Reduction | None,
-    scene: Scene,
-    system: System,
-) -> str:
+def variables_source(table: VariableTable, form: Form, scene: Scene, system: System) -> str:
     """C text that defines VARIABLES and the defaults of the scene."""
+    eom, stepped = form.equations, form.stepped
     place = Places(system, [str(s) for s in eom.u], [str(s) for s in eom.p])
-    stepped = eom if reduction is None else reduction.reduced
     states = {str(s): j for j, s in enumerate((*stepped.q, *stepped.v))}
-    rows = [f"    {_row(v, place.of(v), states)},\n" for v in table.variables]
+    position = {v.name: k for k, v in enumerate(table.variables)}
+    number = {v.name: k for k, v in enumerate(v for v in table.variables if v.bar_of)}
+    rows = []
+    for v in table.variables:
+        at = ("ERROR", position[v.bar_of], number[v.name]) if v.bar_of else place.of(v)
+        rows.append(f"    {_row(v, at, states)},\n")
     return HEAD.format(
         name=scene.name,
         rows="".join(rows),
@@ -58,6 +62,7 @@ def variables_source(
         identifier=string(scene.name),
         tolerance=repr(float(scene.tolerance)),
         method=scene.method.upper(),
+        bars=WITH_BARS if scene.error_bars else NO_BARS,
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from ...mechanics.equations import TIME, EquationsOfMotion
-from ...mechanics.formulations.minimal import Reduction
+from ...mechanics.form import Form
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact, Nonholonomic
 from ...solver.cubic import Cubic
@@ -21,15 +21,18 @@ from .function import function, identifiers, table_name
 Expr = Any
 
 
-def source(eom: EquationsOfMotion, reduction: Reduction | None, formulation: str) -> str:
-    """Python text that defines SYSTEM, the numeric form of the equations in the given formulation.
+def source(form: Form) -> str:
+    """Python text that defines SYSTEM, the numeric form of the equations.
 
     It needs the names System, Row, Own, Friction, Lookups and Embedding of `lagfmu.solver.system`, and Cubic
     where there are tables.
     """
-    eom, reduction, jumps = levelled(eom, reduction)
+    form, jumps = levelled(form)
+    eom, reduction = form.equations, form.reduction
     if reduction is None:
-        text = _system(eom, "", formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
+        text = (
+            _system(eom, "", form.formulation, jumps=jumps) + "\n\nSYSTEM = SYSTEM_OF_COORDINATES\n"
+        )
         return _imported(_tables(eom, text) + text)
     parts = [_bare_system(eom) if eom.bare else _system(eom, "", "multipliers")]
     names = identifiers([*reduction.s, *reduction.sdot, *reduction.reduced.driven, *eom.p, TIME])
@@ -100,11 +103,9 @@ def compile_system(text: str) -> System:
     return system
 
 
-def lower(
-    eom: EquationsOfMotion, reduction: Reduction | None = None, formulation: str = "multipliers"
-) -> System:
-    """The numeric form of `eom`, ready for the solver."""
-    return compile_system(source(eom, reduction, formulation))
+def lower(form: Form) -> System:
+    """The numeric form, ready for the solver."""
+    return compile_system(source(form))
 
 
 def _system(

@@ -203,6 +203,10 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         return none(functions, instanceName,
                     "fmi2Instantiate: the rates of a prescribed motion are estimated from communication "
                     "points, which Model Exchange has not: take co-simulation");
+    if (fmuType == fmi2ModelExchange && ERROR_BARS != NULL)
+        return none(functions, instanceName,
+                    "fmi2Instantiate: error bars come from a companion run beside the FMU's own, and in "
+                    "Model Exchange the importer integrates: take co-simulation, or an FMU without");
 
     const size_t name_size = strlen(instanceName) + 1;
     memset(&draft, 0, sizeof draft);

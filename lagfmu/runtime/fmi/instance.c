@@ -34,11 +34,14 @@ void instance_layout(Instance *x, Arena *arena) {
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         x->closed = arena_ints(&scratch, system->contacts);
         x->count = arena_ints(&scratch, system->contacts);
+        x->stuck = arena_ints(&scratch, system->frictions);
+        x->slips = arena_ints(&scratch, system->frictions);
         x->happened = arena_ints(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
         x->places = arena_doubles(&scratch, system->lookup_count);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
+        if (ERROR_BARS != NULL) ERROR_BARS->layout(x, &saved, &scratch);
         if (pass == 1) break;
         x->saved_size = saved.used;
         const size_t scratch_size = scratch.used;
@@ -72,18 +75,17 @@ void instance_reset(Instance *x) {
 
 /* ------------------------------------------------------------------ values */
 
-static double departed(const Instance *x, int contact, int index, const double *seen,
-                            const double *own) {
-    const System *full = x->solver.system->full;
+static double departed(const Solver *s, int contact, int index, const double *seen,
+                       const double *own) {
+    const System *full = s->system->full;
     if (full != NULL) return seen[contact * full->n + index];
-    if (x->solver.state.count[contact] == 0) return 0;
-    return own[contact * x->solver.system->n + index];
+    if (s->state.count[contact] == 0) return 0;
+    return own[contact * s->system->n + index];
 }
 
-/* Values that lie ready; 0 if the value has to be calculated first. */
-static int ready(const Instance *x, const Variable *v, double *value) {
+/* Values that were set; 0 if it is none of these. */
+static int was_set(const Instance *x, const Variable *v, double *value) {
     const Solver *s = &x->solver;
-    const int embedded = s->system->full != NULL;
     switch (v->place) {
         case AT_PARAMETER: *value = s->p[v->index]; return 1;
         case AT_METHOD: *value = (double)x->given.method; return 1;
@@ -92,9 +94,13 @@ static int ready(const Instance *x, const Variable *v, double *value) {
         case AT_MAXIMUM_STEP: *value = x->given.maximum_step; return 1;
         case AT_MAXIMUM_STEPS: *value = x->given.maximum_steps; return 1;
         case AT_INPUT: *value = s->drive.value[v->index]; return 1;
-        default: break;
+        default: return 0;
     }
-    if (!x->started) return 0;
+}
+
+/* Values that lie ready in the state; 0 if the value has to be calculated first. */
+static int ready(const Solver *s, const Variable *v, double *value) {
+    const int embedded = s->system->full != NULL;
     switch (v->place) {
         case AT_Q:
             if (embedded) return 0;
@@ -123,16 +129,13 @@ double instance_setting(const Instance *x, const Variable *v) {
     const int n = x->solver.system->n;
     double value = 0;
     if (v->role == ROLE_START) return v->state < n ? x->q0[v->state] : x->v0[v->state - n];
-    (void)ready(x, v, &value);
+    (void)was_set(x, v, &value);
     return value;
 }
 
-Status instance_get(Instance *x, const Variable *v, double *value) {
-    if (ready(x, v, value)) return OK;
-    if (!x->observed && instance_observe(x) != OK) return FAILED;
-    if (ready(x, v, value)) return OK;
-    const Observed *o = &x->seen;
-    const State *state = &x->solver.state;
+Status instance_value(Solver *s, const Observed *o, const Variable *v, double *value) {
+    const State *state = &s->state;
+    if (ready(s, v, value)) return OK;
     switch (v->place) {
         case AT_Q: *value = o->q[v->index]; break;
         case AT_V: *value = o->v[v->index]; break;
@@ -152,14 +155,28 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
         case AT_POWER: *value = o->power[v->index]; break;
         case AT_OUTPUT: *value = o->own[v->index]; break;
         case AT_DEPARTURE_Q:
-            *value = departed(x, v->contact, v->index, o->departure_q, state->departure_q);
+            *value = departed(s, v->contact, v->index, o->departure_q, state->departure_q);
             break;
         case AT_DEPARTURE_V:
-            *value = departed(x, v->contact, v->index, o->departure_v, state->departure_v);
+            *value = departed(s, v->contact, v->index, o->departure_v, state->departure_v);
             break;
-        default: return fail(&x->solver.why, "%s has no value", v->name);
+        default: return fail(&s->why, "%s has no value", v->name);
     }
     return OK;
+}
+
+Status instance_get(Instance *x, const Variable *v, double *value) {
+    if (was_set(x, v, value)) return OK;
+    if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
+    if (x->started && ready(&x->solver, v, value)) return OK;
+    if (!x->observed && instance_observe(x) != OK) return FAILED;
+    return instance_value(&x->solver, &x->seen, v, value);
+}
+
+/* The inputs are others than those under which the runs have stepped ahead. */
+static void inputs_changed(Instance *x) {
+    solver_inputs_changed(&x->solver);
+    if (ERROR_BARS != NULL) ERROR_BARS->inputs_changed(x);
 }
 
 /* The first setting of an input after a step replaces its polynomial, whatever is set first. */
@@ -176,7 +193,7 @@ static void set_input(Instance *x, int k, double value) {
     drive->value[k] = value;
     if (same) return;
     x->observed = x->evaluated = 0;
-    if (x->started) solver_inputs_changed(&x->solver);
+    if (x->started) inputs_changed(x);
 }
 
 void instance_set(Instance *x, const Variable *v, double value) {
@@ -235,7 +252,7 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
     if (*where == value) return;
     *where = value;
     x->observed = x->evaluated = 0;
-    if (x->started) solver_inputs_changed(&x->solver);
+    if (x->started) inputs_changed(x);
 }
 
 /* ------------------------------------------------------------------ start */
@@ -294,6 +311,7 @@ Status instance_start(Instance *x) {
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     x->started = 1;
     x->observed = x->evaluated = 0;
+    if (ERROR_BARS != NULL) ERROR_BARS->start(x);
     return OK;
 }
 
@@ -303,6 +321,7 @@ Status instance_observe(Instance *x) {
     if (solver_observe(&x->solver, &x->seen) != OK) return FAILED;
     x->observed = 1;
     x->evaluated = 0;
+    if (ERROR_BARS != NULL) x->bars->observed = 0;
     return OK;
 }
 
@@ -326,7 +345,7 @@ static void estimate_rates(Instance *x) {
         if (!x->set[k]) u[k] = past->u[0];
         const int given = !x->set[k + 1] ? 0 : x->set[k + 2] ? 2 : 1;
         rates_estimate(past, x->solver.state.now.t, u + k, given);
-        solver_inputs_changed(&x->solver);
+        inputs_changed(x);
     }
 }
 
@@ -398,12 +417,28 @@ static void report_events(Instance *x) {
             continue;
         x->tell(x->context, NOTE_EVENT, x->note);
     }
+    for (int i = 0; i < x->solver.system->frictions; i++) {
+        const char *name = x->solver.system->friction[i].name;
+        if (now->slip_count[i] != x->slips[i])
+            (void)snprintf(x->note, sizeof x->note, "friction %s began to slip at t = %s s", name,
+                           digits(now->slip_time[i]).text);
+        else if (now->slide[i].sticks && !x->stuck[i])
+            (void)snprintf(x->note, sizeof x->note, "friction %s sticks", name);
+        else
+            continue;
+        x->tell(x->context, NOTE_EVENT, x->note);
+    }
 }
 
-static void note_contacts(Instance *x) {
-    const size_t size = (size_t)x->solver.system->contacts * sizeof *x->closed;
+static void note_modes(Instance *x) {
+    const System *s = x->solver.system;
+    const size_t size = (size_t)s->contacts * sizeof *x->closed;
     memcpy(x->closed, x->solver.state.closed, size);
     memcpy(x->count, x->solver.state.count, size);
+    for (int i = 0; i < s->frictions; i++) {
+        x->stuck[i] = x->solver.state.slide[i].sticks;
+        x->slips[i] = x->solver.state.slip_count[i];
+    }
 }
 
 /* Of `auto`: why radau5 took over, the first time; then each change that a communication step ends with. */
@@ -425,7 +460,8 @@ Status instance_step(Instance *x, double t_end) {
     instance_save(x, x->backup);
     if (s->system->estimated_count > 0) estimate_rates(x);
     if (s->system->prescribed_count > 0) warn_of_rates(x);
-    if (s->system->contacts > 0) note_contacts(x);
+    if (s->system->contacts + s->system->frictions > 0) note_modes(x);
+    if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;
     const int implicit = s->state.now.choice.implicit;
@@ -433,10 +469,12 @@ Status instance_step(Instance *x, double t_end) {
         instance_restore(x, x->backup);
         return FAILED;
     }
+    if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
     move_inputs(x, t_end);
     if (s->system->lookup_count > 0) warn_of_tables(x);
-    if (s->system->contacts > 0) report_events(x);
+    if (s->system->contacts + s->system->frictions > 0) report_events(x);
     tell_of_method(x, product, implicit);
+    if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
     return OK;
 }
 
@@ -509,6 +547,7 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;
         case AT_OUTPUT: *change = w->down[v->index]; break;
         case AT_INPUT: *change = d.du[v->index]; break;
+        case AT_ERROR: *change = NAN; break; /* it is not known */
         default: break; /* discrete ones and parameters: none */
     }
     if (v->place == AT_LAMBDA && !x->seen.unique[v->index])
@@ -564,6 +603,7 @@ void instance_save(const Instance *x, char *record) {
     head.started = x->started;
     head.running = x->running;
     head.warned = x->warned;
+    if (ERROR_BARS != NULL) ERROR_BARS->save(x);
     memset(record, 0, record_head());
     memcpy(record, &head, sizeof head);
     memcpy(record + record_head(), x->saved, x->saved_size);
@@ -588,4 +628,5 @@ void instance_restore(Instance *x, const char *record) {
     x->running = head.running;
     x->warned = head.warned;
     x->observed = x->evaluated = 0;
+    if (ERROR_BARS != NULL) ERROR_BARS->restore(x);
 }

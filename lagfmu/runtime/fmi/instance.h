@@ -5,6 +5,7 @@
 #ifndef LAGFMU_INSTANCE_H
 #define LAGFMU_INSTANCE_H
 
+#include "bars.h"
 #include "rates.h"
 #include "sensitivity.h"
 #include "solver.h"
@@ -14,7 +15,7 @@
 typedef enum { NOTE_WARNING, NOTE_EVENT } Note;
 typedef void (*Tell)(void *context, Note note, const char *text);
 
-typedef struct {
+typedef struct Instance {
     Solver solver;
     Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
     Sensitivity along;      /* of the full system, where there is an embedding */
@@ -25,6 +26,7 @@ typedef struct {
     int phase;              /* for the caller, saved with the state */
     int started;            /* 1: the consistent start has been found */
     int running;            /* 1: the start is over, only inputs can be set */
+    Bars *bars;             /* error bars; NULL without */
     Past *past;             /* (estimated_count of the system) */
     int warned;             /* 1: a jump of a prescribed motion has been told; 2 << i: lookup i outside */
     double *places;         /* (lookup_count) scratch */
@@ -34,6 +36,7 @@ typedef struct {
     double *expected;       /* (inputs) values at the end of the latest step */
     int *set;               /* (inputs) 1: set since the latest step */
     int *closed, *count;    /* (contacts) before a step */
+    int *stuck, *slips;     /* (frictions) likewise */
     int *happened;          /* (contacts) */
     double *pull;            /* (contacts) [of f/s^2] acceleration towards each, of exchange.c */
     char *saved, *backup;   /* what must be saved; a copy from before a step */
@@ -51,6 +54,9 @@ void instance_reset(Instance *x);
 
 /* The value of a variable.  FAILED, the cause in x->solver.why, if it cannot be calculated. */
 Status instance_get(Instance *x, const Variable *v, double *value);
+
+/* The same of what lies in a state that `o` was observed at: of this instance, or of a companion. */
+Status instance_value(Solver *s, const Observed *o, const Variable *v, double *value);
 
 /* The value of a variable that is not an output, as it was set. */
 double instance_setting(const Instance *x, const Variable *v);

@@ -35,7 +35,7 @@ typedef struct {
     int count, high; /* from 0 */
 } Ints;
 
-static Status no_state(Instance *x, const char *name, double value) {
+Status restored_none(Instance *x, const char *name, double value) {
     return fail(&x->solver.why, "the saved state is none of this FMU's: its %s is %s", name,
                 digits(value).text);
 }
@@ -43,7 +43,7 @@ static Status no_state(Instance *x, const char *name, double value) {
 static Status numbers(Instance *x, const Number *list, size_t count) {
     for (size_t k = 0; k < count; k++)
         if (!(list[k].value >= list[k].low && list[k].value <= list[k].high))
-            return no_state(x, list[k].name, list[k].value);
+            return restored_none(x, list[k].name, list[k].value);
     return OK;
 }
 
@@ -51,7 +51,7 @@ static Status doubles(Instance *x, const Doubles *list, size_t count) {
     for (size_t k = 0; k < count; k++)
         for (int j = 0; j < list[k].count; j++)
             if (!(list[k].values[j] >= list[k].low && list[k].values[j] <= DBL_MAX))
-                return no_state(x, list[k].name, list[k].values[j]);
+                return restored_none(x, list[k].name, list[k].values[j]);
     return OK;
 }
 
@@ -59,7 +59,7 @@ static Status ints(Instance *x, const Ints *list, size_t count) {
     for (size_t k = 0; k < count; k++)
         for (int j = 0; j < list[k].count; j++)
             if (list[k].values[j] < 0 || list[k].values[j] > list[k].high)
-                return no_state(x, list[k].name, list[k].values[j]);
+                return restored_none(x, list[k].name, list[k].values[j]);
     return OK;
 }
 
@@ -84,16 +84,16 @@ static Status settings(Instance *x) {
         {"stop time", x->stop_time, x->start_time, HUGE_VAL},
         {"time of the inputs", x->solver.drive.since, -DBL_MAX, DBL_MAX},
     };
-    if (!offered(given->method)) return no_state(x, "given method", (double)given->method);
-    if (x->started && !offered(s->method)) return no_state(x, "method", (double)s->method);
+    if (!offered(given->method)) return restored_none(x, "given method", (double)given->method);
+    if (x->started && !offered(s->method)) return restored_none(x, "method", (double)s->method);
     if (x->started && !(x->solver.stop_time >= x->start_time))
-        return no_state(x, "stop time", x->solver.stop_time);
+        return restored_none(x, "stop time", x->solver.stop_time);
     return numbers(x, list, sizeof list / sizeof *list);
 }
 
 /* What the method `auto` remembers. */
-static Status choice(Instance *x) {
-    const Choice *c = &x->solver.state.now.choice;
+static Status choice(Instance *x, const Solver *s) {
+    const Choice *c = &s->state.now.choice;
     const Ints list[] = {
         {"stiffness mode", &c->implicit, 1, 1},  {"stiffness turn", &c->turn, 1, 1},
         {"stiffness memory", &c->unseen, 1, MOST}, {"stiffness memory", &c->stiff, 1, MOST},
@@ -108,22 +108,23 @@ static Status choice(Instance *x) {
         {"rho / sigma", c->ratio, 0, HUGE_VAL},
     };
     if ((c->implicit || c->turn) &&
-        (x->solver.settings.method != AUTO || PARTS.methods[RADAU5] == NULL))
-        return no_state(x, "stiffness mode", c->implicit);
+        (s->settings.method != AUTO || PARTS.methods[RADAU5] == NULL))
+        return restored_none(x, "stiffness mode", c->implicit);
     if (ints(x, list, sizeof list / sizeof *list) != OK) return FAILED;
     return numbers(x, sizes, sizeof sizes / sizeof *sizes);
 }
 
 /* Time, and the step ahead. */
-static Status times(Instance *x) {
-    const Numbers *now = &x->solver.state.now;
+static Status times(Instance *x, const Solver *s) {
+    const Numbers *now = &s->state.now;
     const Ints flags[] = {
         {"step count", &now->steps, 1, MOST},
         {"step count", &now->tiny, 1, MOST},
+        {"count of impacts", &now->strikes, 1, MOST},
         {"mode of the step ahead", &now->ahead, 1, 1},
         {"mode of the step ahead", &now->fresh, 1, 1},
         {"rank of the constraints", &now->dependent, 1, 1},
-        {"count of events", &now->event_count, 1, indicators_count(x->solver.system)},
+        {"count of events", &now->event_count, 1, indicators_count(s->system)},
     };
     const Number list[] = {
         {"time", now->t, -DBL_MAX, DBL_MAX},
@@ -138,21 +139,23 @@ static Status times(Instance *x) {
         {"energy dissipated", now->lost, -DBL_MAX, DBL_MAX},
         {"energy dissipated", now->lost_old, -DBL_MAX, DBL_MAX},
         {"energy dissipated", now->lost_ahead, -DBL_MAX, DBL_MAX},
+        {"sum of local errors", now->local[0], 0, DBL_MAX},
+        {"sum of local errors", now->local[1], 0, DBL_MAX},
     };
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (numbers(x, list, sizeof list / sizeof *list) != OK) return FAILED;
-    if (now->ahead && !(now->t <= now->t_integrator && now->t <= x->solver.stop_time))
-        return no_state(x, "integrator's time", now->t_integrator);
+    if (now->ahead && !(now->t <= now->t_integrator && now->t <= s->stop_time))
+        return restored_none(x, "integrator's time", now->t_integrator);
     if (now->ahead && now->event_count > 0 &&
         !(now->event_time >= now->t_old && now->event_time <= now->t_integrator))
-        return no_state(x, "time of the event", now->event_time);
+        return restored_none(x, "time of the event", now->event_time);
     return OK;
 }
 
 /* How frictions stand: a mode, a sign and, once it has been found, a unit vector. */
-static Status slides(Instance *x) {
-    const State *a = &x->solver.state;
-    for (int k = 0; k < x->solver.system->frictions; k++) {
+static Status slides(Instance *x, const Solver *s) {
+    const State *a = &s->state;
+    for (int k = 0; k < s->system->frictions; k++) {
         const Slide *slide = &a->slide[k];
         const double length = hypot(slide->direction[0], slide->direction[1]);
         const Ints flags[] = {{"modes", &slide->sticks, 1, 1}};
@@ -160,14 +163,13 @@ static Status slides(Instance *x) {
             {"slip velocity of rounding", slide->noise, 0, DBL_MAX},
             {"direction of slip", length, x->started ? 1 - 1e-9 : 0, 1 + 1e-9},
         };
-        if (x->started && fabs(slide->sign) != 1) return no_state(x, "sign", slide->sign);
+        if (x->started && fabs(slide->sign) != 1) return restored_none(x, "sign", slide->sign);
         if (ints(x, flags, 1) != OK || numbers(x, list, 2) != OK) return FAILED;
     }
     return OK;
 }
 
-static Status arrays(Instance *x) {
-    const Solver *s = &x->solver;
+static Status arrays(Instance *x, const Solver *s) {
     const State *a = &s->state;
     const System *system = s->system;
     const int n = system->n, contacts = system->contacts, inputs = system->inputs, ny = 2 * n;
@@ -213,11 +215,11 @@ static Status arrays(Instance *x) {
     for (int k = 0; x->started && k < system->jumps; k++)
         if (!(system->floors[k] ? a->level[k] - 0.5 == floor(a->level[k])
                                 : fabs(a->level[k]) == 1 || a->level[k] == 0))
-            return no_state(x, "levels of jumps", a->level[k]);
+            return restored_none(x, "levels of jumps", a->level[k]);
     if (doubles(x, list, sizeof list / sizeof *list) != OK) return FAILED;
-    if (slides(x) != OK) return FAILED;
+    if (slides(x, s) != OK) return FAILED;
     for (int k = 0; k < watched; k++) /* 1 upwards, -1 downwards */
-        if (a->left[k] < -1 || a->left[k] > 1) return no_state(x, "events", a->left[k]);
+        if (a->left[k] < -1 || a->left[k] > 1) return restored_none(x, "events", a->left[k]);
     return ints(x, flags, sizeof flags / sizeof *flags);
 }
 
@@ -226,11 +228,11 @@ static Status pasts(Instance *x) {
     for (int i = 0; i < x->solver.system->estimated_count; i++) {
         const Past *past = &x->past[i];
         if (past->count < 0 || past->count > RATES_KEPT || !(fabs(past->rate) <= DBL_MAX))
-            return no_state(x, "past of an input", past->count);
+            return restored_none(x, "past of an input", past->count);
         for (int k = 0; k < past->count; k++)
             if (!(fabs(past->u[k]) <= DBL_MAX && fabs(past->t[k]) <= DBL_MAX) ||
                 (k > 0 && !(past->t[k] < past->t[k - 1])))
-                return no_state(x, "past of an input", past->t[k]);
+                return restored_none(x, "past of an input", past->t[k]);
     }
     return OK;
 }
@@ -242,9 +244,14 @@ static Status bounds(Instance *x) {
         if (v->type != TYPE_REAL || (v->role != ROLE_PARAMETER && v->role != ROLE_SOLVER)) continue;
         const double value = instance_setting(x, v);
         if (!(value >= v->min && value <= v->max) || (v->positive && !(value > 0)))
-            return no_state(x, v->name, value);
+            return restored_none(x, v->name, value);
     }
     return OK;
+}
+
+Status restored_solver(Instance *x, const Solver *s) {
+    if (choice(x, s) != OK || times(x, s) != OK) return FAILED;
+    return arrays(x, s);
 }
 
 Status instance_restored(Instance *x) {
@@ -255,8 +262,8 @@ Status instance_restored(Instance *x) {
         {"mode", &x->warned, 1, INT_MAX}, /* bits of what has been told */
     };
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
-    if (x->running && !x->started) return no_state(x, "mode", x->running);
-    if (settings(x) != OK || choice(x) != OK || times(x) != OK) return FAILED;
-    if (pasts(x) != OK) return FAILED;
-    return arrays(x) == OK ? bounds(x) : FAILED;
+    if (x->running && !x->started) return restored_none(x, "mode", x->running);
+    if (settings(x) != OK || restored_solver(x, &x->solver) != OK) return FAILED;
+    if (pasts(x) != OK || bounds(x) != OK) return FAILED;
+    return ERROR_BARS != NULL ? ERROR_BARS->restored(x) : OK;
 }

@@ -8,4 +8,8 @@
  * of this FMU, the cause is in x->solver.why; nothing of it must be used. */
 Status instance_restored(Instance *x);
 
+/* The same of one solver of it alone; and why a state is none. */
+Status restored_solver(Instance *x, const Solver *s);
+Status restored_none(Instance *x, const char *name, double value);
+
 #endif

@@ -29,7 +29,8 @@ typedef enum {
     AT_SLIP,                                 /* twice the friction's index, and one more for its second row */
     AT_SLIP_COUNT, AT_SLIP_TIME,             /* friction index */
     AT_SLIP_Q, AT_SLIP_V,                    /* coordinate index, of friction `contact` */
-    AT_LOST                                  /* energy dissipated */
+    AT_LOST,                                 /* energy dissipated */
+    AT_ERROR           /* error bar number `contact`, of the variable at position `index` (bars.h) */
 } Place;
 
 typedef struct {

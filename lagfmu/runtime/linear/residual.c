@@ -7,8 +7,8 @@
 #include "doubled.h"
 #include "schur.h"
 
-void residual(const Linear *l, const double *b, const double *c, const double *x,
-              const double *lambda, double *r, double *g) {
+void linear_residual(const Linear *l, const double *b, const double *c, const double *x,
+                     const double *lambda, double *r, double *g) {
     const System *s = l->system;
     for (int i = 0; i < s->n; i++) r[i] = b != NULL ? b[i] : 0;
     for (int a = 0; a < s->masses; a++) {

@@ -6,8 +6,8 @@
 
 /* r = b + G^T lambda - M x (n) and g = c - G x (m; 0 where a row does not act), in working
  * precision. b may be NULL (zero). */
-void residual(const Linear *l, const double *b, const double *c, const double *x,
-              const double *lambda, double *r, double *g);
+void linear_residual(const Linear *l, const double *b, const double *c, const double *x,
+                     const double *lambda, double *r, double *g);
 
 /* The same for x + x_low and lambda + lambda_low, each product and sum in doubled precision.
  * `r_low` is scratch (n). */

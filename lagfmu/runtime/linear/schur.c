@@ -274,7 +274,7 @@ static void refine_once(Linear *l, int doubled, const double *b, const double *c
         residual_doubled(l, b, c, x, own->x_low, lambda, own->lambda_low, own->r, own->r_low,
                          own->g);
     else
-        residual(l, b, c, x, lambda, own->r, own->g);
+        linear_residual(l, b, c, x, lambda, own->r, own->g);
     substitute(l, own->r, own->g, own->dx, own->dlambda);
     if (doubled) {
         doubled_move(s->n, x, own->x_low, own->dx);

@@ -15,8 +15,6 @@
 
 #include "digits.h"
 
-static const double SAFE = 1e-9; /* 1 + A below this counts as not positive */
-
 static void layout(Mechanism *b, Arena *arena) {
     const System *s = b->system;
     const int n = s->n, m = s->m, count = s->frictions;
@@ -110,51 +108,6 @@ static Status find_law(Mechanism *b, Instant at, const double *q, const double *
     return OK;
 }
 
-Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value) {
-    fail(b->why, "friction ");
-    for (int i = 0; i < count; i++)
-        why_append(b->why, "%s'%s'", i > 0 ? ", " : "", b->system->friction[which[i]].name);
-    why_append(b->why,
-               ": sliding has no acceleration, or several, at t = %s s (Painleve's paradox: the normal "
-               "force would drive itself, 1 + A = %.3g, expected above 0): use a smaller coefficient of "
-               "friction, or let the bodies deform (a spring in the contact)",
-               digits(t).text, value);
-    return FAILED;
-}
-
-/* Gauss's elimination with row exchanges of A x = right, (size, size); the determinant. */
-static double eliminate(int size, double *A, double *right) {
-    double determinant = 1;
-    for (int k = 0; k < size; k++) {
-        int top = k;
-        for (int i = k + 1; i < size; i++)
-            if (fabs(A[i * size + k]) > fabs(A[top * size + k])) top = i;
-        if (A[top * size + k] == 0) return 0;
-        if (top != k) {
-            for (int j = 0; j < size; j++) {
-                const double held = A[k * size + j];
-                A[k * size + j] = A[top * size + j];
-                A[top * size + j] = held;
-            }
-            const double held = right[k];
-            right[k] = right[top];
-            right[top] = held;
-            determinant = -determinant;
-        }
-        determinant *= A[k * size + k];
-        for (int i = k + 1; i < size; i++) {
-            const double part = A[i * size + k] / A[k * size + k];
-            for (int j = k; j < size; j++) A[i * size + j] -= part * A[k * size + j];
-            right[i] -= part * right[k];
-        }
-    }
-    for (int k = size - 1; k >= 0; k--) {
-        for (int j = k + 1; j < size; j++) right[k] -= A[k * size + j] * right[j];
-        right[k] /= A[k * size + k];
-    }
-    return determinant;
-}
-
 /* d = G_t^T e of friction i. */
 static void find_push(Mechanism *b, int i) {
     const System *s = b->system;
@@ -189,7 +142,8 @@ static Status slide(Mechanism *b, double t, int count) {
         if (!(least > SAFE)) return friction_paradox(b, t, &i, 1, least);
         f->A[h * count + h] += 1;
     }
-    const double determinant = eliminate(count, f->A, f->right);
+    memcpy(f->minor, f->A, (size_t)(count * count) * sizeof *f->A);
+    const double determinant = friction_eliminate(count, f->A, f->right);
     if (!(determinant > SAFE)) return friction_paradox(b, t, f->sliding, count, determinant);
     for (int g = 0; g < count; g++) {
         const int i = f->sliding[g];
@@ -204,7 +158,7 @@ static Status slide(Mechanism *b, double t, int count) {
             b->lambda[s->friction[i].row[r]] =
                 -f->mu[2 * i + 1] * f->normal[i] * f->towards[2 * i + r];
     }
-    return OK;
+    return friction_opened(b, t, count, determinant);
 }
 
 static double tangential(const Mechanism *b, int i, const double *lambda, double force[2]) {

@@ -9,6 +9,8 @@
 
 #include "mechanism.h"
 
+#define SAFE 1e-9 /* 1 + A below this counts as not positive */
+
 /* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
  * slip velocity where that is zero or was last known; slip velocities up to `noise` [m/s] are rounding. */
 typedef struct {
@@ -35,7 +37,7 @@ struct Frictions {
     double *d, *zero, *first, *right; /* (n), (m), (m), (frictions) */
     double *answer;      /* (frictions n) accelerations, to each d alone */
     double *pushed;      /* (frictions m) multipliers, to each d alone */
-    double *A, *minor;   /* (frictions^2) */
+    double *A, *minor;   /* (frictions^2), and 1 + A of those that slip */
     double *share;       /* of share.c */
 };
 
@@ -52,8 +54,15 @@ double friction_normal(const Mechanism *b, int i, const double *lambda);
  * leg stay smooth there. */
 void friction_heading(const Slide *slide, const double s[2], double e[2]);
 
-/* The refusal of a sliding problem that has no acceleration, or several (Painleve). */
+/* painleve.c -- the refusal of a sliding problem that has no acceleration, or several. */
 Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value);
+
+/* FAILED where that is so with some of the contacts open; `determinant` of 1 + A, which is in f->minor, of
+ * the `count` frictions that slip. */
+Status friction_opened(Mechanism *b, double t, int count, double determinant);
+
+/* Gauss's elimination with row exchanges of A x = right, (size, size); the determinant. */
+double friction_eliminate(int size, double *A, double *right);
 
 /* share.c -- redundant sticking: of the multipliers that hold the same motion, b->lambda becomes the one of
  * least norm within the cones, or the nearest to it; `best` (m): those of the largest least reserve. */

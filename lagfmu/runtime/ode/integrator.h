@@ -73,6 +73,9 @@ extern const Method dop853, rk4, radau5;
 /* rk4: estimate of the error of one component in the step just taken. */
 double rk4_error(const Integrator *i, int component);
 
+/* dop853: the same, before prepare_dense. */
+double dop853_error(const Integrator *i, int component);
+
 /* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
  * f_old, dense) come from `saved`, the scratch from `scratch`. */
 void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,

@@ -93,6 +93,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     const int watch = indicators_count(s->system) > 0;
     double *y1 = s->work_advance;
     if (leg_step(s, i, bound, longest) != OK) return FAILED;
+    if (s->coarser > 0) PARTS.after_step(s, i);
     if ((watch || i->t > t_end) && leg_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (leg_project(s, i->t, y1) != OK) return FAILED;

@@ -62,10 +62,17 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
                                 dfdt);
 }
 
+double leg_fewest_steps(const Solver *s) {
+    return s->settings.method == RATTLE ? FEWEST_STEPS_RATTLE : FEWEST_STEPS_RK4;
+}
+
+double leg_natural_step(const Solver *s) {
+    return 1 / (leg_fewest_steps(s) * s->state.now.rate);
+}
+
 static Control control(const Solver *s, const Integrator *i, double longest) {
     const Settings *set = &s->settings;
-    const double fewest = set->method == RATTLE ? FEWEST_STEPS_RATTLE : FEWEST_STEPS_RK4;
-    const double fixed = set->step > 0 ? set->step : 1 / (fewest * s->state.now.rate);
+    const double fixed = set->step > 0 ? set->step : leg_natural_step(s);
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
     if (!s->integrator.method->fixed) magnitudes_shared(s, i->y, s->scale);
     return (Control){SAFETY * set->tolerance, s->scale, longest < HUGE_VAL ? longest : 0,

@@ -11,6 +11,11 @@
 /* The rows that act in the present modes. */
 void leg_begin(Solver *s);
 
+/* The fixed step [s] that the motion's natural rate says where solver.step does not, and how many of them
+ * there are in a natural time. */
+double leg_natural_step(const Solver *s);
+double leg_fewest_steps(const Solver *s);
+
 /* Where `stepped` was solved for all rows that act, on the constraints: which of them depend on others is
  * remembered; factors are lost. */
 void leg_choose_rows(Solver *s);

@@ -5,6 +5,7 @@
 #ifndef LAGFMU_PARTS_H
 #define LAGFMU_PARTS_H
 
+#include "companion.h"
 #include "contacts.h"
 #include "events.h"
 #include "impact.h"
@@ -17,6 +18,9 @@ typedef struct {
     /* Integrators by MethodName, that of AUTO being the explicit one; NULL where it is left out. */
     const Method *methods[METHOD_COUNT];
     double (*rk4_error)(const Integrator *i, int component);
+    /* Of error bars; NULL without. */
+    double (*dop853_error)(const Integrator *i, int component);
+    void (*after_step)(Solver *s, Integrator *i);
     Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *level,
                           const double *u, const double *p, const Control *control,
                           double t_bound);

@@ -49,6 +49,8 @@ typedef struct {
     Choice choice;       /* of the method `auto` */
     double lost;         /* [J] that frictions and impacts have dissipated, ... */
     double lost_old, lost_ahead; /* ... and so far where the integrator began its step, and stands */
+    int strikes;         /* impacts so far: contacts that were struck */
+    double local[2];     /* of error bars: sums over the steps of explicit and implicit methods, companion.c */
 } Numbers;
 
 /* ... and its arrays, which lie in one block. */

@@ -145,6 +145,7 @@ Status switch_modes(Solver *s, const int *happened) {
     for (int c = 0; c < contacts; c++) {
         if (s->state.closed[c] && !x.closed[c]) note_departure(s, c);
         if (happened[c] || x.struck[c]) s->state.armed[c] = 0;
+        s->state.now.strikes += x.struck[c];
         s->state.closed[c] = x.closed[c];
     }
     return OK;

@@ -7,7 +7,7 @@ times as the FMU's default experiment does at its default values.
 Two runs that must agree are compared with what the problem itself makes of small changes: a third
 run, whose start values are shifted by SHIFT of their size, shows the amplification; a difference is
 right up to SAFETY * tol * max(1, N) times (1 + amplification so far), relative to the largest
-magnitude of the column.  N as in claims.py.
+magnitude of the column.  N as in closed_forms.py.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import names
 from ...fmu.session import RefusalError
-from .claims import laws, statements
+from .closed_forms import judged, laws
 from .facts import Facts, facts_of
 from .judge import EPS, Check, invariants, lost
 from .player import Drive, Player, Run, Values, play
@@ -51,7 +52,7 @@ class Bench:
         self.facts: Facts = facts_of(path)
         self.quick = quick
         self.forms = (
-            *statements(self.facts.claims, {i.name for i in self.facts.inputs}),
+            *judged(self.facts.closed_forms, {i.name for i in self.facts.inputs}),
             *laws(self.facts.laws),
         )
         self.folder = Path(fmpy.extract(str(path)))
@@ -106,7 +107,7 @@ class Bench:
             rounding = EPS * abs(float(values.get(q, 0.0)))  # of a start that was projected onto 0
             place = abs(seen[q]) if abs(seen[q]) > rounding else 0.0
             size = max(place, self.facts.same_unit(q, known)) or 1.0
-            v, vdot = abs(seen[f"der({q})"]), abs(seen[f"der({q},2)"])
+            v, vdot = abs(seen[names.derivative(q)]), abs(seen[names.derivative(q, 2)])
             largest = max(largest, v / size, float(np.sqrt(vdot / size)))
         return largest if np.isfinite(largest) else 0.0
 
@@ -154,15 +155,27 @@ class Bench:
             count = 0.0
         return max(count, 1.0)
 
-    def _counted(self, run: Run) -> NDArray[np.float64]:
-        """The integral of the natural rate over time."""
+    @cached_property
+    def fastest_rate(self) -> float:
+        """The largest natural rate [1/s] in the default experiment.  Raises RefusalError."""
+        return max(float(self._rates(self.ordinary).max()), self.ordinary_rate)
+
+    def _rates(self, run: Run) -> NDArray[np.float64]:
+        """The natural rate at each point."""
         rate = np.zeros(len(run.rows))
         with np.errstate(all="ignore"):
             for q in self.facts.coordinates:
                 size = np.maximum(np.abs(run.rows[q]), self.facts.same_unit(q, run.values))
                 size = np.where(size > 0, size, 1.0)
-                v, vdot = np.abs(run.rows[f"der({q})"]), np.abs(run.rows[f"der({q},2)"])
+                v = np.abs(run.rows[names.derivative(q)])
+                vdot = np.abs(run.rows[names.derivative(q, 2)])
                 rate = np.maximum(rate, np.maximum(v / size, np.sqrt(vdot / size)))
+        return rate
+
+    def _counted(self, run: Run) -> NDArray[np.float64]:
+        """The integral of the natural rate over time."""
+        rate = self._rates(run)
+        with np.errstate(all="ignore"):
             parts = np.diff(run.rows["time"]) * (rate[1:] + rate[:-1]) / 2
         counted: NDArray[np.float64] = np.concatenate([[0.0], np.cumsum(parts)])[: len(rate)]
         return np.where(np.isfinite(counted), counted, 0.0)
@@ -215,18 +228,19 @@ class Bench:
         a, b = run.rows[:n], other.rows[:n]
         alike = np.ones(n, dtype=bool)
         for c in facts.contacts:
-            differ = np.asarray(a[f"contact.{c}"] != b[f"contact.{c}"])
+            differ = np.asarray(a[names.name(names.CONTACT, c)] != b[names.name(names.CONTACT, c)])
             alone = differ.copy()
             alone[1:] &= ~differ[:-1]
             alone[:-1] &= ~differ[1:]
             alike &= ~alone
-        groups = [facts.coordinates, [f"der({q})" for q in facts.coordinates]]
-        groups += [[f"lambda.{c}" for c in facts.constraints]]
-        groups += [[f"Q.{q}" for q in facts.coordinates if f"Q.{q}" in facts.variables]]
-        for names in groups:
-            largest = {x: float(np.abs(a[x]).max(initial=0.0)) for x in names}
-            for x in names:
-                peers = [largest[y] for y in names if facts.dimensions[y] == facts.dimensions[x]]
+        groups = [facts.coordinates, [names.derivative(q) for q in facts.coordinates]]
+        groups += [[names.name(names.MULTIPLIER, c) for c in facts.constraints]]
+        forces = [names.name(names.FORCE, "", q) for q in facts.coordinates]
+        groups += [[n for n in forces if n in facts.variables]]
+        for group in groups:
+            largest = {x: float(np.abs(a[x]).max(initial=0.0)) for x in group}
+            for x in group:
+                peers = [largest[y] for y in group if facts.dimensions[y] == facts.dimensions[x]]
                 usual = float(np.abs(self.ordinary.rows[x]).max())
                 scale = max(*peers, usual, facts.same_unit(x, run.values)) or 1.0
                 error = np.where(alike, np.abs(a[x] - b[x]), 0.0)
@@ -235,11 +249,11 @@ class Bench:
 
     def _rounding(self, name: str) -> float:
         """A difference that is none: of a motion that is none (a rod that falls flat does not turn)."""
-        q = name.removeprefix("der(").removesuffix(")")
-        if q not in self.facts.coordinates:
+        of = names.read(name)
+        if of.quantity != names.VALUE or of.coordinate not in self.facts.coordinates:
             return 0.0
-        speed = self.ordinary_rate if name != q else 1.0
-        return 100 * EPS * speed * self.facts.usual(q)
+        speed = self.ordinary_rate if of.order else 1.0
+        return 100 * EPS * speed * self.facts.usual(of.coordinate)
 
     def agreement(
         self,

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ... import names
 from ...errors import VerificationError
-from ...fmu.claims import Claim, tables_in, unpack_closed_forms
+from ...fmu.closed_forms import CarriedForm, tables_in, unpack_closed_forms
 from ...verification.simulate import file_stem, read_description
-from ...verification.verify import RECORD, claims_in
+from ...verification.verify import RECORD, closed_forms_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -48,8 +49,8 @@ class Facts:
     coordinates: tuple[str, ...]
     constraints: tuple[str, ...]
     contacts: tuple[str, ...]
-    claims: tuple[Claim, ...]
-    laws: tuple[Claim, ...]
+    closed_forms: tuple[CarriedForm, ...]
+    laws: tuple[CarriedForm, ...]
     dimensions: Mapping[str, Dimension]
     stop_time: float
     step_size: float
@@ -59,13 +60,13 @@ class Facts:
 
     def share(self, constraint: str, coordinate: str) -> str | None:
         """The output with the constraint's share in Q, if it acts on the coordinate."""
-        name = f"Q.{constraint}.{coordinate}"
+        name = names.name(names.FORCE, constraint, coordinate)
         return name if name in self.variables else None
 
     def rates(self, constraint: str) -> bool:
         """True if the residual is a velocity: lambda times it is a power (W), else an energy (J)."""
-        lam = self.dimensions[f"lambda.{constraint}"]
-        left = self.dimensions[f"residual.{constraint}"]
+        lam = self.dimensions[names.name(names.MULTIPLIER, constraint)]
+        left = self.dimensions[names.name(names.RESIDUAL, constraint)]
         return lam[2] + left[2] == -3
 
     def usual(self, coordinate: str) -> float:
@@ -94,9 +95,9 @@ class Facts:
 def facts_of(path: Path) -> Facts:
     """Raises VerificationError if the file is no FMU of lagfmu for co-simulation."""
     description = read_description(path)
-    claims = claims_in(path)
+    closed_forms = closed_forms_in(path)
     variables = {v.name: v for v in description.modelVariables}
-    if description.coSimulation is None or "solver.method" not in variables:
+    if description.coSimulation is None or names.METHOD not in variables:
         raise VerificationError(
             f"{str(path)!r} was not built by lagfmu, or for a scene that leaves out what it would be "
             "judged by: stress the model's full FMU"
@@ -113,9 +114,9 @@ def facts_of(path: Path) -> Facts:
     experiment = description.defaultExperiment
     stop = float(getattr(experiment, "stopTime", None) or 1.0)
     coordinates = tuple(
-        v.name for v in reals if f"der({v.name},2)" in variables and v.causality != "input"
+        v.name for v in reals if names.derivative(v.name, 2) in variables and v.causality != "input"
     )
-    moving = {*coordinates, *(f"der({c})" for c in coordinates)}
+    moving = {*coordinates, *(names.derivative(c) for c in coordinates)}
     return Facts(
         path=path,
         name=file_stem(description),
@@ -130,15 +131,15 @@ def facts_of(path: Path) -> Facts:
         parameters=tuple(
             _settable(v)
             for v in reals
-            if v.causality == "parameter" and not v.name.startswith("solver.")
+            if v.causality == "parameter" and names.read(v.name).head != names.SOLVER
         ),
         starts=tuple(_settable(v) for v in reals if v.name in moving and v.start is not None),
         inputs=tuple(_settable(v) for v in reals if v.causality == "input"),
         motions=_motions([v.name for v in reals if v.causality == "input"]),
         coordinates=coordinates,
-        constraints=tuple(v.name[len("lambda.") :] for v in reals if v.name.startswith("lambda.")),
-        contacts=tuple(n[len("contact.") :] for n in variables if n.startswith("contact.")),
-        claims=tuple(claims),
+        constraints=tuple(names.constraints((v.name for v in reals), names.MULTIPLIER)),
+        contacts=tuple(names.constraints(variables, names.CONTACT)),
+        closed_forms=tuple(closed_forms),
         laws=_laws(path),
         dimensions={v.name: bases.get(v.unit, (0,) * len(BASE)) for v in reals}
         | {"time": (0, 0, 1) + (0,) * (len(BASE) - 3)},
@@ -150,8 +151,8 @@ def facts_of(path: Path) -> Facts:
 
 
 def _motions(inputs: list[str]) -> frozenset[str]:
-    rates = {n for n in inputs if n.startswith("der(")}
-    moving = {n.removeprefix("der(").removesuffix(")").removesuffix(",2") for n in rates}
+    rates = {n for n in inputs if names.read(n).order}
+    moving = {names.read(n).coordinate for n in rates}
     return frozenset(rates | moving)
 
 
@@ -160,7 +161,7 @@ def beside(path: Path) -> Path:
     return path.with_suffix(".lagrange.json")
 
 
-def _laws(path: Path) -> tuple[Claim, ...]:
+def _laws(path: Path) -> tuple[CarriedForm, ...]:
     file = beside(path)
     return tuple(unpack_closed_forms(file.read_bytes(), str(file))) if file.exists() else ()
 

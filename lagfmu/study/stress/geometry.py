@@ -12,9 +12,12 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ...fmu.claims import pack_closed_forms, unpack_closed_forms
+from ... import names
+from ...fmu.closed_forms import pack_closed_forms, unpack_closed_forms
 from ...model.closed_form import TIME, ClosedForm
 from ...model.model import Contact, Model, Nonholonomic, name_of
+from ...model.reactions import reactions_in
+from ...names import read
 from ...prepare.prepare import Prepared
 
 Expr = Any
@@ -36,7 +39,7 @@ class Collision:
 
 class Geometry:
     """`contacts`, `bilateral`: which constraints are; the others, `rough`, hold by friction, or while a
-    contact is closed."""
+    contact is closed: by those that `gates` (m, m) names."""
 
     def __init__(self, forms: Mapping[str, Expr]) -> None:
         kinds = [n.split(":") for n in forms if n.startswith("kind:")]
@@ -47,6 +50,8 @@ class Geometry:
             for kind in ("contact", "bilateral", "rough")
         )
         self.rough = bool(rough.any())
+        pairs = [n.split(":")[1:] for n in forms if n.startswith("gate:")]
+        self.gates = np.array([[[c, by] in pairs for by in self.names] for c in self.names], float)
         self.forms = forms
         self.symbols = sorted({s for e in forms.values() for s in e.free_symbols}, key=str)
         self.needs = [str(s) for s in self.symbols]
@@ -67,15 +72,15 @@ class Geometry:
                 G[k, i] = known.get(f"row:{c}:{a}", 0.0)
         for k, c in enumerate(self.names):
             each[:, k] = [known.get(f"{what}:{c}", 0.0) for what in ("gap", "speed", "restitution")]
-        v = np.array([values[f"der({n})"] for n in self.coordinates])
+        v = np.array([values[names.derivative(n)] for n in self.coordinates])
         f, s, e = each
         return Collision(M, G, f, s, e, G @ v - s)
 
 
 def lay_geometry(fmu: Path, prepared: Prepared) -> None:
     """Write it to where the judge of the FMU looks for it."""
-    names = {v.name for v in prepared.table.variables}
-    forms = [ClosedForm(n, e, sp.S.Zero) for n, e in _forms(prepared.model, names).items()]
+    known = {v.name for v in prepared.table.variables}
+    forms = [ClosedForm(n, e, sp.S.Zero) for n, e in _forms(prepared.model, known).items()]
     _beside(fmu).write_bytes(pack_closed_forms(prepared.scene, forms, prepared.table))
 
 
@@ -84,8 +89,8 @@ def geometry_of(fmu: Path) -> Geometry | None:
     file = _beside(fmu)
     if not file.exists():
         return None
-    claims = unpack_closed_forms(file.read_bytes(), str(file))
-    forms = {c.name: sp.sympify(c.expected) for c in claims}
+    closed_forms = unpack_closed_forms(file.read_bytes(), str(file))
+    forms = {c.name: sp.sympify(c.expected) for c in closed_forms}
     return Geometry(forms) if forms.get("count") == len(forms) - 1 else None
 
 
@@ -98,22 +103,27 @@ def _beside(fmu: Path) -> Path:
     return fmu.with_suffix(".impacts.json")
 
 
-def _forms(model: Model, names: set[str]) -> dict[str, Expr]:
+def _forms(model: Model, known: set[str]) -> dict[str, Expr]:
     forms: dict[str, Expr] = {}
     rates = {q: q.diff(TIME) for q in model.coordinates}
     for q, v in rates.items():
         forms[f"coordinate:{name_of(q)}"] = sp.S.One
         for p, w in rates.items():
             forms[f"mass:{name_of(q)}:{name_of(p)}"] = model.energy_expression.diff(v, w)
-    by_friction = {name for law in model.frictions for name in law.of}
+    by_friction = {name: law for law in model.frictions for name in law.of}
     for c in model.constraints:
         f = sp.sympify(c.expression)
         speed = f if isinstance(c, Nonholonomic) else f.diff(TIME)
-        gated = not isinstance(c, Contact) and c.while_closed is not None
-        kind = "rough" if gated or c.name in by_friction else "bilateral"
+        gate = None if isinstance(c, Contact) else c.while_closed
+        kind = "rough" if gate is not None or c.name in by_friction else "bilateral"
         if isinstance(c, Contact):
             kind = "contact"
         forms[f"kind:{c.name}:{kind}"] = sp.S.One
+        gates = set() if gate is None else {gate}
+        if c.name in by_friction:
+            normal = sp.sympify(by_friction[c.name].normal)
+            gates |= {read(str(s)).constraint for s in reactions_in(normal)}
+        forms |= {f"gate:{c.name}:{by}": sp.S.One for by in gates}
         forms[f"gap:{c.name}"] = sp.S.Zero if isinstance(c, Nonholonomic) else f
         forms[f"speed:{c.name}"] = speed
         for q, v in rates.items():
@@ -121,6 +131,6 @@ def _forms(model: Model, names: set[str]) -> dict[str, Expr]:
         if isinstance(c, Contact):
             forms[f"restitution:{c.name}"] = sp.sympify(c.restitution)
     forms = {n: e for n, e in forms.items() if e != 0}
-    if any(f"der({name_of(q)})" not in names for q in rates):
+    if any(names.derivative(name_of(q)) not in known for q in rates):
         forms = {}
     return forms | {"count": sp.Integer(len(forms))}

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from ... import names
 from .bench import Bench, Finding
 from .facts import Facts
 from .geometry import Collision, Geometry, geometry_of, twin
@@ -71,9 +72,8 @@ def _known(facts: Facts) -> Values:
 
 
 def _state(geometry: Geometry, q: Vector, v: Vector) -> Values:
-    names = geometry.coordinates
-    moving = dict(zip((f"der({n})" for n in names), v.tolist(), strict=True))
-    return dict(zip(names, q.tolist(), strict=True)) | moving
+    states = names.motion(geometry.coordinates)
+    return dict(zip(states, [*q.tolist(), *v.tolist()], strict=True))
 
 
 def _sizes(facts: Facts, geometry: Geometry, known: Values, q: Vector) -> Vector:
@@ -151,10 +151,10 @@ def _impact(
     player.step(2 * time)
     after = player.read()
 
-    def of(seen: Mapping[str, Any], what: str) -> Vector:
-        return np.array([seen[f"der({n}{what})"] for n in geometry.coordinates])
+    def of(seen: Mapping[str, Any], order: int) -> Vector:
+        return np.array([seen[names.derivative(n, order)] for n in geometry.coordinates])
 
-    return v + of(before, ",2") * time, of(after, "") - of(after, ",2") * time
+    return v + of(before, 2) * time, of(after, 1) - of(after, 2) * time
 
 
 def _strike(geometry: Geometry, chosen: list[int], place: Vector, bench: Bench) -> Finding:
@@ -265,6 +265,7 @@ def _alike(geometry: Geometry, here: Collision, there: Collision, signs: Vector)
         table = np.column_stack([geometry.contacts, one.f, one.s, one.e, G])
         turned = np.where(geometry.contacts, 1.0, np.sign(one.s))  # f = 0 is -f = 0
         table[:, [1, 2, *range(4, table.shape[1])]] *= turned[:, None]
+        table = np.hstack([table, geometry.gates @ np.column_stack([one.f, G])])
         return table[np.lexsort(np.round(table, 9).T)]
 
     return np.allclose(described(here, here.G), described(there, there.G * signs), atol=1e-8)

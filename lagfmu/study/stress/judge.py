@@ -8,7 +8,7 @@
   push         lambda >= 0 while a contact is closed, within 10 tol of the largest |lambda|
   no pull      lambda = 0, exactly, while it is open: f lambda = 0
   outside      f >= 0 while it is open, within the gap of 1e-9 of f's own size in which it touches
-  claims       the closed forms and conserved quantities (claims.py)
+  closed_forms       the closed forms and conserved quantities (closed_forms.py)
 
 Each comes as an error and what is allowed; the run is right if no error exceeds what it is allowed.
 """
@@ -22,7 +22,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .claims import Statement, undisturbed
+from ... import names
+from .closed_forms import JudgedForm, undisturbed
 from .facts import Facts
 from .player import Run
 
@@ -49,8 +50,8 @@ class Check:
         return self.error / self.allowed if self.allowed > 0 else float(self.error > 0) * np.inf
 
 
-def invariants(facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Column) -> list[Check]:
-    """All checks of a run, at the points that were reached; `elapsed` as in claims.py."""
+def invariants(facts: Facts, run: Run, forms: Sequence[JudgedForm], elapsed: Column) -> list[Check]:
+    """All checks of a run, at the points that were reached; `elapsed` as in closed_forms.py."""
     if len(run.rows) == 0:
         return []
     bad = [n for n in run.rows.dtype.names or () if not np.isfinite(run.rows[n]).all()]
@@ -71,7 +72,7 @@ def invariants(facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Colu
             run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors
         )
         if points:
-            checks.append(Check(form.claim.name, error, allowed, form.instantaneous))
+            checks.append(Check(form.closed_form.name, error, allowed, form.instantaneous))
     return checks
 
 
@@ -100,7 +101,7 @@ def wound(facts: Facts, run: Run) -> Column:
 
 
 def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
-    """The points before a contact closes again: an impact takes energy, and a start's claims end.
+    """The points before a contact closes again: an impact takes energy, and a start's closed forms end.
 
     One that closes and opens again between two points is seen by its departure; one that is thrown back
     at once, by f, which was on the way through 0 and is positive.
@@ -109,10 +110,10 @@ def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
     after = np.diff(run.rows["time"])[1:]
     landed = np.zeros(len(run.rows), dtype=bool)
     for c in facts.contacts:
-        closed = np.asarray(run.rows[f"contact.{c}"], dtype=bool)
-        departed = np.diff(run.rows[f"departure.{c}.count"])
+        closed = np.asarray(run.rows[names.name(names.CONTACT, c)], dtype=bool)
+        departed = np.diff(run.rows[names.name(names.DEPARTURES, c)])
         landed[1:] |= (closed[1:] & ~closed[:-1]) | (departed > closed[:-1])
-        f = run.rows[f"residual.{c}"]
+        f = run.rows[names.name(names.RESIDUAL, c)]
         with np.errstate(all="ignore"):
             ahead = f[1:-1] + np.diff(f)[:-1] * (after / before)
         landed[2:] |= ~closed[:-2] & ~closed[1:-1] & ~closed[2:] & (ahead < 0)
@@ -133,15 +134,15 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
         rounding = EPS * abs(run.values.get(q, 0.0))
         found[q] = max(facts.same_unit(q, run.values), rounding)
         peers = [p for p in facts.coordinates if facts.dimensions[p] == facts.dimensions[q]]
-        fastest = max(float(np.abs(run.rows[f"der({p})"]).max()) for p in peers)
+        fastest = max(float(np.abs(run.rows[names.derivative(p)]).max()) for p in peers)
         size = found[q] or facts.usual(q)
-        natural = math.sqrt(size) * math.sqrt(float(np.abs(run.rows[f"der({q},2)"]).max()))
-        found[f"der({q})"] = max(fastest, EPS * natural)
-        if f"Q.{q}" in facts.variables:
-            work += EPS * size * float(np.abs(run.rows[f"Q.{q}"]).max())
-    if "energy.potential" in facts.variables:
-        parts = np.abs(run.rows["energy.kinetic"]) + np.abs(run.rows["energy.potential"])
-        found["energy.total"] = found["energy.dissipated"] = max(float(parts.max()), work)
+        natural = math.sqrt(size) * math.sqrt(float(np.abs(run.rows[names.derivative(q, 2)]).max()))
+        found[names.derivative(q)] = max(fastest, EPS * natural)
+        if names.name(names.FORCE, "", q) in facts.variables:
+            work += EPS * size * float(np.abs(run.rows[names.name(names.FORCE, "", q)]).max())
+    if names.POTENTIAL in facts.variables:
+        parts = np.abs(run.rows[names.KINETIC]) + np.abs(run.rows[names.POTENTIAL])
+        found[names.TOTAL] = found[names.DISSIPATED] = max(float(parts.max()), work)
     return found
 
 
@@ -155,7 +156,7 @@ def _worst(what: str, error: Column, allowed: Column) -> Check:
 def _shares(facts: Facts, run: Run) -> list[Check]:
     checks = []
     for q in facts.coordinates:
-        if f"Q.{q}" not in facts.variables:
+        if names.name(names.FORCE, "", q) not in facts.variables:
             continue
         shares = [
             run.rows[name] for c in facts.constraints if (name := facts.share(c, q)) is not None
@@ -163,13 +164,19 @@ def _shares(facts: Facts, run: Run) -> list[Check]:
         total = sum(shares, np.zeros(len(run.rows)))
         size = sum((np.abs(s) for s in shares), np.zeros(len(run.rows)))
         allowed = 4 * (1 + len(shares)) * EPS * size + np.finfo(float).tiny
-        checks.append(_worst(f"shares of Q.{q}", np.abs(run.rows[f"Q.{q}"] - total), allowed))
+        checks.append(
+            _worst(
+                f"shares of Q.{q}",
+                np.abs(run.rows[names.name(names.FORCE, "", q)] - total),
+                allowed,
+            )
+        )
     return checks
 
 
 def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
     """The size of f, or of G v - nu, up to each row; None where lambda never shows G."""
-    rows, lam = run.rows, run.rows[f"lambda.{constraint}"]
+    rows, lam = run.rows, run.rows[names.name(names.MULTIPLIER, constraint)]
     acting = np.abs(lam) > np.finfo(float).tiny / EPS
     if not acting.any():
         return None
@@ -180,7 +187,7 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
             continue
         column, name = rows[q], q
         if facts.rates(constraint):
-            name = f"der({q})"
+            name = names.derivative(q)
             column = rows[name]
         least = max(facts.same_unit(name, run.values), abs(run.values.get(name, 0.0)))
         if not facts.rates(constraint):  # the square of a rounding of the usual place is nothing
@@ -195,12 +202,12 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
 def acts(facts: Facts, run: Run, constraint: str) -> NDArray[np.bool_]:
     """A contact acts while it is closed; what goes with a contact has no multiplier otherwise; what holds
     by friction is judged by its law (lagrange.py)."""
-    if f"slip.{constraint}" in facts.variables:
+    if names.name(names.SLIP, constraint) in facts.variables:
         return np.zeros(len(run.rows), dtype=bool)
     if constraint in facts.contacts:
-        return np.asarray(run.rows[f"contact.{constraint}"], dtype=bool)
+        return np.asarray(run.rows[names.name(names.CONTACT, constraint)], dtype=bool)
     if facts.contacts:
-        return np.asarray(run.rows[f"lambda.{constraint}"] != 0)
+        return np.asarray(run.rows[names.name(names.MULTIPLIER, constraint)] != 0)
     return np.ones(len(run.rows), dtype=bool)
 
 
@@ -209,16 +216,20 @@ def _residuals(facts: Facts, run: Run, sizes: Mapping[str, Column | None]) -> li
     for c in facts.constraints:
         where, size = acts(facts, run, c), sizes[c]
         if size is not None and where.any():
-            error = np.where(where, np.abs(run.rows[f"residual.{c}"]), 0.0)
-            checks.append(_worst(f"residual.{c}", error, ROUNDING * size))
+            error = np.where(where, np.abs(run.rows[names.name(names.RESIDUAL, c)]), 0.0)
+            checks.append(_worst(names.name(names.RESIDUAL, c), error, ROUNDING * size))
     return checks
 
 
 def _contacts(facts: Facts, run: Run, sizes: Mapping[str, Column | None]) -> list[Check]:
     checks = []
     for c in facts.contacts:
-        closed = np.asarray(run.rows[f"contact.{c}"], dtype=bool)
-        lam, f, size = run.rows[f"lambda.{c}"], run.rows[f"residual.{c}"], sizes[c]
+        closed = np.asarray(run.rows[names.name(names.CONTACT, c)], dtype=bool)
+        lam, f, size = (
+            run.rows[names.name(names.MULTIPLIER, c)],
+            run.rows[names.name(names.RESIDUAL, c)],
+            sizes[c],
+        )
         largest = float(np.abs(lam).max())
         push = float(np.maximum(-lam[closed], 0.0).max(initial=0.0))
         allowed = (10 * run.tolerance + 1e-12) * largest + np.finfo(float).tiny

@@ -21,15 +21,16 @@ from typing import Any
 
 import sympy as sp
 
-from ...fmu.claims import pack_closed_forms
+from ... import names
+from ...fmu.closed_forms import pack_closed_forms
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
-from .claims import magnitude
+from .closed_forms import magnitude
 from .facts import beside
 
 Expr = Any
-ROUNDING = 1e-13  # relative to those terms; see claims.LEEWAY
+ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
 SLOW = 1e-9  # of its terms: a slip velocity that has no direction yet
 GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps
@@ -45,7 +46,7 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
     """The equations that can be held against an FMU with these variables."""
     L, sides, masses = model.energy_expression, {}, {}
     for q in model.coordinates:
-        v, name = q.diff(TIME), f"Q.{name_of(q)}"
+        v, name = q.diff(TIME), names.name(names.FORCE, "", name_of(q))
         force = sp.sympify(model.forces.get(q, 0)) + (output(name) if name in variables else 0)
         sides[q] = (L.diff(v).diff(TIME) - L.diff(q), force)
         masses[q] = sp.Abs(in_variables(L.diff(v, 2)))
@@ -69,9 +70,9 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
 
 def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
     """Coulomb's law, whichever mode the FMU says that it is in."""
-    sticks = output(f"sticks.{law.name}")
-    lam = [output(f"lambda.{name}") for name in law.of]
-    slip = [output(f"slip.{name}") for name in law.of]
+    sticks = output(names.name(names.STICKS, law.name))
+    lam = [output(names.name(names.MULTIPLIER, name)) for name in law.of]
+    slip = [output(names.name(names.SLIP, name)) for name in law.of]
     N, force = sp.Abs(in_variables(sp.sympify(law.normal))), sp.sqrt(sum(x**2 for x in lam))
     static, kinetic = in_variables(sp.sympify(law.static)), in_variables(sp.sympify(law.sliding))
     speed, forms, size = sp.sqrt(sum(s**2 for s in slip)), [], sp.Integer(0)
@@ -81,12 +82,14 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
             rate = rate.diff(TIME)
         terms = magnitude(in_variables(rate))
         size += terms
-        forms.append(ClosedForm(f"slip.{name}", rate, s, scale=terms, rounding=ROUNDING))
+        forms.append(
+            ClosedForm(names.name(names.SLIP, name), rate, s, scale=terms, rounding=ROUNDING)
+        )
         sticking = ClosedForm(
             f"{name} while it sticks", sp.Integer(0), s, scale=terms, when=sticks, rounding=ROUNDING
         )
         forms.append(sticking)
-    cone, heat = sp.Max(0, force - static * N), sp.Max(0, output(f"power.{law.name}"))
+    cone, heat = sp.Max(0, force - static * N), sp.Max(0, output(names.name(names.POWER, law.name)))
     slips = (1 - sticks) * sp.Max(0, speed - SLOW * size)
     forms.append(
         ClosedForm(
@@ -121,14 +124,17 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
 def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
     found = []
     for c in model.constraints:
-        f, lam = sp.sympify(c.expression), output(f"lambda.{c.name}")
+        f, lam = sp.sympify(c.expression), output(names.name(names.MULTIPLIER, c.name))
         contact = c.name if isinstance(c, Contact) else c.while_closed
         for q in model.coordinates:
             a = f.diff(q.diff(TIME)) if isinstance(c, Nonholonomic) else f.diff(q)
-            share = f"Q.{c.name}.{name_of(q)}"
+            share = names.name(names.FORCE, c.name, name_of(q))
             if share in variables:
                 found.append(ClosedForm(share, lam * a, output(share), rounding=ROUNDING))
-        rounding, residual = ROUNDING if contact is None else GAP, f"residual.{c.name}"
+        rounding, residual = (
+            ROUNDING if contact is None else GAP,
+            names.name(names.RESIDUAL, c.name),
+        )
         if c.name in model.limited and not isinstance(c, Nonholonomic):
             f = f.diff(TIME)  # what is reported is the missed velocity
         found.append(ClosedForm(residual, f, output(residual), rounding=rounding))
@@ -147,7 +153,7 @@ def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[Close
         contact = c.name if isinstance(c, Contact) else c.while_closed
         form = _form(f"d2/dt2 of {c.name}", rate, sp.Integer(0), scale, contact)
         if c.name in model.limited:
-            form = replace(form, when=output(f"sticks.{model.limited[c.name].name}"))
+            form = replace(form, when=output(names.name(names.STICKS, model.limited[c.name].name)))
         found.append(form)
     return found
 

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from ... import names
 from .bench import Bench, Finding
 from .facts import Facts, Settable
 from .judge import Check
@@ -108,7 +109,7 @@ def departures(bench: Bench, run: Run, other: Run, growth: float) -> list[Check]
     a, b = run.rows[-1], other.rows[-1]
     tolerance = max(run.tolerance, other.tolerance, 1e-13)
     for c in bench.facts.contacts:
-        count, time = f"departure.{c}.count", f"departure.{c}.time"
+        count, time = names.name(names.DEPARTURES, c), names.name(names.DEPARTURE_TIME, c)
         checks.append(Check(f"{count} the same", float(abs(a[count] - b[count])), 0.5))
         if a[count] == b[count] and a[count] > 0:
             allowed = 30 * tolerance * (1 + growth) * float(a["time"])

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import names
 from ...fmu.session import RefusalError, Session, plug
 from ...verification.simulate import Trajectory
 from .facts import Facts
@@ -117,5 +118,5 @@ def play(
     except RefusalError as error:
         refusal = error
         player.renew()
-    used = float(known.get("solver.tolerance") or 0) or tolerance or facts.tolerance
+    used = float(known.get(names.TOLERANCE) or 0) or tolerance or facts.tolerance
     return Run(rows[:reached], known, used, refusal, drive is not None)

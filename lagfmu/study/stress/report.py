@@ -14,6 +14,7 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
+from ...verification import pipeline
 from ...verification.pipeline import Case, Suite
 from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Row
 
@@ -136,7 +137,7 @@ def _case(row: Row) -> Case:
 def all_as_json(tried: Sequence[Tried]) -> str:
     """Every FMU with all its rows, in one list."""
     data = [
-        {"file": t.file, "verdict": ("pass", "fail", "", "not run")[t.suite.code]}
+        {"file": t.file, "verdict": pipeline.VERDICTS[t.suite.code]}
         | {"error": t.error or None}
         | ({} if t.found is None else _data(t.found))
         for t in tried

@@ -7,6 +7,7 @@ import random
 import zlib
 from functools import partial
 
+from ... import names
 from .bench import Bench, Finding
 from .facts import Facts
 from .probe import Probe
@@ -82,14 +83,14 @@ def _random(seed: int, bench: Bench) -> Finding:
 def _at_departure(contact: str, shift: float, bench: Bench) -> Finding:
     """Where lambda is zero already: either mode is right, what follows must be."""
     last = bench.ordinary.rows[-1]
-    if last[f"departure.{contact}.count"] == 0:
+    if last[names.name(names.DEPARTURES, contact)] == 0:
         return bench.judged(bench.ordinary, None, "no departure in the default experiment")
     values = {}
     for s in bench.facts.starts:
         if s.name in bench.facts.coordinates:
-            name = f"departure.{contact}.{s.name}"
+            name = names.name(names.DEPARTURE, contact, s.name)
             values[s.name] = float(last[name])
         else:
-            name = f"departure.{contact}.velocity.{s.name[4:-1]}"
+            name = names.name(names.DEPARTURE, contact, names.read(s.name).coordinate, 1)
             values[s.name] = float(last[name]) * (1 + shift)
     return _from(values, bench)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import names
 from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .facts import Facts
@@ -43,9 +44,9 @@ def _differ(a: dict[str, Any], b: dict[str, Any], what: str) -> Check:
 
 def _across(contact: str, bench: Bench) -> Finding:
     last = bench.ordinary.rows[-1]
-    if last[f"departure.{contact}.count"] == 0:
+    if last[names.name(names.DEPARTURES, contact)] == 0:
         return bench.judged(bench.ordinary, None, "no departure in the default experiment")
-    return _window(bench, float(last[f"departure.{contact}.time"]))
+    return _window(bench, float(last[names.name(names.DEPARTURE_TIME, contact)]))
 
 
 def _rollback(part: float, bench: Bench) -> Finding:
@@ -103,7 +104,7 @@ def _near(bench: Bench, right: dict[str, Any], other: dict[str, Any], time: floa
     checks = bench.agreement(one, two, np.array([grown]), "in pieces", bench.facts.stop_time)
     tolerance = 30 * base.tolerance * (1 + float(grown)) * time
     for c in bench.facts.contacts:
-        count, at = f"departure.{c}.count", f"departure.{c}.time"
+        count, at = names.name(names.DEPARTURES, c), names.name(names.DEPARTURE_TIME, c)
         checks.append(Check(f"{count} in pieces", abs(right[count] - other[count]), 0.5))
         if right[count] == other[count]:
             checks.append(Check(f"{at} in pieces", abs(right[at] - other[at]), tolerance))

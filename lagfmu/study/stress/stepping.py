@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from ... import names
 from ...fmu.session import RefusalError
 from ...methods import FIXED_STEP, INTEGRATORS
 from .bench import REFERENCE, Bench, Finding
@@ -114,9 +115,9 @@ def _tolerance(tolerance: float, bench: Bench) -> Finding:
 
 def _method(method: str, bench: Bench) -> Finding:
     """Those with a fixed step have no tolerance: judged as at 1e-6, with a step made for that."""
-    values: dict[str, float | str] = {"solver.method": method}
+    values: dict[str, float | str] = {names.METHOD: method}
     if method in FIXED_STEP:
-        values["solver.step"] = 1e-3 / bench.ordinary_rate
+        values[names.STEP] = min(1e-3 / bench.ordinary_rate, 1e-2 / bench.fastest_rate)
     run = bench.run(values, bench.times(bench.facts.stop_time))
     if method in FIXED_STEP:
         run = replace(run, tolerance=1e-6)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import atexit
 import hashlib
+import io
+import itertools
 import os
-import tempfile
 import threading
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
@@ -19,11 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import SimulationError
+from ...fmu.archive import version
 from ...fmu.session import Outcome, Plan, Plug
 from .design import Values
 from .host import Host
 
-PATIENCE = "15s"  # for a scheduler to answer
+PATIENCE = 15  # [s] for a scheduler to answer, and to have a worker
 TRIES = 20  # of a chunk whose workers die, after Dask's own
 AHEAD = 3  # chunks a core that are under way or wait
 
@@ -83,12 +85,20 @@ def connected(on: Any) -> tuple[Any, bool]:
     if not isinstance(on, str):
         return on, False
     try:
-        return Client(on, timeout=PATIENCE, set_as_default=False), True
+        client = Client(on, timeout=PATIENCE, set_as_default=False)
     except Exception as error:
         raise SimulationError(
-            f"no Dask scheduler answers at {on!r} within {PATIENCE} ({type(error).__name__}): start one "
+            f"no Dask scheduler answers at {on!r} within {PATIENCE} s ({type(error).__name__}): start one "
             "with `dask scheduler`, and workers with `dask worker ADDRESS`"
         ) from None
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        client.close()
+        raise SimulationError(
+            f"the Dask scheduler at {on!r} has no workers: start some with `dask worker {on}`"
+        ) from None
+    return client, True
 
 
 def distributed(
@@ -101,10 +111,9 @@ def distributed(
     content = fmu.read_bytes()
     digest = hashlib.sha256(content).hexdigest()
     archive = client.submit(bytes, content, key=f"lagfmu-{digest[:24]}", retries=TRIES)
-    cores = sum(client.nthreads().values()) or 1
     waiting, tries = iter(chunks), dict.fromkeys((n for n, _ in chunks), 0)
     rows = dict(chunks)
-    known: dict[Any, int] = {}
+    known: dict[Any, int] = {}  # what is under way
 
     def submit(number: int) -> Any:
         future = client.submit(
@@ -113,8 +122,12 @@ def distributed(
         known[future] = number
         return future
 
-    first = [submit(n) for n, _ in _taken(waiting, AHEAD * cores)]
-    queue: Any = dask.as_completed(first, loop=client.loop)
+    def more() -> list[Any]:
+        """As many chunks as there is work for, however many workers there are by now."""
+        room = AHEAD * (sum(client.nthreads().values()) or 1) - len(known)
+        return [submit(n) for n, _ in itertools.islice(waiting, max(room, 0))]
+
+    queue: Any = dask.as_completed(more(), loop=client.loop)
     for future in queue:
         number = known.pop(future)
         try:
@@ -124,42 +137,38 @@ def distributed(
         except Exception as error:  # the workers that had it died, too often for Dask
             tries[number] += 1
             if tries[number] > TRIES or "KilledWorker" not in type(error).__name__:
-                raise SimulationError(f"chunk {number} cannot be run: {error}") from None
+                raise SimulationError(
+                    f"chunk {number} cannot be run on the cluster ({type(error).__name__}: {error}): its "
+                    f"workers need Python with lagfmu {version()}, as here"
+                ) from None
             queue.add(submit(number))
             continue
         yield number, found
-        for n, _ in _taken(waiting, 1):
-            queue.add(submit(n))
-
-
-def _taken(items: Iterator[Any], count: int) -> Iterator[Any]:
-    for _, item in zip(range(count), items, strict=False):
-        yield item
+        queue.update(more())
 
 
 # ---------------------------------------------------------------------------- in a worker
 
 _lock = threading.Lock()
-_folders: dict[str, tempfile.TemporaryDirectory[str]] = {}
+_unpacked: set[str] = set()  # folders
 _hosts = threading.local()
 
 
 def work(content: bytes, digest: str, plug: Plug, plan: Plan, values: Values) -> Outcome:
     """One chunk in a Dask worker: its thread keeps a host process with the FMU."""
+    from dask.distributed import get_worker
+
+    here = get_worker().local_directory  # Dask clears it behind a worker that was killed
+    place = os.path.join(here, f"lagfmu_{digest}")
     with _lock:
-        if digest not in _folders:
-            folder = tempfile.TemporaryDirectory(prefix="lagfmu_")
-            archive = Path(folder.name, "model.fmu")
-            archive.write_bytes(content)
-            with zipfile.ZipFile(archive) as packed:
-                packed.extractall(Path(folder.name, "fmu"))
-            _folders[digest] = folder
+        if place not in _unpacked:
+            with zipfile.ZipFile(io.BytesIO(content)) as packed:
+                packed.extractall(place)
+            _unpacked.add(place)
     host: Host | None = getattr(_hosts, "host", None)
-    if host is None or _hosts.digest != digest:
+    if host is None or host.plug.folder != place:
         if host is not None:
             host.close()
-        here = os.path.join(_folders[digest].name, "fmu")
-        host = _hosts.host = Host(replace(plug, folder=here))
-        _hosts.digest = digest
+        host = _hosts.host = Host(replace(plug, folder=place))
         atexit.register(host.close)
     return host.run(plan, values)

@@ -15,10 +15,10 @@ import numpy as np
 
 from ... import names
 from ...errors import LagfmuError, SimulationError, VerificationError
-from ...fmu.claims import Claim
+from ...fmu.closed_forms import CarriedForm
 from ...methods import FIXED_STEP, INTEGRATORS
 from ...verification.simulate import file_stem, steps_of
-from ...verification.verify import check_claim, claims_in
+from ...verification.verify import check_closed_form, closed_forms_in
 from .front import front
 from .importer import Importer
 from .quantities import GROUPS, MULTIPLIER, Quantity, residual
@@ -61,7 +61,8 @@ class Row:
 
     `errors` relative to the reference's scales; `residual` the largest |residual| in SI units;
     `statements` the errors of the closed forms along the run; `seconds` each timed run [s]; `below`:
-    quantities whose error is less than that of the reference itself.
+    quantities whose error is less than that of the reference itself; `broken`: closed forms that are not
+    held as `lagfmu verify` holds them at this tolerance (a fixed step promises none).
     """
 
     setting: Setting
@@ -71,6 +72,7 @@ class Row:
     steps: int
     seconds: tuple[float, ...] = ()
     below: tuple[str, ...] = ()
+    broken: tuple[str, ...] = ()
 
     @property
     def median(self) -> float:
@@ -167,7 +169,7 @@ def measure(
 ) -> Tradeoff:
     """Errors and times of an FMU.  Raises SimulationError if not even the reference can be run."""
     say = tick or (lambda *_: None)
-    claims = _claims(fmu)
+    closed_forms = _closed_forms(fmu)
     with Importer(fmu) as importer:
         if names.METHOD not in importer.variables:
             raise VerificationError(
@@ -177,8 +179,8 @@ def measure(
         plan = plan or default_plan(importer)
         plan = replace(plan, repeats=repeats or plan.repeats)
         say("reference", 0, 1)
-        reference = refer(importer, claims, communication=min(plan.communications))
-        rows, refused, cut = _errors(importer, reference, claims, plan, say)
+        reference = refer(importer, closed_forms, communication=min(plan.communications))
+        rows, refused, cut = _errors(importer, reference, closed_forms, plan, say)
         read = [q.name for q in reference.known]
         work = [partial(importer.seconds, r.setting, read) for r in rows]
         work += [partial(importer.floor, h, read) for h in plan.communications]
@@ -197,9 +199,9 @@ def measure(
         )
 
 
-def _claims(fmu: Path) -> list[Claim]:
+def _closed_forms(fmu: Path) -> list[CarriedForm]:
     try:
-        return claims_in(fmu)
+        return closed_forms_in(fmu)
     except LagfmuError:
         return []  # an FMU of another tool has none; it is measured against a converged run
 
@@ -207,7 +209,7 @@ def _claims(fmu: Path) -> list[Claim]:
 def _errors(
     importer: Importer,
     reference: Reference,
-    claims: Sequence[Claim],
+    closed_forms: Sequence[CarriedForm],
     plan: Plan,
     say: Tick,
 ) -> tuple[list[Row], dict[str, str], list[str]]:
@@ -223,7 +225,7 @@ def _errors(
         ):
             begun = time.perf_counter()
             try:
-                rows.append(weigh(importer, setting, reference, claims))
+                rows.append(weigh(importer, setting, reference, closed_forms))
             except SimulationError as error:
                 if method not in {r.setting.method for r in rows} and not accepts(importer, method):
                     refused[method] = str(error)
@@ -260,7 +262,7 @@ def weigh(
     importer: Importer,
     setting: Setting,
     reference: Reference,
-    claims: Sequence[Claim] = (),
+    closed_forms: Sequence[CarriedForm] = (),
     limit: float = math.inf,
 ) -> Row:
     """The errors of one setting.
@@ -274,7 +276,7 @@ def weigh(
         for v in importer.description.modelVariables
         if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
     }
-    checks = [check_claim(c, run, parameters, 1.0) for c in claims]
+    checks = [check_closed_form(c, run, parameters, setting.tolerance) for c in closed_forms]
     return Row(
         setting=setting,
         errors=errors,
@@ -282,6 +284,7 @@ def weigh(
         statements={c.name: c.error for c in checks if c.points},
         steps=steps_of(run),
         below=tuple(n for n, e in errors.items() if e < reference.own[n]),
+        broken=tuple(str(c) for c in checks if setting.tolerance and not c.passed),
     )
 
 

@@ -1,4 +1,4 @@
-"""A tradeoff as a table for the terminal, and as files: JSON with everything, CSV with the rows."""
+"""A tradeoff as a table for the terminal, as JSON with everything, CSV with the rows, a pipeline's suite."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import json
 import math
 import platform
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from ...verification.pipeline import VERDICTS, Case, Suite
 from .measure import Row, Tradeoff
 from .quantities import EVENT, FORCE, MOTION, MULTIPLIER, OWN
 
@@ -138,11 +140,49 @@ def summary(all_found: Sequence[Tradeoff]) -> Table:
     return drawn
 
 
+@dataclass(frozen=True)
+class Measured:
+    """An FMU, or a scene of which none could be made: what was measured, or why it could not be."""
+
+    file: str
+    found: Tradeoff | None
+    error: str = ""
+
+    @property
+    def suite(self) -> Suite:
+        """A case a setting, which fails if a closed form does not hold at its tolerance; a method that
+        the FMU refuses is skipped."""
+        if self.found is None:
+            return Suite(self.file, (), self.error)
+        cases = [
+            Case(str(r.setting), self.found.name, "; ".join(r.broken), "", r.median)
+            for r in self.found.rows
+        ]
+        cases += [
+            Case(m, self.found.name, "", f"refused: {why}") for m, why in self.found.refused.items()
+        ]
+        return Suite(self.file, cases)
+
+
+def all_as_json(measured: Sequence[Measured]) -> str:
+    """Every FMU with all its rows, in one list."""
+    data = [
+        {"file": m.file, "verdict": VERDICTS[m.suite.code], "error": m.error or None}
+        | ({} if m.found is None else _data(m.found))
+        for m in measured
+    ]
+    return json.dumps(_plain(data), indent=1, allow_nan=False) + "\n"
+
+
 def as_json(found: Tradeoff) -> str:
     """Everything, with units in the keys: seconds of wall time, relative errors."""
+    return json.dumps(_plain(_data(found)), indent=1, allow_nan=False) + "\n"
+
+
+def _data(found: Tradeoff) -> dict[str, Any]:
     reference = found.reference
     fronts = [row for h in found.floor for row in found.front(h)]
-    data = {
+    return {
         "format": FORMAT,
         "fmu": found.name,
         "target": found.target,
@@ -174,6 +214,7 @@ def as_json(found: Tradeoff) -> str:
                 "not_above_the_reference": list(row.below),
                 "residual_si": row.residual,
                 "closed_forms_along_the_run": dict(row.statements),
+                "closed_forms_that_do_not_hold": list(row.broken),
                 "steps": row.steps,
                 "wall_s": {
                     "median": row.median,
@@ -187,7 +228,6 @@ def as_json(found: Tradeoff) -> str:
         "refused": dict(found.refused),
         "cut_short": list(found.cut),
     }
-    return json.dumps(_plain(data), indent=1, allow_nan=False) + "\n"
 
 
 def _plain(value: Any) -> Any:

@@ -22,7 +22,7 @@ from ...model.goal import Goal
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
-from ...verification.verify import claims_in
+from ...verification.verify import closed_forms_in
 from .importer import Importer
 from .measure import Plan, Row, Tick, accepts, default_plan, take_turns, weigh, wider
 from .quantities import selected
@@ -94,7 +94,13 @@ def survey(
         for formulation in tried:
             say(f"building {formulation}", 0, 1)
             try:
-                wide = replace(scene, formulation=formulation, methods=METHODS, reals_only=False)
+                wide = replace(
+                    scene,
+                    formulation=formulation,
+                    methods=METHODS,
+                    reals_only=False,
+                    error_bars=False,
+                )
                 prepared = prepare(model, wide)
                 path = write(prepared, Path(folder, formulation), closed_forms, target=target)
                 importers[formulation] = stack.enter_context(Importer(path))
@@ -108,8 +114,8 @@ def survey(
             if first.target == "python":  # each run takes long: one is a time
                 plan = replace(plan, repeats=0, warm_up=False)
         say("reference", 0, 1)
-        claims = claims_in(first.path)
-        reference = refer(first, claims, communication=scene.step_size, second_opinion=False)
+        carried = closed_forms_in(first.path)
+        reference = refer(first, carried, communication=scene.step_size, second_opinion=False)
         names = tuple(q.name for q in selected(reference.known, goal.names))
         found: list[tuple[str, Row, float]] = []
         clock, near = Clock(), dict[str, int]()

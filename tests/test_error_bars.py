@@ -1,0 +1,294 @@
+"""Error bars: how far a run's values may be off, estimated by a companion run at a coarser tolerance."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from conftest import FILES, MODELS
+from fmi2 import EXCHANGE, Library
+from fmpy.fmi1 import FMICallException
+from instance import instance
+from scipy.special import ellipj, ellipk
+from test_forged_states import forged_text
+
+from lagfmu.errors import SimulationError
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.write import write
+from lagfmu.model.file import load
+from lagfmu.prepare.prepare import prepare
+from lagfmu.verification.plot import figure_of
+from lagfmu.verification.simulate import ErrorBarWarning, simulate
+
+INFINITE = np.finfo(float).max
+Barred = Callable[[str], Path]
+
+
+@pytest.fixture(scope="module")
+def barred(target: str, prepared, tmp_path_factory: pytest.TempPathFactory) -> Barred:
+    """barred(NAME): an FMU of models/ with error bars, built once a target."""
+    if target == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    folder, made = tmp_path_factory.mktemp("barred"), {}
+
+    def get(name: str) -> Path:
+        if name not in made:
+            file = load(MODELS / f"{FILES[name]}.py")
+            scene = replace(prepared(name).asked, error_bars=True)
+            made[name] = write(prepare(file.model, scene), folder, target=target)
+        return made[name]
+
+    return get
+
+
+def run(fmu: Path, stop: float, step: float, **options):
+    """All outputs at the communication points."""
+    return fmpy.simulate_fmu(
+        str(fmu), stop_time=stop, step_size=step, output_interval=step, **options
+    )
+
+
+def multiplier(t: np.ndarray) -> np.ndarray:
+    """lambda of x^2 + y^2 = L^2 from rest at 1 rad: -T/(2 L), T = m g (3 cos theta - 2 cos theta0)."""
+    k = math.sin(0.5)
+    sn = ellipj(math.sqrt(9.81) * t + ellipk(k**2), k**2)[0]
+    return -9.81 * (3 * (1 - 2 * (k * sn) ** 2) - 2 * math.cos(1.0)) / 2
+
+
+def test_the_multiplier_of_the_pendulum_lies_within_its_bar(barred):
+    """Held against Jacobi's elliptic functions over 5 s: at least 99 of 100 points, at two tolerances."""
+    for tolerance in (1e-5, 1e-8):
+        found = run(barred("PendulumCartesian"), 5.0, 0.1, relative_tolerance=tolerance)
+        true = np.abs(found["lambda.rod"] - multiplier(found["time"]))
+        bar = found["error.lambda.rod"]
+        assert np.mean(true <= bar) >= 0.99
+        assert (np.diff(bar) >= 0).all()
+        assert bar[-1] < 1e4 * tolerance
+
+
+def test_the_time_of_departure_lies_within_its_bar(barred):
+    """The particle leaves the hemisphere; before it does there is no error to know."""
+    exact = run(barred("Hemisphere"), 2.0, 0.1, relative_tolerance=1e-13)
+    name = "departure.surface.time"
+    for tolerance in (1e-5, 1e-8):
+        found = run(barred("Hemisphere"), 2.0, 0.1, relative_tolerance=tolerance)
+        assert found[f"error.{name}"][0] == 0
+        bar = found[f"error.{name}"][-1]
+        assert abs(found[name][-1] - exact[name][-1]) <= bar < 1e3 * tolerance
+
+
+def test_a_run_is_the_same_with_error_bars_and_without(barred, fmu):
+    """The companion runs beside it and touches nothing: every value of every output, bit for bit."""
+    with_bars = run(barred("Hemisphere"), 2.0, 0.05)
+    without = run(fmu("Hemisphere"), 2.0, 0.05)
+    for name in without.dtype.names:
+        assert np.array_equal(with_bars[name], without[name]), name
+    assert not any(n.startswith("error.") for n in without.dtype.names)
+
+
+def test_going_back_and_on_again_gives_the_same_bars(barred):
+    """The companion is part of a saved state, as a pointer and as bytes, across the departure."""
+    with instance(barred("Hemisphere")) as one, instance(barred("Hemisphere"), "b") as other:
+        for x in (one, other):
+            x.start(tolerance=1e-6)
+        for _ in range(15):
+            one.step(0.1)
+        state = one.fmu.getFMUState()
+        data, now = one.fmu.serializeFMUState(state), one.time
+        for _ in range(5):
+            one.step(0.1)
+        expected = one.outputs()
+        one.fmu.setFMUState(state)
+        other.fmu.setFMUState(other.fmu.deSerializeFMUstate(data))
+        for x in (one, other):
+            x.time = now
+            for _ in range(5):
+                x.step(0.1)
+            assert x.outputs() == expected
+        one.fmu.freeFMUState(state)
+        one.fmu.reset()
+        one.start(tolerance=1e-6)
+        for _ in range(20):
+            one.step(0.1)
+        assert one.outputs() == expected
+
+
+def test_reading_bars_does_not_change_them(barred):
+    """The bars belong to the communication points, whoever looks at them."""
+    with instance(barred("CartPendulum")) as one, instance(barred("CartPendulum"), "b") as other:
+        for x in (one, other):
+            x.start(tolerance=1e-6)
+        for k in range(20):
+            for x in (one, other):
+                x.set("F", math.sin(k))
+                if x is one:
+                    x.outputs()
+                x.step(0.1)
+        assert one.outputs() == other.outputs()
+
+
+def test_a_fixed_step_is_halved_and_that_is_said(barred):
+    """rk4 of order 4: the run of half the step is off by a fifteenth of the difference, and says so."""
+    with instance(barred("PendulumCartesian")) as one:
+        one.start({"solver.method": "rk4", "solver.step": 0.02}, tolerance=1e-6)
+        for _ in range(20):
+            one.step(0.1)
+        off = abs(one.get("lambda.rod") - multiplier(np.array([one.time]))[0])
+        assert off <= one.get("error.lambda.rod") < 100 * off
+        assert one.get("solver.steps") == 200
+        told = [text for status, _, text in one.log if status == 1]
+        assert any("0.01 s in place of 0.02 s" in text for text in told), one.log
+
+
+def test_only_what_has_a_bar_has_one_and_bars_go_with_their_outputs(prepared):
+    """Q, lambda, coordinates, velocities, the model's own outputs and times of events; not energies."""
+    file = load(MODELS / "hemisphere.py")
+    scene = replace(prepared("Hemisphere").asked, error_bars=True)
+    names = {v.name for v in prepare(file.model, scene).table.variables}
+    wanted = {"r", "der(theta)", "lambda.surface", "Q.r", "Q.surface.r", "departure.surface.time"}
+    assert {f"error.{n}" for n in wanted} <= names
+    assert not {"error.energy.total", "error.der(r,2)", "error.a", "error.time"} & names
+    for outputs in (["lambda.surface"], ["error.lambda.surface"]):
+        few = prepare(file.model, replace(scene, outputs=outputs)).table.outputs
+        assert {v.name for v in few} == {"lambda.surface", "error.lambda.surface"}
+    assert not any("error." in v.name for v in prepared("Hemisphere").table.variables)
+
+
+def test_between_the_two_departures_the_bars_are_infinite(barred):
+    """One run has left the hemisphere and the other has not: the largest double, until both have."""
+    name = "departure.surface.time"
+    with instance(barred("Hemisphere")) as one:
+        one.start(tolerance=1e-5)
+        for _ in range(16):
+            one.step(0.1)
+        before, now = one.fmu.getFMUState(), one.time
+        one.step(0.2)
+        left, bar = one.get(name), one.get(f"error.{name}")
+        seen = []
+        for moment in (left - bar / 2, left + bar / 2, left + 100 * bar):
+            one.fmu.setFMUState(before)
+            one.time = now
+            one.step(moment - now)
+            seen.append([one.get(f"error.{n}") for n in ("theta", "lambda.surface", name)])
+        one.fmu.freeFMUState(before)
+    assert (np.array(seen[:2]) == INFINITE).any(axis=0).all()
+    assert max(seen[2]) < 1
+
+
+def test_a_companion_that_cannot_follow_is_told_and_the_run_goes_on(barred, target):
+    """A double pendulum at a tolerance of 0.5: fifty is none at all, and the log says so once."""
+    with instance(barred("DoublePendulum")) as one:
+        one.start(tolerance=0.5)
+        for _ in range(8):
+            one.step(0.5)
+        assert one.get("error.x1") == INFINITE
+        assert all(abs(one.get(n)) < 1e3 for n in ("x1", "y2", "lambda.upper"))
+        told = [text for status, _, text in one.log if status == 1 and "error bars" in text]
+        assert len(told) == 1
+        assert "tolerance 50.0 cannot follow" in told[0]
+
+
+def test_an_fmu_with_error_bars_is_for_co_simulation(barred, target, tmp_path):
+    """In Model Exchange the importer integrates: no interface is offered, and none is given silently."""
+    path = barred("PendulumCartesian")
+    description = fmpy.read_model_description(str(path))
+    assert description.modelExchange is None
+    if target == "native":
+        refused = Library(path, tmp_path)(kind=EXCHANGE)
+        assert refused.handle.value is None
+        assert "take co-simulation" in refused.log[-1][2]
+
+
+def test_a_bar_has_no_derivative(barred, target):
+    """The difference of two runs is no function of the state."""
+    if target == "python":
+        pytest.skip("python FMUs have no directional derivatives")
+    with instance(barred("PendulumCartesian")) as one:
+        one.start()
+        one.step(0.1)
+        of = [one.variables["x"].valueReference]
+        one.fmu.getDirectionalDerivative([one.variables["lambda.rod"].valueReference], of, [1.0])
+        bar = one.variables["error.x"].valueReference
+        with pytest.raises(FMICallException):
+            one.fmu.getDirectionalDerivative([bar], of, [1.0])
+        assert "'error.x' is not defined" in one.log[-1][2]
+
+
+def test_a_forged_companion_is_refused_or_harmless(barred, target, tmp_path):
+    """Modes, times and differences that no companion has, with the right checksum: refused in words, or
+    finite to read."""
+    if target == "native":
+        attack = str(Path(__file__).with_name("test_forged_states.py"))
+        done = subprocess.run(
+            [sys.executable, attack, str(barred("Hemisphere")), str(tmp_path), "steps", "1", "200"],
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
+        assert done.returncode == 0, (done.returncode, done.stderr[-2000:])
+        return
+    changes = {
+        "no bars": lambda whole: whole.update(bars=None),
+        "two parts": lambda whole: whole["bars"].pop(),
+        "too few": lambda whole: whole["bars"][1].pop(),
+        "below zero": lambda whole: whole["bars"][1].__setitem__(0, -1.0),
+        "not a number": lambda whole: whole["bars"][2].__setitem__(0, math.nan),
+        "no state": lambda whole: whole["bars"].__setitem__(0, "{}"),
+    }
+    with instance(barred("Hemisphere")) as one:
+        one.start()
+        one.step(0.05)
+        saved = one.fmu.serializeFMUState(one.fmu.getFMUState())
+        good = one.outputs()
+        for name, change in changes.items():
+            forged = forged_text(saved, lambda whole, inner, change=change: change(whole))
+            with pytest.raises(FMICallException):
+                one.fmu.setFMUState(one.fmu.deSerializeFMUstate(forged))
+            assert "none of this FMU's" in one.log[-1][2], name
+            assert one.outputs() == good
+
+
+def test_simulate_gives_the_bars_of_the_fmu_and_plots_them_as_bands(prepared, barred, target):
+    """The model in this process and its python FMU are one solver; a band stands about each curve."""
+    if target == "native":
+        pytest.skip("the model in this process is the python target's solver")
+    options = {"stop_time": 2.0, "step_size": 0.05, "tolerance": 1e-6}
+    found = simulate(prepared("Hemisphere"), error_bars=True, **options)
+    same = simulate(barred("Hemisphere"), error_bars=True, **options)
+    for name in found.dtype.names:
+        assert np.array_equal(found[name], same[name]), name
+    figure = figure_of(found, found.units, ["lambda.surface", "theta"])
+    assert [len(axis.collections) for axis in figure.axes] == [1, 1]
+
+
+def test_a_run_whose_fixed_step_is_halved_warns(prepared):
+    """What was asked for and what is done, both in seconds."""
+    options = {"stop_time": 0.2, "step_size": 0.1, "error_bars": True}
+    values = {"solver.method": "rk4", "solver.step": 0.02}
+    with pytest.warns(ErrorBarWarning, match=r"0\.01 s in place of 0\.02 s"):
+        simulate(prepared("PendulumCartesian"), start_values=values, **options)
+
+
+def test_an_fmu_without_bars_is_refused_by_name(native_fmu):
+    """Nobody is shown an error of zero that was not measured."""
+    with pytest.raises(SimulationError, match="--error-bars"):
+        simulate(native_fmu("Hemisphere"), error_bars=True)
+
+
+def test_nothing_of_it_is_in_an_fmu_without(native_fmu, python_fmu):
+    """Neither its sources nor its python files hold a companion."""
+    for path in (native_fmu("Hemisphere"), python_fmu("Hemisphere")):
+        with zipfile.ZipFile(path) as archive:
+            files = [
+                n for n in archive.namelist() if n.endswith(("bars.c", "companion.c", "/bars.py"))
+            ]
+        assert files == []
