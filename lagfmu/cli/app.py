@@ -597,7 +597,7 @@ def _finish(
     raise typer.Exit(exit_code(suites))
 
 
-def _load(path: Path, added: list[str] | None, arguments: list[str] | None) -> ModelFile:
+def _load(path: Path, added: list[str] | None, arguments: list[str] | None = None) -> ModelFile:
     """A model file, with further outputs; of a family the one of these arguments."""
     file = load(path, arguments or ())
     return replace(file, model=with_outputs(file.model, added or []))
