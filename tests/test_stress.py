@@ -36,7 +36,7 @@ from lagfmu.study.stress.probe import (
     UNFINISHED,
     WRONG,
     Probe,
-    Row,
+    Verdict,
     attempt,
     verdict,
 )
@@ -222,12 +222,12 @@ def test_the_summary_names_what_is_not_right(lawful, tmp_path):
     """One page over all FMUs: versions, counts by FMU and family, and each row that is not right."""
     refused = "setReal: error: 'm' = {}, expected a finite number"
     rows = (
-        Row("parameters", "m = 1", RIGHT, "", "energy", 0.1, 9, 0.1),
-        Row(
+        Verdict("parameters", "m = 1", RIGHT, "", "energy", 0.1, 9, 0.1),
+        Verdict(
             "parameters", "m = 2", WRONG, "energy: 2.0e+00, allowed 1.0e+00", "energy", 2.0, 9, 0.1
         ),
         *(
-            Row("bounds", f"m = {x}", REFUSED, refused.format(x), "", 0, 0, 0.1)
+            Verdict("bounds", f"m = {x}", REFUSED, refused.format(x), "", 0, 0, 0.1)
             for x in ("nan", "inf")
         ),
     )

@@ -22,7 +22,7 @@ from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress import impacts
 from lagfmu.study.stress.bench import Bench
 from lagfmu.study.stress.geometry import geometry_of, lay_geometry, twin
-from lagfmu.study.stress.probe import RIGHT, WRONG, Row, attempt, verdict
+from lagfmu.study.stress.probe import RIGHT, WRONG, Verdict, attempt, verdict
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
@@ -30,7 +30,7 @@ pytestmark = [
 ]
 
 
-def probed(model: Model, folder: Path) -> dict[str, Row]:
+def probed(model: Model, folder: Path) -> dict[str, Verdict]:
     """Every row of the family."""
     scene = Scene(model.name, stop_time=2.0)
     one = prepare(model, scene)

@@ -16,11 +16,11 @@ from ..errors import ModelError, TableError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
 from ..model.goal import parse
+from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.spline import Spline, splines_in
 from .formula import functions_of, read_formula, text_of
 
-Expr = Any
 FORMAT = 1
 LARGEST_RECORD = 1 << 24  # bytes
 EXPRESSIONS = ("actual", "expected", "scale", "when")

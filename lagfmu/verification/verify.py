@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
+from ..model.parts import Expr
 from .simulate import Trajectory, read_description, simulate, steps_of
 
-Expr = Any
 RECORD = "resources/lagfmu.json"
 MODES = ("Boolean", "Real")  # what a mode may be: a Real where an FMU has Reals alone
 NUMBERS = ("Real", "Integer")

@@ -284,13 +284,12 @@ static Status complete_magnitudes(Solver *s, double span) {
 }
 
 /* The inputs may have been set: levels of jumps are those of now, contacts whose surface went away open,
- * the others go with it; a motion whose rates are estimated may have other ones than it went by. */
+ * the others go with it; a prescribed motion may have another place and other rates than it went by. */
 static Status follow_inputs(Solver *s) {
     const System *system = s->system;
     if (!s->state.now.ahead)
         jumps_settle(s, leg_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (system->prescribed_count == 0) return OK;
-    if (system->contacts == 0 && system->estimated_count == 0) return OK;
     if (system->contacts == 0)
         system_active(system, s->state.closed, s->active);
     else if (PARTS.switch_released(s, s->state.now.span) != OK)

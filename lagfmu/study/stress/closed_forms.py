@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 from ... import names
 from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm
+from ...model.parts import Expr
 from ...verification.verify import applies
 from .player import Run
 
-Expr = Any
 LEEWAY = 10.0
 Column = NDArray[np.float64]
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -16,11 +15,11 @@ from ... import names
 from ...fmu.closed_forms import pack_closed_forms, unpack_closed_forms
 from ...model.closed_form import TIME, ClosedForm
 from ...model.model import Contact, Model, Nonholonomic, name_of
+from ...model.parts import Expr
 from ...model.reactions import reactions_in
 from ...names import read
 from ...prepare.prepare import Prepared
 
-Expr = Any
 Column = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 

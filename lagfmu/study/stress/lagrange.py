@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import sympy as sp
 
@@ -25,11 +24,11 @@ from ... import names
 from ...fmu.closed_forms import pack_closed_forms
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
+from ...model.parts import Expr
 from ...prepare.prepare import Prepared
 from .closed_forms import magnitude
 from .facts import beside
 
-Expr = Any
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
 SLOW = 1e-9  # of its terms: a slip velocity that has no direction yet

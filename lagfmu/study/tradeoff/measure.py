@@ -56,7 +56,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Row:
+class Weighed:
     """One setting, measured.
 
     `errors` relative to the reference's scales; `residual` the largest |residual| in SI units;
@@ -97,7 +97,7 @@ class Tradeoff:
     simulated: float
     step_size: float
     reference: Reference
-    rows: tuple[Row, ...]
+    rows: tuple[Weighed, ...]
     floor: Mapping[float, float]
     refused: Mapping[str, str]
     cut: tuple[str, ...]
@@ -107,7 +107,7 @@ class Tradeoff:
         """The quantities that are measured."""
         return self.reference.known
 
-    def worst(self, row: Row, group: str | Sequence[str]) -> float:
+    def worst(self, row: Weighed, group: str | Sequence[str]) -> float:
         """The largest relative error among the quantities of a group, or among those named.
 
         What is below the reference's own error counts as that error.
@@ -131,7 +131,7 @@ class Tradeoff:
         """The group that speed is weighed against: lambda if there is one."""
         return MULTIPLIER if MULTIPLIER in self.groups else self.groups[0]
 
-    def front(self, communication: float | None = None, group: str | None = None) -> list[Row]:
+    def front(self, communication: float | None = None, group: str | None = None) -> list[Weighed]:
         """The rows that no other beats in both error and time, at one communication step or at all."""
         rows = [
             r
@@ -212,9 +212,9 @@ def _errors(
     closed_forms: Sequence[CarriedForm],
     plan: Plan,
     say: Tick,
-) -> tuple[list[Row], dict[str, str], list[str]]:
+) -> tuple[list[Weighed], dict[str, str], list[str]]:
     """One row a setting, without times; methods that the FMU refuses, and why; what was cut short."""
-    rows: list[Row] = []
+    rows: list[Weighed] = []
     refused: dict[str, str] = {}
     cut: list[str] = []
     total = len(plan.communications) * len(plan.methods)
@@ -243,7 +243,7 @@ def _errors(
     return rows, refused, cut
 
 
-def _largest(row: Row) -> float:
+def _largest(row: Weighed) -> float:
     return max(row.errors.values(), default=0.0)
 
 
@@ -264,7 +264,7 @@ def weigh(
     reference: Reference,
     closed_forms: Sequence[CarriedForm] = (),
     limit: float = math.inf,
-) -> Row:
+) -> Weighed:
     """The errors of one setting.
 
     Raises SimulationError if the FMU refuses it, TooSlowError if it takes longer than `limit` [s].
@@ -277,7 +277,7 @@ def weigh(
         if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
     }
     checks = [check_closed_form(c, run, parameters, setting.tolerance) for c in closed_forms]
-    return Row(
+    return Weighed(
         setting=setting,
         errors=errors,
         residual=residual(run),

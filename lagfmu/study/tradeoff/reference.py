@@ -26,13 +26,13 @@ from ... import names
 from ...errors import SimulationError
 from ...fmu.closed_forms import CarriedForm
 from ...model.closed_form import output
+from ...model.parts import Expr
 from ...verification.simulate import Trajectory
 from ...verification.verify import applies, evaluate
 from .importer import Importer
 from .quantities import Quantity, magnitudes, quantities
 from .setting import Setting
 
-Expr = Any
 TIGHTEST = 1e-14
 ROUNDING = 16 * float(np.finfo(float).eps)  # of a closed form or a run in double precision
 COARSER = 10  # communication steps of the reference in one of the run that it is compared with

@@ -18,7 +18,7 @@ from typing import Protocol
 from ...errors import SimulationError
 from ...methods import FIXED_STEP
 from .importer import TooSlowError
-from .measure import Row
+from .measure import Weighed
 from .setting import ORDERS, Setting
 
 SLOW = 2.5  # times the fastest that holds the error: what takes longer is not chosen
@@ -42,7 +42,7 @@ class Bench(Protocol):
     def coarse(self, setting: Setting, limit: float) -> float:
         """The error at the wider communication step, which costs little."""
 
-    def full(self, setting: Setting, limit: float) -> tuple[Row, float]:
+    def full(self, setting: Setting, limit: float) -> tuple[Weighed, float]:
         """The row at the scene's own communication step, and the larger of both errors."""
 
 
@@ -54,7 +54,7 @@ class Walk:
     bench: Bench
     goal: float
     clock: Clock
-    found: dict[int, tuple[Row, float, float]] = field(default_factory=dict)
+    found: dict[int, tuple[Weighed, float, float]] = field(default_factory=dict)
     errors: dict[int, float] = field(default_factory=dict)
     slow: bool = False
 
@@ -91,7 +91,7 @@ class Walk:
 
 
 def coarsest(walk: Walk, near: int, thorough: bool) -> int | None:
-    """The position of the coarsest dial that holds; the next finer one is measured beside it.
+    """The position of the coarsest dial that holds; the next one with a smaller error is measured beside it.
 
     `thorough`: all that was walked over is measured in full.
     """
@@ -110,9 +110,17 @@ def coarsest(walk: Walk, near: int, thorough: bool) -> int | None:
     if k is None:
         return None
     held = next((j for j in range(k, len(walk.dials)) if not walk.slow and walk.holds(j)), None)
-    if held is not None and held + 1 < len(walk.dials):
-        walk.holds(held + 1)  # in case that the coarsest misses on other values
+    if held is not None:
+        _better(walk, held)
     return held
+
+
+def _better(walk: Walk, held: int) -> None:
+    """Measures the next dial that is more accurate, in case that `held` misses on other values: the next
+    finer one, unless it is the communication step that bounds the error of both."""
+    for k in range(held + 1, len(walk.dials)):
+        if walk.slow or (walk.holds(k) and walk.found[k][1] < walk.found[held][1]):
+            return
 
 
 def _by_order(walk: Walk, k: int) -> int | None:
