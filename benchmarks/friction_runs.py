@@ -27,13 +27,13 @@ from rich.console import Console
 from rich.table import Table
 from sympy import Abs, sympify
 
-from lagfmu.fmu.claims import claims_of
+from lagfmu.fmu.closed_forms import carried
 from lagfmu.fmu.session import LAST, Plan, Session, plug
 from lagfmu.fmu.write import write
 from lagfmu.methods import FIXED_STEP, MENU
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress.claims import LEEWAY, Compiled, laws
+from lagfmu.study.stress.closed_forms import LEEWAY, Compiled, laws
 from lagfmu.study.stress.lagrange import lagrange
 
 MODELS = Path(__file__).parent.parent / "models"
@@ -162,8 +162,13 @@ class Bench:
         }
         names = frozenset(v.name for v in description.modelVariables)
         self.laws = [
-            (law, None if law.claim.when is None else Compiled(law.claim.when, law.claim.name))
-            for law in laws(tuple(claims_of(scene, lagrange(file.model, names))))
+            (
+                law,
+                None
+                if law.closed_form.when is None
+                else Compiled(law.closed_form.when, law.closed_form.name),
+            )
+            for law in laws(tuple(carried(scene, lagrange(file.model, names))))
         ]
         self.fields = [("time", np.float64), *((v.name, KINDS[v.type]) for v in self.read)]
         # what a moving surface gives: lambda . nu, nu = - (rate of the row at rest)
@@ -218,7 +223,7 @@ class Bench:
             error, allowed = hold(law, when, run)
             worst = int(np.argmax(error - allowed)) if len(error) else 0
             if len(error) and error[worst] > allowed[worst]:
-                wrong.append(f"{law.claim.name}: {error[worst]:.1e} > {allowed[worst]:.1e}")
+                wrong.append(f"{law.closed_form.name}: {error[worst]:.1e} > {allowed[worst]:.1e}")
         changes = sum(
             int((np.diff(rows[n].astype(int)) != 0).sum())
             for n in rows.dtype.names
@@ -266,12 +271,12 @@ def hold(law, when, run):
     """Error of a law, and what rounding of its terms allows, where it says something."""
     every = np.ones(len(run.rows), dtype=bool)
     chosen = every if when is None else when.at(every, run) != 0
-    if law.claim.while_closed is not None:
-        chosen = chosen & run.rows[f"contact.{law.claim.while_closed}"]
+    if law.closed_form.while_closed is not None:
+        chosen = chosen & run.rows[f"contact.{law.closed_form.while_closed}"]
     actual, expected = law.actual.at(chosen, run), law.expected.at(chosen, run)
     terms = [np.abs(expected), *(np.abs(s.at(chosen, run)) for s in law.sizes)]
-    allowed = LEEWAY * law.claim.rounding * np.maximum.reduce(terms) + np.finfo(float).tiny
-    if law.claim.name.endswith("while it sticks"):
+    allowed = LEEWAY * law.closed_form.rounding * np.maximum.reduce(terms) + np.finfo(float).tiny
+    if law.closed_form.name.endswith("while it sticks"):
         allowed = np.maximum(allowed, STILL)
     error = np.where(np.isfinite(expected + allowed), np.abs(actual - expected), 0.0)
     return error, np.where(np.isfinite(allowed), allowed, np.inf)

@@ -40,7 +40,6 @@ NUMBERS = {m.name: m.number for m in MENU}
 IN_PYTHON = tuple(m.name for m in MENU if not m.native_only)
 INTEGRATORS = tuple(m.name for m in MENU if not m.made_of)
 FIXED_STEP = tuple(m.name for m in MENU if m.fixed_step)
-ADAPTIVE = tuple(m for m in INTEGRATORS if m not in FIXED_STEP)
 EVALUATIONS = {m.name: m.evaluations for m in MENU if m.evaluations}
 
 

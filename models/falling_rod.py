@@ -6,7 +6,7 @@ tan(theta) = 2, there is no acceleration that agrees with Coulomb's law, or ther
 and such a step are refused.
 """
 
-from sympy import cos, sin, symbols
+from sympy import Abs, cos, sign, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -77,7 +77,9 @@ scenes = [Scene("FallingRod", stop_time=0.75, step_size=0.01)]
 # theta'^2 = theta0'^2 + (3/2)(g/l)(sin(theta0) - sin(theta)).
 rate = -3 * g * cos(theta) / (4 * l)
 square = initial(theta.diff()) ** 2 + 3 * g / (2 * l) * (sin(initial(theta)) - sin(theta))
+slip = initial(x.diff()) + l * sin(initial(theta)) * initial(theta.diff())
 turns = output("sticks.grip") * (1 - output("slipping.grip.count")) * (1 - output("contact.lying"))
+turns = turns * (1 - sign(Abs(slip)))  # a rod that begins by sliding sticks later on
 
 closed_forms = [
     ClosedForm("der(theta,2) on the foot", rate, actual=theta.diff(t, 2), when=turns),

@@ -79,6 +79,8 @@ square = rate0**2 + 3 * g * (sin(theta0) - sin(theta)) / l
 wall = m * cos(theta) * (3 * g * sin(theta) / 4 - l * square / 2)
 floor = m * g - m * (3 * g * cos(theta) ** 2 / 4 + l * sin(theta) * square / 2)
 highest = 2 * sin(theta0) / 3 + 2 * l * rate0**2 / (9 * g)  # sin(theta) where the wall's force ends
+# ... unless it goes up, and over the vertical, where the wall lets go as well:
+over = Heaviside(rate0, 0) * Heaviside(rate0**2 + 3 * g * (sin(theta0) - 1) / l, 1)
 # That is so if it slid on the floor all along:
 slid = initial(output("contact.floor")) * Heaviside(-output("departure.floor.count"), 1)
 
@@ -118,14 +120,14 @@ closed_forms = [
         actual=sin(angle),
         expected=highest,
         at_departure="wall",
-        when=slid,
+        when=slid * (1 - over),
     ),
     ClosedForm(
         "der(theta)^2 at the departure",
         actual=rate**2,
         expected=rate0**2 + 3 * g * (sin(theta0) - highest) / l,
         at_departure="wall",
-        when=slid,
+        when=slid * (1 - over),
     ),
     ClosedForm("x without the wall", free, actual=x, while_open="wall"),
     ClosedForm(

@@ -1,14 +1,31 @@
-"""FMUs for the tests: each is built once a test process, from the model files as a user has them."""
+"""FMUs for the tests, from the model files as a user has them: each is built once, for all processes.
+
+How builds and runs are shared:
+
+- `python_fmu`, `native_fmu`, `fmu` (both targets), `library`, `prepared`, `playable`, `page_file`: models/;
+  a model of a test's own is built in a fixture of its module;
+- `shared_folder` with `once(folder, make)` of once.py, for what tests in several files build;
+- `objects` and `compile_library` of runtime.py: the runtime's C files, compiled once for what they hold, also
+  with SANITIZE;
+- `simulate_fmu` of runs.py: an FMU that runs many times is unpacked once.
+
+What is no fact about one model, but about what lagfmu makes of any, is tried on one of each kind (KINDS).
+What both targets tell alike is told by native in every case, and in files or tests that are marked
+`python_cases(n)` by python in n of them, spread over all.
+"""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 from browser import Page, chromium
 from fmi2 import Library
+from once import once
 
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
@@ -39,6 +56,27 @@ FILES = {
     "Crane": "crane",
     "HalfCar": "half_car",
 }
+# one of each kind: forces alone, multipliers eliminated, a contact and velocities, an input, a table and an
+# output and a prescribed motion, nothing left to integrate by rows
+KINDS = ("PendulumAngle", "Hemisphere", "KnifeEdge", "CartPendulum", "HalfCar", "BouncingBall")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Of the cases of a test that is marked python_cases(n), n run in python."""
+    cases: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        marker, call = item.get_closest_marker("python_cases"), getattr(item, "callspec", None)
+        if marker is not None and call is not None and call.params.get("target") == "python":
+            cases.setdefault(item.nodeid.split("[")[0], []).append(item)
+    gone: set[pytest.Item] = set()
+    for found in cases.values():
+        marker = found[0].get_closest_marker("python_cases")
+        assert marker is not None
+        most, last = marker.args[0], len(found) - 1
+        kept = {round(k * last / max(most - 1, 1)) for k in range(min(most, len(found)))}
+        gone |= {item for k, item in enumerate(found) if k not in kept}
+    config.hook.pytest_deselected(items=[item for item in items if item in gone])
+    items[:] = [item for item in items if item not in gone]
 
 
 @pytest.fixture(scope="session")
@@ -59,34 +97,37 @@ def prepared() -> Callable[[str], Prepared]:
 Fmu = Callable[[str], Path]
 
 
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of this run, the same one in every process."""
+    own = tmp_path_factory.getbasetemp()
+    return (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "shared"
+
+
 def _built(prepared: Callable[[str], Prepared], folder: Path, target: str) -> Fmu:
-    made: dict[str, Path] = {}
-
     def get(name: str) -> Path:
-        if name not in made:
-            forms = load(MODELS / f"{FILES[name]}.py").closed_forms
-            made[name] = write(prepared(name), folder, forms, target=target)
-        return made[name]
+        forms = load(MODELS / f"{FILES[name]}.py").closed_forms
 
-    return get
+        def make(place: Path) -> None:
+            write(prepared(name), place, forms, target=target)
+
+        return once(folder / f"{target}-{name}", make) / f"{name}.fmu"
+
+    return cache(get)
 
 
 @pytest.fixture(scope="session")
-def python_fmu(
-    prepared: Callable[[str], Prepared], tmp_path_factory: pytest.TempPathFactory
-) -> Fmu:
+def python_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
     """python_fmu(NAME): path of the FMU of the python target, built once."""
-    return _built(prepared, tmp_path_factory.mktemp("python"), "python")
+    return _built(prepared, shared_folder, "python")
 
 
 @pytest.fixture(scope="session")
-def native_fmu(
-    prepared: Callable[[str], Prepared], tmp_path_factory: pytest.TempPathFactory
-) -> Fmu:
+def native_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
     """native_fmu(NAME): path of the compiled FMU for this machine, built once."""
     if find_compiler() is None:
         pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    return _built(prepared, tmp_path_factory.mktemp("native"), "native")
+    return _built(prepared, shared_folder, "native")
 
 
 @pytest.fixture(scope="session")

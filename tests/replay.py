@@ -10,8 +10,8 @@ import zipfile
 from pathlib import PurePosixPath
 from xml.etree import ElementTree as ET
 
-import fmpy
 import numpy as np
+from runs import simulate_fmu
 
 PLACE = "extra/org.fmi-standard.fmi-ls-ref/"
 NAMESPACE = "{http://fmi-standard.org/fmi-ls-manifest}"
@@ -32,7 +32,7 @@ def replay(fmu: str, allowed: float = 1e-6) -> dict[str, float]:
             names, *rows = list(csv.reader(io.StringIO(text)))
             expected = dict(zip(names, np.array(rows, dtype=float).T, strict=True))
             step = float(experiment.get("stepSize"))
-            result = fmpy.simulate_fmu(
+            result = simulate_fmu(
                 fmu,
                 start_time=float(experiment.get("startTime")),
                 stop_time=float(experiment.get("stopTime")),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
+from runs import simulate_fmu
+
+pytestmark = pytest.mark.python_cases(3)
 
 CASES = {
     "default": (2.0, 1.0, 9.81),
@@ -18,7 +20,7 @@ EVERY = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 
 def fall(path, case, **start):
     values = dict(zip(("m1", "m2", "g"), case, strict=True))
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path), stop_time=1.0, output_interval=0.05, start_values={**values, **start}
     )
 

@@ -442,7 +442,7 @@ def test_a_minimal_formulation_that_does_not_exist_is_refused():
         ({"stop_time": math.nan}, ("stop_time = nan", "positive")),
         ({"step_size": 0.0}, ("step_size = 0.0", "positive")),
         ({"tolerance": -1e-8}, ("tolerance = -1e-08", "positive")),
-        ({"name": "my scene"}, ("'my scene'", "no FMI name")),
+        ({"name": "my scene"}, ("'my scene'", "not a name that FMI allows")),
     ],
 )
 def test_a_scene_that_cannot_be_is_refused(change, parts):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
+
+pytestmark = pytest.mark.python_cases(3)
 
 G = 9.81
 CASES = {  # m [kg], e, h [m], v0 [m/s]
@@ -45,7 +47,7 @@ def test_every_parabola_is_where_the_bounces_put_it(fmu, case, tolerance, allowe
     1e-9 of its first height.)"""
     times, speeds, end = bounces(case)
     stop = 1.2 * end
-    result = fmpy.simulate_fmu(
+    result = simulate_fmu(
         str(fmu("BouncingBall")),
         stop_time=stop,
         output_interval=stop / 400,
@@ -92,7 +94,7 @@ def test_it_rests_when_the_bounces_have_accumulated(fmu, case):
 @pytest.mark.parametrize("points", [1, 30, 1000])
 def test_infinitely_many_bounces_fit_into_one_communication_step(fmu, points):
     """Rest is reached whether the whole run is one communication step or a thousand."""
-    result = fmpy.simulate_fmu(
+    result = simulate_fmu(
         str(fmu("BouncingBall")), stop_time=5.0, output_interval=5 / points, step_size=5 / points
     )
     assert result["contact.floor"][-1]
@@ -103,7 +105,7 @@ def test_infinitely_many_bounces_fit_into_one_communication_step(fmu, points):
 def test_each_bounce_keeps_e_squared_of_the_energy(fmu):
     """Between the bounces the energy is m g h e^2k, falling in steps that all have the ratio e^2."""
     e = 0.8
-    result = fmpy.simulate_fmu(
+    result = simulate_fmu(
         str(fmu("BouncingBall")),
         stop_time=3.0,
         output_interval=1e-2,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from scipy.integrate import romb
+
+pytestmark = pytest.mark.python_cases(3)
 
 DEFAULT = {"M": 2.0, "m": 1.0, "g": 9.81, "L": 1.0}
 LIGHT = {"M": 0.05, "m": 0.7, "g": 3.7, "L": 0.3}
@@ -35,7 +37,7 @@ def run(path, values, force=None, count=12 * HOLD, tolerance=1e-12):
         signals = np.zeros(count + 1, dtype=[("time", float), ("F", float)])
         signals["time"] = STEP * np.arange(count + 1)
         signals["F"][:count] = force
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=STEP * count,
         output_interval=STEP,

@@ -5,16 +5,18 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 import sympy as sp
+from runs import simulate_fmu
 from scipy.integrate import solve_ivp
 from scipy.special import roots_laguerre
 
 from lagfmu import derive, simulate
 from lagfmu.codegen.py.equations import lower
 from lagfmu.mechanics.form import Form
+
+pytestmark = pytest.mark.python_cases(3)
 
 FILE = Path(__file__).parent.parent / "models" / "chain.py"
 G, MASS, LENGTH = 9.81, 0.1, 0.25
@@ -36,7 +38,7 @@ def places(angles):
 
 
 def hang(path, angles, stop, points=1, tolerance=1e-12):
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / points,

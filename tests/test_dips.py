@@ -16,6 +16,8 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Contact, Model, Parameter, Scene, build_fmu
 from lagfmu.fmu.compiler import find_compiler
 
+pytestmark = pytest.mark.python_cases(3)
+
 x, y = dynamicsymbols("x y")
 m, a, H, w, R = symbols("m a H w R", positive=True)
 PULL = 9.81  # m/s^2, upwards: a flight that dips and comes back

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
+from runs import simulate_fmu
 from scipy.integrate import solve_ivp
+
+pytestmark = pytest.mark.python_cases(2)
 
 G = 9.81
 CASES = {  # m1, m2 [kg], L1, L2 [m], both angles [rad] and their rates [rad/s]
@@ -32,7 +34,7 @@ NAMES = ("x1", "y1", "x2", "y2", "der(x1)", "der(y1)", "der(x2)", "der(y2)")
 def swing(path, case, tolerance=1e-12, stop=3.0, points=30):
     start = dict(zip(NAMES, map(float, bobs(case, *case[4:])), strict=True))
     values = dict(zip(("m1", "m2", "L1", "L2"), case, strict=False))
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / points,

@@ -30,6 +30,8 @@ from lagfmu.fmu.compiler import find_compiler
 from lagfmu.prepare.consistency import RedundantConstraintWarning
 from lagfmu.verification.simulate import simulate
 
+pytestmark = pytest.mark.python_cases(4)
+
 g0 = 9.81  # m/s^2
 m, g, L = symbols("m g L", positive=True)
 x, y, z = dynamicsymbols("x y z")

@@ -13,7 +13,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import FILES
+from conftest import FILES, KINDS
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from instance import Instance, instance
@@ -69,11 +69,13 @@ def listed(xml, what) -> dict[str, list[str]]:
 # ---------------------------------------------------------------------------- checkers
 
 
+@pytest.mark.parametrize("name", KINDS)
 def test_fmpy_reports_no_problem(path):
     """fmpy validate is silent."""
     assert validate_fmu(str(path)) == []
 
 
+@pytest.mark.parametrize("name", KINDS)
 def test_fmutool_reports_no_error(path):
     """fmutool -check (fmu-manipulation-toolbox): schema and rules of the standard."""
     command = [
@@ -555,6 +557,7 @@ def record(one, steps=5, size=0.05) -> list[dict]:
     return found
 
 
+@pytest.mark.parametrize("name", KINDS)
 def test_a_second_experiment_after_reset_gives_the_same_numbers(path):
     """Also after parameters were changed, and right after instantiation."""
     with instance(path) as one:
@@ -606,6 +609,7 @@ def test_calls_with_no_variables_are_accepted(path):
         one.step(0.01)
 
 
+@pytest.mark.parametrize("name", KINDS)
 def test_an_experiment_may_start_late(name, path):
     """Started at t = 10 s: an autonomous system repeats what it does from t = 0."""
     with instance(path) as one, instance(path) as late:
@@ -622,6 +626,7 @@ def test_an_experiment_may_start_late(name, path):
                     assert b[output] == pytest.approx(a[output], rel=1e-5, abs=1e-6), output
 
 
+@pytest.mark.parametrize("name", KINDS)
 def test_a_communication_step_of_any_size_follows_any_other(path):
     """1e-9, 0.1, 1e-3 s: the coordinates are those of one single step."""
     with instance(path) as one, instance(path) as single:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from lagfmu import ClosedForm, Holonomic, Model, Parameter, Scene, output, verify
 from lagfmu.errors import ModelError, VerificationError
-from lagfmu.fmu.claims import pack_closed_forms, unpack_closed_forms
+from lagfmu.fmu.closed_forms import pack_closed_forms, unpack_closed_forms
 from lagfmu.fmu.formula import LONGEST_SUM, read_formula, text_of
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress.facts import facts_of

@@ -24,13 +24,13 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.fmu.claims import claims_of
+from lagfmu.fmu.closed_forms import carried
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress.lagrange import lagrange
-from lagfmu.verification.verify import check_claim
+from lagfmu.verification.verify import check_closed_form
 
 MODELS = Path(__file__).parent.parent / "models"
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -75,10 +75,10 @@ def misses(name: str, result: Any, values: dict[str, float], tolerance: float) -
     file = load(MODELS / f"{FILES[name]}.py")
     known = {str(p.symbol): p.value for p in file.model.parameters} | values
     found = {}
-    for claim in claims_of(scene_of(name), file.closed_forms):
-        check = check_claim(claim, result, known, tolerance)
+    for closed_form in carried(scene_of(name), file.closed_forms):
+        check = check_closed_form(closed_form, result, known, tolerance)
         if check.points:
-            found[claim.name] = check.error / check.allowed
+            found[closed_form.name] = check.error / check.allowed
     return found
 
 
@@ -114,7 +114,7 @@ def test_each_motion_is_that_of_its_closed_forms(
         assert all(miss < 1 for miss in found.values()), (values, found)
         reached |= found.keys()
     file = load(MODELS / f"{FILES[name]}.py")
-    assert reached == {c.name for c in claims_of(scene_of(name), file.closed_forms)}
+    assert reached == {c.name for c in carried(scene_of(name), file.closed_forms)}
 
 
 @pytest.mark.parametrize("name", sorted(RUNS))
@@ -147,14 +147,14 @@ def test_reported_values_obey_lagranges_and_coulombs_laws_to_rounding(
     file = load(MODELS / f"{FILES[name]}.py")
     prepared = prepare(file.model, scene_of(name))
     laws = lagrange(file.model, frozenset(v.name for v in prepared.table.variables))
-    claims = claims_of(scene_of(name), laws)
-    assert any(c.name == "cone of grip" for c in claims)
+    closed_forms = carried(scene_of(name), laws)
+    assert any(c.name == "cone of grip" for c in closed_forms)
     for values in RUNS[name]:
         result = simulate(rubbing(name), start_values=values, step_size=0.0137)
         known = {str(p.symbol): p.value for p in file.model.parameters} | values
-        for claim in claims:
-            check = check_claim(claim, result, known, 1e-300)
-            assert check.error <= check.allowed, claim.name
+        for closed_form in closed_forms:
+            check = check_closed_form(closed_form, result, known, 1e-300)
+            assert check.error <= check.allowed, closed_form.name
 
 
 def test_time_of_each_slip_is_located_to_rounding(rubbing: Build) -> None:

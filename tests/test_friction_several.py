@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
+from runs import simulate_fmu
 from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -283,8 +283,8 @@ def test_model_exchange_tells_the_same_motion(native: Make, name: str) -> None:
     path = str(native(model))
     run = {"stop_time": 1.5, "output_interval": 0.05, "relative_tolerance": 1e-9}
     outputs = ["x" if name != "rough_hemisphere" else "theta", "sticks.grip", "slipping.grip.count"]
-    ours = fmpy.simulate_fmu(path, fmi_type="CoSimulation", output=outputs, **run)
-    theirs = fmpy.simulate_fmu(path, fmi_type="ModelExchange", output=outputs, **run)
+    ours = simulate_fmu(path, fmi_type="CoSimulation", output=outputs, **run)
+    theirs = simulate_fmu(path, fmi_type="ModelExchange", output=outputs, **run)
     at = {round(float(t), 9): k for k, t in enumerate(theirs["time"])}  # the last at an event
     pairs = [(k, at[round(float(t), 9)]) for k, t in enumerate(ours["time"])]
     for column in outputs:

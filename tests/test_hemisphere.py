@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from scipy.integrate import quad
+
+pytestmark = pytest.mark.python_cases(3)
 
 # m [kg], g [m/s^2], a [m]
 EARTH = {"m": 1.0, "g": 9.81, "a": 1.0}
@@ -24,7 +26,7 @@ def slide(path, world, theta0, share=0.0, tolerance=None, stop=14.0, points=1):
     m, g, a = world["m"], world["g"], world["a"]
     rate = np.sqrt(share * g / a * np.cos(theta0))
     stop *= np.sqrt(a / g)
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / points,
@@ -99,7 +101,7 @@ def test_the_time_of_departure_does_not_depend_on_the_communication_step(fmu, th
     the whole run give the same time, which is the integral of d theta/theta'."""
     stop = 2.0
     times = [
-        fmpy.simulate_fmu(
+        simulate_fmu(
             str(fmu("Hemisphere")),
             stop_time=stop,
             output_interval=step,
@@ -236,7 +238,7 @@ def test_a_start_above_the_sphere_is_in_flight(fmu):
         assert one.get("lambda.surface") == 0
         assert one.get("residual.surface") == 0.5
         assert one.log == []
-    result = fmpy.simulate_fmu(
+    result = simulate_fmu(
         str(fmu("Hemisphere")),
         stop_time=0.3,
         output_interval=0.01,

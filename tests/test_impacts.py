@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 import pytest
 from impact_models import G, corner, cradle, e, m, restitution, rod, table, wedge
+from runs import simulate_fmu
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -364,7 +364,7 @@ TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
 
 def exchanged(path: Path, stop: float, interval: float = 0.02, **more: Any) -> Any:
     """A run of fmpy's integrator on the FMU's model exchange."""
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path), stop_time=stop, output_interval=interval, fmi_type="ModelExchange", **more
     )
 

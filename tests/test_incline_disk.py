@@ -3,10 +3,12 @@ alone, through fmpy on the built FMUs."""
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
+
+pytestmark = pytest.mark.python_cases(3)
 
 BOTH = pytest.mark.parametrize("name", ["InclineDisk", "InclineDiskMinimal"])
 DISKS = {
@@ -20,7 +22,7 @@ EVERY = pytest.mark.parametrize("disk", DISKS.values(), ids=DISKS.keys())
 
 
 def roll(path, disk, **start):
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path), stop_time=1.0, output_interval=0.05, start_values={**disk, **start}
     )
 

@@ -8,6 +8,7 @@ import math
 import fmpy
 import numpy as np
 import pytest
+from runs import simulate_fmu
 from scipy.special import ellipj, ellipk
 
 from lagfmu import simulate
@@ -22,7 +23,7 @@ END = 5.0  # s, two and a half periods
 def run(path, stop=END, step=END, tolerance=None, **solver):
     """From rest at THETA0; solver_method='rk4' sets solver.method."""
     start = {n.replace("solver_", "solver."): NUMBERS.get(v, v) for n, v in solver.items()}
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=step,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-import fmpy
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from sympy import Abs, Heaviside, Max, Mod, Piecewise, cos, floor, pi, sign, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -178,7 +178,7 @@ def test_model_exchange_stops_at_the_jumps(own, target, name, stop, velocity):
     stairs, and x' = +2 m/s at the bottom of the valley on the way back."""
     if target == "python":
         pytest.skip("python FMUs have no model exchange")
-    run = fmpy.simulate_fmu(
+    run = simulate_fmu(
         str(own(name)),
         fmi_type="ModelExchange",
         stop_time=stop,

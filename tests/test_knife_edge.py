@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
+from runs import simulate_fmu
+
+pytestmark = pytest.mark.python_cases(3)
 
 DEFAULT = {"m": 1.0, "J": 0.1, "g": 9.81, "alpha": np.pi / 6}
 OTHER = {"m": 70.0, "J": 2.5, "g": 3.7, "alpha": 0.1}
@@ -21,7 +23,7 @@ EVERY = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 
 def skate(path, case, stop=6.0, tolerance=1e-12):
     world, omega, phi0, u0 = case
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / 120,
@@ -95,7 +97,7 @@ def test_the_blade_never_slides_sideways_and_the_force_does_no_work(fmu, case):
 
 def test_a_sideways_velocity_is_taken_away(fmu):
     """Thrown across the blade at the start, it keeps only the part along the blade."""
-    result = fmpy.simulate_fmu(
+    result = simulate_fmu(
         str(fmu("KnifeEdge")),
         stop_time=0.1,
         output_interval=0.1,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from scipy.integrate import quad, solve_ivp
 
 from lagfmu import verify
+
+pytestmark = pytest.mark.python_cases(3)
 
 G = 9.81
 CASES = {  # m [kg], l [m], theta0 [rad], share of the rate at which it would leave the wall at once
@@ -38,7 +40,7 @@ def slide(path, case, tolerance=1e-12, stop=6.0, points=1):
         "der(x)": -length / 2 * np.sin(theta0) * rate,
         "der(y)": length / 2 * np.cos(theta0) * rate,
     }
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / points,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from scipy.integrate import quad, solve_ivp
 from scipy.special import ellipk
 
 from lagfmu import verify
+
+pytestmark = pytest.mark.python_cases(3)
 
 WORLDS = {  # m [kg], g [m/s^2], a [m]
     "earth": {"m": 1.0, "g": 9.81, "a": 1.0},
@@ -24,7 +26,7 @@ def run(path, world, square, tolerance=1e-12, stop=6.0, points=1):
     """From the bottom with v0^2 = square * g a; `stop` in units of sqrt(a/g)."""
     g, a = world["g"], world["a"]
     stop *= np.sqrt(a / g)
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / points,

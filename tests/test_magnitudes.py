@@ -8,6 +8,8 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from instance import instance
 
+pytestmark = pytest.mark.python_cases(4)
+
 g = 9.81  # m/s^2
 
 

@@ -12,11 +12,11 @@ from scipy.integrate import simpson
 from scipy.special import ellipk, ellipkinc
 
 from lagfmu import derive, simulate
-from lagfmu.fmu.claims import claims_of
+from lagfmu.fmu.closed_forms import carried
 from lagfmu.model.file import ModelFile, load
 from lagfmu.model.model import Model
 from lagfmu.prepare.prepare import prepare
-from lagfmu.verification.verify import check_claim
+from lagfmu.verification.verify import check_closed_form
 
 MODELS = Path(__file__).parent.parent / "models"
 g = 9.81  # m/s^2
@@ -102,12 +102,12 @@ def test_outputs_equal_the_closed_forms(name: str, tolerance: float, changed: bo
     )
     inputs = {str(i.symbol.func): i.start for i in file.model.inputs}
     known = {str(p.symbol): p.value for p in file.model.parameters} | inputs | values
-    claims = claims_of(scene, file.closed_forms)
-    assert any(c.name.startswith("lambda.") for c in claims)
-    for claim in claims:
-        check = check_claim(claim, result, known, max(tolerance, 1e-12))
-        assert check.points > 0, claim.name
-        assert check.error < check.allowed, claim.name
+    closed_forms = carried(scene, file.closed_forms)
+    assert any(c.name.startswith("lambda.") for c in closed_forms)
+    for closed_form in closed_forms:
+        check = check_closed_form(closed_form, result, known, max(tolerance, 1e-12))
+        assert check.points > 0, closed_form.name
+        assert check.error < check.allowed, closed_form.name
 
 
 def test_the_table_above_names_every_scene_of_the_lectures() -> None:

@@ -16,6 +16,8 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Contact, Model, Parameter, Scene, build_fmu
 from lagfmu.fmu.compiler import find_compiler
 
+pytestmark = pytest.mark.python_cases(3)
+
 G = 9.81
 COUNT = 3
 AMPLITUDE, SHAKEN = 0.03, 20.0  # A w^2 = 12 m/s^2

@@ -107,7 +107,7 @@ def test_a_model_is_verified_in_one_call():
     """The file's closed forms are those that it is held to."""
     found = lagfmu.verify(MODELS / "incline_disk.py")
     assert found.passed
-    assert found.claims
+    assert found.closed_forms
 
 
 @pytest.mark.parametrize("words", [["bead"], ["bead.py", "--from", "pendulum"]])

@@ -221,7 +221,10 @@ def test_the_page_shows_what_an_output_is_made_of(prepared):
         (Output("x", y, "m"), ("'x' is used twice", "rename")),
         (Output("x.high", y, "m"), ("'x' would be a variable", "x.high", "group")),
         (Output("energy.mine", m * g * y, "J"), ("'energy'", "reserved", "choose")),
-        (Output("bob height", y, "m"), ("'bob height'", "no FMI name", "bob.height")),
+        (
+            Output("bob height", y, "m"),
+            ("'bob height'", "not a name that FMI allows", "bob.height"),
+        ),
         (Output("h", "y", "m"), ("output 'h'", "no SymPy expression")),
         (Output("h", y, "m", description=3), ("output 'h'", "expected a text")),
         (Output("h", y, "m", otherwise=m), ("output 'h', otherwise", "kg", "m")),

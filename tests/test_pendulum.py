@@ -3,11 +3,13 @@ eq. 9), through fmpy on the built FMUs, against Jacobi's elliptic functions."""
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from scipy.special import ellipj, ellipk
+
+pytestmark = pytest.mark.python_cases(3)
 
 NAMES = ("PendulumCartesian", "PendulumAngle", "PendulumNullspace")
 EVERY = pytest.mark.parametrize("name", NAMES)
@@ -27,7 +29,7 @@ def swing(path, theta0, rate=0.0, world=DEFAULT, stop=5.0, tolerance=1e-12, poin
             "der(x)": L * rate * np.cos(theta0),
             "der(y)": L * rate * np.sin(theta0),
         }
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / points,

@@ -11,6 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 from redundant import SYSTEMS
+from runs import simulate_fmu
 
 from lagfmu import Scene, simulate
 from lagfmu.fmu.compiler import find_compiler
@@ -97,7 +98,7 @@ def test_an_importers_integrator_does_not_meet_them_either(name, pair, monkeypat
         found = []
         for fmu in pair(name, "native"):
             count = 0
-            fmpy.simulate_fmu(
+            simulate_fmu(
                 str(fmu),
                 fmi_type="ModelExchange",
                 relative_tolerance=tolerance,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from scipy.integrate import quad
+
+pytestmark = pytest.mark.python_cases(3)
 
 WORLDS = {  # m [kg], g [m/s^2], a, R [m]
     "earth": {"m": 1.0, "g": 9.81, "a": 1.0, "R": 0.2},
@@ -23,7 +25,7 @@ def roll(path, world, theta0, share=0.0, tolerance=1e-12, stop=12.0, points=1):
     rate = np.sqrt(share * g / b * np.cos(theta0))
     stop *= np.sqrt(b / g)
     start = {"r": b, "theta": theta0, "der(theta)": rate, "der(phi)": b / R * rate}
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / points,

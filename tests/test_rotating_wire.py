@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import fmpy
 import numpy as np
 import pytest
+from runs import simulate_fmu
+
+pytestmark = pytest.mark.python_cases(3)
 
 CASES = {
     "default": {"m": 1.0, "omega": 2.0, "r0": 0.1, "v0": 0.0},
@@ -16,7 +18,7 @@ CASES = {
 def spin(path, m, omega, r0, v0, tolerance=1e-12, **start):
     stop = 4 / abs(omega)
     start = {"r": r0, "der(r)": v0, "der(phi)": omega, **start}
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / 50,

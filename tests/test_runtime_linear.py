@@ -17,7 +17,7 @@ import pytest
 import test_linear as python
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runtime import compile_library, compiler
+from runtime import SANITIZE, compile_library, compiler
 
 from lagfmu.codegen.c.elimination import plan
 from lagfmu.solver.failure import StepFailureError
@@ -196,8 +196,7 @@ class Row(ctypes.Structure):
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    watched = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=undefined")
-    flags = watched if "LAGFMU_SANITIZE" in os.environ else ()
+    flags = SANITIZE if "LAGFMU_SANITIZE" in os.environ else ()
     return declare(compile_library(tmp_path_factory.mktemp("linear"), SOURCES, DOOR, flags))
 
 

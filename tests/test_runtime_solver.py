@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from conftest import FILES
 from linkages import FOUR_BAR, TIME, pinned_rod, rods
-from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compile_library, compiler
+from runtime import FLAGS, INCLUDES, RUNTIME_FILES, SANITIZE, compile_library, compiler, objects
 from sympy import sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_euler_parameters import top
@@ -1020,8 +1020,6 @@ def test_inputs_that_change_drop_what_lies_ahead(bench):
 
 # --------------------------------------------------------------------------- memory
 
-SANITIZE = ("-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-
 DRIVER = """
 #include <stdio.h>
 
@@ -1067,22 +1065,8 @@ int main(int count, char **values) {
 """
 
 
-def sanitizing_compiler(*arguments: str) -> None:
-    command = [compiler(), *FLAGS, *SANITIZE, "-Werror", *INCLUDES, *arguments]
-    subprocess.run(command, check=True, timeout=300)
-
-
-@pytest.fixture(scope="module")
-def sanitized(folder: Path) -> Path:
-    """The runtime as a library, not to be loaded into Python, which is no sanitized program."""
-    target = folder / "sanitized.so"
-    files = [str(RUNTIME_FILES[name]) for name in SOURCES]
-    sanitizing_compiler("-shared", "-fPIC", "-o", str(target), *files)
-    return target
-
-
 @pytest.mark.parametrize("name", ["Hemisphere", "PendulumAngle", "Atwood", "KnifeEdge"])
-def test_no_byte_outside_the_arrays_is_touched(name, folder, prepared, sanitized):
+def test_no_byte_outside_the_arrays_is_touched(name, folder, prepared):
     """Address and undefined-behaviour sanitizers find nothing from the start to the last mode."""
     one = prepared(name)
     q, v, _ = defaults(one.system, one.table)
@@ -1091,8 +1075,10 @@ def test_no_byte_outside_the_arrays_is_touched(name, folder, prepared, sanitized
     (folder / f"{name}.c").write_text(text, encoding="utf-8")
     (folder / f"{name}_main.c").write_text(BENCH.read_text("utf-8") + DRIVER, encoding="utf-8")
     program = folder / name
-    parts = [str(folder / f"{name}.c"), str(folder / f"{name}_main.c"), str(sanitized), "-lm"]
-    sanitizing_compiler("-o", str(program), *parts)
+    parts = [str(folder / f"{name}.c"), str(folder / f"{name}_main.c")]
+    runtime = objects([RUNTIME_FILES[file] for file in SOURCES], SANITIZE)
+    command = [compiler(), *FLAGS, *SANITIZE, "-Werror", *INCLUDES, *parts, *runtime]
+    subprocess.run([*command, "-o", str(program), "-lm"], check=True, timeout=300)
     arguments = [repr(float(a)) for a in (*q, *v, *p)]
     done = subprocess.run([str(program), *arguments], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from runtime import INCLUDES, RUNTIME_FILES, compiler
+from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
 from test_extremes import isosceles, swing
 from test_jumps import MODELS as JUMPS
 
@@ -23,8 +23,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::lagfmu.prepare.consistency.RedundantConstraintWarning"),
 ]
 SCENARIO = Path(__file__).parent / "scenario.c"
-SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
-FLAGS = ("-std=c99", "-O1", "-g", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 LIVES = {  # steps that reach the event or the singular point in between
     "Hemisphere": 0.07,  # a contact that opens
     "CartPendulum": 0.05,  # an input
@@ -76,39 +74,18 @@ def unpacked(native_fmu, prepared, tmp_path_factory):
     return get
 
 
-@pytest.fixture(scope="module")
-def objects(tmp_path_factory):
-    """objects(flags): the runtime and scenario.c, compiled once."""
-    made: dict[tuple[str, ...], list[str]] = {}
-
-    def get(flags: tuple[str, ...]) -> list[str]:
-        if flags not in made:
-            folder = tmp_path_factory.mktemp("objects")
-            files = [
-                str(SCENARIO),
-                *sorted(str(p) for p in RUNTIME_FILES.values() if p.suffix == ".c"),
-            ]
-            command = [compiler(), *FLAGS, *flags, *INCLUDES, "-c", *files]
-            run = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
-            if run.returncode and "sanitize" in run.stderr:
-                pytest.skip("the compiler has no sanitizers")
-            assert run.returncode == 0, run.stderr[-2000:]
-            made[flags] = sorted(str(p) for p in folder.glob("*.o"))
-        return made[flags]
-
-    return get
-
-
-def program(folder: Path, name: str, flags: tuple[str, ...], objects: list[str]) -> Path:
+def program(folder: Path, name: str, flags: tuple[str, ...]) -> Path:
     """scenario.c with the FMU's generated sources and what it holds of the runtime, which is the same for
     every FMU."""
     sources = folder / "sources"
-    held = re.findall(r"^/\* (\w+)\.c \*/$", (sources / "lagfmu.c").read_text(), re.MULTILINE)
+    held = re.findall(r"^/\* (\w+\.c) \*/$", (sources / "lagfmu.c").read_text(), re.MULTILINE)
     generated = [str(p) for p in sorted(sources.glob("*.c")) if p.name != "lagfmu.c"]
     target = folder / f"{name}_{len(flags)}"
-    objects = [o for o in objects if Path(o).stem in {*held, SCENARIO.stem}]
-    command = [compiler(), *FLAGS, *flags, f"-I{sources}", "-o", str(target), *generated, *objects]
-    run = subprocess.run([*command, "-lm"], capture_output=True, text=True, timeout=300)
+    linked = objects([SCENARIO, *(RUNTIME_FILES[file] for file in held)], flags)
+    command = [compiler(), *FLAGS, *flags, "-Werror", f"-I{sources}", "-o", str(target)]
+    run = subprocess.run(
+        [*command, *generated, *linked, "-lm"], capture_output=True, text=True, timeout=300
+    )
     assert run.returncode == 0, run.stderr[-2000:]
     return target
 
@@ -133,10 +110,10 @@ def arguments(description, step: float) -> list[str]:
 
 
 @pytest.mark.parametrize("name", sorted(LIVES))
-def test_nothing_is_undefined_and_no_byte_is_left_behind(unpacked, objects, name):
+def test_nothing_is_undefined_and_no_byte_is_left_behind(unpacked, name):
     """AddressSanitizer, LeakSanitizer and UndefinedBehaviorSanitizer are silent."""
     folder, description = unpacked(name)
-    made = program(folder, name, SANITIZE, objects(SANITIZE))
+    made = program(folder, name, SANITIZE)
     run = subprocess.run(
         [str(made), *arguments(description, LIVES[name])],
         capture_output=True,
@@ -149,12 +126,12 @@ def test_nothing_is_undefined_and_no_byte_is_left_behind(unpacked, objects, name
 
 
 @pytest.mark.parametrize("name", ["Hemisphere", "CartPendulum", "Isosceles"])
-def test_valgrind_finds_nothing(unpacked, objects, name):
+def test_valgrind_finds_nothing(unpacked, name):
     """No value is used before it is set, no block is left."""
     if shutil.which("valgrind") is None:
         pytest.skip("valgrind is not installed")
     folder, description = unpacked(name)
-    made = program(folder, name, (), objects(()))
+    made = program(folder, name, ())
     run = subprocess.run(
         [
             "valgrind",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import fmpy
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from scipy.integrate import simpson, solve_ivp
 
 from lagfmu import verify
@@ -16,7 +16,7 @@ DEFAULT = {"J": 0.1, "m": 1.0, "M": 1.0, "r": 0.1, "l": 0.3, "s": 0.2, "k": 1e6,
 
 
 def turn(path, stop=1.0, points=100, tolerance=1e-8, **values):
-    return fmpy.simulate_fmu(
+    return simulate_fmu(
         str(path),
         stop_time=stop,
         output_interval=stop / points,

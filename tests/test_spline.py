@@ -121,7 +121,7 @@ def test_beyond_its_ends_a_table_goes_on_straight_and_says_so_once(target, tmp_p
 
 
 def test_a_closed_form_may_hold_a_table(tmp_path):
-    """A claim that looks a table up travels with its points, and is held against the run."""
+    """A closed form that looks a table up travels with its points, and is held against the run."""
     forms = [ClosedForm("z", wire(x)), ClosedForm("der(z)", wire(x).diff())]
     path = build_fmu(bead(), tmp_path, Scene("Bead"), forms, target="native", check=False)
     found = verify(path, stop_time=0.5)

@@ -238,6 +238,7 @@ def same_as_dop853(path, values, stop, points, tolerance):
     assert seen[0] == seen[1]
 
 
+@pytest.mark.python_cases(8)
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-8, 1e-12])
 @pytest.mark.parametrize("name", sorted(set(FILES) - {"SliderCrank"}))
 def test_where_nothing_is_stiff_auto_is_dop853(fmu, name, tolerance):

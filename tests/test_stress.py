@@ -26,7 +26,7 @@ from lagfmu.fmu.session import RefusalError
 from lagfmu.model.model import name_of
 from lagfmu.study.stress import worker
 from lagfmu.study.stress.bench import Bench, Finding
-from lagfmu.study.stress.claims import magnitude
+from lagfmu.study.stress.closed_forms import magnitude
 from lagfmu.study.stress.judge import Check, first_landing
 from lagfmu.study.stress.lagrange import lay_beside
 from lagfmu.study.stress.probe import (
@@ -36,7 +36,7 @@ from lagfmu.study.stress.probe import (
     UNFINISHED,
     WRONG,
     Probe,
-    Row,
+    Verdict,
     attempt,
     verdict,
 )
@@ -143,7 +143,7 @@ def test_lagranges_equations_hold_at_every_tolerance(lawful, prepared, name):
     with Bench(lawful(name), quick=True) as one:
         run = one.run({}, one.times(one.facts.stop_time), 1e-1)
         checks = {c.what: c for c in one.checks(run)}
-        laws = [checks[claim.name] for claim in one.facts.laws]
+        laws = [checks[closed_form.name] for closed_form in one.facts.laws]
         names = {c.what for c in laws}
         for q in prepared(name).model.coordinates:
             assert f"Lagrange's equation of {name_of(q)}" in names
@@ -222,12 +222,12 @@ def test_the_summary_names_what_is_not_right(lawful, tmp_path):
     """One page over all FMUs: versions, counts by FMU and family, and each row that is not right."""
     refused = "setReal: error: 'm' = {}, expected a finite number"
     rows = (
-        Row("parameters", "m = 1", RIGHT, "", "energy", 0.1, 9, 0.1),
-        Row(
+        Verdict("parameters", "m = 1", RIGHT, "", "energy", 0.1, 9, 0.1),
+        Verdict(
             "parameters", "m = 2", WRONG, "energy: 2.0e+00, allowed 1.0e+00", "energy", 2.0, 9, 0.1
         ),
         *(
-            Row("bounds", f"m = {x}", REFUSED, refused.format(x), "", 0, 0, 0.1)
+            Verdict("bounds", f"m = {x}", REFUSED, refused.format(x), "", 0, 0, 0.1)
             for x in ("nan", "inf")
         ),
     )

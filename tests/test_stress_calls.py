@@ -19,7 +19,7 @@ from lagfmu.study.stress.bench import Bench
 from lagfmu.study.stress.geometry import lay_geometry
 from lagfmu.study.stress.lagrange import lay_beside
 from lagfmu.study.stress.player import Player
-from lagfmu.study.stress.probe import RIGHT, WRONG, Row, attempt, verdict
+from lagfmu.study.stress.probe import RIGHT, WRONG, Verdict, attempt, verdict
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 FAMILIES = (calls, derivatives, exchange, unique)
@@ -36,7 +36,7 @@ def bench(native_fmu, prepared, tmp_path_factory) -> Iterator[Bench]:
         yield one
 
 
-def rows(bench: Bench) -> dict[str, Row]:
+def rows(bench: Bench) -> dict[str, Verdict]:
     """Every row of the families, by the probe's name."""
     found = [p for family in FAMILIES for p in family.probes(bench.facts, bench.quick)]
     return {p.name: verdict(p, attempt(p, bench), 0.0) for p in found}

@@ -7,19 +7,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from impact_models import corner, cradle, rod, table, wedge
+from sympy import cos, sin, symbols
+from sympy.physics.mechanics import dynamicsymbols
 
 import lagfmu.fmu.native
-from lagfmu import Scene
+from lagfmu import Contact, Friction, Nonholonomic, Parameter, Scene, multiplier
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
 from lagfmu.model.model import Model
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress import impacts
 from lagfmu.study.stress.bench import Bench
-from lagfmu.study.stress.geometry import lay_geometry, twin
-from lagfmu.study.stress.probe import RIGHT, WRONG, Row, attempt, verdict
+from lagfmu.study.stress.geometry import geometry_of, lay_geometry, twin
+from lagfmu.study.stress.probe import RIGHT, WRONG, Verdict, attempt, verdict
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
@@ -27,7 +30,7 @@ pytestmark = [
 ]
 
 
-def probed(model: Model, folder: Path) -> dict[str, Row]:
+def probed(model: Model, folder: Path) -> dict[str, Verdict]:
     """Every row of the family."""
     scene = Scene(model.name, stop_time=2.0)
     one = prepare(model, scene)
@@ -82,3 +85,32 @@ def test_a_wrong_law_of_impacts_is_found(mutant, tmp_path, monkeypatch):
     monkeypatch.setattr(lagfmu.fmu.native, "runtime_files", lambda: changed)
     rows = probed(rod(inertia=4.0, theta=0.2), tmp_path) | probed(corner(tilt=0.3), tmp_path)
     assert any(row.verdict == WRONG for row in rows.values())
+
+
+@pytest.mark.parametrize(("feet", "mirrors"), [(("left", "right"), 1), (("left",), 0)])
+def test_a_rod_that_rubs_with_one_foot_has_no_mirror_image(feet, mirrors, tmp_path):
+    """theta -> -theta, x -> -x takes a foot to the other one: an image only if both rub, or none."""
+    t = dynamicsymbols._t
+    x, z, theta = dynamicsymbols("x z theta")
+    m, l = symbols("m l", positive=True)  # noqa: E741
+    ends = {"left": -l, "right": l}
+    rows = [Contact(n, z + s * sin(theta)) for n, s in ends.items()]
+    for n in feet:
+        rate = (x + ends[n] * cos(theta)).diff(t)
+        rows += [
+            Nonholonomic(f"{n}_foot", rate),
+            Friction(f"{n}_grip", of=[f"{n}_foot"], normal=multiplier(n), static=0.5),
+        ]
+    model = Model(
+        name="Rubs",
+        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 + m * l**2 / 6 * theta.diff() ** 2,
+        coordinates={x: "m", z: "m", theta: "rad"},
+        constraints=rows,
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(l, 1.0, "m")],
+        start={z: 1.0},
+    )
+    lay_geometry(tmp_path / "Rubs.fmu", prepare(model, Scene("Rubs")))
+    geometry = geometry_of(tmp_path / "Rubs.fmu")
+    known = {"m": 1.0, "l": 1.0, "time": 0.0}
+    found = impacts._mirrors(geometry, known, np.array([0.0, 0.0, 0.0]))
+    assert len([s for s in found if s[2] < 0]) == mirrors

@@ -82,19 +82,6 @@ def both(python_fmu, native_fmu, name: str, values: dict[str, Any], **options: A
 
 
 @pytest.mark.parametrize("name", sorted(FILES))
-def test_both_declare_the_same_variables(python_fmu, native_fmu, name):
-    """Names, value references, causality, variability, initial, units, limits and start values."""
-    ours, theirs = declared(native_fmu(name)), declared(python_fmu(name))
-    for (kind, variable, typed), expected in zip(ours, theirs, strict=True):
-        typed.pop("reinit", None)  # of Model Exchange, which is native only
-        assert (kind, typed) == (expected[0], expected[2])
-        for attributes in (variable, expected[1]):
-            if attributes["name"] == "solver.method":  # rattle is native only
-                attributes.pop("description")
-        assert variable == expected[1]
-
-
-@pytest.mark.parametrize("name", sorted(FILES))
 def test_both_start_with_what_they_declare(fmu, name):
     """What can be set stands, before it is set, at the start value in the description: to the bit."""
     path = fmu(name)

@@ -45,7 +45,7 @@ from lagfmu.study.tradeoff.report import table
 from lagfmu.study.tradeoff.search import Clock, Walk, coarsest
 from lagfmu.study.tradeoff.setting import Setting, dials, tolerances
 from lagfmu.study.tradeoff.survey import formulations, survey
-from lagfmu.verification.verify import claims_in, verify
+from lagfmu.verification.verify import closed_forms_in, verify
 
 MODELS = Path(__file__).parent.parent / "models"
 PENDULUM = load(MODELS / "pendulum.py")
@@ -125,8 +125,8 @@ def test_a_closed_form_in_the_state_becomes_one_in_time(fmu):
     """lambda(phi) of the knife edge and phi = omega t give lambda = -2 m g sin(alpha) sin(omega t)."""
     path = fmu("KnifeEdge")
     with Importer(path) as importer:
-        found = refer(importer, claims_in(path), {"phi": 0.3}, 0.1, 1.0)
-        plain = refer(importer, claims_in(path), None, 0.1, 1.0)
+        found = refer(importer, closed_forms_in(path), {"phi": 0.3}, 0.1, 1.0)
+        plain = refer(importer, closed_forms_in(path), None, 0.1, 1.0)
     expected = -2 * 9.81 * 0.5 * np.sin(plain.run["time"])
     assert found.source["lambda.edge"] == plain.source["lambda.edge"] == "closed form in time"
     assert plain.values["lambda.edge"] == pytest.approx(expected, abs=1e-14)
@@ -169,7 +169,7 @@ def test_a_missed_event_is_an_infinite_error(fmu):
     """A run without the departure, or with one too many, has no right time of it."""
     path = fmu("Hemisphere")
     with Importer(path) as importer:
-        reference = refer(importer, claims_in(path), communication=0.1)
+        reference = refer(importer, closed_forms_in(path), communication=0.1)
         run = importer.observe(Setting("dop853", 1e-6, 0.0, 0.1))
     assert reference.errors(run)["departure.surface.time"] < 1e-6
     run["departure.surface.count"] = 0

@@ -711,7 +711,7 @@ def _print(found: Verification) -> None:
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
         table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
     print_whole(console, table)
-    if not found.claims:
+    if not found.closed_forms:
         console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
     for check in found.checks:
         if not check.passed and check.detail:

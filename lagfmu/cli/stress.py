@@ -27,7 +27,7 @@ from ..prepare.prepare import prepare
 from ..study.stress.facts import facts_of
 from ..study.stress.geometry import lay_geometry, twin
 from ..study.stress.lagrange import lay_beside
-from ..study.stress.probe import UNFINISHED, WRONG, Row
+from ..study.stress.probe import UNFINISHED, WRONG, Verdict
 from ..study.stress.report import MEANING, Stressed, Tried, as_json, as_markdown, summary, table
 from ..study.stress.summary import as_summary
 from ..verification.pipeline import UsageError
@@ -115,9 +115,9 @@ def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> S
     return one
 
 
-def _probe(fmu: Path, console: Console, quick: bool, limit: float) -> list[Row]:
+def _probe(fmu: Path, console: Console, quick: bool, limit: float) -> list[Verdict]:
     """Every row, with as many processes as it takes."""
-    rows: list[Row] = []
+    rows: list[Verdict] = []
     with progress(console, fmu.stem) as tick, tempfile.TemporaryDirectory() as folder:
         total, first = 1, 0
         while first < total:
@@ -125,7 +125,7 @@ def _probe(fmu: Path, console: Console, quick: bool, limit: float) -> list[Row]:
             for line in job.lines(limit):
                 total = line.get("total", total)
                 if "row" in line:
-                    rows.append(Row(**line["row"]))
+                    rows.append(Verdict(**line["row"]))
                     first = line["end"] + 1
                 elif "probe" in line:
                     tick(f"{line['family']}: {line['probe']}", line["begin"], total)
@@ -135,7 +135,7 @@ def _probe(fmu: Path, console: Console, quick: bool, limit: float) -> list[Row]:
                 raise BuildError(f"{str(fmu)!r} cannot be probed: {job.complaint()}")
             verdict, detail = job.cut
             rows.append(
-                Row(
+                Verdict(
                     job.latest["family"],
                     job.latest["probe"],
                     verdict,

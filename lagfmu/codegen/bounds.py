@@ -9,7 +9,6 @@ Interval Analysis, 1966).  The same text serves both languages but for the names
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import sympy as sp
 from sympy.core.relational import Relational
@@ -18,8 +17,8 @@ from ..mechanics.differential import Differential
 from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.jumps import Jumps
 from ..model.model import Constraint, Contact
+from ..model.parts import Expr
 
-Expr = Any
 FUNCTIONS = {
     **{f: f.__name__ for f in (sp.sin, sp.cos, sp.tan, sp.exp, sp.log, sp.atan, sp.asin, sp.acos)},
     **{f: f.__name__ for f in (sp.sinh, sp.cosh, sp.tanh, sp.asinh, sp.atan2, sp.sign, sp.floor)},

@@ -20,10 +20,9 @@ from typing import Any
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
+from ..model.parts import Expr
 from ..model.spline import HIGHEST as HIGHEST_DERIVATIVE
 from ..model.spline import Spline
-
-Expr = Any
 
 LONGEST = 200_000  # characters of one formula
 MOST_NODES = 50_000  # of its syntax tree

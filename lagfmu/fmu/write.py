@@ -17,7 +17,7 @@ from ..prepare.prepare import Prepared
 from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
-from .claims import pack_closed_forms
+from .closed_forms import pack_closed_forms
 from .compiler import HOST
 
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed

@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import Any
 
 import sympy as sp
 
@@ -19,6 +18,7 @@ from ..mechanics.equations import symbols_of
 from ..mechanics.form import Form
 from ..methods import FIXED_STEP, described
 from ..model.model import Contact, Nonholonomic, name_of
+from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.units import (
     ENERGY,
@@ -37,7 +37,6 @@ from ..names import Subject, derivative
 from ..solver.state import MAXIMUM_STEPS
 from .variables import Value, Variable, VariableTable
 
-Expr = Any
 SPEED = METRE / SECOND
 BARRED = (  # what has an error bar, besides coordinates, velocities and outputs of one word
     *(names.MULTIPLIER, names.FORCE, names.OWN, names.DEPARTURE_TIME, names.SLIP_TIME),

@@ -9,13 +9,12 @@ expression, and grows linearly with it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import sympy as sp
 
 from ..errors import DerivationError
+from ..model.parts import Expr
 
-Expr = Any
 CONSTANT_PIECES = (
     sp.sign,
     sp.Heaviside,

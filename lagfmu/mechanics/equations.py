@@ -16,7 +16,6 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
@@ -24,12 +23,12 @@ from sympy.physics.vector import dynamicsymbols
 from ..errors import ModelError
 from ..model.display import Displayed
 from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
+from ..model.parts import Expr
 from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
 from ..names import derivative, read
 
-Expr = Any
 TIME = dynamicsymbols._t
 
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import sympy as sp
 
 from ..errors import ModelError
 from ..model.model import Contact, Model, Parameter, name_of
+from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.selection import select
 from .equations import TIME, EquationsOfMotion
 from .form import Form
-
-Expr = Any
 
 
 def numbers_of(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> dict[Expr, Expr]:

@@ -22,10 +22,10 @@ from sympy.core.relational import Relational
 from sympy.printing.precedence import precedence
 
 from ..errors import ModelError
+from ..model.parts import Expr
 from .equations import TIME, EquationsOfMotion
 from .form import Form
 
-Expr = Any
 SAMPLES = 6  # points of a surface at which a jump is looked for
 TRIALS = 60  # random points from which the surface is sought
 SMALL = sp.Float("1e-15")  # part of the force's own size that is no jump

@@ -18,6 +18,7 @@ import sympy as sp
 from .. import names
 from ..errors import ModelError
 from ..model.model import Constraint, Contact, Holonomic, Output
+from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.selection import select
 from ..names import derivative
@@ -25,7 +26,6 @@ from .coupling import coupled
 from .equations import EquationsOfMotion, symbols_of
 from .form import Form
 
-Expr = Any
 Indices = frozenset[int]
 SOLVED = {names.MULTIPLIER, names.UNIQUE, names.RESIDUAL, names.FORCE}  # from the full equations
 ENERGIES = {names.KINETIC, names.POTENTIAL, names.TOTAL}

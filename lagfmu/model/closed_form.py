@@ -8,15 +8,14 @@ with parameters and start values changed or not.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from .. import names
 from .model import name_of
+from .parts import Expr
 
-Expr = Any
 TIME = dynamicsymbols._t
 
 

@@ -10,7 +10,6 @@ velocities q' by its kinematic equations.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import sympy as sp
 from sympy.physics.mechanics import LagrangesMethod, Lagrangian, System
@@ -18,8 +17,7 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
 from .model import Constraint, Holonomic, Input, Model, Nonholonomic, Parameter, name_of
-
-Expr = Any
+from .parts import Expr
 
 
 def from_lagranges_method(

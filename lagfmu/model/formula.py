@@ -21,10 +21,9 @@ from sympy.physics.vector import dynamicsymbols
 from ..errors import ModelError
 from ..names import derivative
 from .model import Model
-from .parts import Input, Output, name_of
+from .parts import Expr, Input, Output, name_of
 from .reactions import force_of_constraint, multiplier
 
-Expr = Any
 TEXT = re.compile(r"\s*([^=\s]+)\s*=(.*)\[([^\[\]]*)\]\s*\Z", re.S)
 NAMES = re.compile(
     r"der\(\s*[A-Za-z_]\w*\s*(?:,\s*2\s*)?\)|(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*(?!\w|\s*\()"

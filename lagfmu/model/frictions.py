@@ -41,8 +41,8 @@ def check_kinds(model: ModelFields, problems: list[str]) -> None:
             continue
         if not isinstance(f.name, str) or not NAME.match(f.name):
             problems.append(
-                f"friction name {f.name!r} is no FMI name: use letters a-z, A-Z, digits and _, not "
-                "beginning with a digit"
+                f"friction name {f.name!r} is not a name that FMI allows: use letters a-z, A-Z, digits "
+                "and _, not beginning with a digit"
             )
         if f.name in seen:
             problems.append(f"two frictions are called {f.name!r}: rename one")

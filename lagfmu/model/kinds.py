@@ -206,7 +206,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
 def check_name(kind: str, name: object, problems: list[str]) -> None:
     if not isinstance(name, str) or not NAME.match(name):
         problems.append(
-            f"{kind} name {name!r} is no FMI name: use letters a-z, A-Z, digits and _, "
+            f"{kind} name {name!r} is not a name that FMI allows: use letters a-z, A-Z, digits and _, "
             "not beginning with a digit"
         )
     elif kind == "model" and keyword.iskeyword(name):

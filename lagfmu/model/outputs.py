@@ -55,8 +55,8 @@ def _check_names(model: ModelFields, problems: list[str]) -> None:
         parts = o.name.split(".") if isinstance(o.name, str) else [""]
         if not all(NAME.match(part) for part in parts):
             problems.append(
-                f"output name {o.name!r} is no FMI name: use letters a-z, A-Z, digits and _, not "
-                "beginning with a digit, in parts with a dot between them, as 'bob.height'"
+                f"output name {o.name!r} is not a name that FMI allows: use letters a-z, A-Z, digits "
+                "and _, not beginning with a digit, in parts with a dot between them, as 'bob.height'"
             )
             continue
         if parts[0] in RESERVED:

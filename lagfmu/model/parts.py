@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
-Expr = Any  # a SymPy expression; SymPy carries no types
+Expr = Any  # a SymPy expression: SymPy 1.14 ships no types, so that a stricter name would check nothing
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 

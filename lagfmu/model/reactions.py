@@ -11,17 +11,14 @@ is solved for cannot stand among what it is solved from.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from ..errors import UnitError
 from ..names import FORCE, MULTIPLIER, REACTIONS, name, read
-from .parts import ModelFields, Nonholonomic, name_of
+from .parts import Expr, ModelFields, Nonholonomic, name_of
 from .units import ONE, Unit, dimension_of, generalized_force_unit, multiplier_unit
-
-Expr = Any
 
 
 def multiplier(constraint: str) -> Expr:

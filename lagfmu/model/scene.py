@@ -74,7 +74,9 @@ class Scene:
     def __post_init__(self) -> None:
         problems = []
         if not NAME.match(self.name):
-            problems.append(f"scene name {self.name!r} is no FMI name: use letters, digits and _")
+            problems.append(
+                f"scene name {self.name!r} is not a name that FMI allows: use letters, digits and _"
+            )
         elif keyword.iskeyword(self.name):
             problems.append(
                 f"scene name {self.name!r} is a word of the Python language: choose another"

@@ -25,10 +25,9 @@ from scipy.interpolate import CubicSpline
 
 from ..errors import LagfmuWarning, TableError, UnitError
 from ..solver.cubic import Cubic
-from .parts import NAME
+from .parts import NAME, Expr
 from .units import parse_unit
 
-Expr = Any
 FEWEST = {"natural": 2, "clamped": 2, "not-a-knot": 4, "periodic": 3}
 HIGHEST = 3  # order of the derivative that is constant between knots
 

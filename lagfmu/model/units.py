@@ -25,8 +25,8 @@ from sympy.functions.elementary.trigonometric import (
 from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
+from .parts import Expr
 
-Expr = Any  # sympy is untyped
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 _EXAMPLES = "'m', 'rad', 'N.m', 'm/s2', 'kg.m2' or '1'"
 _REGISTRY: pint.UnitRegistry[Any] = pint.UnitRegistry()

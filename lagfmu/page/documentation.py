@@ -65,7 +65,7 @@ TITLES = {  # by the kind of what a variable is of
 
 
 @dataclass(frozen=True)
-class Row:
+class Line:
     """One line of the variable table."""
 
     name: str
@@ -145,11 +145,11 @@ def shown(unit: Unit | None) -> str:
     return name.replace(".", "·")
 
 
-def _grouped(variables: Sequence[Variable]) -> list[tuple[str, str, list[Row]]]:
-    rows: dict[str, list[Row]] = {title: [] for title, _ in GROUPS}
+def _grouped(variables: Sequence[Variable]) -> list[tuple[str, str, list[Line]]]:
+    rows: dict[str, list[Line]] = {title: [] for title, _ in GROUPS}
     for v in variables:
         start = "" if v.start is None else str(v.start)
-        row = Row(v.name, v.causality, v.kind, shown(v.unit), start, v.description)
+        row = Line(v.name, v.causality, v.kind, shown(v.unit), start, v.description)
         rows[_group(v)].append(row)
     return [(title, remark, rows[title]) for title, remark in GROUPS if rows[title]]
 

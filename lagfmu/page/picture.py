@@ -19,13 +19,13 @@ from ..errors import BuildError, ModelError
 from ..mechanics.equations import TIME
 from ..model.closed_form import in_variables
 from ..model.model import Model, Nonholonomic
+from ..model.parts import Expr
 from ..model.picture import Arrow, Disk, Ground, Line, Path, Point, Rod, Shape, Spring, points_of
 from ..model.reactions import multiplier
 from ..model.spline import SplineBase
 from ..prepare.prepare import Prepared
 from ..solver.cubic import Cubic
 
-Expr = Any
 Packed = float | str | list[Any]
 FUNCTIONS: Mapping[Any, str] = {
     **{f: f.__name__ for f in (sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.atan2)},

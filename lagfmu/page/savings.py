@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import sympy as sp
 
@@ -13,10 +12,9 @@ from ..codegen.c.equations import model_source
 from ..codegen.c.parts import needs_tangents
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.fold import idle as idle_parameters
+from ..model.parts import Expr
 from ..model.units import Unit
 from ..prepare.prepare import Prepared, prepare
-
-Expr = Any
 
 
 @dataclass(frozen=True)

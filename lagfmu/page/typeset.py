@@ -26,10 +26,10 @@ from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.formulations.nullspace import lambda_free, largest_group
 from ..model.model import Contact, Nonholonomic
+from ..model.parts import Expr
 from ..model.reactions import multiplier
 from ..names import derivative, read
 
-Expr = Any  # SymPy carries no types
 Printed = tuple[str, str]  # LaTeX, text
 MOST = 24  # equations of a kind that are printed
 LONGEST = 500  # operations beyond which an expression is not printed

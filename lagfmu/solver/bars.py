@@ -23,6 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..names import motion
 from .advance import advance
 from .failure import StepFailureError
 from .leg import FEWEST_STEPS
@@ -145,7 +146,7 @@ def widened(
     all_paired = paired(state, companion)
     worst, size, found = list(bars.worst), list(bars.size), []
     share = 1.0 if coarse.method == "rk4" else min(1.0, MARGIN / _ratio(state, companion))
-    states = (*system.coordinates, *(f"der({c})" for c in system.coordinates))
+    states = motion(system.coordinates)
     natural = dict(zip(states, state.scale, strict=True))
     rounding = ROUNDING * EPS * math.sqrt(1 + state.steps)
     for k, name in enumerate(names):

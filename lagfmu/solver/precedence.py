@@ -23,7 +23,6 @@ from .magnitudes import Mask
 from .system import Matrix, System, Vector
 
 OMITTED, GIVEN, SET = 0, 1, 2  # nobody said it; the model's `start` does; the importer did
-RANKS = ("left out", "given in the model", "set")
 EASE = (
     2.0**-15
 )  # weight of a rank below those that a stage frees: its square is lost in rounding, twice

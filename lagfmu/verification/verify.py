@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import SettingError, VerificationError
-from ..fmu.claims import LARGEST_RECORD, Claim, unpack_closed_forms
+from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
+from ..model.parts import Expr
 from .simulate import Trajectory, read_description, simulate, steps_of
 
-Expr = Any
 RECORD = "resources/lagfmu.json"
 MODES = ("Boolean", "Real")  # what a mode may be: a Real where an FMU has Reals alone
 NUMBERS = ("Real", "Integer")
@@ -60,7 +60,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """The checks of one FMU, `claims` of them closed forms, and what the run cost.
+    """The checks of one FMU, `closed_forms` of them closed forms, and what the run cost.
 
     `uncovered` are the outputs of which no closed form and no reference says anything.
     """
@@ -70,7 +70,7 @@ class Verification:
     simulated: float
     seconds: float
     steps: int
-    claims: int
+    closed_forms: int
     uncovered: tuple[str, ...] = ()
 
     @property
@@ -122,12 +122,12 @@ def verify(
     """
     path = Path(fmu)
     description = read_description(path)
-    claims = claims_in(path) if reference is None or is_ours(path) else []
+    closed_forms = closed_forms_in(path) if reference is None or is_ours(path) else []
     _check_texts(description, start_values or {})
     problems = validate_fmu(str(path))
     begun = time.perf_counter()
     read = {v.name for v in description.modelVariables if v.causality in ("local", "input")}
-    besides = sorted(read & set().union(*(claim.variables for claim in claims)))
+    besides = sorted(read & set().union(*(closed_form.variables for closed_form in closed_forms)))
     if reference is not None and stop_time is None:
         stop_time = float(reference.table["time"][-1]) or None
     result = simulate(path, stop_time, step_size, tolerance, start_values, inputs, besides=besides)
@@ -149,12 +149,15 @@ def verify(
     as_built = tolerance is None and not any(
         names.read(k).head == names.SOLVER for k in start_values or ()
     )
-    checks += [check_claim(claim, result, values, used, as_built) for claim in claims]
+    checks += [
+        check_closed_form(closed_form, result, values, used, as_built)
+        for closed_form in closed_forms
+    ]
     if reference is not None:
         checks += reference.checks(result)
     span = float(result["time"][-1] - result["time"][0])
     steps = steps_of(result)
-    said = set().union(*(claim.variables for claim in claims))
+    said = set().union(*(closed_form.variables for closed_form in closed_forms))
     said |= set(reference.table.dtype.names or ()) if reference is not None else set()
     outputs = [v.name for v in description.modelVariables if v.causality == "output"]
     return Verification(
@@ -163,7 +166,7 @@ def verify(
         span,
         seconds,
         steps,
-        len(claims),
+        len(closed_forms),
         tuple(n for n in outputs if n not in said),
     )
 
@@ -196,7 +199,7 @@ def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
         raise SettingError(f"{', '.join(wrong)}: expected a number")
 
 
-def claims_in(path: Path) -> list[Claim]:
+def closed_forms_in(path: Path) -> list[CarriedForm]:
     """The closed forms that an FMU carries.  Raises VerificationError if it is none of lagfmu's."""
     variables = {v.name: v for v in read_description(path).modelVariables}
     try:
@@ -206,20 +209,24 @@ def claims_in(path: Path) -> list[Claim]:
                     f"{str(path)!r} carries no closed forms ({RECORD} is missing): it was not built "
                     "by lagfmu, and there is nothing to hold it against"
                 )
-            claims = unpack_closed_forms(_record(archive), str(path))
+            closed_forms = unpack_closed_forms(_record(archive), str(path))
     except (zipfile.BadZipFile, OSError) as error:
         raise VerificationError(f"{str(path)!r} cannot be read as an FMU ({error})") from None
     problems = []
-    for claim in claims:
-        for name in sorted(claim.variables):
+    for closed_form in closed_forms:
+        for name in sorted(closed_form.variables):
             v = variables.get(name)
             if v is None:
-                problems.append(f"closed form {claim.name!r} uses {name!r}, which is no variable")
+                problems.append(
+                    f"closed form {closed_form.name!r} uses {name!r}, which is no variable"
+                )
             elif v.type not in (MODES if names.read(name).quantity in names.MODES else NUMBERS):
-                problems.append(f"closed form {claim.name!r} uses {name!r}, which is a {v.type}")
+                problems.append(
+                    f"closed form {closed_form.name!r} uses {name!r}, which is a {v.type}"
+                )
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
-    return claims
+    return closed_forms
 
 
 def _record(archive: zipfile.ZipFile) -> bytes:
@@ -249,8 +256,8 @@ def _starts(description: Any, given: Mapping[str, Any], result: Trajectory) -> C
     return Check("starts as described", worst, 0, max(count, 1), "; ".join(missed))
 
 
-def check_claim(
-    claim: Claim,
+def check_closed_form(
+    closed_form: CarriedForm,
     result: Trajectory,
     values: Mapping[str, float],
     tolerance: float,
@@ -261,25 +268,27 @@ def check_claim(
     `as_built`: held to the accuracy that the FMU was built for, if it was built for one.
     """
     result = _with_modes(result)
-    chosen = applies(claim, result, values)
-    allowed = claim.allowed(tolerance, as_built)
+    chosen = applies(closed_form, result, values)
+    allowed = closed_form.allowed(tolerance, as_built)
     count = int(chosen.sum())
     if count == 0:
-        return Check(claim.name, 0.0, allowed, 0)
+        return Check(closed_form.name, 0.0, allowed, 0)
     rows = result[chosen]
-    actual = evaluate(claim.actual, rows, result, values, claim.name)
-    if claim.expected is None:
+    actual = evaluate(closed_form.actual, rows, result, values, closed_form.name)
+    if closed_form.expected is None:
         expected = np.full_like(actual, actual[0])
     else:
-        expected = evaluate(claim.expected, rows, result, values, claim.name)
-    if claim.scale is None:
+        expected = evaluate(closed_form.expected, rows, result, values, closed_form.name)
+    if closed_form.scale is None:
         scale = float(np.abs(expected).max())
     else:
-        scale = float(np.abs(evaluate(claim.scale, rows, result, values, claim.name)).max())
+        scale = float(
+            np.abs(evaluate(closed_form.scale, rows, result, values, closed_form.name)).max()
+        )
     error = float(np.abs(actual - expected).max())
     if not math.isfinite(error):
-        return Check(claim.name, math.inf, allowed, count, "not a finite number")
-    return Check(claim.name, error / scale if scale > 0 else error, allowed, count)
+        return Check(closed_form.name, math.inf, allowed, count, "not a finite number")
+    return Check(closed_form.name, error / scale if scale > 0 else error, allowed, count)
 
 
 def _with_modes(result: Trajectory) -> Trajectory:
@@ -290,7 +299,9 @@ def _with_modes(result: Trajectory) -> Trajectory:
     return result.astype(types)
 
 
-def applies(claim: Claim, result: Trajectory, values: Mapping[str, float]) -> NDArray[np.bool_]:
+def applies(
+    closed_form: CarriedForm, result: Trajectory, values: Mapping[str, float]
+) -> NDArray[np.bool_]:
     """The communication points of a run at which a closed form says something; `values`: parameters."""
 
     def closed(contact: str) -> NDArray[np.bool_]:
@@ -300,27 +311,32 @@ def applies(claim: Claim, result: Trajectory, values: Mapping[str, float]) -> ND
         return np.asarray(result[names.name(names.DEPARTURES, contact)] > 0)
 
     chosen = np.ones(len(result), dtype=bool)
-    if claim.while_closed is not None:
-        chosen &= closed(claim.while_closed)
-    if claim.while_open is not None:
-        chosen &= ~closed(claim.while_open)
-    for contact in _departures(claim):  # before the first one there is nothing to compare with
+    if closed_form.while_closed is not None:
+        chosen &= closed(closed_form.while_closed)
+    if closed_form.while_open is not None:
+        chosen &= ~closed(closed_form.while_open)
+    for contact in _departures(
+        closed_form
+    ):  # before the first one there is nothing to compare with
         chosen &= left(contact)
-    if (until := claim.until_departure) is not None:
+    if (until := closed_form.until_departure) is not None:
         chosen &= np.logical_and.accumulate(closed(until) & ~left(until))
-    if claim.when is not None:
-        chosen &= evaluate(claim.when, result, result, values, claim.name) != 0
-    if (at := claim.at_departure) is not None:
+    if closed_form.when is not None:
+        chosen &= evaluate(closed_form.when, result, result, values, closed_form.name) != 0
+    if (at := closed_form.at_departure) is not None:
         chosen &= (np.cumsum(left(at)) == 1) & closed(at)[0]
     return chosen
 
 
-def _departures(claim: Claim) -> list[str]:
-    """Contacts whose departure the claim speaks of, if its `when` does not count them itself."""
+def _departures(closed_form: CarriedForm) -> list[str]:
+    """Contacts whose departure the closed form speaks of, if its `when` does not count them itself."""
     symbols = {
-        str(s) for e in (claim.actual, claim.expected) if e is not None for s in e.free_symbols
+        str(s)
+        for e in (closed_form.actual, closed_form.expected)
+        if e is not None
+        for s in e.free_symbols
     }
-    counted = set() if claim.when is None else {str(s) for s in claim.when.free_symbols}
+    counted = set() if closed_form.when is None else {str(s) for s in closed_form.when.free_symbols}
     told = {s.constraint for s in map(names.read, symbols) if s.head == names.DEPARTURE}
     return sorted(c for c in told if names.name(names.DEPARTURES, c) not in counted)
 

@@ -1,7 +1,7 @@
 """Equations of motion -> model.c: their numeric form as `const System`, see runtime/system.h.
 
-The C twin of numeric.py, with the same layout: M as the non-zeros of its lower triangle, G as its
-non-zeros, both sorted by row, then column.  Equations and patterns only; no solver text.
+The C twin of codegen/py/equations.py, with the same layout: M as the non-zeros of its lower triangle, G
+as its non-zeros, both sorted by row, then column.  Equations and patterns only; no solver text.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ...mechanics.form import Form
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact
+from ...model.parts import Expr
 from .. import bounds
 from .function import FILL, Result, function
 from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
 
-Expr = Any
 HEAD = """/* model.c -- {name}{description}
  *
  *   M(q,t) vdot = F(q,v,t,u) + G^T lambda ,  G v = nu(q,t,u) ,  G vdot = gamma(q,v,t,u) ,  f(q,t) = 0

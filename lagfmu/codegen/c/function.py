@@ -11,15 +11,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from textwrap import wrap
-from typing import Any
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
+from ...model.parts import Expr
 from .printer import POWER, Printer
 from .subexpressions import Names, common_subexpressions
 
-Expr = Any
 BLOCK = 1000  # different nodes of the expressions in one block
 TERMS = 40  # of one sum in one statement
 RUN = 6  # equal neighbours that are worth a loop

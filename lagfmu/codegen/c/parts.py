@@ -62,7 +62,8 @@ def parts_source(scene: Scene, system: System) -> str | None:
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
-    rows += ["    .after_step = companion_after_step,\n"] if scene.error_bars else []
+    if scene.error_bars:
+        rows += [f"    .{part} = companion_{part},\n" for part in ("after_step", "inside")]
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""
@@ -96,5 +97,9 @@ def files_left_out(scene: Scene, system: System) -> frozenset[str]:
 
 def _own(found: tuple[str, ...], error_bars: bool) -> list[tuple[str, str]]:
     """Functions of one method that the others do not have."""
-    parts = [("rk4", "error"), ("rattle", "step"), *([("dop853", "error")] * error_bars)]
+    parts = [
+        ("rk4", "error"),
+        ("rattle", "step"),
+        *([("dop853", "error"), ("dop853", "inside")] * error_bars),
+    ]
     return [(m, part) for m, part in parts if m in found]

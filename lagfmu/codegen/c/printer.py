@@ -15,9 +15,9 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean, BooleanFunction
 
 from ...errors import DerivationError
+from ...model.parts import Expr
 from ..identifier import identifier
 
-Expr = Any
 Text = tuple[str, int]  # of an expression, and how tightly its outermost operator binds
 SUM, PRODUCT, ATOM = range(3)
 POWER = 6  # integer powers up to this one are printed as products

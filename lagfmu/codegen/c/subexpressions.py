@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
+from ...model.parts import Expr
 from .printer import POWER, TAKEN
-
-Expr = Any
 
 
 class Names:

@@ -12,7 +12,6 @@ from ...model.model import Constraint, Contact, Nonholonomic
 from . import elimination
 from . import solve as csolve
 
-Expr = Any
 Pair = tuple[int, int]
 
 

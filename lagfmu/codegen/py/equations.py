@@ -13,12 +13,11 @@ from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.form import Form
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.model import Contact, Nonholonomic
+from ...model.parts import Expr
 from ...solver.cubic import Cubic
 from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
 from .. import bounds
 from .function import function, identifiers, table_name
-
-Expr = Any
 
 
 def source(form: Form) -> str:

@@ -15,9 +15,9 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from ...errors import DerivationError
+from ...model.parts import Expr
 from ..identifier import identifier
 
-Expr = Any
 ARGUMENTS = (
     *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "h", "e", "energy"),
     *("vdot", "lam", "Q", "w", "static", "kinetic", "load", "normal"),

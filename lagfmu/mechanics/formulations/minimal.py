@@ -18,10 +18,10 @@ import sympy as sp
 
 from ...errors import DerivationError
 from ...model.model import Constraint, Holonomic
+from ...model.parts import Expr
 from .. import shorter
 from ..equations import TIME, EquationsOfMotion
 
-Expr = Any
 SMALL = 400  # operations below which a reduced expression is worth simplifying
 
 

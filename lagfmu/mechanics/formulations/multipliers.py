@@ -8,14 +8,12 @@ derivation no end.
 
 from __future__ import annotations
 
-from typing import Any
-
 import sympy as sp
 
 from ...errors import DerivationError
+from ...model.parts import Expr
 from ..equations import TIME, EquationsOfMotion
 
-Expr = Any  # SymPy has no types
 MOST, OPERATIONS = 6, 400  # coordinates and constraints together; operations of M, G, F and gamma
 
 

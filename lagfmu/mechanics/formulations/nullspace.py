@@ -17,10 +17,10 @@ from typing import Any
 import sympy as sp
 from sympy.polys.polyerrors import PolynomialError
 
+from ...model.parts import Expr
 from .. import shorter
 from ..equations import EquationsOfMotion
 
-Expr = Any  # SymPy carries no types
 Pivots = tuple[int, ...]
 TRIALS = 100  # choices of pivot columns that are compared
 

@@ -16,10 +16,9 @@ from sympy import Add, Mul, S
 from sympy.polys.domains import QQ
 from sympy.polys.matrices import DomainMatrix
 
+from ...model.parts import Expr
 from .fractions import admit_gcd
 from .tower import Tower
-
-Expr = Any  # SymPy has no types
 
 _LARGEST = 90  # unknowns
 

@@ -27,6 +27,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
 from ...model.display import Displayed
+from ...model.parts import Expr
 from .coefficients import Chart, pfaffian
 from .echelon import rref
 from .frobenius import curvature, derived_flag, exact, obstruction
@@ -37,7 +38,6 @@ from .undecided import Undecided, within
 
 __all__ = ["Classification", "Integral", "Kind", "classify", "pfaffian"]
 
-Expr = Any  # SymPy has no types
 
 _EFFORT = 3e6  # for the integrals of a set, and again for those of its forms one by one
 

@@ -12,8 +12,7 @@ from sympy import Dummy, Eq, S, expand, simplify, sympify
 from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
-
-Expr = Any  # SymPy has no types
+from ...model.parts import Expr
 
 
 def pfaffian(form: Expr, coordinates: Sequence[Expr]) -> tuple[list[Expr], Expr]:

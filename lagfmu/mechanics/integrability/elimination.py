@@ -8,21 +8,19 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 from sympy import Dummy
 
+from ...model.parts import Expr
 from .echelon import rref
 from .inverse import invert
-from .system import System
+from .pfaffians import Pfaffians
 from .tower import Tower
 from .undecided import FAILURES, late
 
-Expr = Any  # SymPy has no types
-
 
 def restricted(
-    system: System,
+    system: Pfaffians,
     f: Expr,
     integrate: Callable[[Sequence[Sequence[Expr]], Sequence[Expr]], list[Expr]],
 ) -> Iterator[Expr]:

@@ -13,12 +13,11 @@ from typing import Any
 
 from sympy import log
 
+from ...model.parts import Expr
 from .form import OneForm
 from .frobenius import pairs
 from .potential import potential
 from .quadrature import quadrature
-
-Expr = Any  # SymPy has no types
 
 
 def bernoulli(form: OneForm) -> Iterator[Expr | None]:

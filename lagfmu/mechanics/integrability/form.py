@@ -12,11 +12,10 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
+from ...model.parts import Expr
 from .fractions import admit_gcd
 from .frobenius import pairs
 from .tower import Tower
-
-Expr = Any  # SymPy has no types
 
 
 class OneForm:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 from sympy import Dummy, S, log
 
+from ...model.parts import Expr
 from .form import OneForm
 from .potential import potential, tidy
 from .tower import Tower
 
-Expr = Any  # SymPy has no types
 Integrate = Callable[[Sequence[Expr], Sequence[Expr]], Expr | None]  # of a form in fewer variables
 
 

@@ -9,18 +9,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from typing import Any
 
+from ...model.parts import Expr
 from .ansatz import combine, monomials, relations
 from .elimination import restricted
 from .frobenius import along
 from .linear import exponential_integrals
+from .pfaffians import Pfaffians
 from .single import single
-from .system import System
 from .tower import Tower
 from .undecided import FAILURES, late
-
-Expr = Any  # SymPy has no types
 
 
 def first_integrals(
@@ -34,7 +32,7 @@ def first_integrals(
 
     `forms` are further one-forms worth trying, and `known` candidates for integrals.
     """
-    system = System(rows, variables)
+    system = Pfaffians(rows, variables)
 
     def inner(rows: Sequence[Sequence[Expr]], variables: Sequence[Expr]) -> list[Expr]:
         return first_integrals((), rows, variables, (), depth + 1)
@@ -61,7 +59,7 @@ def first_integrals(
     return system.found
 
 
-def _polynomial_integrals(system: System, degree: int) -> Iterator[Expr]:
+def _polynomial_integrals(system: Pfaffians, degree: int) -> Iterator[Expr]:
     """f = sum of monomials with constant coefficients: a linear system for these."""
     tower = Tower(system.variables, itertools.chain(*system.rows))
     rows = [[tower.element(entry) for entry in row] for row in system.rows]

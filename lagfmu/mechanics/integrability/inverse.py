@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from sympy import (
     Add,
     Mul,
@@ -22,7 +20,7 @@ from sympy import (
     together,
 )
 
-Expr = Any  # SymPy has no types
+from ...model.parts import Expr
 
 
 def invert(f: Expr, value: Expr, x: Expr) -> Expr | None:

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import Any
 
 from sympy import S
 
+from ...model.parts import Expr
 from .ansatz import combine, monomials, relations
 from .form import OneForm
 from .frobenius import pairs
 from .potential import potential, tidy
-
-Expr = Any  # SymPy has no types
 
 
 def inverse_factors(form: OneForm) -> Iterator[Expr | None]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import Any
 
 from sympy import (
     Abs,
@@ -34,16 +33,15 @@ from sympy import (
     together,
 )
 
+from ...model.parts import Expr
 from .echelon import rref
+from .pfaffians import Pfaffians
 from .quadrature import quadrature
-from .system import System
 from .tower import Tower
 from .undecided import late
 
-Expr = Any  # SymPy has no types
 
-
-def exponential_integrals(system: System) -> Iterator[Expr]:
+def exponential_integrals(system: Pfaffians) -> Iterator[Expr]:
     """The integrals of the parts of the system that are linear on their own.
 
     Every variable that the system holds is tried as s: time, or an angle that drives the others.
@@ -61,7 +59,7 @@ def exponential_integrals(system: System) -> Iterator[Expr]:
         yield from _linear(_speeds(system, others, s), others, s)
 
 
-def _speeds(system: System, others: list[Expr], s: Expr) -> dict[Expr, Expr]:
+def _speeds(system: Pfaffians, others: list[Expr], s: Expr) -> dict[Expr, Expr]:
     """dx/ds of the variables that move with s alone."""
     places = [system.variables.index(x) for x in (*others, s)]
     tower = Tower(system.variables, itertools.chain(*system.rows))

@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 from sympy import Dummy, S
 
+from ...model.parts import Expr
 from .form import OneForm
 from .frobenius import pairs
 from .inverse import invert
 from .potential import without
 from .tower import Tower
 
-Expr = Any  # SymPy has no types
 Integrate = Callable[[Sequence[Expr], Sequence[Expr]], Expr | None]  # of a form in fewer variables
 
 

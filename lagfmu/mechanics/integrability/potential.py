@@ -11,11 +11,10 @@ from typing import Any
 
 from sympy import Add, Mul, Pow, S, exp, expand, factor_terms, ilcm, log
 
+from ...model.parts import Expr
 from .quadrature import quadrature
 from .tower import Tower
 from .undecided import FAILURES
-
-Expr = Any  # SymPy has no types
 
 
 def potential(row: Sequence[Expr], variables: Sequence[Expr]) -> Expr | None:

@@ -9,7 +9,6 @@ by t = tan(angle/2).  The integral of an unknown function is left as it stands.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 from sympy import (
     Add,
@@ -41,9 +40,8 @@ from sympy.core.function import AppliedUndef
 from sympy.integrals.manualintegrate import manualintegrate
 from sympy.simplify.fu import TR8
 
+from ...model.parts import Expr
 from .undecided import late, spend
-
-Expr = Any  # SymPy has no types
 
 _LONG = 600  # operations of an integrand beyond which no integration is tried
 _TERM = 40  # operations of one term of it

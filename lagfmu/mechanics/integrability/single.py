@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from sympy import exp, expand
 
+from ...model.parts import Expr
 from .factors import bernoulli, combination, separable
 from .form import OneForm
 from .homogeneous import homogeneous
@@ -14,8 +14,6 @@ from .lie import inverse_factors
 from .natani import natani
 from .potential import potential, tidy
 from .undecided import FAILURES, late
-
-Expr = Any  # SymPy has no types
 
 
 def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Expr | None:

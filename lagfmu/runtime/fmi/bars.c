@@ -21,19 +21,23 @@ static const double INFINITE = DBL_MAX;
 
 /* ------------------------------------------------------------------ memory */
 
-static int bar_count(void) {
-    int count = 0;
-    for (int k = 0; k < VARIABLE_COUNT; k++) count += VARIABLES[k].place == AT_ERROR;
-    return count;
+static void find_bars(Bars *b) {
+    b->end = VARIABLE_COUNT;
+    while (b->end > 0 && VARIABLES[b->end - 1].place != AT_ERROR) b->end -= 1;
+    b->first = b->end;
+    while (b->first > 0 && VARIABLES[b->first - 1].place == AT_ERROR) b->first -= 1;
 }
 
 static void layout(Instance *x, Arena *saved, Arena *scratch) {
     Bars counted, *b = arena_take(scratch, 1, sizeof *b);
-    const int count = bar_count();
     x->bars = b;
     if (b == NULL) b = memset(&counted, 0, sizeof counted);
+    find_bars(b);
+    const int count = b->end - b->first;
     solver_layout(&b->solver, saved, scratch, MODEL_SYSTEM);
     b->solver.p = x->solver.p;
+    b->solver.alike = companion_alike(BAR_COARSER);
+    x->solver.alike = HUGE_VAL;
     observed_layout(&b->seen, scratch, MODEL_SYSTEM);
     b->kept = arena_take(saved, 1, sizeof *b->kept);
     b->worst = arena_doubles(saved, count);
@@ -55,8 +59,6 @@ static void share(Instance *x) {
     c->stop_time = x->solver.stop_time;
     c->settings = x->solver.settings;
     c->settings.tolerance *= BAR_COARSER;
-    c->coarser = BAR_COARSER;
-    x->solver.coarser = 1;
     if (has_fixed_step(x)) c->settings.step = step;
 }
 
@@ -82,7 +84,7 @@ static void tell_halved(Instance *x) {
 
 static void start(Instance *x) {
     Bars *b = x->bars;
-    const size_t bars = (size_t)bar_count() * sizeof *b->worst;
+    const size_t bars = (size_t)(b->end - b->first) * sizeof *b->worst;
     b->solver.settings.step = 0;
     share(x);
     b->solver.state.now = x->solver.state.now;
@@ -176,10 +178,9 @@ static void widen(Instance *x) {
     if (*b->lost || look(x) != OK || *b->lost) return;
     const int paired = companion_paired(&x->solver, &b->solver);
     const double part = share_of(x);
-    for (int k = 0; k < VARIABLE_COUNT; k++) {
+    for (int k = b->first; k < b->end; k++) {
         const Variable *bar = &VARIABLES[k];
         double worst, size;
-        if (bar->place != AT_ERROR) continue;
         (void)compare(x, bar, paired, part, &worst, &size);
         b->worst[bar->contact] = worst;
         b->size[bar->contact] = size;
@@ -226,7 +227,7 @@ static Status restored(Instance *x) {
     if (!x->started) return OK;
     share(x);
     if (*b->lost != 0 && *b->lost != 1) return restored_none(x, "companion", *b->lost);
-    for (int k = 0; k < bar_count(); k++) {
+    for (int k = 0; k < b->end - b->first; k++) {
         if (!(b->worst[k] >= 0 && b->worst[k] <= DBL_MAX))
             return restored_none(x, "error bar", b->worst[k]);
         if (!(b->size[k] >= 0 && b->size[k] <= DBL_MAX))

@@ -22,6 +22,7 @@ typedef struct {
     Solver solver;    /* the companion; its inputs and parameters are the delivered run's own */
     Observed seen;    /* what can be read at its state, while `observed` is 1 */
     int observed;
+    int first, end;   /* the bars' positions among the variables, where they stand together */
     /* saved with the instance: */
     Numbers *kept;    /* the companion's numbers, from instance_save() on */
     double *worst;    /* (bars) the largest so far, but for rounding */

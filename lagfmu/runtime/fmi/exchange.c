@@ -218,9 +218,6 @@ Status exchange_step_done(Instance *x, int *event) {
     if (drift(x, &worst) != OK) return FAILED;
     if (s->state.now.dependent && s->stepped.linear.rung != RUNG_SCHUR && choose_rows(x) != OK)
         return FAILED; /* the rows that stood for all are about to depend on each other */
-    for (int c = 0; c < s->system->contacts; c++)
-        if (!s->state.closed[c] && s->stepped.f[s->system->contact[c]] > s->state.gap[c])
-            s->state.armed[c] = 1;
     if (find_happened(x, &any) != OK) return FAILED;
     if (!any && s->system->frictions > 0) {
         double *y = s->work_advance;

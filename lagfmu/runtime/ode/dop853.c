@@ -272,6 +272,12 @@ static void dop853_dense(const Integrator *i, double t, double *y) {
     }
 }
 
+/* The last term of the polynomial, beyond which its error begins, of one component at t. */
+double dop853_inside(const Integrator *i, double t, int j) {
+    const double s = (t - i->t_old) / (i->t - i->t_old), z = 1 - s;
+    return (s * s) * (s * s) * (z * z * z) * i->dense[6 * i->ny + j];
+}
+
 static int dop853_doubles(int ny) {
     return 14 * ny; /* y1, sum, k_2 to k_12 and the argument of k_12 */
 }

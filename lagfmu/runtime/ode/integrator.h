@@ -76,6 +76,9 @@ double rk4_error(const Integrator *i, int component);
 /* dop853: the same, before prepare_dense. */
 double dop853_error(const Integrator *i, int component);
 
+/* dop853: estimate of the error of one component by dense output at t. */
+double dop853_inside(const Integrator *i, double t, int component);
+
 /* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
  * f_old, dense) come from `saved`, the scratch from `scratch`. */
 void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,

@@ -93,7 +93,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     const int watch = indicators_count(s->system) > 0;
     double *y1 = s->work_advance;
     if (leg_step(s, i, bound, longest) != OK) return FAILED;
-    if (s->coarser > 0) PARTS.after_step(s, i);
+    if (s->alike > 0) PARTS.after_step(s, i);
     if ((watch || i->t > t_end) && leg_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (leg_project(s, i->t, y1) != OK) return FAILED;
@@ -177,6 +177,7 @@ static Status arrive(Solver *s, double t_end) {
     if (i->t > t_end) {
         double *between = s->work_advance;
         i->method->dense(i, t_end, between);
+        if (s->alike > 0) PARTS.inside(s, i, t_end, between);
         if (leg_project(s, t_end, between) != OK) return FAILED;
         y = between;
     }

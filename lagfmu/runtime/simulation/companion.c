@@ -13,14 +13,25 @@ static double power(double x, int n) {
     return product;
 }
 
+double companion_alike(double coarser) {
+    return 0.9 * step_size_root(coarser, 8);
+}
+
+static int is_alike(const Solver *s, const Integrator *i) {
+    return i->method == PARTS.methods[DOP853] && i->h_next > s->alike * (i->t - i->t_old);
+}
+
 void companion_after_step(Solver *s, Integrator *i) {
-    const double h = i->t - i->t_old, longer = 0.9 * step_size_root(s->coarser, 8);
-    const int explicit_one = i->method == PARTS.methods[DOP853];
-    const double local = power(h * s->state.now.rate, explicit_one ? 9 : 6);
-    if (local <= DBL_MAX - s->state.now.local[!explicit_one])
-        s->state.now.local[!explicit_one] += local;
-    if (!explicit_one || !(s->coarser > 1 && i->h_next >= longer * h)) return;
+    const int implicit = i->method != PARTS.methods[DOP853];
+    const double local = power((i->t - i->t_old) * s->state.now.rate, implicit ? 6 : 9);
+    if (local <= DBL_MAX - s->state.now.local[implicit]) s->state.now.local[implicit] += local;
+    if (!is_alike(s, i)) return;
     for (int j = 0; j < i->ny; j++) i->y[j] += PARTS.dop853_error(i, j);
+}
+
+void companion_inside(const Solver *s, const Integrator *i, double t, double *y) {
+    if (!is_alike(s, i)) return;
+    for (int j = 0; j < i->ny; j++) y[j] += PARTS.dop853_inside(i, t, j);
 }
 
 double companion_ratio(const Solver *a, const Solver *b) {

@@ -11,7 +11,7 @@ typedef struct {
     const System *system;
     Settings settings;
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
-    double coarser;            /* with error bars: the tolerance in those of the delivered run, 1 or more; else 0 */
+    double alike;              /* with error bars, else 0: see companion.h */
     State state;
     Drive drive;
     double *p;                 /* (parameters) */

@@ -7,7 +7,7 @@ times as the FMU's default experiment does at its default values.
 Two runs that must agree are compared with what the problem itself makes of small changes: a third
 run, whose start values are shifted by SHIFT of their size, shows the amplification; a difference is
 right up to SAFETY * tol * max(1, N) times (1 + amplification so far), relative to the largest
-magnitude of the column.  N as in claims.py.
+magnitude of the column.  N as in closed_forms.py.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...fmu.session import RefusalError
-from .claims import laws, statements
+from .closed_forms import judged, laws
 from .facts import Facts, facts_of
 from .judge import EPS, Check, invariants, lost
 from .player import Drive, Player, Run, Values, play
@@ -52,7 +52,7 @@ class Bench:
         self.facts: Facts = facts_of(path)
         self.quick = quick
         self.forms = (
-            *statements(self.facts.claims, {i.name for i in self.facts.inputs}),
+            *judged(self.facts.closed_forms, {i.name for i in self.facts.inputs}),
             *laws(self.facts.laws),
         )
         self.folder = Path(fmpy.extract(str(path)))
@@ -155,8 +155,13 @@ class Bench:
             count = 0.0
         return max(count, 1.0)
 
-    def _counted(self, run: Run) -> NDArray[np.float64]:
-        """The integral of the natural rate over time."""
+    @cached_property
+    def fastest_rate(self) -> float:
+        """The largest natural rate [1/s] in the default experiment.  Raises RefusalError."""
+        return max(float(self._rates(self.ordinary).max()), self.ordinary_rate)
+
+    def _rates(self, run: Run) -> NDArray[np.float64]:
+        """The natural rate at each point."""
         rate = np.zeros(len(run.rows))
         with np.errstate(all="ignore"):
             for q in self.facts.coordinates:
@@ -165,6 +170,12 @@ class Bench:
                 v = np.abs(run.rows[names.derivative(q)])
                 vdot = np.abs(run.rows[names.derivative(q, 2)])
                 rate = np.maximum(rate, np.maximum(v / size, np.sqrt(vdot / size)))
+        return rate
+
+    def _counted(self, run: Run) -> NDArray[np.float64]:
+        """The integral of the natural rate over time."""
+        rate = self._rates(run)
+        with np.errstate(all="ignore"):
             parts = np.diff(run.rows["time"]) * (rate[1:] + rate[:-1]) / 2
         counted: NDArray[np.float64] = np.concatenate([[0.0], np.cumsum(parts)])[: len(rate)]
         return np.where(np.isfinite(counted), counted, 0.0)

@@ -6,7 +6,8 @@ along any direction
     sum_k  dR/do_k  do_k = 0
 
 with the changes do_k that fmi2GetDirectionalDerivative names: nothing but the FMU's own values stands in
-it, and no difference quotient.  It may be off by WITHIN of the sum of the terms' magnitudes.
+it, and no difference quotient.  It may be off by WITHIN of the sum of the terms' magnitudes, or of the law's
+own size (in the metric of M, lagrange.py) over that of what is changed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import sympy as sp
 from ... import names
 from ...verification.verify import applies
 from .bench import Bench, Finding
-from .claims import Statement
+from .closed_forms import JudgedForm, magnitude
 from .facts import Facts
 from .judge import Check
 from .player import table
@@ -42,23 +43,25 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
 
 @dataclass(frozen=True)
 class _Law:
-    """R's partial derivatives by the variables `moving`, of the variables `needs`."""
+    """R's partial derivatives by the variables `moving` and last its size, of the variables `needs`."""
 
-    statement: Statement
+    judged: JudgedForm
     moving: tuple[str, ...]
     needs: tuple[str, ...]
     slopes: Callable[..., Any]
 
 
-def _law(form: Statement, variables: set[str]) -> _Law | None:
+def _law(form: JudgedForm, variables: set[str]) -> _Law | None:
     """None where R has no derivative everywhere."""
-    R = sp.sympify(form.claim.actual) - sp.sympify(form.claim.expected)
-    symbols = sorted(R.free_symbols, key=str)
-    by = [s for s in symbols if str(s) in variables]
+    R = sp.sympify(form.closed_form.actual) - sp.sympify(form.closed_form.expected)
+    parts = [sp.sympify(e) for e in (form.closed_form.actual, form.closed_form.expected)]
+    size = sp.Add(*(magnitude(e) for e in parts), form.closed_form.scale or 0)
+    symbols = sorted(R.free_symbols | size.free_symbols, key=str)
+    by = [s for s in symbols if s in R.free_symbols and str(s) in variables]
     slopes = [] if R.has(*KINKED) else [R.diff(s) for s in by]
     if not slopes or any(e.has(sp.Derivative, sp.Subs) for e in slopes):
         return None
-    function = sp.lambdify(symbols, slopes, modules=["scipy", "numpy"], dummify=True)
+    function = sp.lambdify(symbols, [*slopes, size], modules=["scipy", "numpy"], dummify=True)
     return _Law(form, tuple(map(str, by)), tuple(map(str, symbols)), function)
 
 
@@ -78,12 +81,13 @@ def _along_each(bench: Bench) -> Finding:
             rows[name][0] = value
         asked = [n for n in reals if _defined(n, values)]
         laws = [x for x in forms if x is not None and {*x.moving} <= {*asked, *seeds}]
-        laws = [x for x in laws if applies(x.statement.claim, rows, known)[0]]
+        laws = [x for x in laws if applies(x.judged.closed_form, rows, known)[0]]
         for seed in seeds:
             references = player.references(asked), player.references([seed])
             found = player.call("getDirectionalDerivative", *references, [1.0])
             changes = dict.fromkeys(seeds, 0.0) | dict(zip(asked, found, strict=True)) | {seed: 1.0}
-            checks += [_missed(x, known | values, changes, seed) for x in laws]
+            size = _size(bench, seed, known | values)
+            checks += [_missed(x, known | values, changes, seed, size) for x in laws]
     return Finding(tuple(checks))
 
 
@@ -95,9 +99,20 @@ def _defined(name: str, values: Mapping[str, Any]) -> bool:
     return bool(values[names.name(names.UNIQUE, of.constraint)])
 
 
-def _missed(law: _Law, values: Mapping[str, Any], changes: Mapping[str, float], seed: str) -> Check:
-    slopes = np.array(law.slopes(*(float(values[n]) for n in law.needs)), dtype=float)
-    terms = slopes * [changes[n] for n in law.moving]
-    allowed = WITHIN * float(np.abs(terms).sum()) + float(np.finfo(float).tiny)
-    what = f"{law.statement.claim.name} along {seed}"
+def _size(bench: Bench, name: str, values: Mapping[str, Any]) -> float:
+    """How large a coordinate is, a velocity in a natural time, an input."""
+    facts, q = bench.facts, name.removeprefix("der(").removesuffix(")")
+    if q not in facts.coordinates:
+        return abs(float(values[name])) or 1.0
+    size = max(abs(float(values[q])), facts.same_unit(q, values)) or facts.usual(q)
+    return size if q == name else max(size * bench.ordinary_rate, abs(float(values[name])))
+
+
+def _missed(
+    law: _Law, values: Mapping[str, Any], changes: Mapping[str, float], seed: str, size: float
+) -> Check:
+    *slopes, own = (float(x) for x in law.slopes(*(float(values[n]) for n in law.needs)))
+    terms = np.array(slopes) * [changes[n] for n in law.moving]
+    allowed = WITHIN * (float(np.abs(terms).sum()) + own / size) + float(np.finfo(float).tiny)
+    what = f"{law.judged.closed_form.name} along {seed}"
     return Check(what, abs(float(terms.sum())), allowed)

@@ -10,9 +10,9 @@ from typing import Any
 
 from ... import names
 from ...errors import VerificationError
-from ...fmu.claims import Claim, tables_in, unpack_closed_forms
+from ...fmu.closed_forms import CarriedForm, tables_in, unpack_closed_forms
 from ...verification.simulate import file_stem, read_description
-from ...verification.verify import RECORD, claims_in
+from ...verification.verify import RECORD, closed_forms_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -49,8 +49,8 @@ class Facts:
     coordinates: tuple[str, ...]
     constraints: tuple[str, ...]
     contacts: tuple[str, ...]
-    claims: tuple[Claim, ...]
-    laws: tuple[Claim, ...]
+    closed_forms: tuple[CarriedForm, ...]
+    laws: tuple[CarriedForm, ...]
     dimensions: Mapping[str, Dimension]
     stop_time: float
     step_size: float
@@ -95,7 +95,7 @@ class Facts:
 def facts_of(path: Path) -> Facts:
     """Raises VerificationError if the file is no FMU of lagfmu for co-simulation."""
     description = read_description(path)
-    claims = claims_in(path)
+    closed_forms = closed_forms_in(path)
     variables = {v.name: v for v in description.modelVariables}
     if description.coSimulation is None or names.METHOD not in variables:
         raise VerificationError(
@@ -139,7 +139,7 @@ def facts_of(path: Path) -> Facts:
         coordinates=coordinates,
         constraints=tuple(names.constraints((v.name for v in reals), names.MULTIPLIER)),
         contacts=tuple(names.constraints(variables, names.CONTACT)),
-        claims=tuple(claims),
+        closed_forms=tuple(closed_forms),
         laws=_laws(path),
         dimensions={v.name: bases.get(v.unit, (0,) * len(BASE)) for v in reals}
         | {"time": (0, 0, 1) + (0,) * (len(BASE) - 3)},
@@ -161,7 +161,7 @@ def beside(path: Path) -> Path:
     return path.with_suffix(".lagrange.json")
 
 
-def _laws(path: Path) -> tuple[Claim, ...]:
+def _laws(path: Path) -> tuple[CarriedForm, ...]:
     file = beside(path)
     return tuple(unpack_closed_forms(file.read_bytes(), str(file))) if file.exists() else ()
 

@@ -6,19 +6,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
 from ... import names
-from ...fmu.claims import pack_closed_forms, unpack_closed_forms
+from ...fmu.closed_forms import pack_closed_forms, unpack_closed_forms
 from ...model.closed_form import TIME, ClosedForm
 from ...model.model import Contact, Model, Nonholonomic, name_of
+from ...model.parts import Expr
+from ...model.reactions import reactions_in
+from ...names import read
 from ...prepare.prepare import Prepared
 
-Expr = Any
 Column = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ class Collision:
 
 class Geometry:
     """`contacts`, `bilateral`: which constraints are; the others, `rough`, hold by friction, or while a
-    contact is closed."""
+    contact is closed: by those that `gates` (m, m) names."""
 
     def __init__(self, forms: Mapping[str, Expr]) -> None:
         kinds = [n.split(":") for n in forms if n.startswith("kind:")]
@@ -48,6 +49,8 @@ class Geometry:
             for kind in ("contact", "bilateral", "rough")
         )
         self.rough = bool(rough.any())
+        pairs = [n.split(":")[1:] for n in forms if n.startswith("gate:")]
+        self.gates = np.array([[[c, by] in pairs for by in self.names] for c in self.names], float)
         self.forms = forms
         self.symbols = sorted({s for e in forms.values() for s in e.free_symbols}, key=str)
         self.needs = [str(s) for s in self.symbols]
@@ -85,8 +88,8 @@ def geometry_of(fmu: Path) -> Geometry | None:
     file = _beside(fmu)
     if not file.exists():
         return None
-    claims = unpack_closed_forms(file.read_bytes(), str(file))
-    forms = {c.name: sp.sympify(c.expected) for c in claims}
+    closed_forms = unpack_closed_forms(file.read_bytes(), str(file))
+    forms = {c.name: sp.sympify(c.expected) for c in closed_forms}
     return Geometry(forms) if forms.get("count") == len(forms) - 1 else None
 
 
@@ -106,15 +109,20 @@ def _forms(model: Model, known: set[str]) -> dict[str, Expr]:
         forms[f"coordinate:{name_of(q)}"] = sp.S.One
         for p, w in rates.items():
             forms[f"mass:{name_of(q)}:{name_of(p)}"] = model.energy_expression.diff(v, w)
-    by_friction = {name for law in model.frictions for name in law.of}
+    by_friction = {name: law for law in model.frictions for name in law.of}
     for c in model.constraints:
         f = sp.sympify(c.expression)
         speed = f if isinstance(c, Nonholonomic) else f.diff(TIME)
-        gated = not isinstance(c, Contact) and c.while_closed is not None
-        kind = "rough" if gated or c.name in by_friction else "bilateral"
+        gate = None if isinstance(c, Contact) else c.while_closed
+        kind = "rough" if gate is not None or c.name in by_friction else "bilateral"
         if isinstance(c, Contact):
             kind = "contact"
         forms[f"kind:{c.name}:{kind}"] = sp.S.One
+        gates = set() if gate is None else {gate}
+        if c.name in by_friction:
+            normal = sp.sympify(by_friction[c.name].normal)
+            gates |= {read(str(s)).constraint for s in reactions_in(normal)}
+        forms |= {f"gate:{c.name}:{by}": sp.S.One for by in gates}
         forms[f"gap:{c.name}"] = sp.S.Zero if isinstance(c, Nonholonomic) else f
         forms[f"speed:{c.name}"] = speed
         for q, v in rates.items():

@@ -265,6 +265,7 @@ def _alike(geometry: Geometry, here: Collision, there: Collision, signs: Vector)
         table = np.column_stack([geometry.contacts, one.f, one.s, one.e, G])
         turned = np.where(geometry.contacts, 1.0, np.sign(one.s))  # f = 0 is -f = 0
         table[:, [1, 2, *range(4, table.shape[1])]] *= turned[:, None]
+        table = np.hstack([table, geometry.gates @ np.column_stack([one.f, G])])
         return table[np.lexsort(np.round(table, 9).T)]
 
     return np.allclose(described(here, here.G), described(there, there.G * signs), atol=1e-8)

@@ -8,7 +8,7 @@
   push         lambda >= 0 while a contact is closed, within 10 tol of the largest |lambda|
   no pull      lambda = 0, exactly, while it is open: f lambda = 0
   outside      f >= 0 while it is open, within the gap of 1e-9 of f's own size in which it touches
-  claims       the closed forms and conserved quantities (claims.py)
+  closed_forms       the closed forms and conserved quantities (closed_forms.py)
 
 Each comes as an error and what is allowed; the run is right if no error exceeds what it is allowed.
 """
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import names
-from .claims import Statement, undisturbed
+from .closed_forms import JudgedForm, undisturbed
 from .facts import Facts
 from .player import Run
 
@@ -50,8 +50,8 @@ class Check:
         return self.error / self.allowed if self.allowed > 0 else float(self.error > 0) * np.inf
 
 
-def invariants(facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Column) -> list[Check]:
-    """All checks of a run, at the points that were reached; `elapsed` as in claims.py."""
+def invariants(facts: Facts, run: Run, forms: Sequence[JudgedForm], elapsed: Column) -> list[Check]:
+    """All checks of a run, at the points that were reached; `elapsed` as in closed_forms.py."""
     if len(run.rows) == 0:
         return []
     bad = [n for n in run.rows.dtype.names or () if not np.isfinite(run.rows[n]).all()]
@@ -72,7 +72,7 @@ def invariants(facts: Facts, run: Run, forms: Sequence[Statement], elapsed: Colu
             run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors
         )
         if points:
-            checks.append(Check(form.claim.name, error, allowed, form.instantaneous))
+            checks.append(Check(form.closed_form.name, error, allowed, form.instantaneous))
     return checks
 
 
@@ -101,7 +101,7 @@ def wound(facts: Facts, run: Run) -> Column:
 
 
 def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
-    """The points before a contact closes again: an impact takes energy, and a start's claims end.
+    """The points before a contact closes again: an impact takes energy, and a start's closed forms end.
 
     One that closes and opens again between two points is seen by its departure; one that is thrown back
     at once, by f, which was on the way through 0 and is positive.

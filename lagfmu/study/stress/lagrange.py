@@ -17,20 +17,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import sympy as sp
 
 from ... import names
-from ...fmu.claims import pack_closed_forms
+from ...fmu.closed_forms import pack_closed_forms
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
+from ...model.parts import Expr
 from ...prepare.prepare import Prepared
-from .claims import magnitude
+from .closed_forms import magnitude
 from .facts import beside
 
-Expr = Any
-ROUNDING = 1e-13  # relative to those terms; see claims.LEEWAY
+ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
 SLOW = 1e-9  # of its terms: a slip velocity that has no direction yet
 GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps

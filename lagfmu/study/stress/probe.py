@@ -24,7 +24,7 @@ class Probe:
 
 
 @dataclass(frozen=True)
-class Row:
+class Verdict:
     """The verdict on a probe; `closest`: the check that came nearest to its limit, `ratio` of it."""
 
     family: str
@@ -37,7 +37,7 @@ class Row:
     seconds: float
 
 
-def verdict(probe: Probe, finding: Finding, seconds: float) -> Row:
+def verdict(probe: Probe, finding: Finding, seconds: float) -> Verdict:
     """Wrong if a check fails or a refusal is unclear; else refused, if it was; else right.
 
     Where nothing but single instants could be judged it is only consistent.
@@ -63,7 +63,7 @@ def verdict(probe: Probe, finding: Finding, seconds: float) -> Row:
         ) + (f"; and {len(failed) - 4} more" if len(failed) > 4 else "")
         if finding.refusal is not None:
             detail += f" (then refused: {finding.refusal})"
-    return Row(
+    return Verdict(
         probe.family, probe.name, answer, detail, closest, ratio, len(finding.checks), seconds
     )
 

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from ...verification import pipeline
 from ...verification.pipeline import Case, Suite
-from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Row
+from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Verdict
 
 FORMAT = 1
 VERDICTS = (RIGHT, CONSISTENT, REFUSED, WRONG, UNFINISHED)
@@ -51,7 +51,7 @@ class Stressed:
     quick: bool
     limit: float
     laws: bool
-    rows: tuple[Row, ...]
+    rows: tuple[Verdict, ...]
 
     def count(self, verdict: str, family: str | None = None) -> int:
         """Rows with that verdict."""
@@ -104,11 +104,11 @@ def summary(all_found: Sequence[Stressed]) -> Table:
     return drawn
 
 
-def _ratio(row: Row) -> str:
+def _ratio(row: Verdict) -> str:
     return f"{row.ratio:.1e}" if row.ratio else ""
 
 
-def _text(row: Row) -> str:
+def _text(row: Verdict) -> str:
     nearest = row.closest if row.verdict == RIGHT and row.ratio else ""
     return "; ".join(t for t in (nearest, row.detail) if t)
 
@@ -128,7 +128,7 @@ class Tried:
         return Suite(self.file, [_case(r) for r in rows], self.error)
 
 
-def _case(row: Row) -> Case:
+def _case(row: Verdict) -> Case:
     failure = row.detail if row.verdict == WRONG else ""
     skipped = row.detail if row.verdict == UNFINISHED else ""
     return Case(row.probe, row.family, failure, skipped, row.seconds)

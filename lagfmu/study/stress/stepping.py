@@ -117,7 +117,7 @@ def _method(method: str, bench: Bench) -> Finding:
     """Those with a fixed step have no tolerance: judged as at 1e-6, with a step made for that."""
     values: dict[str, float | str] = {names.METHOD: method}
     if method in FIXED_STEP:
-        values[names.STEP] = 1e-3 / bench.ordinary_rate
+        values[names.STEP] = min(1e-3 / bench.ordinary_rate, 1e-2 / bench.fastest_rate)
     run = bench.run(values, bench.times(bench.facts.stop_time))
     if method in FIXED_STEP:
         run = replace(run, tolerance=1e-6)

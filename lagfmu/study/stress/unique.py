@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...names import UNIQUE, name
 from .bench import Bench, Finding
 from .facts import Facts
 from .geometry import Collision, Geometry, geometry_of
@@ -41,7 +42,7 @@ def _told(geometry: Geometry, bench: Bench) -> Finding:
         wrong = [
             geometry.names[i]
             for i, known in zip(rows, right, strict=True)
-            if bool(run.rows[f"unique.{geometry.names[i]}"][k]) != known
+            if bool(run.rows[name(UNIQUE, geometry.names[i])][k]) != known
         ]
         checks.append(Check("unique" + "".join(f" {c}" for c in wrong), float(len(wrong)), 0.5))
     note = "" if checks else "G is too near to a change of rank to be sure"

@@ -18,7 +18,7 @@ from ...model.goal import Goal
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
-from ...verification.verify import claims_in
+from ...verification.verify import closed_forms_in
 from .held_out import Case, held_out
 from .importer import Importer
 from .measure import Tick
@@ -85,7 +85,7 @@ def pick(
                 )
                 path = write(prepared, folder, closed_forms, target=measured.target)
                 with Importer(path) as importer:
-                    cases = held_out(importer, claims_in(path))
+                    cases = held_out(importer, closed_forms_in(path))
         except LagfmuError as error:
             reasons.append(f"{option}: {error}")
             continue

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.claims import Claim
+from ...fmu.closed_forms import CarriedForm
 from ...verification.simulate import Trajectory, steps_of
 from .importer import Importer
 from .measure import wider
@@ -36,7 +36,9 @@ class Case:
         return max(self.errors[n] + self.own[n] for n in names)
 
 
-def held_out(importer: Importer, claims: Sequence[Claim], cases: int = CASES) -> list[Case]:
+def held_out(
+    importer: Importer, closed_forms: Sequence[CarriedForm], cases: int = CASES
+) -> list[Case]:
     """The FMU as it was built, with its default settings, at `cases` other points.
 
     Errors are the larger ones of the FMU's communication step and of up to ten times that.
@@ -48,7 +50,7 @@ def held_out(importer: Importer, claims: Sequence[Claim], cases: int = CASES) ->
     found = []
     for k in range(cases):
         values = other_values(importer, scene, random.Random(k))
-        reference = refer(importer, claims, values, second_opinion=False)
+        reference = refer(importer, closed_forms, values, second_opinion=False)
         run = importer.observe(built, values)
         steps = steps_of(run)
         errors = reference.errors(run)

@@ -15,10 +15,10 @@ import numpy as np
 
 from ... import names
 from ...errors import LagfmuError, SimulationError, VerificationError
-from ...fmu.claims import Claim
+from ...fmu.closed_forms import CarriedForm
 from ...methods import FIXED_STEP, INTEGRATORS
 from ...verification.simulate import file_stem, steps_of
-from ...verification.verify import check_claim, claims_in
+from ...verification.verify import check_closed_form, closed_forms_in
 from .front import front
 from .importer import Importer
 from .quantities import GROUPS, MULTIPLIER, Quantity, residual
@@ -56,7 +56,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Row:
+class Weighed:
     """One setting, measured.
 
     `errors` relative to the reference's scales; `residual` the largest |residual| in SI units;
@@ -97,7 +97,7 @@ class Tradeoff:
     simulated: float
     step_size: float
     reference: Reference
-    rows: tuple[Row, ...]
+    rows: tuple[Weighed, ...]
     floor: Mapping[float, float]
     refused: Mapping[str, str]
     cut: tuple[str, ...]
@@ -107,7 +107,7 @@ class Tradeoff:
         """The quantities that are measured."""
         return self.reference.known
 
-    def worst(self, row: Row, group: str | Sequence[str]) -> float:
+    def worst(self, row: Weighed, group: str | Sequence[str]) -> float:
         """The largest relative error among the quantities of a group, or among those named.
 
         What is below the reference's own error counts as that error.
@@ -131,7 +131,7 @@ class Tradeoff:
         """The group that speed is weighed against: lambda if there is one."""
         return MULTIPLIER if MULTIPLIER in self.groups else self.groups[0]
 
-    def front(self, communication: float | None = None, group: str | None = None) -> list[Row]:
+    def front(self, communication: float | None = None, group: str | None = None) -> list[Weighed]:
         """The rows that no other beats in both error and time, at one communication step or at all."""
         rows = [
             r
@@ -169,7 +169,7 @@ def measure(
 ) -> Tradeoff:
     """Errors and times of an FMU.  Raises SimulationError if not even the reference can be run."""
     say = tick or (lambda *_: None)
-    claims = _claims(fmu)
+    closed_forms = _closed_forms(fmu)
     with Importer(fmu) as importer:
         if names.METHOD not in importer.variables:
             raise VerificationError(
@@ -179,8 +179,8 @@ def measure(
         plan = plan or default_plan(importer)
         plan = replace(plan, repeats=repeats or plan.repeats)
         say("reference", 0, 1)
-        reference = refer(importer, claims, communication=min(plan.communications))
-        rows, refused, cut = _errors(importer, reference, claims, plan, say)
+        reference = refer(importer, closed_forms, communication=min(plan.communications))
+        rows, refused, cut = _errors(importer, reference, closed_forms, plan, say)
         read = [q.name for q in reference.known]
         work = [partial(importer.seconds, r.setting, read) for r in rows]
         work += [partial(importer.floor, h, read) for h in plan.communications]
@@ -199,9 +199,9 @@ def measure(
         )
 
 
-def _claims(fmu: Path) -> list[Claim]:
+def _closed_forms(fmu: Path) -> list[CarriedForm]:
     try:
-        return claims_in(fmu)
+        return closed_forms_in(fmu)
     except LagfmuError:
         return []  # an FMU of another tool has none; it is measured against a converged run
 
@@ -209,12 +209,12 @@ def _claims(fmu: Path) -> list[Claim]:
 def _errors(
     importer: Importer,
     reference: Reference,
-    claims: Sequence[Claim],
+    closed_forms: Sequence[CarriedForm],
     plan: Plan,
     say: Tick,
-) -> tuple[list[Row], dict[str, str], list[str]]:
+) -> tuple[list[Weighed], dict[str, str], list[str]]:
     """One row a setting, without times; methods that the FMU refuses, and why; what was cut short."""
-    rows: list[Row] = []
+    rows: list[Weighed] = []
     refused: dict[str, str] = {}
     cut: list[str] = []
     total = len(plan.communications) * len(plan.methods)
@@ -225,7 +225,7 @@ def _errors(
         ):
             begun = time.perf_counter()
             try:
-                rows.append(weigh(importer, setting, reference, claims))
+                rows.append(weigh(importer, setting, reference, closed_forms))
             except SimulationError as error:
                 if method not in {r.setting.method for r in rows} and not accepts(importer, method):
                     refused[method] = str(error)
@@ -243,7 +243,7 @@ def _errors(
     return rows, refused, cut
 
 
-def _largest(row: Row) -> float:
+def _largest(row: Weighed) -> float:
     return max(row.errors.values(), default=0.0)
 
 
@@ -262,9 +262,9 @@ def weigh(
     importer: Importer,
     setting: Setting,
     reference: Reference,
-    claims: Sequence[Claim] = (),
+    closed_forms: Sequence[CarriedForm] = (),
     limit: float = math.inf,
-) -> Row:
+) -> Weighed:
     """The errors of one setting.
 
     Raises SimulationError if the FMU refuses it, TooSlowError if it takes longer than `limit` [s].
@@ -276,8 +276,8 @@ def weigh(
         for v in importer.description.modelVariables
         if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
     }
-    checks = [check_claim(c, run, parameters, setting.tolerance) for c in claims]
-    return Row(
+    checks = [check_closed_form(c, run, parameters, setting.tolerance) for c in closed_forms]
+    return Weighed(
         setting=setting,
         errors=errors,
         residual=residual(run),

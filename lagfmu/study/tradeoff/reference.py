@@ -24,15 +24,15 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.claims import Claim
+from ...fmu.closed_forms import CarriedForm
 from ...model.closed_form import output
+from ...model.parts import Expr
 from ...verification.simulate import Trajectory
 from ...verification.verify import applies, evaluate
 from .importer import Importer
 from .quantities import Quantity, magnitudes, quantities
 from .setting import Setting
 
-Expr = Any
 TIGHTEST = 1e-14
 ROUNDING = 16 * float(np.finfo(float).eps)  # of a closed form or a run in double precision
 COARSER = 10  # communication steps of the reference in one of the run that it is compared with
@@ -78,7 +78,7 @@ class Reference:
 
 def refer(
     importer: Importer,
-    claims: Sequence[Claim],
+    closed_forms: Sequence[CarriedForm],
     values: Mapping[str, Any] | None = None,
     communication: float | None = None,
     stop: float | None = None,
@@ -110,8 +110,8 @@ def refer(
     if second_opinion:
         opinion = _opinion(importer, converged, given, wide * h, end)
     checked: float | None = None
-    for name, claim, expected in _in_time(claims, importer, given, run):
-        where = applies(claim, run, _numbers(importer, given)) & np.isfinite(expected)
+    for name, closed_form, expected in _in_time(closed_forms, importer, given, run):
+        where = applies(closed_form, run, _numbers(importer, given)) & np.isfinite(expected)
         if name not in right or not where.any():
             continue
         miss = float(np.abs(right[name] - expected)[where].max()) / scale[name]
@@ -174,9 +174,12 @@ def _numbers(importer: Importer, given: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _in_time(
-    claims: Sequence[Claim], importer: Importer, given: Mapping[str, Any], run: Trajectory
-) -> list[tuple[str, Claim, NDArray[np.float64]]]:
-    """(output, claim, expected values) for the closed forms that need time and start values only."""
+    closed_forms: Sequence[CarriedForm],
+    importer: Importer,
+    given: Mapping[str, Any],
+    run: Trajectory,
+) -> list[tuple[str, CarriedForm, NDArray[np.float64]]]:
+    """(output, closed form, expected values) for the closed forms that need time and start values only."""
     values = _numbers(importer, given)
     constant = values.keys() - set(run.dtype.names or ()) | {"time"}
 
@@ -185,12 +188,12 @@ def _in_time(
             str(s) in constant or names.initially(str(s)) for s in sp.sympify(e).free_symbols
         )
 
-    open_claims = [
+    open_forms = [
         c
-        for c in claims
+        for c in closed_forms
         if c.expected is not None and c.actual.is_Symbol and c.at_departure is None
     ]
-    always = [c for c in open_claims if c.while_closed is None and c.while_open is None]
+    always = [c for c in open_forms if c.while_closed is None and c.while_open is None]
     solved: dict[Expr, Expr] = {}
     for _ in always:
         for c in always:
@@ -198,7 +201,7 @@ def _in_time(
             if c.actual not in solved and explicit(expected):
                 solved[output(str(c.actual))] = expected
     found, taken = [], set()
-    for c in open_claims:
+    for c in open_forms:
         expected = sp.sympify(c.expected).xreplace(solved)
         if explicit(expected) and (str(c.actual), c.while_closed, c.while_open) not in taken:
             taken.add((str(c.actual), c.while_closed, c.while_open))

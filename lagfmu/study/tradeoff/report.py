@@ -15,7 +15,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...verification.pipeline import VERDICTS, Case, Suite
-from .measure import Row, Tradeoff
+from .measure import Tradeoff, Weighed
 from .quantities import EVENT, FORCE, MOTION, MULTIPLIER, OWN
 
 SYMBOLS = {MULTIPLIER: "λ", FORCE: "Q", MOTION: "motion", OWN: "outputs", EVENT: "event"}
@@ -60,7 +60,7 @@ def table(found: Tradeoff, communication: float) -> Table:
     return drawn
 
 
-def _error(found: Tradeoff, row: Row, group: str) -> str:
+def _error(found: Tradeoff, row: Weighed, group: str) -> str:
     names = [q.name for q in found.known if q.group == group]
     below = all(n in row.below for n in names)
     return f"{'≤' if below else ''}{found.worst(row, group):.1e}"
@@ -104,7 +104,7 @@ def remarks(found: Tradeoff) -> list[str]:
 
 def cheapest(
     found: Tradeoff, goal: float, communication: float | None = None, group: str | None = None
-) -> Row | None:
+) -> Weighed | None:
     """The fastest row whose error in the group (lambda, if it has one) is at most `goal`."""
     good = [
         r

@@ -18,7 +18,7 @@ from typing import Protocol
 from ...errors import SimulationError
 from ...methods import FIXED_STEP
 from .importer import TooSlowError
-from .measure import Row
+from .measure import Weighed
 from .setting import ORDERS, Setting
 
 SLOW = 2.5  # times the fastest that holds the error: what takes longer is not chosen
@@ -42,7 +42,7 @@ class Bench(Protocol):
     def coarse(self, setting: Setting, limit: float) -> float:
         """The error at the wider communication step, which costs little."""
 
-    def full(self, setting: Setting, limit: float) -> tuple[Row, float]:
+    def full(self, setting: Setting, limit: float) -> tuple[Weighed, float]:
         """The row at the scene's own communication step, and the larger of both errors."""
 
 
@@ -54,7 +54,7 @@ class Walk:
     bench: Bench
     goal: float
     clock: Clock
-    found: dict[int, tuple[Row, float, float]] = field(default_factory=dict)
+    found: dict[int, tuple[Weighed, float, float]] = field(default_factory=dict)
     errors: dict[int, float] = field(default_factory=dict)
     slow: bool = False
 

@@ -22,9 +22,9 @@ from ...model.goal import Goal
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
-from ...verification.verify import claims_in
+from ...verification.verify import closed_forms_in
 from .importer import Importer
-from .measure import Plan, Row, Tick, accepts, default_plan, take_turns, weigh, wider
+from .measure import Plan, Tick, Weighed, accepts, default_plan, take_turns, weigh, wider
 from .quantities import selected
 from .reference import Reference, refer
 from .search import SLOW, Clock, Walk, coarsest, start
@@ -40,7 +40,7 @@ class Option:
     """A formulation with a setting, measured; `error` is that of the quantities asked for."""
 
     formulation: str
-    row: Row
+    row: Weighed
     error: float
 
     @property
@@ -114,10 +114,10 @@ def survey(
             if first.target == "python":  # each run takes long: one is a time
                 plan = replace(plan, repeats=0, warm_up=False)
         say("reference", 0, 1)
-        claims = claims_in(first.path)
-        reference = refer(first, claims, communication=scene.step_size, second_opinion=False)
+        carried = closed_forms_in(first.path)
+        reference = refer(first, carried, communication=scene.step_size, second_opinion=False)
         names = tuple(q.name for q in selected(reference.known, goal.names))
-        found: list[tuple[str, Row, float]] = []
+        found: list[tuple[str, Weighed, float]] = []
         clock, near = Clock(), dict[str, int]()
         for formulation, importer in importers.items():
             task = _Task(formulation, importer, reference, names, goal.on_the_scene, clock, near)
@@ -135,7 +135,7 @@ def survey(
         )
 
 
-def _error(row: Row, names: Sequence[str], reference: Reference) -> float:
+def _error(row: Weighed, names: Sequence[str], reference: Reference) -> float:
     return max(max(row.errors[n], reference.own[n]) for n in names)
 
 
@@ -157,7 +157,7 @@ class _Task:
         errors = self._wide(setting, limit)
         return max(max(errors[n], self.reference.own[n]) for n in self.names)
 
-    def full(self, setting: Setting, limit: float) -> tuple[Row, float]:
+    def full(self, setting: Setting, limit: float) -> tuple[Weighed, float]:
         """The row, with the larger errors of both communication steps, and the largest of them."""
         row = _worse(
             weigh(self.importer, setting, self.reference, limit=limit), self._wide(setting, limit)
@@ -174,9 +174,9 @@ class _Task:
 
 def _weighed(
     task: _Task, plan: Plan, dropped: list[str], say: Tick
-) -> list[tuple[str, Row, float]]:
+) -> list[tuple[str, Weighed, float]]:
     """(formulation, row, seconds of that first run), method by method, from coarse to fine."""
-    found: list[tuple[str, Row, float]] = []
+    found: list[tuple[str, Weighed, float]] = []
     for j, method in enumerate(plan.methods):
         say(f"errors of {task.formulation}, {method}", j, len(plan.methods))
         if not accepts(task.importer, method):
@@ -192,17 +192,17 @@ def _weighed(
     return found
 
 
-def _worse(row: Row, others: Mapping[str, float]) -> Row:
+def _worse(row: Weighed, others: Mapping[str, float]) -> Weighed:
     return replace(row, errors={n: max(e, others[n]) for n, e in row.errors.items()})
 
 
 def _worth_timing(
-    found: Sequence[tuple[str, Row, float]],
+    found: Sequence[tuple[str, Weighed, float]],
     names: Sequence[str],
     reference: Reference,
     goal: Goal,
     plan: Plan,
-) -> list[tuple[str, Row, float]]:
+) -> list[tuple[str, Weighed, float]]:
     """What takes no longer than SLOW times the fastest that holds the goal.
 
     Where runs take long (no `warm_up`) only what holds it, unless nothing does.

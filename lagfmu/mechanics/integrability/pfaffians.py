@@ -9,18 +9,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
 
+from ...model.parts import Expr
 from .echelon import rref
 from .form import OneForm
 from .frobenius import along
 from .tower import Tower
 from .undecided import FAILURES, late
 
-Expr = Any  # SymPy has no types
 
-
-class System:
+class Pfaffians:
     """dx_p + sum_f b_f dx_f = 0, in reduced rows, and the integrals found so far."""
 
     def __init__(self, rows: Sequence[Sequence[Expr]], variables: Sequence[Expr]) -> None:

@@ -1,18 +1,18 @@
 """The closed forms that an FMU carries, compiled once, with the error that each is allowed.
 
-A claim `actual = expected` that follows the motion (it knows the start, the time or a departure, or says
-that something is conserved) may be off by
+A closed form `actual = expected` that follows the motion (it knows the start, the time or an event, or
+says that something is conserved) may be off by
 
     LEEWAY * within * tol * max(1, N) * A * size,    at least    LEEWAY * rounding * max(1, N) * A * size
 
-where `within` and `rounding` are the claim's own, N counts the natural times of the motion that have
+where `within` and `rounding` are the closed form's own, N counts the natural times of the motion that have
 passed, in units of those in the FMU's default experiment, and `size` is
-the largest over the run of the claim's scale and of the sum of the magnitudes of its terms: an error of
+the largest over the run of the closed form's scale and of the sum of the magnitudes of its terms: an error of
 tol in a state is one of tol * |term| in each term, and no sum can be better than its terms.  A is the
 largest angle so far [rad], at least 1: its error is tol * |angle|, that of its sine too.  LEEWAY, because
 `within` holds at the default tolerance, and errors are proportional to the tolerance only roughly.
 
-A claim among the outputs of one instant has nothing to do with the integration: whatever the tolerance,
+A closed form among the outputs of one instant has nothing to do with the integration: whatever the tolerance,
 it may be off by  LEEWAY * rounding * size,  with the size at that instant.
 """
 
@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...errors import VerificationError
-from ...fmu.claims import Claim
+from ...fmu.closed_forms import CarriedForm
+from ...model.parts import Expr
 from ...verification.verify import applies
 from .player import Run
 
-Expr = Any
 LEEWAY = 10.0
 Column = NDArray[np.float64]
 
@@ -91,14 +91,14 @@ class Compiled:
 
 
 @dataclass(frozen=True)
-class Statement:
-    """A claim ready to be judged; `pointwise`: it holds at each instant, whatever the inputs did.
+class JudgedForm:
+    """A closed form ready to be judged; `pointwise`: it holds at each instant, whatever the inputs did.
 
     `instantaneous`: it relates the outputs of one instant, so that no error of the integration enters;
     `law`: an equation that is solved at that instant, so that nothing but its own terms is its size.
     """
 
-    claim: Claim
+    closed_form: CarriedForm
     actual: Compiled
     expected: Compiled | None
     sizes: tuple[Compiled, ...]
@@ -118,7 +118,7 @@ class Statement:
         `growth` is max(1, N) at each row; `undisturbed` are the rows before the first impact, where
         also that may be judged which speaks of the start; `floors` as in Compiled.at.
         """
-        chosen = applies(self.claim, run.rows, run.values)
+        chosen = applies(self.closed_form, run.rows, run.values)
         if not self.instantaneous:
             chosen = chosen & undisturbed
         actual = self.actual.at(chosen, run)
@@ -136,10 +136,10 @@ class Statement:
         if not known.any():
             return 0.0, 1.0, 0
         size = np.maximum.reduce(sizes)
-        relative = np.full(len(actual), LEEWAY * self.claim.rounding)
+        relative = np.full(len(actual), LEEWAY * self.closed_form.rounding)
         if not self.instantaneous:
             size = np.full(len(actual), size[known].max())
-            tolerance = LEEWAY * self.claim.within * run.tolerance
+            tolerance = LEEWAY * self.closed_form.within * run.tolerance
             relative = np.maximum(relative, tolerance) * growth[chosen]
         allowed = relative * size + np.finfo(float).tiny
         error = np.abs(actual - expected)
@@ -147,32 +147,32 @@ class Statement:
         return float(error[worst]), float(allowed[worst]), int(known.sum())
 
 
-def statements(claims: tuple[Claim, ...], inputs: set[str]) -> tuple[Statement, ...]:
+def judged(closed_forms: tuple[CarriedForm, ...], inputs: set[str]) -> tuple[JudgedForm, ...]:
     """Every closed form, compiled."""
     found = []
-    for c in claims:
+    for c in closed_forms:
         parts = [c.actual] + ([] if c.expected is None else [c.expected])
         used = {str(s) for e in parts for s in sp.sympify(e).free_symbols}
         follows = any(
-            u == "time" or names.initially(u) or names.read(u).head == names.DEPARTURE for u in used
+            u == "time" or names.initially(u) or names.read(u).head in names.EVENTS for u in used
         )
-        found.append(_statement(c, c.expected is not None and not follows, False, inputs))
+        found.append(_judged(c, c.expected is not None and not follows, False, inputs))
     return tuple(found)
 
 
-def laws(claims: tuple[Claim, ...]) -> tuple[Statement, ...]:
+def laws(closed_forms: tuple[CarriedForm, ...]) -> tuple[JudgedForm, ...]:
     """Lagrange's equations (lagrange.py), compiled: instantaneous even where time stands in them.
 
     One value that has to vanish is rounding of the run, not of itself.
     """
-    alone = [c.expected == 0 and sp.sympify(c.actual).is_Symbol for c in claims]
-    return tuple(_statement(c, True, not a, set()) for c, a in zip(claims, alone, strict=True))
+    alone = [c.expected == 0 and sp.sympify(c.actual).is_Symbol for c in closed_forms]
+    return tuple(_judged(c, True, not a, set()) for c, a in zip(closed_forms, alone, strict=True))
 
 
-def _statement(c: Claim, instantaneous: bool, law: bool, inputs: set[str]) -> Statement:
+def _judged(c: CarriedForm, instantaneous: bool, law: bool, inputs: set[str]) -> JudgedForm:
     parts = [c.actual] + ([] if c.expected is None else [c.expected])
     sizes = [magnitude(sp.sympify(e)) for e in parts] + ([] if c.scale is None else [c.scale])
-    return Statement(
+    return JudgedForm(
         c,
         Compiled(c.actual, c.name),
         None if c.expected is None else Compiled(c.expected, c.name),
@@ -183,6 +183,6 @@ def _statement(c: Claim, instantaneous: bool, law: bool, inputs: set[str]) -> St
     )
 
 
-def undisturbed(run: Run, found: tuple[Statement, ...]) -> tuple[Statement, ...]:
+def undisturbed(run: Run, found: tuple[JudgedForm, ...]) -> tuple[JudgedForm, ...]:
     """Those that say something about this run: driven, only what holds at each instant."""
     return tuple(s for s in found if s.pointwise or not run.driven)

@@ -16,11 +16,11 @@ from ..errors import ModelError, TableError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
 from ..model.goal import parse
+from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.spline import Spline, splines_in
 from .formula import functions_of, read_formula, text_of
 
-Expr = Any
 FORMAT = 1
 LARGEST_RECORD = 1 << 24  # bytes
 EXPRESSIONS = ("actual", "expected", "scale", "when")
@@ -28,8 +28,8 @@ CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 
 
 @dataclass(frozen=True)
-class Claim:
-    """One statement to verify, in symbols named as the FMU's variables.
+class CarriedForm:
+    """A closed form (or what is conserved) as an FMU carries it, in symbols named as the FMU's variables.
 
     `expected` is None for a conserved quantity; `accuracy` is the relative error that the FMU was built
     to hold, as long as it runs with the settings that it was built with.
@@ -49,7 +49,7 @@ class Claim:
     accuracy: float | None = None
 
     def allowed(self, tolerance: float, as_built: bool) -> float:
-        """The relative error that the statement may have; `as_built`: with the FMU's own settings."""
+        """The relative error that it may have; `as_built`: with the FMU's own settings."""
         if as_built and self.accuracy is not None:
             return max(self.accuracy, self.rounding)
         return max(self.within * tolerance, self.rounding)
@@ -70,7 +70,7 @@ class Claim:
         left |= {s.constraint for s in map(names.read, read) if s.head == names.DEPARTURE}
         return (read | {names.name(names.DEPARTURES, c) for c in left}) - {"time"}
 
-    def in_scene(self, numbers: Mapping[str, Expr], held: Collection[str]) -> Claim | None:
+    def in_scene(self, numbers: Mapping[str, Expr], held: Collection[str]) -> CarriedForm | None:
         """The same with numbers for parameters, and contacts that stay closed; None if it speaks of
         such a contact being open, or never holds with these numbers."""
         if {self.while_open, self.at_departure} & set(held):
@@ -96,9 +96,9 @@ class Claim:
         )
 
 
-def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> list[Claim]:
+def carried(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> list[CarriedForm]:
     """The closed forms that apply to this FMU."""
-    claims = []
+    found = []
     for form in closed_forms:
         if form.only is not None and scene.name not in form.only:
             continue
@@ -108,8 +108,8 @@ def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> l
         else:
             actual = output(form.name) if form.actual is None else form.actual
             expected, leaving = in_variables(form.expected), form.at_departure
-        claims.append(
-            Claim(
+        found.append(
+            CarriedForm(
                 name=form.name,
                 actual=in_variables(actual),
                 expected=expected,
@@ -123,7 +123,7 @@ def claims_of(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> l
                 when=None if form.when is None else in_variables(form.when),
             )
         )
-    return claims
+    return found
 
 
 def pack_closed_forms(
@@ -134,54 +134,54 @@ def pack_closed_forms(
     held: Collection[str] = (),
     tables: Sequence[Spline] = (),
 ) -> bytes:
-    """JSON with the claims; expressions are indexed symbols, so that any name can be read back.
+    """JSON with the closed forms; expressions are indexed symbols, so that any name can be read back.
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
-    closed, `tables` those that the model looks up, besides those of the claims.  Claims that need a
-    variable which the scene leaves out are left out too.  Raises ModelError if a claim uses what no FMU of
+    closed, `tables` those that the model looks up, besides those of the closed forms.  Those that need a
+    variable which the scene leaves out are left out too.  Raises ModelError if one uses what no FMU of
     the model has.
     """
-    claims = [
-        claim
-        for form in claims_of(scene, closed_forms)
-        if (claim := form.in_scene(numbers or {}, held)) is not None
+    applying = [
+        found
+        for form in carried(scene, closed_forms)
+        if (found := form.in_scene(numbers or {}, held)) is not None
     ]
     known = {v.name for v in table.variables}
     problems = []
     kept = []
-    for claim in claims:
-        missing = sorted(claim.variables - known)
+    for form in applying:
+        missing = sorted(form.variables - known)
         if not missing:
-            kept.append(claim)
+            kept.append(form)
         elif scene.complete:
             for name in missing:
                 near = difflib.get_close_matches(name, known, 1)
                 problems.append(
-                    f"closed form {claim.name!r} uses {name!r}, which is no variable of the FMU"
+                    f"closed form {form.name!r} uses {name!r}, which is no variable of the FMU"
                     + (f"; did you mean {near[0]!r}?" if near else "")
                 )
     goal = None if scene.accuracy is None else parse(scene.accuracy)
-    held_against = [getattr(claim, key) for claim in kept for key in EXPRESSIONS]
+    held_against = [getattr(form, key) for form in kept for key in EXPRESSIONS]
     used = splines_in(e for e in held_against if e is not None)
     tables = sorted({*tables, *used}, key=lambda s: s.name)
     packed, functions = [], functions_of(tables)
-    for claim in kept:
+    for form in kept:
         entry: dict[str, Any] = {
-            key: getattr(claim, key) for key in ("name", *CONDITIONS, "within", "rounding")
+            key: getattr(form, key) for key in ("name", *CONDITIONS, "within", "rounding")
         }
         short_of: dict[Expr, str] = {}
         for key in EXPRESSIONS:
-            e = getattr(claim, key)
+            e = getattr(form, key)
             entry[key] = None if e is None else _text(sp.sympify(e), short_of)
         if goal is not None:
-            symbols = {str(s) for s in sp.sympify(claim.actual).free_symbols}
-            entry["accuracy"] = goal.allowed(symbols, claim.within)
+            symbols = {str(s) for s in sp.sympify(form.actual).free_symbols}
+            entry["accuracy"] = goal.allowed(symbols, form.within)
         entry["symbols"] = {short: str(symbol) for symbol, short in short_of.items()}
         packed.append(entry)
         try:
-            _claim(entry, functions)  # it has to come back
+            _form(entry, functions)  # it has to come back
         except ValueError as error:
-            problems.append(f"closed form {claim.name!r} cannot be carried by an FMU: {error}")
+            problems.append(f"closed form {form.name!r} cannot be carried by an FMU: {error}")
     if problems:
         raise ModelError(scene.name, problems)
     record: dict[str, Any] = {"format": FORMAT, "closed_forms": packed}
@@ -194,8 +194,8 @@ def pack_closed_forms(
     return json.dumps(record, indent=1).encode()
 
 
-def unpack_closed_forms(content: bytes, name: str) -> list[Claim]:
-    """The claims in an FMU, none of whose text is run (fmu/formula.py).
+def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
+    """The closed forms in an FMU, none of whose text is run (fmu/formula.py).
 
     Raises VerificationError if the file is not lagfmu's.
     """
@@ -207,7 +207,7 @@ def tables_in(content: bytes, name: str) -> list[Spline]:
     return _unpacked(content, name)[1]
 
 
-def _unpacked(content: bytes, name: str) -> tuple[list[Claim], list[Spline]]:
+def _unpacked(content: bytes, name: str) -> tuple[list[CarriedForm], list[Spline]]:
     try:
         if len(content) > LARGEST_RECORD:
             raise ValueError(f"{len(content)} bytes, expected at most {LARGEST_RECORD}")
@@ -219,7 +219,7 @@ def _unpacked(content: bytes, name: str) -> tuple[list[Claim], list[Spline]]:
                 raise ValueError(f"expected a list of {what}")
         tables = [_spline(entry) for entry in data.get("tables", [])]
         functions = functions_of(tables)
-        return [_claim(entry, functions) for entry in data["closed_forms"]], tables
+        return [_form(entry, functions) for entry in data["closed_forms"]], tables
     except (ValueError, RecursionError) as error:
         raise VerificationError(
             f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "
@@ -246,7 +246,7 @@ def _spline(entry: Any) -> Spline:
         raise ValueError(str(error)) from None
 
 
-def _claim(entry: Any, tables: Mapping[str, Any]) -> Claim:
+def _form(entry: Any, tables: Mapping[str, Any]) -> CarriedForm:
     """One entry of the record.  Raises ValueError with what is wrong in it."""
     texts = {"name", *CONDITIONS, *EXPRESSIONS}
     numbers = {"within", "rounding"}
@@ -278,4 +278,4 @@ def _claim(entry: Any, tables: Mapping[str, Any]) -> Claim:
     for key in EXPRESSIONS:
         text = entry[key]
         fields[key] = None if text is None else read_formula(text, symbols, tables)
-    return Claim(**fields)
+    return CarriedForm(**fields)

@@ -1,0 +1,25 @@
+"""fmpy's simulate_fmu for FMUs that run many times: unpacked, and the description read and checked, once."""
+
+from __future__ import annotations
+
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+FOLDERS: list[tempfile.TemporaryDirectory[str]] = []  # each goes with this process
+
+
+def simulate_fmu(path: str | Path, **options: Any) -> Any:
+    """fmpy.simulate_fmu(path, **options)."""
+    state = Path(path).stat()
+    folder, description = _unpacked(str(path), state.st_mtime_ns, state.st_size)
+    return fmpy.simulate_fmu(folder, model_description=description, **options)
+
+
+@cache
+def _unpacked(path: str, *_: int) -> tuple[str, Any]:
+    FOLDERS.append(tempfile.TemporaryDirectory(prefix="lagfmu_run_"))
+    return fmpy.extract(path, FOLDERS[-1].name), fmpy.read_model_description(path)
