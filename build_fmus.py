@@ -30,7 +30,7 @@ from lagfmu.fmu.native import takes_long
 from lagfmu.fmu.write import TARGETS
 from lagfmu.model.file import ModelFile, load
 from lagfmu.model.scene import Scene
-from lagfmu.prepare.prepare import prepare
+from lagfmu.prepare.prepare import Prepared, prepare
 
 MODELS = Path(__file__).parent / "models"
 RUNS = 3  # the time is the median of these
@@ -39,12 +39,22 @@ HEADINGS += ["statement", "error", "allowed", "verdict"]
 
 
 def build_one(
-    file: ModelFile, scene: Scene, target: str, out: Path, platforms: Sequence[str]
+    file: ModelFile,
+    scene: Scene,
+    target: str,
+    out: Path,
+    platforms: Sequence[str],
+    known: dict[str, Prepared],
 ) -> tuple[Path, float, Verification, float]:
-    """The FMU, seconds to build it, its verification, seconds to simulate it."""
+    """The FMU, seconds to build it, its verification, seconds to simulate it.
+
+    `known`: what was prepared so far by names of scenes, which serves both targets.
+    """
     begun = time.perf_counter()
-    scene, choice = settled(file.model, scene, file.closed_forms, target)
-    prepared = prepare(file.model, scene)
+    asked, choice = settled(file.model, scene, file.closed_forms, target)
+    prepared = known.get(scene.name)
+    if prepared is None or prepared.asked != asked or prepared.derived.model is not file.model:
+        prepared = known[scene.name] = prepare(file.model, asked)
     built = package(prepared, out, file.closed_forms, target, platforms, choice, reference=True)
     spent = time.perf_counter() - begun
     found = built.verification or verify(built.path)
@@ -92,6 +102,7 @@ def main(
     width = max((len(scene.name) for _, scene, _ in work), default=0)
     console.print(_line(width, "", "FMU", "target", "ms/s", "worst", "of"), style="bold")
     rows: list[tuple[str, ...]] = []
+    known: dict[str, Prepared] = {}
     warnings.showwarning = lambda message, *_: console.print(
         Text(f"note: {message}"), soft_wrap=True
     )
@@ -106,7 +117,9 @@ def main(
             if wait and not shown:
                 console.print(f"{name}{wait}")
             try:
-                path, built, found, seconds = build_one(file, scene, target, out / target, places)
+                path, built, found, seconds = build_one(
+                    file, scene, target, out / target, places, known
+                )
             except LagfmuError as error:
                 problems.append(f"{name}: {error}")
                 console.print(_line(width, "FAIL", scene.name, target), style="bold red")

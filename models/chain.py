@@ -1,4 +1,5 @@
-"""Chain of n equal bobs on n massless links, in Cartesian coordinates: chain(n) is the model.
+"""Chain of n equal bobs on n massless links, in Cartesian coordinates: family(n) makes it:
+`lagfmu build models/chain.py -p n=8` builds Chain8.
 
 x1, y1, ... xn, yn [m] are the bobs, to the right and up from the support; link k holds bob k to bob
 k - 1.  With f = |d|^2 - l^2 of a link d, lambda.link1, ... [N/m] are -tension/(2 l), as for the pendulum:
@@ -43,6 +44,8 @@ def links(n):
 
 def chain(n):
     """The chain of n links, let go from rest along a straight line at ANGLE."""
+    if n < 1:
+        raise ValueError(f"a chain of n = {n} links, expected at least 1")
     p = bobs(n)[1:]
     T = sum(m * (x.diff() ** 2 + y.diff() ** 2) / 2 for x, y in p)
     V = sum(m * g * y for _, y in p)
@@ -96,15 +99,21 @@ def multipliers(n):
 
 
 LINKS = 4
-model = chain(LINKS)
 
-scenes = [Scene("Chain", stop_time=5.0, step_size=0.01)]
 
-closed_forms = [
-    *(ClosedForm(f"lambda.link{k}", e) for k, e in enumerate(multipliers(LINKS), 1)),
-    *(
-        ClosedForm(f"length of link {k} squared", l**2, actual=dx**2 + dy**2)
-        for k, (dx, dy) in enumerate(links(LINKS), 1)
-    ),
-    Conserved("energy", output("energy.total"), scale=LINKS * (LINKS + 1) * m * g * l / 2),
-]
+def family(n=LINKS):
+    """The chain of n links, its scene and its closed forms."""
+    model = chain(n)
+    scene = Scene("Chain" if n == LINKS else f"Chain{n}", stop_time=5.0, step_size=0.01)
+    closed_forms = [
+        *(ClosedForm(f"lambda.link{k}", e) for k, e in enumerate(multipliers(n), 1)),
+        *(
+            ClosedForm(f"length of link {k} squared", l**2, actual=dx**2 + dy**2)
+            for k, (dx, dy) in enumerate(links(n), 1)
+        ),
+        Conserved("energy", output("energy.total"), scale=n * (n + 1) * m * g * l / 2),
+    ]
+    return model, [scene], closed_forms
+
+
+model, scenes, closed_forms = family()

@@ -65,6 +65,31 @@ def test_a_fine_communication_step_sees_the_same_motion_in_between(library):
     exact.free()
 
 
+@pytest.mark.parametrize("name", ["PendulumCartesian", "Hemisphere"])
+def test_looking_changes_nothing_to_the_last_bit(library, name):
+    """Between two steps the state is found when somebody asks.  Who looks at every communication point, who
+    looks at the last one alone, and who restores a state that was saved before anybody had looked see the
+    same outputs, and go on to the same ones."""
+    curious, blind, other = (library(name)(logging=False).start(None, 1e-8) for _ in range(3))
+    for _ in range(40):
+        curious.step(2.0**-6)
+        curious.outputs()
+        blind.step(2.0**-6)
+    state = blind.saved()
+    other.does("SetFMUstate", state)
+    other.does("FreeFMUstate", byref(state))
+    other.time = blind.time
+    for _ in range(2):
+        expected = curious.outputs()
+        assert blind.outputs() == expected
+        assert other.outputs() == expected
+        for one in (curious, blind, other):
+            one.step(2.0**-6)
+            one.step(2.0**-6)
+    for one in (curious, blind, other):
+        one.free()
+
+
 @pytest.mark.parametrize("step", STEPS[1:])
 def test_an_event_ahead_is_invisible_until_its_time(library, step):
     """The particle's departure is found while the integrator stands far ahead.  Until then the contact is

@@ -262,3 +262,14 @@ def test_too_fast_for_the_sphere_it_flies_at_once(fmu, share):
     assert (result["departure.surface.count"] == 0).all()
     assert (result["residual.surface"] >= 0).all()
     check_parabola(result, 1.0, theta0, np.sqrt(share * 9.81 * np.cos(theta0)))
+
+
+@pytest.mark.parametrize(("rise", "rests"), [(1e-13, True), (1e-6, False)])
+def test_what_parts_too_slowly_to_be_seen_rests(fmu, rise, rests):
+    """At the top it would rise by v^2/(2 g): by less than the gap within which contacts touch, 1e-9 of the
+    radius, it rests as after an impact, lambda = m g, instead of a flight that ends at no certain time;
+    by more, it flies."""
+    with instance(fmu("Hemisphere")) as one:
+        one.start({"theta": 0.0, "der(r)": np.sqrt(2 * 9.81 * rise)})
+        assert bool(one.get("contact.surface")) == rests
+        assert one.get("lambda.surface") == pytest.approx(9.81 if rests else 0.0, rel=1e-12)

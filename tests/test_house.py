@@ -94,3 +94,15 @@ def test_only_the_fmi_layer_says_fmi() -> None:
     for path in ROOT.glob("runtime/*/*.[ch]"):
         if path.parent.name != "fmi":
             assert not re.search(r"\bfmi2[A-Z]\w+", path.read_text()), path.name
+
+
+def test_names_of_variables_are_composed_in_one_place() -> None:
+    """What a variable is of is looked up: outside names.py no f-string makes a name, and nothing takes one
+    apart by its beginning."""
+    heads = (
+        "lambda|unique|residual|Q|contact|departure|sticks|margin|power|slip|slipping|energy|error"
+    )
+    made = re.compile(rf'f"(?:{heads})\.\{{|(?:startswith|removeprefix)\(\(?"(?:{heads})\.')
+    for path in MODULES:
+        if path.name != "names.py":
+            assert not made.search(path.read_text(encoding="utf-8")), path.name

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from conftest import MODELS
 from instance import instance
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import build_fmu
+from lagfmu import Holonomic, Input, Model, Parameter, build_fmu
 from lagfmu.errors import ModelError
 from lagfmu.model.file import load
 
@@ -56,6 +58,32 @@ def test_a_motion_that_is_connected_is_not_told(native_fmu, h):
     """All three, at fine and coarse steps (a sixteenth of the period), and a rope that is held."""
     assert told(native_fmu("Crane"), h, 3) == []
     assert told(native_fmu("Crane"), h, 2, still=True) == []
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_rate_counts_from_the_moment_at_which_it_is_set(tmp_path, target):
+    """A bead on a wire that is turned from outside runs outward as r'' = r omega^2: with 1 rad/s for 0.1 s,
+    from there with the 3 rad/s that are set, of which the first internal step knows already."""
+    r, turn, phi = dynamicsymbols("r turn phi")
+    m = symbols("m", positive=True)
+    model = Model(
+        name="Wire",
+        lagrangian=m * (r.diff() ** 2 + r**2 * turn.diff() ** 2) / 2,
+        coordinates={r: "m", turn: "rad"},
+        constraints=[Holonomic("drive", turn - phi)],
+        parameters=[Parameter(m, 1.0, "kg")],
+        inputs=[Input(phi, "rad", 0.0, rate=1.0)],
+        start={r: 1.0, turn.diff(): 1.0},
+    )
+    fmu = build_fmu(model, tmp_path, target=target, check=False)
+    with instance(fmu) as one:
+        one.start(tolerance=1e-10)
+        one.step(0.1)
+        one.set("der(phi)", 3.0)
+        one.step(0.1)
+        place, speed = np.cosh(0.1), np.sinh(0.1)
+        expected = place * np.cosh(0.3) + speed * np.sinh(0.3) / 3
+        assert one.get("r") == pytest.approx(expected, rel=1e-8)
 
 
 # ---------------------------------------------------------------------------- estimated

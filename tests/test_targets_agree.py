@@ -27,6 +27,9 @@ TOLERANCE = 1e-11
 CLOSER = {  # the spring's pull is 1e6 N/m times the difference of two places known to the tolerance
     "SliderCrank": 1e-12
 }
+FORGETS = {  # s: changed, a speed that differs by 1e-10 changes accelerations by 1e-9 then, 1e-5 after 10 s
+    "DoublePendulum": 2.0
+}
 
 
 def declared(path: Path) -> list[tuple[str, Any, Any]]:
@@ -105,16 +108,14 @@ def test_both_start_with_what_they_declare(fmu, name):
 
 @pytest.mark.parametrize("changed", [False, True], ids=["defaults", "changed"])
 @pytest.mark.parametrize("name", sorted(FILES))
-def test_both_tell_the_same_motion(request, python_fmu, native_fmu, name, changed):
+def test_both_tell_the_same_motion(python_fmu, native_fmu, name, changed):
     """All outputs at 41 instants: positions, velocities, accelerations, lambda, Q and each constraint's
     share in it, energies, and of every contact its mode and the time, place and speed of its departure."""
-    if changed and name in ("DoublePendulum", "HalfCar"):  # 1e-6 apart since scales are shared
-        request.node.add_marker(
-            pytest.mark.xfail(reason="known: the targets differ by 1e-6", strict=False)
-        )
     values = CHANGED[name] if changed else {}
     tolerance = CLOSER.get(name, TOLERANCE)
     stop = float(simulate_stop(native_fmu(name)))
+    if changed:
+        stop = FORGETS.get(name, stop)
     run = {"tolerance": tolerance, "stop_time": stop, "step_size": stop / POINTS}
     expected, found = both(python_fmu, native_fmu, name, values, **run)
     assert expected.dtype.names == found.dtype.names

@@ -49,6 +49,7 @@ from ..verification.verify import Verification
 from .film import film
 from .options import (
     AddOutput,
+    Arguments,
     Contacts,
     Derivatives,
     ErrorBars,
@@ -160,6 +161,7 @@ def build(
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
     ] = None,
+    arguments: Arguments = None,
     check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
     reference: Annotated[
         bool, typer.Option("--reference", help="Put reference results inside (FMI-LS-REF).")
@@ -221,7 +223,7 @@ def build(
             raise LagfmuError(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
-        file = _load(model, add_output)
+        file = _load(model, add_output, arguments)
         for s in narrowed(_chosen(file, scene), **needs):
             choice = ""
             if s.accuracy is not None:
@@ -296,6 +298,7 @@ def new_command(
 def show(
     model: ModelPath,
     scene: Annotated[str | None, typer.Option(help="Which FMU of the file.")] = None,
+    arguments: Arguments = None,
     outputs: Outputs = None,
     fixed: Fixed = None,
     inputs: Inputs = None,
@@ -318,7 +321,7 @@ def show(
     needs |= {"formulation": formulation, "derivatives": derivatives}
     needs |= {"reals_only": reals_only, "error_bars": error_bars}
     with _plainly():
-        file = _load(model, add_output)
+        file = _load(model, add_output, arguments)
         for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
             try:
                 prepared = prepare(file.model, s)
@@ -396,6 +399,7 @@ def simulate_command(
     step_size: StepSize = None,
     tolerance: Tolerance = None,
     scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    arguments: Arguments = None,
     plot_: Annotated[
         Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
     ] = None,
@@ -416,12 +420,14 @@ def simulate_command(
     with _plainly():
         source: Any = target
         if target.suffix == ".py":
-            file = _load(target, add_output)
+            file = _load(target, add_output, arguments)
             chosen = _chosen(file, None if scene is None else [scene])
             source = prepare(file.model, narrowed(chosen, error_bars=error_bars)[0])
             name = source.scene.name
             variables = source.table.variables
             units = {v.name: v.unit.name for v in variables if v.unit is not None}
+        elif arguments:
+            raise LagfmuError(f"-p {arguments[0]} is for a model file: an FMU is one of its family")
         elif add_output:
             raise LagfmuError(
                 "--add-output is for a model file: an FMU has the outputs it was built with"
@@ -591,9 +597,9 @@ def _finish(
     raise typer.Exit(exit_code(suites))
 
 
-def _load(path: Path, added: list[str] | None) -> ModelFile:
-    """A model file, with further outputs."""
-    file = load(path)
+def _load(path: Path, added: list[str] | None, arguments: list[str] | None = None) -> ModelFile:
+    """A model file, with further outputs; of a family the one of these arguments."""
+    file = load(path, arguments or ())
     return replace(file, model=with_outputs(file.model, added or []))
 
 

@@ -26,6 +26,14 @@ def _option(text: str) -> Any:
     return typer.Option(metavar="NAME,...", help=text, rich_help_panel="What the scene needs")
 
 
+Arguments = Annotated[
+    Names,
+    typer.Option(
+        "-p",
+        metavar="NAME=VALUE",
+        help="An argument of the file's function 'family', e.g. -p n=8; repeatable.",
+    ),
+]
 Outputs = Annotated[Names, _option(OUTPUTS)]
 Fixed = Annotated[Names, _option(FIXED)]
 Inputs = Annotated[Names, _option(INPUTS)]

@@ -6,13 +6,14 @@ import importlib.util
 import os
 import sys
 import traceback
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from ..errors import LagfmuError, ModelError
 from .closed_form import ClosedForm, Conserved
+from .family import made
 from .model import Model
 from .scene import Scene
 
@@ -27,8 +28,9 @@ class ModelFile:
     closed_forms: tuple[ClosedForm | Conserved, ...]
 
 
-def load(path: str | os.PathLike[str]) -> ModelFile:
-    """Run a model file and take its model.
+def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFile:
+    """Run a model file and take its model; with `arguments`, NAME=VALUE, that which its function `family`
+    makes of them (family.py).
 
     Raises ModelError if the file is missing, raises, or does not define exactly one Model.
     """
@@ -54,6 +56,11 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
         raise ModelError(str(file), [_where(error, file.absolute())]) from error
     finally:
         sys.path.remove(folder)
+    if arguments:
+        found, problems = made(module, arguments, lambda error: _where(error, file.absolute()))
+        if problems:
+            raise ModelError(str(file), problems)
+        return _taken(file, found["model"], found)
     models = {id(v): (k, v) for k, v in vars(module).items() if isinstance(v, Model)}
     if len(models) != 1:
         names = ", ".join(k for k, _ in models.values()) or "none"
@@ -62,9 +69,14 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
             [f"the file defines {len(models)} models ({names}), expected one: model = Model(...)"],
         )
     ((_, model),) = models.values()
+    return _taken(file, model, vars(module))
+
+
+def _taken(file: Path, model: Model, names: Mapping[str, Any]) -> ModelFile:
+    """The model with the scenes and closed forms among the names beside it."""
     problems: list[str] = []
-    scenes = _listed(module, "scenes", (Scene,), problems) or (Scene(model.name),)
-    forms = _listed(module, "closed_forms", (ClosedForm, Conserved), problems)
+    scenes = _listed(names, "scenes", (Scene,), problems) or (Scene(model.name),)
+    forms = _listed(names, "closed_forms", (ClosedForm, Conserved), problems)
     titles = [s.name for s in scenes if isinstance(s, Scene)]
     problems += [
         f"scenes hold the name {name!r} twice, so that one FMU would replace the other: rename one"
@@ -83,10 +95,10 @@ def load(path: str | os.PathLike[str]) -> ModelFile:
 
 
 def _listed(
-    module: ModuleType, name: str, types: tuple[type, ...], problems: list[str]
+    names: Mapping[str, Any], name: str, types: tuple[type, ...], problems: list[str]
 ) -> tuple[Any, ...]:
     """The file's list of that name; what is no list, or stands in it wrongly, is a problem."""
-    found = getattr(module, name, ())
+    found = names.get(name, ())
     expected = f"expected a list of {types[0].__name__}(...)"
     if not isinstance(found, (list, tuple)):
         problems.append(f"{name} = {found!r}, {expected}")

@@ -38,7 +38,7 @@ GREEK = {*greeks, *(name.capitalize() for name in greeks), "lambda", "Lambda"}
 PARTS = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-DOTS = ("", "\u0307", "\u0308")
+DOTS = ("", "\u0307", "\u0308", "\u20db")
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def typeset(form: Form) -> tuple[Section, ...]:
 
 
 def name_latex(name: str, dots: int = 0) -> str:
-    """A name as LaTeX: theta_1 -> \\theta_{1}, slide -> \\mathrm{slide}; with 0, 1 or 2 dots."""
+    """A name as LaTeX: theta_1 -> \\theta_{1}, slide -> \\mathrm{slide}; with up to 3 dots."""
     base, subscripts = _parts(name)
     letter = _letter(base)
     if dots:

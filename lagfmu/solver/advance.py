@@ -55,7 +55,7 @@ def advance(
         at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
         if system.contacts and system.prescribed:
             state = at_contacts.released(at, state, state.span)
-        elif system.estimated:  # whose rates may be others than it went by
+        elif system.prescribed:  # whose place and rates may be others than it went by
             q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
             q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
             state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))

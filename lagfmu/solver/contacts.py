@@ -83,6 +83,21 @@ def complementary_modes(
     )
 
 
+def low(
+    at: Instant, q: Vector, v: Vector, closed: Sequence[bool], parting: Sequence[int], gap: Vector
+) -> list[int]:
+    """Of the contacts that part those that would not rise above the gap within which contacts touch, v^2 <=
+    2 a gap: they rest.  Without it a ball would bounce infinitely often in a finite time."""
+    now = motion(at, q, v, at.system.active(closed))
+    found = []
+    for c in parting:
+        k = at.system.contacts[c]
+        speed, pull = now.G[k] @ v - now.nu[k], now.gamma[k] - now.G[k] @ now.vdot
+        if pull > 0 and speed**2 <= 2 * pull * gap[c]:
+            found.append(c)
+    return found
+
+
 def _force_scale(now: Motion) -> Vector:
     """For each row the multiplier that would carry all forces alone, those of constraint included."""
     G = np.abs(now.G)

@@ -113,7 +113,7 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
     if system.floors:
         at = settled(at, q)
     size = sizes(system, q, at.p, size)
-    q, v, closed = _velocities(at, q, v0, closed, size, rank[n:])
+    q, v, closed = _velocities(at, q, v0, closed, size, gap, rank[n:])
     modes: tuple[bool, ...] = ()
     touching: list[int] = []
     if system.contacts:
@@ -206,9 +206,11 @@ def _velocities(
     v0: Vector,
     closed: Sequence[bool],
     size: Vector,
+    gap: Vector,
     rank: Sequence[int],
 ) -> tuple[Vector, Vector, list[bool]]:
-    """Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open."""
+    """Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open, unless it parts so
+    slowly that it would not rise above the gap within which contacts touch: as after an impact."""
     system = at.system
     M, F, G, nu, _ = at.evaluate(q, v0)
     _check_masses(system, M)
@@ -219,9 +221,16 @@ def _velocities(
     shut = [
         c and not speed[k] > TOUCH * unit[k] for c, k in zip(closed, system.contacts, strict=True)
     ]
-    rows = system.active(shut)
-    v = velocities_from_afar(at, q, v0, rows, rank, natural)
-    q, v = project(at, q, v, rows, np.zeros(system.m), size, dependent=True)
+    here, none = q, np.zeros(system.m)
+    while True:
+        rows = system.active(shut)
+        v = velocities_from_afar(at, here, v0, rows, rank, natural)
+        q, v = project(at, here, v, rows, none, size, dependent=True)
+        parting = [c for c, touches in enumerate(closed) if touches and not shut[c]]
+        low = at_contacts.low(at, q, v, shut, parting, gap) if parting else []
+        if not low:
+            break
+        shut = [s or c in low for c, s in enumerate(shut)]
     M, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
     unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)

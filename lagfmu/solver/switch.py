@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import at_slides
-from .contacts import complementary_modes
+from .contacts import complementary_modes, low
 from .impact import impacts
 from .instant import Instant
 from .leg import Leg
@@ -136,8 +136,7 @@ def _settled(
 ) -> tuple[bool, ...]:
     """The modes after the impacts: accelerations decide where df/dt is zero; what parts is open.
 
-    Contacts that were struck rest if the rebound would not rise above the gap within which contacts touch,
-    v^2/(2 a) <= gap: without it a ball would bounce infinitely often in a finite time.
+    Contacts that were struck rest if the rebound would not rise above the gap (contacts.py).
     """
     slow = _slow(at, q, v, state)
     _, _, G, nu, _ = at.evaluate(q, v)
@@ -146,20 +145,12 @@ def _settled(
     touching = {c for c in near if abs(slip[c]) <= limit[c]}
     guess = [c in touching and (shut or c in bounced) for c, shut in enumerate(closed)]
     modes = complementary_modes(at, q, v, guess, touching, leaving)
-    now = motion(at, q, v, at.system.active(modes))
-    pull = (now.gamma - now.G @ now.vdot)[list(at.system.contacts)]
-    low = {
-        c
-        for c in near
-        if (closed[c] or c in bounced)
-        and slip[c] > limit[c]
-        and pull[c] > 0
-        and slip[c] ** 2 <= 2 * pull[c] * state.gap[c]
-    }
-    if not low:
+    parting = [c for c in near if (closed[c] or c in bounced) and slip[c] > limit[c]]
+    rest = low(at, q, v, modes, parting, np.array(state.gap)) if parting else []
+    if not rest:
         return modes
-    guess = [shut or c in low for c, shut in enumerate(modes)]
-    return complementary_modes(at, q, v, guess, touching | low, leaving)
+    guess = [shut or c in rest for c, shut in enumerate(modes)]
+    return complementary_modes(at, q, v, guess, touching | {*rest}, leaving)
 
 
 def _levels(at: Instant, q: Vector, state: State, modes: Sequence[bool]) -> Vector:

@@ -220,7 +220,9 @@ def _initializer(part: Any, name: str, tables: list[str]) -> str:
         else:
             table = f"{name}_{member.name}"
             numbers = ", ".join(map(str, value or (0,)))  # C99 knows no empty array
-            text = textwrap.fill(numbers, 96, initial_indent="    ", subsequent_indent="    ")
-            tables.append(f"static const int {table}[] = {{\n{text}}};")
+            head = f"static const int {table}[] = {{"
+            if len(head) + len(numbers) > 96:
+                numbers = "\n" + textwrap.indent(textwrap.fill(numbers, 92), "    ")
+            tables.append(f"{head}{numbers}}};")
             written.append(table)
     return "{" + ", ".join(written) + "}"

@@ -65,6 +65,7 @@ void instance_reset(Instance *x) {
     x->stop_time = HUGE_VAL;
     x->tolerance = 0;
     x->given.method = (MethodName)DEFAULT_METHOD;
+    x->solver.on_demand = ERROR_BARS == NULL; /* which are carried from point to point */
     x->started = x->running = x->warned = x->observed = x->evaluated = 0;
     for (int k = 0; k < VARIABLE_COUNT; k++)
         if (VARIABLES[k].type == TYPE_REAL &&
@@ -168,6 +169,7 @@ Status instance_value(Solver *s, const Observed *o, const Variable *v, double *v
 Status instance_get(Instance *x, const Variable *v, double *value) {
     if (was_set(x, v, value)) return OK;
     if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
+    if (solver_arrive(&x->solver) != OK) return FAILED;
     if (x->started && ready(&x->solver, v, value)) return OK;
     if (!x->observed && instance_observe(x) != OK) return FAILED;
     return instance_value(&x->solver, &x->seen, v, value);
@@ -317,7 +319,7 @@ Status instance_start(Instance *x) {
 
 Status instance_observe(Instance *x) {
     if (x->observed) return OK;
-    if (instance_start(x) != OK) return FAILED;
+    if (instance_start(x) != OK || solver_arrive(&x->solver) != OK) return FAILED;
     if (solver_observe(&x->solver, &x->seen) != OK) return FAILED;
     x->observed = 1;
     x->evaluated = 0;
@@ -457,7 +459,8 @@ static void tell_of_method(Instance *x, double product, int implicit) {
 
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
-    instance_save(x, x->backup);
+    const int passed = solver_passed(s, t_end);
+    if (!passed) instance_save(x, x->backup);
     if (s->system->estimated_count > 0) estimate_rates(x);
     if (s->system->prescribed_count > 0) warn_of_rates(x);
     if (s->system->contacts + s->system->frictions > 0) note_modes(x);
@@ -466,7 +469,7 @@ Status instance_step(Instance *x, double t_end) {
     const double product = s->state.now.choice.product;
     const int implicit = s->state.now.choice.implicit;
     if (solver_advance(s, t_end) != OK) {
-        instance_restore(x, x->backup);
+        if (!passed) instance_restore(x, x->backup);
         return FAILED;
     }
     if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);

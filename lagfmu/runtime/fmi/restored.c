@@ -122,6 +122,8 @@ static Status times(Instance *x, const Solver *s) {
         {"step count", &now->tiny, 1, MOST},
         {"count of impacts", &now->strikes, 1, MOST},
         {"mode of the step ahead", &now->ahead, 1, 1},
+        {"mode of the step ahead", &now->between, 1,
+         now->ahead && x->started && !x->exchange},
         {"mode of the step ahead", &now->fresh, 1, 1},
         {"rank of the constraints", &now->dependent, 1, 1},
         {"count of events", &now->event_count, 1, indicators_count(s->system)},

@@ -2,7 +2,8 @@
  *
  * Steps are taken and projected within a leg (leg.c); events are found (events.c) and met (switch.c).
  * In a scene without inputs the integrator may stand ahead of the communication point: the state there
- * is read from dense output and projected.  It never passes the stop time, an event that lies ahead is
+ * is read from dense output and projected, on demand if the caller has it so: what nobody looks at costs
+ * nothing.  It never passes the stop time, an event that lies ahead is
  * kept until its time, and a step ahead that fails is taken again as far as the communication point. */
 #include <float.h>
 #include <math.h>
@@ -156,6 +157,36 @@ static void put(Solver *s, double t, const double *y) {
     memcpy(s->state.q, y, n * sizeof *y);
     memcpy(s->state.v, y + n, n * sizeof *y);
     s->state.now.t = t;
+    s->state.now.between = 0;
+}
+
+/* The state at t, within the step just taken. */
+static Status put_between(Solver *s, double t) {
+    const Integrator *i = &s->integrator;
+    double *y = s->work_advance;
+    i->method->dense(i, t, y);
+    if (s->alike > 0) PARTS.inside(s, i, t, y);
+    if (leg_project(s, t, y) != OK) return FAILED;
+    put(s, t, y);
+    return OK;
+}
+
+/* Tables are looked at and work is summed at each communication point. */
+static int waits(const Solver *s) {
+    return s->on_demand && s->system->lookup_count == 0 && s->system->frictions == 0 && runs_ahead(s);
+}
+
+Status solver_arrive(Solver *s) {
+    if (!s->state.now.between) return OK;
+    resume(s);
+    leg_begin(s);
+    return put_between(s, s->state.now.t);
+}
+
+int solver_passed(const Solver *s, double t_end) {
+    const Numbers *now = &s->state.now;
+    return now->ahead && now->t_integrator > t_end &&
+           !(now->event_count > 0 && now->event_time <= t_end) && waits(s);
 }
 
 /* What frictions have dissipated at t, within the step just taken. */
@@ -172,19 +203,19 @@ static Status lose(Solver *s, double t) {
 
 /* The communication point is reached, or passed. */
 static Status arrive(Solver *s, double t_end) {
-    Integrator *i = &s->integrator;
-    const double *y = i->y;
-    if (i->t > t_end) {
-        double *between = s->work_advance;
-        i->method->dense(i, t_end, between);
-        if (s->alike > 0) PARTS.inside(s, i, t_end, between);
-        if (leg_project(s, t_end, between) != OK) return FAILED;
-        y = between;
+    const Integrator *i = &s->integrator;
+    Numbers *now = &s->state.now;
+    if (i->t == t_end) {
+        put(s, t_end, i->y);
+    } else if (waits(s)) {
+        now->t = t_end;
+        now->between = 1;
+    } else if (put_between(s, t_end) != OK) {
+        return FAILED;
     }
     if (s->system->frictions > 0 && lose(s, t_end) != OK) return FAILED;
-    put(s, t_end, y);
-    s->state.now.step = i->h_next;
-    if (!runs_ahead(s)) s->state.now.ahead = 0;
+    now->step = i->h_next;
+    if (!runs_ahead(s)) now->ahead = 0;
     return OK;
 }
 
@@ -253,13 +284,12 @@ static Status complete_magnitudes(Solver *s, double span) {
 }
 
 /* The inputs may have been set: levels of jumps are those of now, contacts whose surface went away open,
- * the others go with it; a motion whose rates are estimated may have other ones than it went by. */
+ * the others go with it; a prescribed motion may have another place and other rates than it went by. */
 static Status follow_inputs(Solver *s) {
     const System *system = s->system;
     if (!s->state.now.ahead)
         jumps_settle(s, leg_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (system->prescribed_count == 0) return OK;
-    if (system->contacts == 0 && system->estimated_count == 0) return OK;
     if (system->contacts == 0)
         system_active(system, s->state.closed, s->active);
     else if (PARTS.switch_released(s, s->state.now.span) != OK)

@@ -115,14 +115,48 @@ static Status check_velocities(const Start *x, const int *active, double *fastes
     return FAILED;
 }
 
-/* Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open. */
+/* Of the contacts that touch and part, those that would not rise above the gap within which contacts touch,
+ * v^2 <= 2 a gap, are closed; whether there are any. */
+static Status close_low(const Start *x, int *active, int *any) {
+    const System *s = x->s->system;
+    State *state = &x->s->state;
+    Mechanism *b = &x->s->stepped;
+    int parting = 0;
+    *any = 0;
+    if (s->contacts == 0) return OK;
+    if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return FAILED;
+    for (int c = 0; c < s->contacts; c++)
+        parting |= !state->closed[c] && b->f[s->contact[c]] <= state->gap[c];
+    if (!parting) return OK;
+    if (mechanism_motion(b, x->at, state->q, state->v, active) == FAILED) return FAILED;
+    if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return FAILED;
+    for (int c = 0; c < s->contacts; c++) {
+        const int k = s->contact[c];
+        const double speed = mechanism_slip(b, k, state->v);
+        const double pull = b->gamma[k] - mechanism_row(b, k, b->vdot);
+        if (state->closed[c] || !(b->f[k] <= state->gap[c])) continue;
+        if (pull > 0 && speed * speed <= 2 * pull * state->gap[c]) state->closed[c] = *any = 1;
+    }
+    return OK;
+}
+
+/* Velocities on G v = nu of the rows that act. */
+static Status move_velocities(const Start *x, int *active, const double *natural) {
+    State *state = &x->s->state;
+    Mechanism *b = &x->s->stepped;
+    system_active(x->s->system, state->closed, active);
+    if (afar_velocities(x, state->q, natural, active, state->v) == FAILED) return FAILED;
+    return mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->size);
+}
+
+/* Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open, unless it parts so slowly
+ * that it comes to rest, as after an impact. */
 static Status find_velocities(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
     double *natural = x->s->work_initial, *fastest = natural + s->n, *shared = fastest + s->n;
-    int *active = x->s->iwork_initial;
-    memcpy(state->v, x->v0, (size_t)s->n * sizeof *state->v);
+    int *active = x->s->iwork_initial, low = 1;
     if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return afar_refused(x->s);
     if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
@@ -133,12 +167,10 @@ static Status find_velocities(const Start *x) {
         double speed = mechanism_slip(b, k, x->v0);
         if (speed > TOUCH * mechanism_row_size(b, k, shared)) state->closed[c] = 0;
     }
-    system_active(s, state->closed, active);
-    if (afar_velocities(x, state->q, natural, active, state->v) == FAILED)
-        return afar_refused(x->s);
-    if (mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->size) ==
-        FAILED)
-        return afar_refused(x->s);
+    while (low) {
+        if (move_velocities(x, active, natural) == FAILED) return afar_refused(x->s);
+        if (close_low(x, active, &low) == FAILED) return afar_refused(x->s);
+    }
     if (mechanism_evaluate(b, x->at, state->q, state->v) == FAILED) return afar_refused(x->s);
     return check_velocities(x, active, natural, shared);
 }

@@ -11,6 +11,7 @@ typedef struct {
     const System *system;
     Settings settings;
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
+    int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
     double alike;              /* with error bars, else 0: see companion.h */
     State state;
     Drive drive;
@@ -62,6 +63,13 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
 /* advance.c -- from state.now.t to t_end [s].  FAILED leaves the state in disorder: the caller
  * puts the saved one back (it keeps a copy). */
 Status solver_advance(Solver *s, double t_end);
+
+/* q and v at the communication point, where they are still to be found (on_demand).  FAILED: they cannot
+ * be projected onto the constraints. */
+Status solver_arrive(Solver *s);
+
+/* 1: the integrator has been beyond t_end already, and to advance there on demand cannot fail. */
+int solver_passed(const Solver *s, double t_end);
 
 /* The inputs were set: what was integrated ahead with the old ones is dropped. */
 void solver_inputs_changed(Solver *s);

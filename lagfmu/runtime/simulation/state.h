@@ -42,6 +42,7 @@ typedef struct {
     int steps;           /* internal steps taken so far */
     int tiny;            /* those of the present communication step that make no headway */
     int ahead;           /* 1: the integrator stands at integrator->t >= t, and dense output answers */
+    int between;         /* 1: q and v are still to be taken from dense output at t: solver_arrive() */
     double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */
     int event_count;     /* indicators that leave their ranges then */
     double t_old, t_integrator, h_next, error_old; /* of the integrator, when it is ahead */

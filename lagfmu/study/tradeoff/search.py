@@ -91,7 +91,7 @@ class Walk:
 
 
 def coarsest(walk: Walk, near: int, thorough: bool) -> int | None:
-    """The position of the coarsest dial that holds; the next finer one is measured beside it.
+    """The position of the coarsest dial that holds; the next one with a smaller error is measured beside it.
 
     `thorough`: all that was walked over is measured in full.
     """
@@ -110,9 +110,17 @@ def coarsest(walk: Walk, near: int, thorough: bool) -> int | None:
     if k is None:
         return None
     held = next((j for j in range(k, len(walk.dials)) if not walk.slow and walk.holds(j)), None)
-    if held is not None and held + 1 < len(walk.dials):
-        walk.holds(held + 1)  # in case that the coarsest misses on other values
+    if held is not None:
+        _better(walk, held)
     return held
+
+
+def _better(walk: Walk, held: int) -> None:
+    """Measures the next dial that is more accurate, in case that `held` misses on other values: the next
+    finer one, unless it is the communication step that bounds the error of both."""
+    for k in range(held + 1, len(walk.dials)):
+        if walk.slow or (walk.holds(k) and walk.found[k][1] < walk.found[held][1]):
+            return
 
 
 def _by_order(walk: Walk, k: int) -> int | None:
