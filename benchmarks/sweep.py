@@ -1,4 +1,4 @@
-"""What a run costs in a sweep: python benchmarks/sweep.py ratios | million [RUNS] | cluster [RUNS]
+"""What a run costs in a sweep: python benchmarks/sweep.py ratios | million | cluster | deaths [RUNS]
 
 Hemisphere, 2 s a run, the start angle varied; the time of the departure and the largest multiplier are kept.
 
@@ -7,12 +7,14 @@ ratios    a run in `lagfmu.sweep`, in `fmpy.simulate_fmu`, in fmpy with a kept i
           processes, what takes turns within a round; medians
 million   10^6 runs on all cores: time, and the memory of the client and of its workers along the way
 cluster   a Dask scheduler and workers as a user starts them: the numbers of the local run, the time with one
-          and with two workers; then a worker and once the client killed (SIGKILL) again and again
+          and with two workers, and the processor time of the workers and of all the rest
+deaths    the same with a worker killed (SIGKILL) every few seconds, and the client once
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import signal
@@ -239,8 +241,18 @@ class Cluster:
             process.wait()
 
 
-def cluster(path: Path, folder: Path, runs: int, step: float) -> None:
-    """Numbers, speed, deaths."""
+def spent(processes: list[subprocess.Popen[bytes]]) -> float:
+    """Processor time [s] of processes and their descendants so far."""
+    ticks = 0
+    for p in {member for process in processes for member in tree(process.pid)}:
+        with contextlib.suppress(OSError):
+            words = Path(f"/proc/{p}/stat").read_text().rsplit(")", 1)[1].split()
+            ticks += sum(map(int, words[11:15]))  # its own, and of children that ended
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def cluster(path: Path, folder: Path, runs: int, step: float, every: float | None) -> None:
+    """Numbers and speed; with `every` deaths, so many seconds apart."""
     options = {"keep": KEEP, "stop_time": STOP, "step_size": step}
     vary = {"theta": angles(runs)}
     here = lagfmu.sweep(path, vary, **options)
@@ -250,22 +262,29 @@ def cluster(path: Path, folder: Path, runs: int, step: float) -> None:
 
     dask = Cluster(folder)
     try:
-        workers, walls = [], []
+        workers, walls = [dask.worker()], []
+        if every is not None:
+            murders(dask, [*workers, dask.worker()], path, folder, runs, step, every)
+            print(f"the local numbers: {same(table_of(folder / 'out.parquet', runs))}")
+            return
         for count in (1, 2):
-            workers.append(dask.worker())
+            if count > 1:
+                workers.append(dask.worker())
             lagfmu.sweep(path, {"theta": angles(200)}, on=dask.address, **options)  # warm
             begun = time.perf_counter()
+            theirs, rest = spent(workers), spent(dask.started[:1]) + processor()
             found = lagfmu.sweep(path, vary, on=dask.address, **options)
             walls.append(time.perf_counter() - begun)
-            print(f"{count} workers: {runs} runs in {walls[-1]:.1f} s, the local numbers: {same(found)}",
+            theirs = spent(workers) - theirs
+            rest = spent(dask.started[:1]) + processor() - rest
+            print(f"{count} workers: {runs} runs in {walls[-1]:.1f} s, processor {theirs:.1f} s in the "
+                  f"workers, {rest:.1f} s in scheduler and client; the local numbers: {same(found)}",
                   flush=True)  # fmt: skip
         print(
             f"speed-up {walls[0] / walls[1]:.2f} on a machine with a load of {os.getloadavg()[0]:.0f}"
         )
-        murders(dask, workers, path, folder, runs, step)
     finally:
         dask.close()
-    print(f"the local numbers: {same(table_of(folder / 'out.parquet', runs))}")
 
 
 def table_of(file: Path, runs: int) -> dict[str, object]:
@@ -278,8 +297,10 @@ def table_of(file: Path, runs: int) -> dict[str, object]:
     return {k: table[k] for k in KEEP}
 
 
-def murders(dask: Cluster, workers: list, path: Path, folder: Path, runs: int, step: float) -> None:
-    """A worker is killed every three seconds, and the client once."""
+def murders(
+    dask: Cluster, workers: list, path: Path, folder: Path, runs: int, step: float, every: float
+) -> None:
+    """A worker is killed every so many seconds, and the client once."""
     out = folder / "out.parquet"
     words = [sys.executable, "-m", "lagfmu", "sweep", str(path), "--on", dask.address, "--out", str(out),
              "--vary", f"theta={FIRST}:{LAST}:{runs}", "--stop-time", str(STOP), "--step-size", str(step),
@@ -295,7 +316,7 @@ def murders(dask: Cluster, workers: list, path: Path, folder: Path, runs: int, s
             client.wait()
             found = done
             client = subprocess.Popen([*words, "--resume"])
-        if done and time.monotonic() - last > 3:
+        if done and time.monotonic() - last > every:
             killed += dask.kill_one(workers[killed % 2])
             last = time.monotonic()
     assert client.returncode == 0
@@ -306,9 +327,10 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("what", choices=["ratios", "million", "cluster"])
+    parser.add_argument("what", choices=["ratios", "million", "cluster", "deaths"])
     parser.add_argument("runs", type=int, nargs="?")
     parser.add_argument("--step", type=float, default=0.01, help="communication step [s]")
+    parser.add_argument("--every", type=float, default=4, help="[s] from death to death")
     parser.add_argument("--rounds", type=int, default=5)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as name:
@@ -318,4 +340,5 @@ if __name__ == "__main__":
         elif given.what == "million":
             million(fmu(place), place, given.runs or 10**6, given.step)
         else:
-            cluster(fmu(place), place, given.runs or 20000, given.step)
+            every = given.every if given.what == "deaths" else None
+            cluster(fmu(place), place, given.runs or 20000, given.step, every)

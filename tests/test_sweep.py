@@ -247,12 +247,21 @@ def test_axes_are_crossed_in_the_order_in_which_they_are_given():
         (["--vary", "theta=1,2", "--keep", "lambda.surface:peak"], "time-of-max"),
         (["--vary", "theta=1,2", "--out", "runs.xls"], ".parquet, .nc or .zarr"),
         ([], "nothing varies"),
+        (["--vary", "theta=1,2", "--step-size", "0"], "step_size = 0.0"),
+        (["--vary", "theta=1,2", "--workers", "0"], "workers = 0, expected a whole number from 1"),
+        (["--vary", "theta=1,2", "--seed", "-1"], "seed = -1, expected a whole number from 0"),
+        (["--vary", "theta=1,2", "--sampling", "grid"], "latin-hypercube, sobol"),
+        (["--vary", "theta=1,2", "--scene", "Other"], "is for a model file"),
+        (["--vary", "theta=1,2", "--tolerance", "0"], "tolerance = 0.0"),
+        (["--vary", "theta=1,2", "--resume"], "the out of the sweep"),
+        (["--vary", "theta=1,2", "--plot", "runs.xyz"], ".svg, .png, .pdf"),
+        (["--vary", "solver.method=1.5"], "expected a whole number"),
     ],
 )  # fmt: skip
 def test_bad_input_is_told_with_the_remedy(hemisphere, options, message):
     """Before anything is run: the name, what was given, what was expected."""
     done = CliRunner().invoke(app, ["sweep", str(hemisphere), *options])
-    assert done.exit_code == 1
+    assert done.exit_code == 2
     assert message in " ".join(done.output.split())
 
 

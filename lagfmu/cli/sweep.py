@@ -15,12 +15,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ..errors import LagfmuError, SimulationError
+from ..errors import LagfmuError, SettingError
 from ..study.sweep.design import axis, distribution, from_file
 from ..study.sweep.plot import plot
 from ..study.sweep.sweep import sweep
 from ..verification.reference import read_table
 
+FIGURES = (".svg", ".png", ".pdf")
 SHOWN = 5  # reasons in the summary
 NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
@@ -49,7 +50,9 @@ def run_sweep(
     """Do it, print what came of it.  Raises LagfmuError."""
     axes, laws = dict(map(axis, vary)), dict(map(distribution, sample))
     if len(axes) < len(vary) or len(laws) < len(sample):
-        raise SimulationError(f"a quantity varies in two ways: {', '.join((*vary, *sample))}")
+        raise SettingError(f"a quantity varies in two ways: {', '.join((*vary, *sample))}")
+    if figure is not None and figure.suffix not in FIGURES:
+        raise SettingError(f"--plot {str(figure)!r}: expected a file {', '.join(FIGURES)}")
     table = None
     if rows is not None:
         names, values = from_file(rows)

@@ -139,12 +139,12 @@ static Status slide(Mechanism *b, double t, int count) {
         }
         const double own = f->A[h * count + h];
         const double least = s->friction[i].gated ? 1 + own : 1 - fabs(own);
-        if (!(least > SAFE)) return friction_paradox(b, t, &i, 1, least);
+        if (!(least > PAINLEVE_SAFE)) return friction_paradox(b, t, &i, 1, least);
         f->A[h * count + h] += 1;
     }
     memcpy(f->minor, f->A, (size_t)(count * count) * sizeof *f->A);
     const double determinant = friction_eliminate(count, f->A, f->right);
-    if (!(determinant > SAFE)) return friction_paradox(b, t, f->sliding, count, determinant);
+    if (!(determinant > PAINLEVE_SAFE)) return friction_paradox(b, t, f->sliding, count, determinant);
     for (int g = 0; g < count; g++) {
         const int i = f->sliding[g];
         const double strength = f->mu[2 * i + 1] * f->right[g];

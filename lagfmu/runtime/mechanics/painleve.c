@@ -142,7 +142,7 @@ Status friction_opened(Mechanism *b, double t, int sliding, double determinant) 
     for (unsigned mask = 1; count > 0 && mask < 1u << contacts; mask++) {
         for (int r = 0; r < count; r++) which[r] = opens(b, rows[r], rows, contacts, mask);
         const double left = determinant * minor(B, count, which) / minor(K, count, which);
-        if (!(left > SAFE)) return friction_paradox(b, t, b->friction->sliding, sliding, left);
+        if (!(left > PAINLEVE_SAFE)) return friction_paradox(b, t, b->friction->sliding, sliding, left);
     }
     return OK;
 }

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from ...errors import SimulationError
+from ...errors import SettingError
 from ...methods import NUMBERS
 from ...names import METHOD
 
@@ -68,59 +68,59 @@ def number(text: str, name: str, what: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise SimulationError(f"{what}: {text!r} is no finite number")
+        raise SettingError(f"{what}: {text!r} is no finite number")
     return value
 
 
 def axis(text: str) -> tuple[str, Values]:
-    """NAME=FROM:TO:COUNT, NAME=FROM:TO:COUNT:log or NAME=VALUE,VALUE,...  Raises SimulationError."""
+    """NAME=FROM:TO:COUNT, NAME=FROM:TO:COUNT:log or NAME=VALUE,VALUE,...  Raises SettingError."""
     name, sign, values = (part.strip() for part in text.partition("="))
     what = f"--vary {text!r}"
     if not (name and sign and values):
-        raise SimulationError(f"{what}: expected NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,...")
+        raise SettingError(f"{what}: expected NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,...")
     if ":" not in values:
         return name, np.array([number(v, name, what) for v in values.split(",")])
     parts = values.split(":")
     if len(parts) not in (3, 4) or (len(parts) == 4 and parts[3].strip() != "log"):
-        raise SimulationError(f"{what}: expected FROM:TO:COUNT, or FROM:TO:COUNT:log")
+        raise SettingError(f"{what}: expected FROM:TO:COUNT, or FROM:TO:COUNT:log")
     low, high = number(parts[0], name, what), number(parts[1], name, what)
     if not parts[2].strip().isdigit() or int(parts[2]) < 1:
-        raise SimulationError(f"{what}: {parts[2]!r} values, expected a whole number from 1")
+        raise SettingError(f"{what}: {parts[2]!r} values, expected a whole number from 1")
     count = int(parts[2])
     if count > MOST:
-        raise SimulationError(
+        raise SettingError(
             f"{what}: {count} values, {8e-9 * count:.3g} GB, expected at most {MOST:.0e}"
         )
     if low == high and count > 1:
-        raise SimulationError(f"{what}: {count} values from {low!r} to {high!r}: the step is zero")
+        raise SettingError(f"{what}: {count} values from {low!r} to {high!r}: the step is zero")
     if len(parts) == 4:
         if not (low > 0 and high > 0):
-            raise SimulationError(f"{what}: logarithmic, expected both ends above zero")
+            raise SettingError(f"{what}: logarithmic, expected both ends above zero")
         return name, np.geomspace(low, high, count)
     return name, np.linspace(low, high, count)
 
 
 def distribution(text: str) -> tuple[str, Any]:
-    """NAME ~ KIND(...), as name and a frozen distribution of SciPy.  Raises SimulationError."""
+    """NAME ~ KIND(...), as name and a frozen distribution of SciPy.  Raises SettingError."""
     what = f"--sample {text!r}"
     known = ", ".join(f"{k}({', '.join(v)})" for k, v in DISTRIBUTIONS.items())
     match = SAMPLE.match(text)
     if match is None or match["kind"] not in DISTRIBUTIONS:
-        raise SimulationError(f"{what}: expected NAME ~ one of {known}")
+        raise SettingError(f"{what}: expected NAME ~ one of {known}")
     wanted = DISTRIBUTIONS[match["kind"]]
     given = [number(v, "", what) for v in match["arguments"].split(",") if v.strip()]
     if len(given) != len(wanted):
-        raise SimulationError(f"{what}: expected {match['kind']}({', '.join(wanted)})")
+        raise SettingError(f"{what}: expected {match['kind']}({', '.join(wanted)})")
     value = dict(zip(wanted, given, strict=True))
     low, high, mean, sd = (value.get(k, 0.0) for k in ("low", "high", "mean", "sd"))
     if "low" in value and not low < high:
-        raise SimulationError(f"{what}: low = {low!r}, expected less than high = {high!r}")
+        raise SettingError(f"{what}: low = {low!r}, expected less than high = {high!r}")
     if "sd" in value and not sd > 0:
-        raise SimulationError(f"{what}: sd = {sd!r}, expected more than zero")
+        raise SettingError(f"{what}: sd = {sd!r}, expected more than zero")
     name = match["name"]
     if match["kind"] == "loguniform":
         if not low > 0:
-            raise SimulationError(f"{what}: low = {low!r}, expected more than zero")
+            raise SettingError(f"{what}: low = {low!r}, expected more than zero")
         return name, stats.loguniform(low, high)
     if match["kind"] == "uniform":
         return name, stats.uniform(low, high - low)
@@ -131,8 +131,6 @@ def distribution(text: str) -> tuple[str, Any]:
 
 def sampled(laws: Mapping[str, Any], runs: int, seed: int, plan: str = PLANS[0]) -> Values:
     """(runs, laws) values: points of the unit cube, put through the inverses of the distributions."""
-    if plan not in PLANS:
-        raise SimulationError(f"sampling {plan!r} is unknown, expected one of {', '.join(PLANS)}")
     if plan == "sobol":
         unit = stats.qmc.Sobol(len(laws), rng=seed).random_base2(math.ceil(math.log2(max(runs, 1))))
         unit = unit[:runs]
@@ -144,15 +142,15 @@ def sampled(laws: Mapping[str, Any], runs: int, seed: int, plan: str = PLANS[0])
 
 
 def from_file(path: Path) -> tuple[tuple[str, ...], Values]:
-    """Names and rows of a .csv or .parquet file, a column a quantity.  Raises SimulationError."""
+    """Names and rows of a .csv or .parquet file, a column a quantity.  Raises SettingError."""
     import pandas as pd
 
     if path.suffix not in (".csv", ".parquet"):
-        raise SimulationError(f"--from {str(path)!r}: expected a .csv or .parquet file")
+        raise SettingError(f"--from {str(path)!r}: expected a .csv or .parquet file")
     try:
         frame = pd.read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
     except Exception as error:
-        raise SimulationError(f"--from {str(path)!r} cannot be read: {error}") from None
+        raise SettingError(f"--from {str(path)!r} cannot be read: {error}") from None
     names = tuple(str(c).strip() for c in frame.columns)
     wrong = []
     for name, column in zip(names, frame.columns, strict=True):
@@ -163,7 +161,7 @@ def from_file(path: Path) -> tuple[tuple[str, ...], Values]:
         if len(bad):
             wrong.append(f"{name} in row {bad[0] + 1} is {frame[column].iloc[bad[0]]!r}")
     if wrong or not len(frame):
-        raise SimulationError(
+        raise SettingError(
             f"--from {str(path)!r}: {'; '.join(wrong) or 'no rows'}; expected finite numbers below a "
             "line of names"
         )
@@ -182,32 +180,34 @@ def design(
     """All combinations of the axes `vary`, the samples and the rows.
 
     `sample` maps names to frozen distributions of SciPy, of which `runs` points are drawn; `most` is how many
-    bytes the table may have.  Raises SimulationError.
+    bytes the table may have.  Raises SettingError.
     """
     vary, sample = dict(vary or {}), dict(sample or {})
     blocks: list[tuple[tuple[str, ...], Values]] = [
         ((name,), np.asarray(values, dtype=float).reshape(-1, 1)) for name, values in vary.items()
     ]
+    if plan not in PLANS:
+        raise SettingError(f"sampling {plan!r} is unknown, expected one of {', '.join(PLANS)}")
     empty = [n for n, v in blocks if not len(v)]
     if empty:
-        raise SimulationError(f"nothing is given for {', '.join(n[0] for n in empty)}")
+        raise SettingError(f"nothing is given for {', '.join(n[0] for n in empty)}")
     if sample:
         if runs is None or not 1 <= runs <= MOST:
             size = f" ({8e-9 * runs * len(sample):.3g} GB)" if runs and runs > MOST else ""
-            raise SimulationError(
+            raise SettingError(
                 f"runs = {runs!r}{size}, expected a whole number from 1 to {MOST:.0e} for the samples"
             )
     elif runs is not None:
-        raise SimulationError("runs is for samples, and nothing is sampled")
+        raise SettingError("runs is for samples, and nothing is sampled")
     names = [n for block, _ in blocks for n in block] + list(sample) + list(rows[0] if rows else ())
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
-        raise SimulationError(f"{', '.join(twice)} varies in two ways")
+        raise SettingError(f"{', '.join(twice)} varies in two ways")
     if not names:
-        raise SimulationError("nothing varies: give an axis, a sample, or rows of a file")
+        raise SettingError("nothing varies: give an axis, a sample, or rows of a file")
     count = math.prod(len(v) for _, v in blocks) * (runs or 1) * (len(rows[1]) if rows else 1)
     if count * 8 * len(names) > most:
-        raise SimulationError(
+        raise SettingError(
             f"{count:.3g} runs: their table of {len(names)} quantities alone has "
             f"{count * 8 * len(names) / 1e9:.3g} GB, expected at most {most / 1e9:.3g} GB"
         )

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ... import names
-from ...errors import SimulationError
+from ...errors import SettingError
 from ...fmu.session import LAST, MAX, MEAN, MIN, TIME_OF_MAX, TYPES
 
 REDUCTIONS = {"last": LAST, "max": MAX, "min": MIN, "mean": MEAN, "time-of-max": TIME_OF_MAX}
@@ -40,7 +40,7 @@ class Kept:
 
 def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
     """`known` maps the FMU's variables to their FMI types.  Without texts: the largest multipliers, and
-    counts and times of departures.  Raises SimulationError with all problems at once."""
+    counts and times of departures.  Raises SettingError with all problems at once."""
     if not texts:
         texts = [f"{n}:max" for n in names.those(known, names.MULTIPLIER)]
         events = names.those(known, names.DEPARTURES, names.DEPARTURE_TIME)
@@ -62,7 +62,7 @@ def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
         else:
             numbers.append((name, how))
     if problems:
-        raise SimulationError("keep: " + "; ".join(problems))
+        raise SettingError("keep: " + "; ".join(problems))
     return Kept(tuple(numbers), tuple(trajectories))
 
 

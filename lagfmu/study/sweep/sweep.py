@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import names
-from ...errors import SimulationError
+from ...errors import SettingError, SimulationError
 from ...fmu.archive import version
 from ...fmu.compiler import find_compiler
 from ...fmu.session import TYPES, Plan, plug
@@ -80,6 +80,7 @@ def sweep(
     `status` and `reason`.  Raises SimulationError with what was expected.
     """
     _require()
+    _check_options(workers, seed, tolerance, resume and out is None)
     with _fmu(target, scene) as path:
         return _sweep(
             path,
@@ -121,12 +122,12 @@ def _sweep(
     drives = _drives(inputs, times, variables)
     _check(varied, variables, drives[0])
     if out is not None and out.suffix not in SUFFIXES:
-        raise SimulationError(f"--out {str(out)!r}: expected a file .parquet, .nc or .zarr")
+        raise SettingError(f"--out {str(out)!r}: expected a file .parquet, .nc or .zarr")
     if kept.trajectories and out is not None and out.suffix == ".parquet":
-        raise SimulationError("trajectories do not fit a Parquet file: --out FILE.nc or FILE.zarr")
+        raise SettingError("trajectories do not fit a Parquet file: --out FILE.nc or FILE.zarr")
     size = 8 * len(varied) * (len(kept.numbers) + len(kept.trajectories) * len(times))
     if size > memory():
-        raise SimulationError(
+        raise SettingError(
             f"{len(varied)} runs would keep {size / 1e9:.3g} GB, more than the {memory() / 1e9:.3g} GB that "
             "fit here: keep less, or make fewer runs"
         )
@@ -245,6 +246,10 @@ def _fmu(target: Any, scene: Scene | str | None) -> Iterator[Path]:
     else:
         path = Path(target)
         if path.suffix != ".py":
+            if scene is not None:
+                raise SettingError(
+                    f"scene {scene!r} is for a model file: {str(path)!r} is one already"
+                )
             yield path
             return
         file = load(path)
@@ -253,7 +258,7 @@ def _fmu(target: Any, scene: Scene | str | None) -> Iterator[Path]:
         if isinstance(scene, Scene):
             chosen = scene
         elif scene is not None and scene not in names:
-            raise SimulationError(f"{path}: no FMU is called {scene!r}; known: {', '.join(names)}")
+            raise SettingError(f"{path}: no FMU is called {scene!r}; known: {', '.join(names)}")
         else:
             chosen = file.scenes[0 if scene is None else names.index(scene)]
     kind = "native" if find_compiler() is not None else "python"
@@ -278,12 +283,27 @@ def _design(
 
 def _times(path: Path, stop_time: float | None, step_size: float | None) -> NDArray[np.float64]:
     experiment = read_description(path).defaultExperiment
+    for what, value in (("stop_time", stop_time), ("step_size", step_size)):
+        if value is not None and not 0 < value < np.inf:
+            raise SettingError(f"{what} = {value!r} s, expected a positive number")
     stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
     step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
-    for what, value in (("stop_time", stop), ("step_size", step)):
-        if not 0 < value < np.inf:
-            raise SimulationError(f"{what} = {value!r} s, expected a positive number")
     return communication_points(stop, step)
+
+
+def _check_options(workers: int | None, seed: int, tolerance: float | None, nowhere: bool) -> None:
+    """All problems at once."""
+    problems = []
+    if workers is not None and workers < 1:
+        problems.append(f"workers = {workers}, expected a whole number from 1")
+    if seed < 0:
+        problems.append(f"seed = {seed}, expected a whole number from 0")
+    if tolerance is not None and not 0 < tolerance < np.inf:
+        problems.append(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+    if nowhere:
+        problems.append("resume needs the out of the sweep that was interrupted")
+    if problems:
+        raise SettingError("; ".join(problems))
 
 
 def _check(varied: Design, variables: Mapping[str, Any], driven: Sequence[str]) -> None:
@@ -298,8 +318,12 @@ def _check(varied: Design, variables: Mapping[str, Any], driven: Sequence[str]) 
     problems += [
         f"{n} varies and comes from the file of inputs" for n in varied.names if n in driven
     ]
+    for name, column in zip(varied.names, varied.table.T, strict=True):
+        whole = name in settable and variables[name].type != "Real"
+        if whole and (bad := column[column != np.round(column)]).size:
+            problems.append(f"{name} = {float(bad[0])!r}, expected a whole number")
     if problems:
-        raise SimulationError("; ".join(problems))
+        raise SettingError("; ".join(problems))
 
 
 def _drives(
@@ -312,9 +336,9 @@ def _drives(
     known = [n for n, v in variables.items() if v.causality == "input"]
     unknown = [missing(n, known) for n in names if n not in known]
     if unknown or "time" not in (inputs.dtype.names or ()):
-        raise SimulationError("inputs: " + ("; ".join(unknown) or "there is no column 'time'"))
+        raise SettingError("inputs: " + ("; ".join(unknown) or "there is no column 'time'"))
     if not (np.diff(inputs["time"]) >= 0).all() or not np.isfinite(inputs["time"]).all():
-        raise SimulationError("inputs: the times are not sorted, expected rising seconds")
+        raise SettingError("inputs: the times are not sorted, expected rising seconds")
     table = np.column_stack([np.interp(times, inputs["time"], inputs[n]) for n in names])
     return names, table
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import SimulationError
+from ...errors import SettingError, SimulationError
 from ...fmu.session import STATUS, Outcome
 from .design import Design
 from .host import CRASHED
@@ -85,18 +85,18 @@ class Parts:
             try:
                 found = json.loads(record.read_text(encoding="utf-8"))
             except (OSError, ValueError):
-                raise SimulationError(
+                raise SettingError(
                     f"{str(folder)!r} is not the folder of a sweep ({RECORD} is missing): choose another "
                     "--out"
                 ) from None
             differ = sorted(k for k in identity if found.get(k) != identity[k])
             if differ:
-                raise SimulationError(
+                raise SettingError(
                     f"{str(folder)!r} belongs to another sweep ({', '.join(differ)} differ): finish that "
                     "one, delete its folder, or choose another --out"
                 )
             if not resume:
-                raise SimulationError(
+                raise SettingError(
                     f"{len(self.done)} finished chunks of this sweep are in {str(folder)!r}: go on with "
                     "--resume, or delete the folder"
                 )
