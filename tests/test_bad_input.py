@@ -1155,3 +1155,24 @@ def test_an_inertia_that_no_double_holds_is_refused(fmu):
         one.fmu.enterInitializationMode()
         with refused(one, FATAL, "overflow" if one.native else "too small for a double"):
             one.fmu.exitInitializationMode()
+
+
+def test_a_derivative_by_another_time_is_refused(tmp_path):
+    """x.diff(T) of x(t) is 0, and the kinetic energy would lack it without a word; road.diff(s) of a
+    symbol that stands in it is none of that."""
+    file = tmp_path / "late.py"
+    file.write_text(
+        "from sympy import diff, symbols\n"
+        "from sympy.physics.mechanics import dynamicsymbols\n"
+        "from lagfmu import Model, Parameter\n"
+        "x = dynamicsymbols('x')\n"
+        "t, m = symbols('t m', positive=True)\n"
+        "slope = (m * t**2).diff(t)\n"
+        "lagrangian = m * x.diff(t) ** 2 / 2 + m * diff(x, t) ** 2 / 2\n"
+        "model = Model(name='Late', lagrangian=m * x.diff() ** 2 / 2, coordinates={x: 'm'},\n"
+        "              parameters=[Parameter(m, 1.0, 'kg')])\n"
+    )
+    message = refusal(lambda: load(file), ModelError)
+    says(
+        message, "2 problems", "line 7: x.diff(t) is 0", "line 7: diff(x, t) is 0", "write x.diff()"
+    )

@@ -16,6 +16,7 @@ from .closed_form import ClosedForm, Conserved
 from .family import made
 from .model import Model
 from .scene import Scene
+from .times import foreign_times
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,9 @@ def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFi
         raise ModelError(str(file), [_where(error, file.absolute())]) from error
     finally:
         sys.path.remove(folder)
+    wrong = foreign_times(file.read_bytes(), vars(module))
+    if wrong:
+        raise ModelError(str(file), wrong)
     if arguments:
         found, problems = made(module, arguments, lambda error: _where(error, file.absolute()))
         if problems:
