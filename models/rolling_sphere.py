@@ -9,7 +9,7 @@ the friction on the rolling sphere, positive in the sense of a growing theta: it
 negative.  The friction acts while the surface is touched, and goes with it.
 """
 
-from sympy import Max, Rational, cos, exp, pi, sign, sin, symbols
+from sympy import Abs, Max, Rational, cos, exp, pi, sign, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -117,8 +117,10 @@ def w(at):
 
 
 slips = output("slipping.grip.count")
-rolls = output("sticks.grip") * (1 - sign(slips))  # since the start
-once = Max(0, 1 - (slips - 1) ** 2)
+way, turned = (a + R) * initial(theta.diff()), R * initial(phi.diff())
+began = 1 - sign(Max(0, Abs(way - turned) - 1e-12 * (Abs(way) + Abs(turned))))  # by rolling
+rolls = began * output("sticks.grip") * (1 - sign(slips))  # since the start
+once = began * Max(0, 1 - (slips - 1) ** 2)
 slides = once * (1 - output("sticks.grip")) * Max(0, sign(output("slip.rolling")))
 never = {"only": ["RollingSphere"]}
 rough = {"only": ["SlippingSphere"], "until_departure": "surface"}

@@ -118,6 +118,24 @@ def test_the_stop_time_belongs_to_the_saved_state(pushed):
     ends.does("DoStep", c_double(0), c_double(1.5), 1)
 
 
+def test_tolerance_and_mode_belong_to_a_state_saved_before_the_start(library):
+    """A state of the initialization with 1e-4, taken over by an instance that runs from 5 s to 6 s at 1e-12:
+    it initializes, runs from 0 s at 1e-4 past a second, with the bits of the one that it was saved in."""
+    pendulum = library("PendulumCartesian")
+    one, other = pendulum(), pendulum()
+    one.does("SetupExperiment", 1, c_double(1e-4), c_double(0), 0, c_double(0))
+    other.does("SetupExperiment", 1, c_double(1e-12), c_double(5), 1, c_double(6))
+    for each in (one, other):
+        each.does("EnterInitializationMode")
+    other.does("ExitInitializationMode")
+    other.does("SetFMUstate", other.loaded(one.bytes_of(one.saved())))
+    other.time = 0.0
+    for each in (one, other):
+        each.does("ExitInitializationMode")
+        each.step(2.0)
+    assert other.outputs() == one.outputs()
+
+
 def test_of_several_events_in_a_step_the_earliest_is_met_first(ledges):
     """x falls 0.21 m to rest; y, declared last, falls 0.2 m, lands first, at 0.2 s with -2 m/s, and goes up
     with 2 m/s: in one step over both landings."""
