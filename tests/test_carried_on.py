@@ -95,15 +95,33 @@ def test_an_input_goes_on_by_both_of_its_derivatives(pushed, restored):
 
 
 def test_a_force_set_anew_forgets_its_derivatives(pushed):
-    """F = 3 + 4 t, then F = 1 from t = 0.5 on: from there m x'' = 1."""
+    """F = 3 + 4 t + 5 t^2/2, then F = 1 from t = 0.5 on: from there m x'' = 1."""
     one = pushed().start(tolerance=1e-12)
     one.set("F", 3.0)
     push(one, 1, 4.0)
+    push(one, 2, 5.0)
     one.step(0.5)
     before = one.get("der(x)")
     one.set("F", 1.0)
     one.step(0.5)
     assert one.get("der(x)") - before == pytest.approx(0.25, rel=1e-11)
+
+
+def test_an_acceleration_grows_with_the_force(pushed):
+    """F = 3 + 4 t: fmi2GetRealOutputDerivatives gives F'/m = 2 m/s^3 for the acceleration, and 0 once F is
+    set anew."""
+    one = pushed().start(tolerance=1e-12)
+    one.set("F", 3.0)
+    push(one, 1, 4.0)
+    one.step(0.5)
+    found = c_double()
+    which = one.references(["der(x,2)"]), c_size_t(1), byref(c_int(1)), byref(found)
+    one.does("GetRealOutputDerivatives", *which)
+    assert found.value == pytest.approx(2.0, rel=1e-12)
+    one.set("F", 1.0)
+    one.step(0.5)
+    one.does("GetRealOutputDerivatives", *which)
+    assert found.value == 0.0
 
 
 def test_the_stop_time_belongs_to_the_saved_state(pushed):
