@@ -63,7 +63,7 @@ int main(int argc, char *argv[]) {
                 return 1;
         }
     }
-    for (int k = 0; k < METHOD_COUNT; k++) {
+    for (int k = 1; k < METHOD_COUNT; k++) { /* 0 is no method */
         if (strcmp(argv[1], METHOD_NAMES[k]) == 0)
             core.solver.settings.method = (MethodName)k;
     }
