@@ -170,6 +170,21 @@ def test_a_page_shows_what_is_asked_for(native_fmu: Callable[[str], Path], tmp_p
     assert "--outputs and --add-output" in result.stderr
 
 
+def test_a_start_off_the_constraints_gets_no_page(tmp_path: Path) -> None:
+    """A rod of 1 m and a bob at 1.6 m: refused as build refuses it, with the nearest start that there is."""
+    source = (Path(__file__).parent.parent / "models" / "pendulum.py").read_text(encoding="utf-8")
+    file, out = tmp_path / "off.py", tmp_path / "off.html"
+    file.write_text(
+        source + "\nfrom dataclasses import replace\n"
+        "model = replace(model, start={**model.start, next(iter(model.coordinates)): 1.6})\n",
+        encoding="utf-8",
+    )
+    result = CliRunner().invoke(app, ["page", str(file), "--out", str(out)])
+    assert result.exit_code == 1
+    assert "misses the constraints" in result.stderr
+    assert not out.exists()
+
+
 def test_without_zig_the_message_says_what_to_do(
     native_fmu: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -12,6 +12,7 @@ from ..model.file import load
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
+from ..prepare.starts import check_given, tell
 from .playable import playable
 from .render import Playable, render
 
@@ -62,9 +63,12 @@ def write_page(target: Model | Path, out: Path | None = None, scene: Scene | Non
 
 
 def _playable(target: Model | Path, scene: Scene | None) -> Playable:
-    if isinstance(target, Model):
-        return playable(prepare(target, scene))
-    if target.suffix != ".py":
-        return playable(target)
-    file = load(target)
-    return playable(prepare(file.model, scene or file.scenes[0]))
+    if not isinstance(target, Model):
+        if target.suffix != ".py":
+            return playable(target)
+        file = load(target)
+        target, scene = file.model, scene or file.scenes[0]
+    prepared = prepare(target, scene)
+    check_given(target.name, prepared.structure.start.moved)
+    tell(prepared.structure.start.moved)
+    return playable(prepared)

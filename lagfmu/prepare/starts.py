@@ -46,8 +46,8 @@ def check_given(model: str, moved: Iterable[Moved]) -> None:
         raise ModelError(
             model,
             [
-                f"start gives {m.name} = {m.given!r}, which misses the constraints; with the other values "
-                f"given it would have to be {m.used!r}: correct it, or leave it out of start"
+                f"start gives {m.name} = {m.given!r}, which misses the constraints; the nearest "
+                f"start that satisfies them has {m.used!r}: correct the start, or leave it out"
                 for m in wrong
             ],
         )

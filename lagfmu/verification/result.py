@@ -65,7 +65,7 @@ class Result(np.ndarray):  # type: ignore[type-arg]
         ]  # fmt: skip
         hidden = len(lines) - 1 - SHOWN
         if hidden > 0:
-            lines = [*lines[: SHOWN + 1], f"and {hidden} more: .dtype.names"]
+            lines = [*lines[: SHOWN + 1], f"and {hidden} more: to_dataframe(), or by name"]
         return "\n".join([f"{self.name}: {len(self)} points", *(line.rstrip() for line in lines)])
 
     __str__ = __repr__
