@@ -31,6 +31,7 @@ from lagfmu.fmu.write import write
 from lagfmu.model.file import load
 from lagfmu.model.model import Model
 from lagfmu.model.scene import Scene
+from lagfmu.names import bar as bar_of
 from lagfmu.prepare.prepare import prepare
 
 MODELS = Path(__file__).parent.parent / "models"
@@ -101,7 +102,7 @@ def measure(
     description = fmpy.read_model_description(str(fmu))
     session = Session(plug(fmu, description, fmpy.extract(str(fmu), unzipdir=folder)))
     known = [v.name for v in description.modelVariables]
-    names = tuple(n for n in known if f"error.{n}" in known)
+    names = tuple(n for n in known if bar_of(n) in known)
     chance = np.random.default_rng([seed, sum(map(ord, scene.name))])
     made = []
     for factor, number in ((1, count - count // EVERY), (LONG, count // EVERY)):
@@ -114,7 +115,7 @@ def measure(
         tolerances = 10 ** chance.uniform(-10, -4, number)
         plan = Plan(
             vary=(*rows[0], "solver.tolerance"),
-            keep=tuple((n, LAST) for n in (*names, *(f"error.{n}" for n in names), "solver.steps")),
+            keep=tuple((n, LAST) for n in (*names, *(bar_of(n) for n in names), "solver.steps")),
             times=times,
             drive=tuple(inputs),
             drives=np.array(list(inputs.values())).T if inputs else None,
@@ -169,7 +170,7 @@ def cost(with_bars: Path, without: Path, folder: str, scene: Scene) -> float:
         description = fmpy.read_model_description(str(fmu))
         where = fmpy.extract(str(fmu), unzipdir=f"{folder}/cost{k}")
         sessions.append(Session(plug(fmu, description, where)))
-    names = [n for n in sessions[1].plug.variables if f"error.{n}" in sessions[0].plug.variables]
+    names = [n for n in sessions[1].plug.variables if bar_of(n) in sessions[0].plug.variables]
     points = int(np.ceil(scene.stop_time / scene.step_size))
     plan = Plan((), tuple((n, LAST) for n in names), np.arange(points + 1) * scene.step_size)
     ratios = []

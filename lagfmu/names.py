@@ -6,6 +6,7 @@ der(x,2).  It travels inside python FMUs.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,6 +25,7 @@ SLIPS, SLIP_TIME = "slipping.count", "slipping.time"
 KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
 ENERGY, SOLVER = "energy", "solver"
+RATE = re.compile(r"der\((\w+)(?:,(\d+))?\)")
 ERROR = "error"  # how far off another variable may be: error.lambda.rod
 STEPS = "solver.steps"
 METHOD, TOLERANCE, STEP = "solver.method", "solver.tolerance", "solver.step"
@@ -67,6 +69,8 @@ def name(quantity: str, constraint: str = "", coordinate: str = "", order: int =
     if quantity in (VALUE, OWN):
         return derivative(coordinate, order)
     head, _, tail = quantity.partition(".")
+    if quantity == ERROR and (rate := RATE.fullmatch(coordinate)):
+        coordinate, order = rate[1], 1  # a structured name has der() around it or not at all
     words = (head, constraint, tail, "velocity" if order else "", coordinate)
     return ".".join(word for word in words if word)
 
@@ -88,7 +92,8 @@ def read(text: str) -> Subject:
     if head in (ENERGY, SOLVER) and len(rest) == 1:
         return Subject(text)
     if head == ERROR and rest:
-        return Subject(head, "", ".".join(rest))
+        rate = rest[0] == "velocity" and len(rest) == 2
+        return Subject(head, "", derivative(rest[1]) if rate else ".".join(rest))
     if head in EVENTS and len(rest) in (2, 3):
         constraint, last, rate = rest[0], rest[-1], len(rest) - 2
         if last in ("count", "time"):
@@ -100,8 +105,8 @@ def read(text: str) -> Subject:
         return Subject(head, rest[0])
     if rest:
         return Subject(OWN, coordinate=text)
-    inner, _, order = text.removeprefix("der(").removesuffix(")").partition(",")
-    return Subject(VALUE, "", inner, 0 if inner == text else int(order or 1))
+    found = RATE.fullmatch(text)
+    return Subject(VALUE, "", found[1], int(found[2] or 1)) if found else Subject(VALUE, "", text)
 
 
 def bar(of: str) -> str:

@@ -24,6 +24,7 @@ from lagfmu.errors import SimulationError
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
+from lagfmu.names import bar as bar_of
 from lagfmu.prepare.prepare import prepare
 from lagfmu.verification.plot import figure_of
 from lagfmu.verification.simulate import ErrorBarWarning, simulate
@@ -80,8 +81,8 @@ def test_the_time_of_departure_lies_within_its_bar(barred):
     name = "departure.surface.time"
     for tolerance in (1e-5, 1e-8):
         found = run(barred("Hemisphere"), 2.0, 0.1, relative_tolerance=tolerance)
-        assert found[f"error.{name}"][0] == 0
-        bar = found[f"error.{name}"][-1]
+        assert found[bar_of(name)][0] == 0
+        bar = found[bar_of(name)][-1]
         assert abs(found[name][-1] - exact[name][-1]) <= bar < 1e3 * tolerance
 
 
@@ -154,7 +155,7 @@ def test_only_what_has_a_bar_has_one_and_bars_go_with_their_outputs(prepared):
     scene = replace(prepared("Hemisphere").asked, error_bars=True)
     names = {v.name for v in prepare(file.model, scene).table.variables}
     wanted = {"r", "der(theta)", "lambda.surface", "Q.r", "Q.surface.r", "departure.surface.time"}
-    assert {f"error.{n}" for n in wanted} <= names
+    assert {bar_of(n) for n in wanted} <= names
     assert not {"error.energy.total", "error.der(r,2)", "error.a", "error.time"} & names
     for outputs in (["lambda.surface"], ["error.lambda.surface"]):
         few = prepare(file.model, replace(scene, outputs=outputs)).table.outputs
@@ -171,13 +172,13 @@ def test_between_the_two_departures_the_bars_are_infinite(barred):
             one.step(0.1)
         before, now = one.fmu.getFMUState(), one.time
         one.step(0.2)
-        left, bar = one.get(name), one.get(f"error.{name}")
+        left, bar = one.get(name), one.get(bar_of(name))
         seen = []
         for moment in (left - bar / 2, left + bar / 2, left + 100 * bar):
             one.fmu.setFMUState(before)
             one.time = now
             one.step(moment - now)
-            seen.append([one.get(f"error.{n}") for n in ("theta", "lambda.surface", name)])
+            seen.append([one.get(bar_of(n)) for n in ("theta", "lambda.surface", name)])
         one.fmu.freeFMUState(before)
     assert (np.array(seen[:2]) == INFINITE).any(axis=0).all()
     assert max(seen[2]) < 1

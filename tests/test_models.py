@@ -44,15 +44,14 @@ CHANGED = {  # far from the defaults, consistent or not: the projection and the 
     "Atwood": {"m1": 0.3, "m2": 3, "g": 1.6, "x1": 0.5, "x2": -0.5, "der(x1)": 0.4},
     "CartPendulum": {"M": 0.4, "m": 3, "L": 2, "c": 0.7, "s": 1, "x": 2, "der(s)": 0.3, "F": 2},
     "RollingSphere": {"m": 2.3, "g": 3.7, "a": 0.6, "r": 0.7, "theta": -0.3, "der(theta)": -0.4},
-    "SlippingSphere": {  # it slips from the start: backwards, then down
+    "SlippingSphere": {
         "m": 2.3,
         "g": 3.7,
         "a": 0.6,
         "r": 0.8,
-        "theta": -0.3,
-        "der(theta)": -0.4,
-        "mu_s": 0.8,
-        "mu_k": 0.5,
+        "theta": 0.1,
+        "mu_s": 0.3,
+        "mu_k": 0.2,
     },
     "Ladder": {  # a start that is not at both wall and floor is another motion
         "m": 3,

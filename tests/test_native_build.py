@@ -279,7 +279,7 @@ def test_the_sources_link_into_an_importer(everywhere, tmp_path):
     sources = sorted(str(p) for p in (folder / "sources").glob("*.c"))
     flags = ["-O1", "-DLINKED", "-DFMI2_FUNCTION_PREFIX=Hemisphere_", "-ffp-contract=off"]
     command = [*cross().command, "-target", "x86_64-linux-gnu.2.17", *flags, "-o", str(program)]
-    command += [f"-I{folder / 'sources'}", str(HERE / "host.c"), *sources, "-lm"]
+    command += [f"-I{folder / 'sources'}", *INCLUDES, str(HERE / "host.c"), *sources, "-lm"]
     subprocess.run(command, check=True, timeout=LONG)
     found = hemisphere_by([str(program)], "none", everywhere)
     np.testing.assert_array_equal(found, expected)

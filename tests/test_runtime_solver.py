@@ -277,7 +277,9 @@ def check_start(
 # --------------------------------------------------------------------------- start and observation
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize(
+    "name", [n for n in FILES if n != "SlippingSphere"]
+)  # of rows without friction
 def test_start_and_outputs_are_those_of_the_python_solver(name, bench):
     """Both targets begin in one state and see the same lambda, Q, accelerations and energies."""
     one = bench(name)

@@ -292,7 +292,7 @@ def test_trajectories_come_back_from_the_file_with_what_they_are(
         assert found.attrs["fmu_sha256"] == digest
         assert found.attrs["lagfmu"] == version()
         assert found.attrs["fmpy"]
-        assert found.attrs["command"].startswith("lagfmu ")
+        assert found.attrs["command"].startswith("lagfmu")
         assert pd.isna(found["theta"].values[0]).all()
         assert "outside its bounds" in str(found["reason"].values[0, 0])
 
