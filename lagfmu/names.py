@@ -92,8 +92,8 @@ def read(text: str) -> Subject:
     if head in (ENERGY, SOLVER) and len(rest) == 1:
         return Subject(text)
     if head == ERROR and rest:
-        rate = rest[0] == "velocity" and len(rest) == 2
-        return Subject(head, "", derivative(rest[1]) if rate else ".".join(rest))
+        of_velocity = rest[0] == "velocity" and len(rest) == 2
+        return Subject(head, "", derivative(rest[1]) if of_velocity else ".".join(rest))
     if head in EVENTS and len(rest) in (2, 3):
         constraint, last, rate = rest[0], rest[-1], len(rest) - 2
         if last in ("count", "time"):
