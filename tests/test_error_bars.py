@@ -18,8 +18,10 @@ from fmi2 import EXCHANGE, Library
 from fmpy.fmi1 import FMICallException
 from instance import instance
 from scipy.special import ellipj, ellipk
+from sympy.physics.mechanics import dynamicsymbols
 from test_forged_states import forged_text
 
+from lagfmu import Output, Scene
 from lagfmu.errors import SimulationError
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
@@ -293,3 +295,17 @@ def test_nothing_of_it_is_in_an_fmu_without(native_fmu, python_fmu):
     assert not {"/* bars.c */", "/* companion.c */"} & {*runtime.splitlines()}
     with zipfile.ZipFile(python_fmu("Hemisphere")) as archive:
         assert [n for n in archive.namelist() if n.endswith("/bars.py")] == []
+
+
+def test_an_output_called_a_time_is_no_event(target: str, tmp_path: Path) -> None:
+    """A bob that swings through and a clock of its own: lap.time beside a lap.count that moves all the while
+    is off by rounding."""
+    if target == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    file = load(MODELS / "pendulum.py")
+    t, x = dynamicsymbols._t, next(iter(file.model.coordinates))
+    own = (Output("lap.time", t, "s"), Output("lap.count", x**2, "m^2"))
+    model = replace(file.model, outputs=own)
+    fmu = write(prepare(model, Scene("Lap", error_bars=True)), tmp_path, target=target)
+    bars = run(fmu, 1.0, 0.25)[bar_of("lap.time")]
+    assert (bars < 1e-13).all()

@@ -21,9 +21,11 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
-from ..names import motion
+from ..names import DEPARTURE_TIME, DEPARTURES, SLIP_TIME, SLIPS, motion, read
+from ..names import name as name_of
 from .advance import advance
 from .failure import StepFailureError
 from .leg import FEWEST_STEPS
@@ -164,10 +166,12 @@ def widened(
     return replace(bars, worst=tuple(worst), size=tuple(size)), found, ""
 
 
+@lru_cache(maxsize=4096)
 def _count(name: str) -> str:
     """The count of the events whose latest time this is; nothing of another variable."""
-    head, _, tail = name.rpartition(".")
-    return f"{head}.count" if tail == "time" else ""
+    of = read(name)
+    count = {DEPARTURE_TIME: DEPARTURES, SLIP_TIME: SLIPS}.get(of.quantity)
+    return "" if count is None else name_of(count, of.constraint)
 
 
 def _ratio(a: State, b: State) -> float:
