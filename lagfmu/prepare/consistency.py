@@ -26,9 +26,9 @@ from ..solver.initial import Start, start
 from ..solver.instant import Instant
 from ..solver.jumps import levels_at
 from ..solver.observe import expand, observe
-from ..solver.solution import RANK
 from ..solver.state import Settings
 from ..solver.system import Matrix, System, Vector
+from ..solver.thresholds import RANK
 from .diagnosis import cause_of_failure, negative_energy
 from .starts import ranks
 

@@ -17,8 +17,9 @@ from . import dependent
 from .failure import StepFailureError
 from .kkt import kkt
 from .schur import schur
-from .solution import ON, Solution, loose
+from .solution import Solution, loose
 from .system import Matrix, Vector
+from .thresholds import ON_CONSTRAINTS
 
 
 def solve(
@@ -49,7 +50,7 @@ def solve(
 def solve_nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector, off: float = 0.0) -> Solution:
     """The same by nullspace.py, where that is safe."""
     _check_finite(M, b, G, c)
-    found = dependent.nullspace(M, b, G, c) if len(G) and off <= ON else None
+    found = dependent.nullspace(M, b, G, c) if len(G) and off <= ON_CONSTRAINTS else None
     return solve(M, b, G, c, off=off) if found is None else _finite(found)
 
 
