@@ -195,7 +195,7 @@ EVENTS = {
 
 
 def located(one: Instance, event: Event, tolerance: float) -> float:
-    """The time [s] at which what is read changes: as it is told, or by bisection with steps that are undone."""
+    """The time [s] at which what is read changes: as told, or by bisection with steps that are undone."""
     begin, end = event.between
     one.start(event.values, tolerance=tolerance)
     one.fmu.doStep(0.0, begin)
