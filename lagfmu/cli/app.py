@@ -49,23 +49,7 @@ from ..verification.result import NOT_YET, Result, as_text
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification
 from .film import film
-from .options import (
-    AddOutput,
-    Arguments,
-    Contacts,
-    Derivatives,
-    ErrorBars,
-    Fixed,
-    Formulation,
-    Frictions,
-    Inputs,
-    Method,
-    Methods,
-    Name,
-    Outputs,
-    RealsOnly,
-    narrowed,
-)
+from .options import NARROWING, OPTIONS, AddOutput, Arguments, ErrorBars, Needs, narrowed, takes
 from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .terminal import new_table, prepare_streams, print_whole
@@ -157,6 +141,7 @@ def _ours(warning: Any) -> bool:
 
 
 @app.command()
+@takes(*OPTIONS)
 def build(
     model: ModelPath,
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist"),
@@ -191,32 +176,11 @@ def build(
         bool,
         typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
     ] = False,
-    outputs: Outputs = None,
-    fixed: Fixed = None,
-    inputs: Inputs = None,
-    contacts: Contacts = None,
-    frictions: Frictions = None,
-    methods: Methods = None,
-    method: Method = None,
-    formulation: Formulation = None,
-    derivatives: Derivatives = None,
-    reals_only: RealsOnly = None,
-    error_bars: ErrorBars = None,
-    name: Name = None,
+    *,
+    needs: Needs,
     add_output: AddOutput = None,
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
-    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {
-        "frictions": frictions,
-        "contacts": contacts,
-        "methods": methods,
-        "method": method,
-        "name": name,
-    }
-    needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    needs |= {"reals_only": reals_only, "error_bars": error_bars}
-    narrowing = (outputs, fixed, inputs, contacts, frictions, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -226,7 +190,7 @@ def build(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
         file = _load(model, add_output, arguments)
-        for s in narrowed(_chosen(file, scene), **needs):
+        for s in narrowed(_chosen(file, scene), {**needs, "accuracy": accuracy}):
             choice = ""
             if s.accuracy is not None:
                 chosen = chosen_for(file, s, parse(s.accuracy), kind, console)
@@ -235,7 +199,8 @@ def build(
                 f"building {'and verifying ' if check else ''}{s.name}{_first_time(target, places)}"
             ):
                 prepared = prepare(file.model, s)
-                if name is None and any(v is not None for v in narrowing):
+                less = any(needs[n] is not None for n in NARROWING)
+                if less and needs["name"] is None:
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
                 built = package(
                     prepared,
@@ -297,34 +262,22 @@ def new_command(
 
 
 @app.command()
+@takes(*(n for n in OPTIONS if n != "name"))
 def show(
     model: ModelPath,
     scene: Annotated[str | None, typer.Option(help="Which FMU of the file.")] = None,
     arguments: Arguments = None,
-    outputs: Outputs = None,
-    fixed: Fixed = None,
-    inputs: Inputs = None,
-    contacts: Contacts = None,
-    frictions: Frictions = None,
-    methods: Methods = None,
-    method: Method = None,
-    formulation: Formulation = None,
-    derivatives: Derivatives = None,
-    reals_only: RealsOnly = None,
-    error_bars: ErrorBars = None,
+    *,
+    needs: Needs,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
 
     Of a scene that needs less than everything, also what was pruned and what that saved.
     """
-    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"frictions": frictions, "contacts": contacts, "methods": methods, "method": method}
-    needs |= {"formulation": formulation, "derivatives": derivatives}
-    needs |= {"reals_only": reals_only, "error_bars": error_bars}
     with _plainly():
         file = _load(model, add_output, arguments)
-        for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
+        for s in narrowed(_chosen(file, None if scene is None else [scene]), needs):
             try:
                 prepared = prepare(file.model, s)
             except CannotStartError as error:
@@ -428,7 +381,7 @@ def simulate_command(
         if target.suffix == ".py":
             file = _load(target, add_output, arguments)
             chosen = _chosen(file, None if scene is None else [scene])
-            source = prepare(file.model, narrowed(chosen, error_bars=error_bars)[0])
+            source = prepare(file.model, narrowed(chosen, {"error_bars": error_bars})[0])
             name = source.scene.name
             variables = source.table.variables
         elif arguments:
@@ -472,6 +425,7 @@ def simulate_command(
 
 
 @app.command()
+@takes("outputs", "fixed", "inputs")
 def page(
     target: Annotated[
         Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or a native FMU.")
@@ -480,23 +434,24 @@ def page(
         Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
-    outputs: Outputs = None,
-    fixed: Fixed = None,
-    inputs: Inputs = None,
+    arguments: Arguments = None,
+    *,
+    needs: Needs,
     add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
-    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    given = {"scene": scene, **needs, "add-output": add_output}
+    given = {"scene": scene, "p": arguments, **needs, "add-output": add_output}
     with _plainly():
         source: Model | Path = target
         chosen = None
         if target.suffix == ".py":
-            file = _load(target, add_output)
+            file = _load(target, add_output, arguments)
             source = file.model
             scenes = _chosen(file, None if scene is None else [scene])
-            chosen = narrowed(scenes[:1], **needs)[0]
-        elif said := [f"--{n}" for n, value in given.items() if value is not None]:
+            chosen = narrowed(scenes[:1], needs)[0]
+        elif said := [
+            f"{'--' if len(n) > 1 else '-'}{n}" for n, value in given.items() if value is not None
+        ]:
             raise LagfmuError(
                 f"{' and '.join(said)}: an FMU is one scene with outputs of its own; leave it out, or "
                 "make the page from the model file"
