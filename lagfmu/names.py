@@ -22,6 +22,7 @@ STICKS, MARGIN, POWER, SLIPPING = "sticks", "margin", "power", "slipping"  # of 
 SLIP = "slip"  # of a constraint that holds by friction
 DEPARTURES, DEPARTURE_TIME = "departure.count", "departure.time"
 SLIPS, SLIP_TIME = "slipping.count", "slipping.time"
+COUNT_OF = {DEPARTURE_TIME: DEPARTURES, SLIP_TIME: SLIPS}  # of the events whose latest time it is
 KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
 ENERGY, SOLVER = "energy", "solver"

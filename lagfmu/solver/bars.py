@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-from ..names import DEPARTURE_TIME, DEPARTURES, SLIP_TIME, SLIPS, motion, read
+from ..names import COUNT_OF, motion, read
 from ..names import name as name_of
 from .advance import advance
 from .failure import StepFailureError
@@ -170,7 +170,7 @@ def widened(
 def _count(name: str) -> str:
     """The count of the events whose latest time this is; nothing of another variable."""
     of = read(name)
-    count = {DEPARTURE_TIME: DEPARTURES, SLIP_TIME: SLIPS}.get(of.quantity)
+    count = COUNT_OF.get(of.quantity)
     return "" if count is None else name_of(count, of.constraint)
 
 
