@@ -79,8 +79,9 @@ def new_table(title: str, *columns: str, text: Sequence[str] = ()) -> Table:
 
 def _width(cell: RenderableType) -> int:
     """Of its longest line."""
-    lines: Sequence[Text] = Text.from_markup(cell).split() if isinstance(cell, str) else ()
-    return max((line.cell_len for line in lines), default=0)
+    if not isinstance(cell, str):
+        return 0
+    return max((line.cell_len for line in Text.from_markup(cell).split()), default=0)
 
 
 def print_whole(console: Console, drawn: Table) -> None:
