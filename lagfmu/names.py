@@ -70,7 +70,7 @@ def name(quantity: str, constraint: str = "", coordinate: str = "", order: int =
     if quantity in (VALUE, OWN):
         return derivative(coordinate, order)
     head, _, tail = quantity.partition(".")
-    if quantity == ERROR and (rate := RATE.fullmatch(coordinate)):
+    if quantity == ERROR and (rate := RATE.fullmatch(coordinate)) and rate[2] is None:
         coordinate, order = rate[1], 1  # a structured name has der() around it or not at all
     words = (head, constraint, tail, "velocity" if order else "", coordinate)
     return ".".join(word for word in words if word)

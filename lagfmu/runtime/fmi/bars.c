@@ -170,7 +170,7 @@ static int compare(Instance *x, const Variable *bar, int paired, double share, d
 /* The part of a difference that is the bar: all of it where a fixed step is halved. */
 static double share_of(const Instance *x) {
     if (has_fixed_step(x)) return 1;
-    return fmin(1, BAR_MARGIN / companion_ratio(&x->solver, &x->bars->solver));
+    return companion_share(&x->solver, &x->bars->solver, BAR_MARGIN, BAR_FEW);
 }
 
 static void widen(Instance *x) {

@@ -226,6 +226,7 @@ static Status meet(Solver *s) {
     double *y = s->work_advance;
     if (s->system->frictions > 0 && lose(s, t) != OK) return FAILED;
     if (leg_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
+    if (s->alike > 0) PARTS.at_event(s);
     put(s, t, y);
     s->state.now.step = i->t - i->t_old;
     if (s->state.now.choice.implicit) {

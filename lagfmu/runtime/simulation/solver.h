@@ -13,6 +13,7 @@ typedef struct {
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
     double alike;              /* with error bars, else 0: see companion.h */
+    LocalErrors local_trial;   /* of the latest trial of an event's time */
     State state;
     Drive drive;
     double *p;                 /* (parameters) */
