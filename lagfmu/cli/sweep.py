@@ -18,6 +18,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..errors import LagfmuError, SettingError
+from ..model.units import for_reading
 from ..verification.reference import read_table
 from .options import InputFile, StepSize, StopTime, Tolerance
 from .terminal import console, new_table, plainly, print_whole
@@ -240,7 +241,7 @@ def _range(runs: Any, name: str, refused: int) -> str:
 
 
 def _unit(runs: Any, name: str, bracketed: bool) -> str:
-    unit = str(runs[name].attrs.get("units", ""))
+    unit = for_reading(str(runs[name].attrs.get("units", "")))
     return f"[{unit}]" if unit and bracketed else unit
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from . import at_friction
-from .failure import StepFailureError
+from .failure import MasslessError, StepFailureError
 from .instant import Instant, Motion
 from .linear import solve, solve_nullspace
 from .solution import RANK, Solution
@@ -52,9 +52,12 @@ def _method(at: Instant, off: float) -> Callable[[Matrix, Vector, Matrix, Vector
     """The ladder of linear.py, as the formulation has it."""
 
     def method(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution:
-        if at.system.formulation == "nullspace":
-            return solve_nullspace(M, b, G, c, off)
-        return solve(M, b, G, c, off=off)
+        try:
+            if at.system.formulation == "nullspace":
+                return solve_nullspace(M, b, G, c, off)
+            return solve(M, b, G, c, off=off)
+        except MasslessError as error:
+            raise error.named(at.system.coordinates) from error
 
     return method
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import lapack
 
-from .failure import StepFailureError
+from .failure import MasslessError, StepFailureError
 from .schur import half_solve, mass_factor
 from .solution import ON, RANK, Solution, loose
 from .system import Matrix, Vector
@@ -70,9 +70,10 @@ def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: 
     keep = sigma > max(RANK, loose(off)) * sigma[0]
     null = Vt[~keep]
     if not nearest and len(null) and np.abs(null[:, :n]).max() > 1e-8:
-        raise StepFailureError(
+        raise MasslessError(
             "the mass matrix is singular on the constraint surface: a coordinate has neither mass "
-            "nor a constraint that determines its acceleration"
+            "nor a constraint that determines its acceleration",
+            np.flatnonzero(np.abs(null[:, :n]).max(axis=0) > 1e-8).tolist(),
         )
     right = np.concatenate([b, c]) * d
     missed = 0.0 if nearest or off > ON else np.abs(U[:, ~keep].T @ right).max(initial=0)

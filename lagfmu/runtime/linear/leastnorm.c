@@ -83,10 +83,19 @@ Status least_norm_factor(Linear *l) {
     for (int j = w.cod.rank; j < w.cod.columns; j++) {
         for (int i = 0; i < w.cod.columns; i++) w.z[i] = i == j;
         cod_from_rows(&w.cod, w.z, w.spare);
-        if (!l->nearest && largest(n, w.z) > VANISHES)
-            return fail(l->why,
-                        "the mass matrix is singular on the constraint surface: a coordinate has "
-                        "neither mass nor a constraint that determines its acceleration");
+        if (!l->nearest && largest(n, w.z) > VANISHES) {
+            const char *comma = " (";
+            (void)fail(l->why,
+                       "the mass matrix is singular on the constraint surface: a coordinate has "
+                       "neither mass nor a constraint that determines its acceleration");
+            for (int i = 0; i < n; i++) {
+                if (!(fabs(w.z[i]) > VANISHES)) continue;
+                why_append(l->why, "%s%s", comma, l->system->coordinates[i]);
+                comma = ", ";
+            }
+            why_append(l->why, ")");
+            return FAILED;
+        }
         for (int k = 0; k < l->system->m; k++)
             if (l->active[k] && !(fabs(w.z[w.place[k]]) < VANISHES)) l->unique[k] = 0;
     }

@@ -118,7 +118,10 @@ static Status climb(Linear *l) {
         return OK;
     }
     if (DEPENDENT != NULL) return DEPENDENT->factor(l);
-    return fail(l->why, "the mass matrix is singular at this state: a coordinate has no mass");
+    (void)fail(l->why, "the mass matrix is singular at this state: a coordinate has no mass");
+    if (schur_of(l)->doubtful_mass >= 0)
+        why_append(l->why, " (%s)", l->system->coordinates[schur_of(l)->doubtful_mass]);
+    return FAILED;
 }
 
 /* By the plan's lists, or a rung above. */

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SimulationError
+from ...model.units import for_reading
 from .table import INFINITE, happened, numbers, one_by_one, varied
 
 FIGURES = (".svg", ".png", ".pdf")
@@ -53,7 +54,7 @@ def _drawn(found: Any, name: str) -> Any:
 
 
 def _label(found: Any, name: str) -> str:
-    unit = found[name].attrs.get("units", "")
+    unit = for_reading(found[name].attrs.get("units", ""))
     return f"{name} [{unit}]" if unit else name
 
 

@@ -217,13 +217,11 @@ def happened(found: Any, column: str) -> np.ndarray[Any, Any]:
     Whether it has is known by its count where that was kept, and of a time also by its being 0.
     """
     values = np.array(found[column].values, dtype=float)
-    subject = names.read(column.rpartition(":")[0])
-    if subject.head not in names.EVENTS or subject.quantity in names.COUNT_OF.values():
-        return values
-    count = f"{names.name(f'{subject.head}.count', subject.constraint)}:last"
+    of = column.rpartition(":")[0]
+    count = f"{names.counted(of)}:last"
     if count in found:
         values[found[count].values == 0] = np.nan
-    elif subject.quantity in names.COUNT_OF:
+    elif names.read(of).quantity in names.COUNT_OF:
         values[values == 0] = np.nan
     return values
 
