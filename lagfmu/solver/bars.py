@@ -4,12 +4,13 @@ The companion steps the same equations from the same consistent start under the 
 that is COARSER times the delivered one's.  With x of the delivered run and y of the companion, at the
 communication points t_k so far,
 
-    bar = max( max_k s_k |x(t_k) - y(t_k)| ,  rounding of max_k |x(t_k)| ) ,
+    bar = max( max_k s_k d_k ,  rounding of max_k |x(t_k)| ) ,   d_k = |x(t_k) - y(t_k)| ,
     s_k = min(1, MARGIN / r_k) (1 + FEW / N_k) :
 
-the difference is the companion's error, which is r times the delivered one's if local errors were all there
-is: r is the ratio of the sums of h^(p + 1) of both.  N is the companion's sum in its largest part: where a few
-steps decide, their errors may cancel by chance (docs/error_bars.md).
+d is the companion's error, which is r times the delivered one's if local errors were all there is: r is the
+ratio of the sums of h^(p + 1) of both.  N is the companion's sum in its largest part: where a few steps
+decide, their errors may cancel by chance.  Where d is no longer small beside |x| the motions part, and all of
+it is the bar: s is at least min(1, s + d / max |x|)  (docs/error_bars.md).
 
 Events pair by their count: while one of the runs has met an event that the other has not, a difference says
 nothing and the bar is infinite, for which the largest double stands.  A method of fixed steps delivers twice
@@ -38,7 +39,7 @@ from .system import System
 
 COARSER = 100.0  # the companion's tolerance, in those of the delivered run
 MARGIN = 5.0  # a bar is so many times what the ratio of local errors leaves of a difference, ...
-FEW = 4.0  # ... and 1 + FEW times as much where a single step decides
+FEW = 3.0  # ... and 1 + FEW times as much where a single step decides
 ROUNDING = (
     4.0  # bars are no smaller than this times eps, sqrt(steps) and the largest magnitude so far
 )
@@ -163,7 +164,9 @@ def widened(
         else:
             size[k] = max(size[k], abs(mine[name]), natural.get(name, 0.0))
         if pair:
-            worst[k] = min(max(worst[k], share * abs(mine[name] - others[name])), INFINITE)
+            off = abs(mine[name] - others[name])
+            part = max(share, min(1.0, share + off / size[k])) if size[k] else 1.0
+            worst[k] = min(max(worst[k], part * off), INFINITE)
         bar = max(worst[k], rounding * size[k]) if pair else INFINITE
         found.append(min(bar, INFINITE))
     return replace(bars, worst=tuple(worst), size=tuple(size)), found, ""

@@ -163,7 +163,8 @@ static int compare(Instance *x, const Variable *bar, int paired, double share, d
     }
     if (!is_paired_for(of, &x->solver, &b->solver, paired)) return 0;
     if (instance_value(&b->solver, &b->seen, of, &other) != OK) return 0;
-    *worst = fmin(fmax(*worst, share * fabs(mine - other)), INFINITE);
+    const double off = fabs(mine - other), part = fmax(share, fmin(1, share + off / *size));
+    *worst = fmin(fmax(*worst, part * off), INFINITE);
     return 1;
 }
 
