@@ -128,7 +128,8 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
             return at_contacts.complementary_modes(at, q, v, shut, touching)
 
         at = replace(at, slides=at_slides.begun(at, q, v, size))
-        at, modes = at_slides.settle(at, q, v, modes, contacts_at)
+        contacts = at_slides.Contacts(contacts_at, contacts_at, touching)
+        at, modes = at_slides.settle(at, q, v, modes, contacts)
         limited = [row.friction is not None for row in system.rows]
         offset = np.where(limited, at.residual(q), 0.0)
     q, v = project(at, q, v, system.active(modes), offset, size, dependent=True)

@@ -6,13 +6,16 @@ s' = G_t vdot - gamma_t of the equations of sliding.  For one row that is a choi
 root on the circle, the one nearest to "against lambda_t".  All frictions that stand at s = 0 are settled
 together: the worst slips first; where that goes wrong, every combination is tried, most sticking first
 (Pfeiffer & Glocker 1996, chs. 5 and 6).
+
+Where sliding one way is Painleve's paradox, a body at rest may have several accelerations: it sticks, or its
+contact opens (Genot & Brogliato 1999).  Both are looked at wherever the one or the other begins.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,10 +40,30 @@ ROUNDS = 50
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)  # of the work done by friction within a step
 
 
+@dataclass(frozen=True)
+class Contacts:
+    """The contacts at a state, for given frictions and from a guess of their modes.
+
+    settled(at, closed): the modes; complementary(at, closed): by the accelerations alone; `touching` and
+    `leaving`: positions, as in contacts.py.
+    """
+
+    settled: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]]
+    complementary: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]]
+    touching: Collection[int]
+    leaving: Collection[int] = ()
+
+
 def noises(system: System, G: Matrix, nu: Vector, speed: Vector) -> Vector:
     """The slip velocity [m/s] of each friction that rounding of velocities of the size `speed` makes."""
     unit = np.abs(G) @ np.abs(speed) + np.abs(nu)
     return np.array([SLACK * unit[list(f.rows)].sum() for f in system.frictions])
+
+
+def _noises(at: Instant, q: Vector, v: Vector, state: State) -> Vector:
+    """That of the motion as it is."""
+    _, _, G, nu, _ = at.evaluate(q, v)
+    return noises(at.system, G, nu, np.maximum(np.abs(v), np.array(state.size) * state.rate))
 
 
 def begun(at: Instant, q: Vector, v: Vector, size: Vector) -> tuple[Slide, ...]:
@@ -69,19 +92,21 @@ def settle(
     q: Vector,
     v: Vector,
     closed: tuple[bool, ...],
-    contacts: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]],
+    contacts: Contacts,
     ended: Collection[int] = (),
     begins: Collection[int] = (),
 ) -> tuple[Instant, tuple[bool, ...]]:
     """The modes of frictions and contacts together: the instant with its frictions, and the contacts.
 
-    `contacts` settles those for given frictions.  `ended`: frictions whose slip velocity has just come to
-    zero; `begins`: those that have just reached the edge of their cone, where rounding must not decide.
+    `ended`: frictions whose slip velocity has just come to zero; `begins`: those that have just reached
+    the edge of their cone, where rounding must not decide.
     """
+    stuck = [slide.sticks for slide in at.slides]
     for _ in range(ROUNDS):
         at = replace(at, slides=_choose(at, q, v, closed, ended, begins))
-        found = contacts(at, closed)
+        found = contacts.settled(at, closed)
         if found == closed:
+            _check_rest(at, q, v, closed, stuck, contacts)
             return at, closed
         closed = found
     raise StepFailureError(
@@ -118,6 +143,45 @@ def _choose(
     if not resting:
         return _signed(now, slides)
     return _Rest(now, resting, slides, begins).settled()
+
+
+def _check_rest(
+    at: Instant,
+    q: Vector,
+    v: Vector,
+    closed: tuple[bool, ...],
+    stuck: Sequence[bool],
+    contacts: Contacts,
+) -> None:
+    """Raises StepFailureError if a friction at rest that begins to stick might as well let its contact
+    open, or one whose contact is open might as well stick.  `stuck`: those that stuck before."""
+    system = at.system
+    _, _, G, nu, _ = at.evaluate(q, v)
+    s = slip_velocity(system, G, v, nu)
+    on = loaded(system, system.active(closed))
+    for i, (f, slide) in enumerate(zip(system.frictions, at.slides, strict=True)):
+        if not f.gated or (stuck[i] if on[i] else not np.hypot(*s[i]) <= slide.noise):
+            continue
+        own = {c for c, k in enumerate(system.contacts) if k in f.normal and c in contacts.touching}
+        if not own or own & {*contacts.leaving} or (on[i] and not slide.sticks):
+            continue
+        other = tuple(not on[i] if c in own else shut for c, shut in enumerate(closed))
+        slides = list(at.slides)
+        slides[i] = replace(slide, sticks=not on[i])
+        trial = replace(at, slides=tuple(slides))
+        try:
+            if contacts.complementary(trial, other) != other:
+                continue
+            now = motion(trial, q, v, system.active(other))
+        except StepFailureError:
+            continue
+        if on[i] or now.press.reserve[i] >= 0:
+            raise StepFailureError(
+                f"friction {f.name!r}: at rest it has several accelerations at t = {float(at.t)!r} s: it "
+                "sticks, or its contact opens (Painleve's paradox: in one direction of slip the normal "
+                "force would drive itself): use a smaller coefficient of friction, or let the bodies "
+                "deform (a spring in the contact)"
+            )
 
 
 class _Now:
@@ -169,6 +233,8 @@ class _Rest:
         held = self.now.motion(stuck)
         against = {i: self._against(held, i) for i in self.resting}
         sticking = [i for i in self.resting if i not in self.begins]
+        if self.begins:  # beyond its cone it slips against lambda_t, or not at all
+            _signed(self.now, self._with(sticking, against))
         while True:  # the worst slips first
             found = self._trial(sticking, against)
             if found is None:
@@ -354,11 +420,15 @@ def renewed(at: Instant, state: State) -> State:
     q, v = np.array(state.q), np.array(state.v)
     _, _, G, nu, _ = at.evaluate(q, v)
     s = slip_velocity(at.system, G, v, nu)
-    moved = tuple(
-        _along(slide, x) if slide.sticks and np.hypot(x[0], x[1]) > JUMP * slide.noise else slide
-        for slide, x in zip(state.slides, s, strict=True)
-    )
-    return state if moved == state.slides else replace(state, slides=moved)
+    noise = _noises(at, q, v, state)  # at the start nothing may have been at work
+    slides = [replace(x, noise=float(n)) for x, n in zip(state.slides, noise, strict=True)]
+    moved, slippings = [], list(state.slippings)
+    for i, (slide, x) in enumerate(zip(slides, s, strict=True)):
+        away = slide.sticks and np.hypot(x[0], x[1]) > JUMP * slide.noise
+        moved.append(_along(slide, x) if away else slide)
+        if away:
+            slippings[i] = Departure(slippings[i].count + 1, state.t, state.q, state.v)
+    return replace(state, slides=tuple(moved), slippings=tuple(slippings))
 
 
 def switched_slides(
@@ -368,7 +438,7 @@ def switched_slides(
     arriving: Vector,
     state: State,
     left: Collection[int],
-    contacts: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]],
+    contacts: Contacts,
 ) -> tuple[Instant, State]:
     """After the event at which the indicators `left` left their ranges, and after its impacts: the
     frictions and contacts settled together, with the level that sticking rows keep, what impacts have
@@ -379,8 +449,7 @@ def switched_slides(
     system, before = at.system, at.slides
     mine = [i - first_of_frictions(system) for i in left if i >= first_of_frictions(system)]
     M, _, G, nu, _ = at.evaluate(q, v)
-    speed = np.maximum(np.abs(v), np.array(state.size) * state.rate)
-    noise = noises(system, G, nu, speed)
+    noise = _noises(at, q, v, state)
     slides = [replace(s, noise=float(n)) for s, n in zip(before, noise, strict=True)]
     for i in mine:
         if i % 2:  # the normal force of a bilateral constraint turns over

@@ -2,7 +2,10 @@
  *
  * All frictions that stand at s = 0 are settled together: the worst slips first; where that goes wrong,
  * every combination is tried, most sticking first.  For one row the direction is a choice of two; for two
- * rows a root on the circle, the one nearest to "against lambda_t". */
+ * rows a root on the circle, the one nearest to "against lambda_t".
+ *
+ * Where sliding one way is Painleve's paradox, a body at rest may have several accelerations: it sticks, or
+ * its contact opens (Genot & Brogliato 1999).  Both are looked at wherever the one or the other begins. */
 #include "slides.h"
 
 #include <string.h>
@@ -42,6 +45,14 @@ static void set_noise(Solver *s, const double *speed, Slide *slides) {
             slides[i].noise += SLACK * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
         }
     }
+}
+
+/* The noise of the motion as it is, of the G that was evaluated last. */
+static void renew_noise(Solver *s, Slide *slides) {
+    double *speed = s->work_contacts;
+    for (int j = 0; j < s->system->n; j++)
+        speed[j] = fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
+    set_noise(s, speed, slides);
 }
 
 /* Slipping along v's slip velocity, where that is not rounding. */
@@ -179,12 +190,10 @@ static Status steer(Rest *x, int i, int *found) {
     return OK;
 }
 
-/* The resting ones stick as in x->sticking, the others slip, each in a direction of its own acceleration.
- * If found, the latest motion is that of these modes. */
-static int try_modes(Rest *x) {
-    const int count = x->s->system->frictions;
+/* The resting ones stick as in x->sticking, the others slip as in x->guess; how many. */
+static int set_modes(Rest *x) {
     int slipping = 0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < x->s->system->frictions; i++) {
         if (!x->resting[i]) continue;
         x->slides[i].sticks = x->sticking[i];
         if (x->sticking[i]) continue;
@@ -192,6 +201,13 @@ static int try_modes(Rest *x) {
         x->slides[i].direction[0] = x->guess[2 * i];
         x->slides[i].direction[1] = x->guess[2 * i + 1];
     }
+    return slipping;
+}
+
+/* The resting ones stick as in x->sticking, the others slip, each in a direction of its own acceleration.
+ * If found, the latest motion is that of these modes. */
+static int try_modes(Rest *x) {
+    const int count = x->s->system->frictions, slipping = set_modes(x);
     for (int round = 0; round < ROUNDS; round++) {
         int turned = 0;
         if (find_signs(x) != OK) return 0;
@@ -259,12 +275,18 @@ static Status no_modes(Rest *x) {
 
 static Status settle_resting(Rest *x) {
     const int count = x->s->system->frictions;
+    int begins = 0;
     for (int i = 0; i < count; i++)
         if (x->resting[i]) x->slides[i].sticks = 1;
     if (motion(x) != OK) return FAILED;
     for (int i = 0; i < count; i++) {
         if (x->resting[i]) aim(x, i);
         x->sticking[i] = x->resting[i] && !x->begins[i];
+        if (x->begins[i]) begins = 1;
+    }
+    if (begins) { /* beyond its cone it slips against lambda_t, or not at all */
+        set_modes(x);
+        if (find_signs(x) != OK) return FAILED;
     }
     while (try_modes(x)) { /* the worst slips first */
         const int worst = furthest_out(x);
@@ -296,6 +318,64 @@ static Status choose(Rest *x, const int *ended) {
     return any ? settle_resting(x) : find_signs(x);
 }
 
+/* The trial modes of contacts are complementary as they are. */
+static int fits(Rest *x, int *trial, const int *touching, const int *leaving) {
+    Solver *s = x->s;
+    const size_t bytes = (size_t)s->system->contacts * sizeof *trial;
+    int *settled = trial + s->system->contacts;
+    memcpy(settled, trial, bytes);
+    return PARTS.contacts_modes(s, x->at, s->state.q, s->state.v, settled, touching, leaving) == OK &&
+           memcmp(settled, trial, bytes) == 0;
+}
+
+/* The contacts that press friction i and touch become as `shut`; 0 if there are none, or one is leaving. */
+static int turn_contacts(const System *s, int i, int shut, int *closed, const int *touching,
+                         const int *leaving) {
+    const Friction *law = &s->friction[i];
+    int any = 0;
+    for (int c = 0; c < s->contacts; c++)
+        for (int k = law->first; k < law->first + law->normals; k++) {
+            if (s->press[k] != s->contact[c] || !touching[c]) continue;
+            if (leaving != NULL && leaving[c]) return 0;
+            closed[c] = shut;
+            any = 1;
+        }
+    return any;
+}
+
+/* FAILED if a friction at rest that begins to stick might as well let its contact open, or one whose contact
+ * is open might as well stick. */
+static Status check_rest(Rest *x, const int *closed, const int *touching, const int *leaving) {
+    Solver *s = x->s;
+    const System *system = s->system;
+    struct Frictions *f = s->stepped.friction;
+    int *trial = s->iwork_slides + 4 * system->frictions, any = 0;
+    for (int i = 0; i < system->frictions; i++) {
+        const Slide held = x->slides[i];
+        const int on = f->loaded[i];
+        double slip[2];
+        friction_slip(&s->stepped, i, s->state.v, slip);
+        const int still = hypot(slip[0], slip[1]) <= held.noise;
+        if (!system->friction[i].gated || (on ? s->state.slide[i].sticks || !held.sticks : !still))
+            continue;
+        memcpy(trial, closed, (size_t)system->contacts * sizeof *trial);
+        if (!turn_contacts(system, i, !on, trial, touching, leaving)) continue;
+        x->slides[i].sticks = !on;
+        const int other = fits(x, trial, touching, leaving) && (on || f->reserve[i] >= 0);
+        x->slides[i] = held;
+        if (other)
+            return fail(&s->why,
+                        "friction '%s': at rest it has several accelerations at t = %s s: it sticks, or "
+                        "its contact opens (Painleve's paradox: in one direction of slip the normal "
+                        "force would drive itself): use a smaller coefficient of friction, or let the "
+                        "bodies deform (a spring in the contact)",
+                        system->friction[i].name, digits(x->at.t).text);
+        (void)s->stepped.sliding->acting(&s->stepped, x->active); /* what is loaded */
+        any = 1;
+    }
+    return any ? motion(x) : OK;
+}
+
 /* The modes of frictions and contacts together, from those in x->slides and `closed`. */
 static Status settle(Rest *x, int *closed, const int *ended, const int *touching,
                      const int *leaving) {
@@ -310,7 +390,7 @@ static Status settle(Rest *x, int *closed, const int *ended, const int *touching
         if (s->system->contacts == 0) return OK;
         if (PARTS.contacts_modes(s, x->at, s->state.q, s->state.v, closed, touching, leaving) != OK)
             return FAILED;
-        if (memcmp(before, closed, bytes) == 0) return OK;
+        if (memcmp(before, closed, bytes) == 0) return check_rest(x, closed, touching, leaving);
     }
     return fail(&s->why,
                 "no combination of sticking, slipping and open contacts satisfies their laws at t = %s "
@@ -404,14 +484,11 @@ static Status change(Solver *s, Instant at, const int *left, const double *arriv
                      const int *touching, const int *leaving) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
-    double *speed = s->work_contacts;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     if (arriving != NULL && lose(s, arriving) != OK) return FAILED;
-    for (int j = 0; j < system->n; j++)
-        speed[j] = fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
     Rest x = rest(s, at);
     int *ended = s->iwork_slides + 3 * system->frictions;
-    set_noise(s, speed, x.slides);
+    renew_noise(s, x.slides);
     for (int i = 0; i < system->frictions; i++) {
         x.begins[i] = left[2 * i] && s->state.slide[i].sticks;
         ended[i] = left[2 * i] && !s->state.slide[i].sticks;
@@ -438,6 +515,7 @@ static Status renew(Solver *s) {
     if (!any || s->system->inputs == 0) return OK;
     const Instant at = leg_instant(s, s->state.now.t);
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
+    renew_noise(s, s->state.slide); /* at the start nothing may have been at work */
     for (int i = 0; i < s->system->frictions; i++) {
         double slip[2];
         friction_slip(b, i, s->state.v, slip);
