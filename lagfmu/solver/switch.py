@@ -17,8 +17,7 @@ from .leg import Leg
 from .motion import motion, project
 from .state import Departure, State
 from .system import Vector
-
-SLOW = 1e-9  # speed of a gap, relative to the motion's own, that counts as none
+from .thresholds import SLOW
 
 
 def released(at: Instant, state: State, span: float) -> State:
