@@ -9,11 +9,16 @@ from __future__ import annotations
 
 import csv
 import io
+import multiprocessing
+import os
 import statistics
 import sys
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated
 
@@ -28,8 +33,7 @@ from lagfmu.cli.terminal import prepare_streams
 from lagfmu.fmu.compiler import HOST, find_compiler
 from lagfmu.fmu.native import takes_long
 from lagfmu.fmu.write import TARGETS
-from lagfmu.model.file import ModelFile, load
-from lagfmu.model.scene import Scene
+from lagfmu.model.file import load
 from lagfmu.prepare.prepare import Prepared, prepare
 
 MODELS = Path(__file__).parent / "models"
@@ -37,34 +41,64 @@ RUNS = 3  # the time is the median of these
 HEADINGS = ["fmu", "target", "bytes", "build_s", "steps", "wall_ms_per_s"]
 HEADINGS += ["statement", "error", "allowed", "verdict"]
 
-
-def build_one(
-    file: ModelFile,
-    scene: Scene,
-    target: str,
-    out: Path,
-    platforms: Sequence[str],
-    known: dict[str, Prepared],
-) -> tuple[Path, float, Verification, float]:
-    """The FMU, seconds to build it, its verification, seconds to simulate it.
-
-    `known`: what was prepared so far by names of scenes, which serves both targets.
-    """
-    begun = time.perf_counter()
-    asked, choice = settled(file.model, scene, file.closed_forms, target)
-    prepared = known.get(scene.name)
-    if prepared is None or prepared.asked != asked or prepared.derived.model is not file.model:
-        prepared = known[scene.name] = prepare(file.model, asked)
-    built = package(prepared, out, file.closed_forms, target, platforms, choice, reference=True)
-    spent = time.perf_counter() - begun
-    found = built.verification or verify(built.path)
-    runs = [found, *(verify(built.path) for _ in range(RUNS - 1))]
-    return built.path, spent, found, statistics.median(r.seconds for r in runs)
+load_once = cache(load)
 
 
-def first(target: str, platforms: Sequence[str]) -> bool:
-    """True if the C runtime has to be compiled before this FMU."""
-    return target == "native" and takes_long(platforms)
+@dataclass(frozen=True)
+class Made:
+    """One FMU: where it stands and what it cost [s], or why it could not be built."""
+
+    scene: str
+    target: str
+    path: Path = Path()
+    built: float = 0.0
+    found: Verification | None = None
+    seconds: float = 0.0
+    error: str = ""
+    notes: tuple[str, ...] = ()
+
+
+def build_scene(
+    work: tuple[Path, str], targets: Sequence[str], out: Path, platforms: Sequence[str]
+) -> list[Made]:
+    """The FMUs of one scene of a model file, an FMU a target: what is prepared serves all."""
+    path, name = work
+    file = load_once(path)
+    scene = next(s for s in file.scenes if s.name == name)
+    prepared: Prepared | None = None
+    made = []
+    for target in targets:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                begun = time.perf_counter()
+                asked, choice = settled(file.model, scene, file.closed_forms, target)
+                if prepared is None or prepared.asked != asked:
+                    prepared = prepare(file.model, asked)
+                folder, forms = out / target, file.closed_forms
+                fmu = package(prepared, folder, forms, target, platforms, choice, reference=True)
+                spent = time.perf_counter() - begun
+                found = fmu.verification or verify(fmu.path)
+                runs = [found, *(verify(fmu.path) for _ in range(RUNS - 1))]
+                seconds = statistics.median(r.seconds for r in runs)
+                one = partial(Made, name, target, fmu.path, spent, found, seconds)
+            except LagfmuError as error:
+                one = partial(Made, name, target, error=str(error))
+        made.append(one(notes=tuple(str(w.message) for w in caught)))
+    return made
+
+
+def build_all(
+    work: Sequence[tuple[Path, str]], targets: Sequence[str], out: Path, platforms: Sequence[str]
+) -> Iterator[list[Made]]:
+    """The FMUs of each scene in turn, made by as many processes as the machine has cores."""
+    build = partial(build_scene, targets=targets, out=out, platforms=platforms)
+    processes = min(len(work), os.cpu_count() or 1)
+    if processes < 2:
+        yield from map(build, work)
+        return
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(build, work)
 
 
 def main(
@@ -87,7 +121,7 @@ def main(
     if targets != TARGETS:
         console.print("no C compiler: python FMUs only; pip install ziglang for the others")
     problems: list[str] = []
-    files: list[ModelFile] = []
+    work: list[tuple[Path, str]] = []
     for name in models or ():
         if not (MODELS / f"{name}.py").is_file():
             problems.append(f"there is no models/{name}.py")
@@ -95,49 +129,22 @@ def main(
         if models and path.stem not in models:
             continue
         try:
-            files.append(load(path))
+            work += [(path, scene.name) for scene in load_once(path).scenes]
         except LagfmuError as error:
             problems.append(str(error))
-    work = [(file, scene, target) for file in files for scene in file.scenes for target in targets]
-    width = max((len(scene.name) for _, scene, _ in work), default=0)
+    width = max((len(name) for _, name in work), default=0)
+    if work and "native" in targets and takes_long(places):
+        console.print("the C runtime is compiled first")
     console.print(_line(width, "", "FMU", "target", "ms/s", "worst", "of"), style="bold")
     rows: list[tuple[str, ...]] = []
-    known: dict[str, Prepared] = {}
-    warnings.showwarning = lambda message, *_: console.print(
-        Text(f"note: {message}"), soft_wrap=True
-    )
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     shown = console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
-        task = progress.add_task("", total=len(work))
-        for file, scene, target in work:
-            name = f"{target}/{scene.name}"
-            wait = " (compiles the runtime first)" if first(target, places) else ""
-            progress.update(task, description=f"{name}{wait}")
-            if wait and not shown:
-                console.print(f"{name}{wait}")
-            try:
-                path, built, found, seconds = build_one(
-                    file, scene, target, out / target, places, known
-                )
-            except LagfmuError as error:
-                problems.append(f"{name}: {error}")
-                console.print(_line(width, "FAIL", scene.name, target), style="bold red")
-            else:
-                spent = f"{1e3 * seconds / found.simulated:.3g}"
-                good = found.passed
-                verdict, style = ("pass", "green") if good else ("FAIL", "bold red")
-                worst = found.worst
-                text = (f"{worst.error:.1e}", worst.name) if worst is not None else ("", "")
-                line = _line(width, verdict, scene.name, target, spent, *text)
-                console.print(Text(line, style="" if good else style), soft_wrap=True)
-                for check in found.checks:
-                    if not check.passed:
-                        problems.append(f"{name}: {check}")
-                    elif not check.points:  # it is of another start than the default one
-                        console.print(Text(f"note: {name}: {check}"), soft_wrap=True)
-                cost = (f"{path.stat().st_size}", f"{built:.3g}", f"{found.steps}", spent)
-                rows += [(scene.name, target, *cost, *row) for row in found.rows()]
+        task = progress.add_task("scenes", total=len(work))
+        for scene in build_all(work, targets, out, places):
+            for made in scene:
+                problems += _report(console, width, made)
+                rows += _rows(made)
             progress.advance(task)
     if rows:
         file_of_all = out / "verification.csv"
@@ -147,9 +154,45 @@ def main(
         console.print(Text(f"FAIL {problem}", style="bold red"), soft_wrap=True)
     if problems or not work:
         sys.exit(1)
-    count = f"all {len(work)} FMUs in {out} hold" if len(work) > 1 else f"the FMU in {out} holds"
-    closed = "their closed forms" if len(work) > 1 else "its closed forms"
+    total = len(work) * len(targets)
+    count = f"all {total} FMUs in {out} hold" if total > 1 else f"the FMU in {out} holds"
+    closed = "their closed forms" if total > 1 else "its closed forms"
     console.print(Text(f"{count} {closed}", style="green"), soft_wrap=True)
+
+
+def _report(console: Console, width: int, made: Made) -> list[str]:
+    """Prints the line of one FMU and its notes; returns what is wrong with it."""
+    name, found = f"{made.target}/{made.scene}", made.found
+    problems = [f"{name}: {made.error}"] if found is None else []
+    notes = list(made.notes)
+    verdict, cells, style = "FAIL", [made.scene, made.target], "bold red"
+    if found is not None:
+        problems += [f"{name}: {c}" for c in found.checks if not c.passed]
+        # not reached: it is of another start than the default one
+        notes += [f"{name}: {c}" for c in found.checks if c.passed and not c.points]
+        cells.append(_cost(made, found))
+        if found.worst is not None:
+            cells += [f"{found.worst.error:.1e}", found.worst.name]
+        if found.passed:
+            verdict, style = "pass", ""
+    console.print(Text(_line(width, verdict, *cells), style=style), soft_wrap=True)
+    for note in notes:
+        console.print(Text(f"note: {note}"), soft_wrap=True)
+    return problems
+
+
+def _rows(made: Made) -> list[tuple[str, ...]]:
+    """A row a statement of one FMU."""
+    found = made.found
+    if found is None:
+        return []
+    cost = (f"{made.path.stat().st_size}", f"{made.built:.3g}", f"{found.steps}")
+    return [(made.scene, made.target, *cost, _cost(made, found), *row) for row in found.rows()]
+
+
+def _cost(made: Made, found: Verification) -> str:
+    """Wall time of a simulated second [ms]."""
+    return f"{1e3 * made.seconds / found.simulated:.3g}"
 
 
 def _line(

@@ -258,11 +258,12 @@ class Ours:
         method: str = "",
         step: float = STEP,
         mode: str = "run",
+        stop: float = STOP,
     ) -> list[Any]:
         """The command line of host.c."""
         chosen = f"{self.references['solver.method']}={NUMBERS[method]}" if method else "-"
         return [
-            *(self.host, mode, self.library, self.guid, self.resources, tolerance, STOP, step),
+            *(self.host, mode, self.library, self.guid, self.resources, tolerance, stop, step),
             *(BUDGET, communication, self.references["solver.steps"], chosen),
             *(self.references[name] for name in outputs),
         ]
@@ -284,13 +285,17 @@ def build(path: Path, out: Path, target: str, *options: str) -> None:
 
 def native_fmu(problem: Problem) -> Ours:
     """The problem's native FMU, unpacked."""
-    fmu = built(problem, "native")
+    return unpacked(built(problem, "native"), problem.folder)
+
+
+def unpacked(fmu: Path, out: Path) -> Ours:
+    """A native FMU in a folder beside it; the host in `out`."""
     folder = fmu.with_suffix("")
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(folder)
     description = fmpy.read_model_description(str(folder), validate=False)
     return Ours(
-        compiled(problem.folder / "host", native("host.c", "stopwatch.c"), "-ldl"),
+        compiled(out / "host", native("host.c", "stopwatch.c"), "-ldl"),
         folder / "binaries" / "linux64" / f"{description.coSimulation.modelIdentifier}.so",
         description.guid,
         (folder / "resources").as_uri(),

@@ -120,6 +120,17 @@ def barred(text: str) -> str:
     return found.coordinate if found.quantity == ERROR else ""
 
 
+def counted(text: str) -> str:
+    """The count of the event that a variable tells the latest time or state of: while it is 0, the variable
+    says nothing (FMI has no way to leave it out: it is a finite 0).  Empty for every other variable."""
+    found = read(text)
+    if found.quantity == ERROR:
+        return counted(found.coordinate)
+    if found.head not in EVENTS or found.quantity in (DEPARTURES, SLIPS):
+        return ""
+    return name(f"{found.head}.count", found.constraint)
+
+
 def those(known: Iterable[str], *quantities: str) -> list[str]:
     """The names, among those known, of these quantities."""
     return [text for text in known if read(text).quantity in quantities]

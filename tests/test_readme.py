@@ -15,6 +15,7 @@ import pytest
 import typer.main
 from typer.testing import CliRunner
 
+import lagfmu
 from lagfmu import simulate, verify
 from lagfmu.cli.app import app
 from lagfmu.fmu.compiler import find_compiler
@@ -30,6 +31,7 @@ REPOSITORY = Path(__file__).parent.parent
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
 PAGES = sorted((REPOSITORY / "docs").glob("*.md"))
 TEXT = "\n".join([README, *(page.read_text(encoding="utf-8") for page in PAGES)])
+GALLERY = (REPOSITORY / "docs" / "gallery.md").read_text(encoding="utf-8")
 TUTORIAL = (REPOSITORY / "docs" / "tutorial.md").read_text(encoding="utf-8")
 
 
@@ -154,6 +156,29 @@ def test_the_tutorial_runs_as_a_notebook(tmp_path, monkeypatch):
     assert any(page.startswith("<iframe") for page in pages)
 
 
+def test_every_public_name_stands_in_the_reference():
+    """What can be imported from lagfmu is documented under its name, once."""
+    told = re.findall(
+        r"^::: \S+\.(\w+)$", (REPOSITORY / "docs/reference.md").read_text(), re.MULTILINE
+    )
+    assert sorted(told) == sorted(lagfmu.__all__)
+
+
+def test_the_gallery_names_every_model():
+    """In the repository each row opens the model's file, and says what the model says of itself."""
+    rows = re.findall(r"^\| \[[^\]]+\]\(\.\./(\S+)\) \| (.*) \|$", GALLERY, re.MULTILINE)
+    files = sorted(p.relative_to(REPOSITORY) for p in (REPOSITORY / "models").glob("*.py"))
+    assert [Path(path) for path, _ in rows] == files
+    assert [text for _, text in rows] == [load(REPOSITORY / f).model.description for f in files]
+
+
+def test_links_of_the_pages_lead_somewhere():
+    """In the repository as it is cloned, before any site is built."""
+    for page in [REPOSITORY / "README.md", *PAGES]:
+        for link in re.findall(r"\]\(([^)#]+?)(?:#[\w-]+)?\)", page.read_text(encoding="utf-8")):
+            assert "://" in link or (page.parent / link).exists(), (page.name, link)
+
+
 def test_the_site_builds_strictly(tmp_path, monkeypatch):
     """Every page in the navigation, no broken link, every name of the reference documented; the gallery
     holds live pages (of two models here), the tutorial is there as a notebook."""
@@ -177,3 +202,4 @@ def test_the_site_builds_strictly(tmp_path, monkeypatch):
     assert "lagfmu" in (site / "gallery" / "belt.html").read_text(encoding="utf-8")
     assert 'href="hemisphere.html"' in (site / "gallery" / "index.html").read_text(encoding="utf-8")
     assert (site / "tutorial.ipynb").is_file()
+    assert 'href="../tutorial.ipynb"' in (site / "tutorial" / "index.html").read_text("utf-8")

@@ -32,7 +32,8 @@ from ..model.goal import parse
 from ..model.library import known, new
 from ..model.model import Model
 from ..model.scene import Scene
-from ..names import METHOD
+from ..model.units import for_reading
+from ..names import DEPARTURE_TIME, METHOD, SLIP_TIME, those
 from ..page.text import show as show_prepared
 from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
@@ -41,9 +42,10 @@ from ..study.tradeoff.page import section
 from ..study.tradeoff.report import all_as_json as measured_as_json
 from ..verification.crosscheck import as_csv, write_crosscheck
 from ..verification.pipeline import WRONG_USAGE, Suite, UsageError, as_junit, exit_code
-from ..verification.plot import plot
+from ..verification.plot import default_names
 from ..verification.reference import read_table
 from ..verification.report import as_json
+from ..verification.result import NOT_YET, Result, as_text
 from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification
 from .film import film
@@ -416,7 +418,11 @@ def simulate_command(
     error_bars: ErrorBars = None,
     add_output: AddOutput = None,
 ) -> None:
-    """Simulate an FMU or a model; print the last values, plot or save the rest."""
+    """Simulate an FMU or a model; print the last values, plot or save the rest.
+
+    With a figure, a table or a film only multipliers, coordinates and times of events are printed; -v names
+    others.
+    """
     with _plainly():
         source: Any = target
         if target.suffix == ".py":
@@ -425,7 +431,6 @@ def simulate_command(
             source = prepare(file.model, narrowed(chosen, error_bars=error_bars)[0])
             name = source.scene.name
             variables = source.table.variables
-            units = {v.name: v.unit.name for v in variables if v.unit is not None}
         elif arguments:
             raise LagfmuError(f"-p {arguments[0]} is for a model file: an FMU is one of its family")
         elif add_output:
@@ -435,7 +440,6 @@ def simulate_command(
         else:
             description = read_description(target)
             name, variables = description.modelName, description.modelVariables
-            units = {v.name: v.unit for v in variables if v.unit}
         known = {v.name: v.causality for v in variables if v.causality != "parameter"}
         besides = _besides(variable or (), known)
         given = _assignments(set_)
@@ -451,13 +455,14 @@ def simulate_command(
                 besides=besides,
                 error_bars=bool(error_bars),
             )
-        _print_last(name, result, units, variable or ())
+        written = any(f is not None for f in (csv, plot_, animate))
+        _print_last(name, result, variable or (_first_of(result) if written else ()))
         if csv is not None:
             _save(csv, result)
             console.print(f"[green]wrote[/] {escape(str(csv))}", soft_wrap=True)
         if plot_ is not None:
             console.print(
-                f"[green]wrote[/] {escape(str(plot(result, units, plot_, variable or (), name)))}",
+                f"[green]wrote[/] {escape(str(result.plot(*(variable or ()), out=plot_)))}",
                 soft_wrap=True,
             )
         if animate is not None:
@@ -743,16 +748,19 @@ def _besides(names: Sequence[str], known: Mapping[str, str]) -> list[str]:
     return [n for n in names if n in known and known[n] != "output"]
 
 
-def _print_last(
-    name: str, result: Any, units: Mapping[str, str], names: Sequence[str] = ()
-) -> None:
+def _first_of(result: Result) -> list[str]:
+    """What one looks for first: multipliers, coordinates, the times of events."""
+    known = list(result.dtype.names or ())
+    return default_names(known) + those(known, DEPARTURE_TIME, SLIP_TIME)
+
+
+def _print_last(name: str, result: Result, names: Sequence[str] = ()) -> None:
     """The last values of the named variables, of all outputs without names."""
     table = new_table(f"{name} at t = {result['time'][-1]:g} s", "variable", "value", "unit")
     table.columns[0].justify = table.columns[2].justify = "left"
-    for n in names or result.dtype.names[1:]:
-        value = result[n][-1]
-        text = f"{value:.9g}" if result[n].dtype.kind == "f" else str(value)
-        table.add_row(escape(n), text, escape(units.get(n, "")))
+    for n in names or list(result.dtype.names or ())[1:]:
+        text = as_text(result[n][-1], 9) if result.known(n)[-1] else NOT_YET
+        table.add_row(escape(n), text, escape(for_reading(result.units.get(n))))
     print_whole(console, table)
 
 

@@ -8,6 +8,7 @@ const AT_FIRST = [
   "Energies",
   "Generalized forces of constraint",
   "Residuals",
+  "Gaps of contacts",
 ];
 const MOST = 12; // curves of one chart
 const HEIGHT = 190;

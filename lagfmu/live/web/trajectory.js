@@ -43,6 +43,11 @@ class Trajectory {
     return here + part * (column[row + 1] - here);
   }
 
+  /* Whether a variable says something there: the time and the state of an event from the first one on. */
+  isKnown(variable, [row]) {
+    return !variable.counted || this.columns[PLACE.get(variable.counted)][row] > 0;
+  }
+
   /* [{time, text}]: counted events at their time, else a truth that changes, at the row that shows it. */
   happened() {
     const found = [];
@@ -59,8 +64,9 @@ class Trajectory {
       } else if (v.type === "Boolean" && !v.name.startsWith("unique.")) {
         for (let i = 1; i < column.length; i++) {
           if (column[i] === column[i - 1]) continue;
-          const text = `${v.name} ${column[i] ? "begins" : "ends"}`;
-          found.push({ time: this.time[i], since: this.time[i - 1], text, truth: true });
+          const [since, time] = [this.time[i - 1], this.time[i]];
+          const text = `${v.name} ${column[i] ? "begins" : "ends"}, after ${shown(since, 10)} s`;
+          found.push({ time, since, text, truth: true });
         }
       }
     });
