@@ -44,20 +44,7 @@ def advance(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
         )
     with np.errstate(all="ignore"):
-        inputs = system.inputs_at(u, 0.0)
-        if system.floors:  # the inputs may have been set
-            levels = levels_at(system, state.t, np.array(state.q), inputs, p)
-            state = replace(state, levels=levels)
-        at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
-        if system.contacts and system.prescribed:
-            state = at_contacts.released(at, state, state.span)
-        elif system.prescribed:  # whose place and rates may be others than it went by
-            q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
-            q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
-            state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
-        if system.frictions:
-            state = at_slides.renewed(at, state)
-            at = replace(at, slides=state.slides)
+        at, state = beginning(system, state, u, p)
         if is_incomplete(state):
             state = complete(at, settings, state, t_end - state.t)
         headway = Headway(settings, begun, t_end, state.rate)
@@ -71,6 +58,29 @@ def advance(
                     "chatter without end, or a force jumps to and fro"
                 )
     return replace(state, span=t_end - begun)
+
+
+def beginning(
+    system: System, state: State, u: Sequence[float], p: Sequence[float]
+) -> tuple[Instant, State]:
+    """What each step begins with: the inputs may have been set.  Levels of jumps are those of now, contacts
+    whose surface went away open, the others go with it; a prescribed motion may have another place and other
+    rates than it went by.  Raises StepFailureError."""
+    inputs = system.inputs_at(u, 0.0)
+    if system.floors:
+        levels = levels_at(system, state.t, np.array(state.q), inputs, p)
+        state = replace(state, levels=levels)
+    at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
+    if system.contacts and system.prescribed:
+        state = at_contacts.released(at, state, state.span)
+    elif system.prescribed:
+        q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
+        q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
+        state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
+    if system.frictions:
+        state = at_slides.renewed(at, state)
+        at = replace(at, slides=state.slides)
+    return at, state
 
 
 @dataclass

@@ -119,6 +119,15 @@ static void inputs_changed(Instance *x) {
     if (!*x->bars->lost) solver_inputs_changed(&x->bars->solver);
 }
 
+/* A look at the state with which the next step begins; one that cannot be found is told by that step. */
+static void turn(Instance *x) {
+    Bars *b = x->bars;
+    b->observed = 0;
+    if (*b->lost) return;
+    share(x);
+    *b->lost = solver_follow(&b->solver) != OK;
+}
+
 /* ------------------------------------------------------------------ bars */
 
 /* The time of an event pairs by the count of its own kind. */
@@ -241,4 +250,4 @@ static Status restored(Instance *x) {
 }
 
 const ErrorBars BARS = {layout,         start, begin_step, follow,  widen,
-                        inputs_changed, get,   save,       restore, restored};
+                        inputs_changed, turn,  get,        save,    restore, restored};

@@ -42,6 +42,8 @@ typedef struct {
     void (*follow)(struct Instance *x, double t_end);
     void (*widen)(struct Instance *x);
     void (*inputs_changed)(struct Instance *x);
+    /* The companion goes with a prescribed motion that was set, as the delivered run does to be read. */
+    void (*turn)(struct Instance *x);
     /* The bar of a variable; the largest double stands for infinity. */
     Status (*get)(struct Instance *x, const Variable *v, double *value);
     void (*save)(const struct Instance *x);
