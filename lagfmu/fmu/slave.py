@@ -30,8 +30,9 @@ from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.rates import Past, estimated, half_connected, restored_past
 from ..solver.restored import restored, restored_settings
-from ..solver.state import SMALLEST_TOLERANCE, Settings, State
+from ..solver.state import Settings, State
 from ..solver.system import System
+from ..solver.thresholds import SMALLEST_TOLERANCE
 from .references import end_once, keep, keep_module_of
 
 Call = TypeVar("Call", bound=Callable[..., Any])

@@ -20,11 +20,7 @@ from .motion import project
 from .state import Settings, State
 from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step, is_due, unjudged_step
 from .system import System, Vector
-
-CHATTER = 200  # contact events in next to no time after which the step is given up
-PATIENCE = 200  # steps after which a communication step is judged by its average step
-STEP_LIMIT = 1e7  # internal steps that a communication step may need
-TINY = 1e-6  # part of the natural time; a step shorter than this makes no headway
+from .thresholds import AT_ONCE, CHATTER, HEADWAY, PATIENCE, STEP_LIMIT
 
 
 def advance(
@@ -69,7 +65,7 @@ def advance(
             leg = Leg(system, settings, state, u, p, begun, after_step)
             state = _travel(leg, state, t_end, headway)
             events.append(state.t)
-            if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
+            if len(events) == CHATTER and events[-1] - events[0] < AT_ONCE / state.rate:
                 raise StepFailureError(
                     f"{CHATTER} events in {events[-1] - events[0]:.1g} s at t = {state.t!r} s: contacts "
                     "chatter without end, or a force jumps to and fro"
@@ -92,16 +88,16 @@ class Headway:
         """Counts the step from t0 to t.  Raises StepFailureError if t_end is too far off for its kind."""
         most, gone, way = self.settings.maximum_steps, t - self.begun, self.t_end - self.begun
         self.steps += 1
-        self.tiny += (t - t0) * self.rate < TINY
+        self.tiny += (t - t0) * self.rate < HEADWAY
         if 0 < most < self.tiny:
             raise StepFailureError(
                 f"the communication step to t = {self.t_end!r} s makes no headway at t = {t!r} s: more "
                 f"than {most:.0f} internal steps (solver.maximum_steps) were shorter than "
-                f"{TINY / self.rate:.2g} s, {TINY:.0e} of the motion's natural time: is there a force "
+                f"{HEADWAY / self.rate:.2g} s, {HEADWAY:.0e} of the motion's natural time: is there a force "
                 "that jumps to and fro?"
             )
         if self.steps >= PATIENCE and self.steps * way > STEP_LIMIT * gone:
-            needed = self.steps * way / max(gone, TINY * way)
+            needed = self.steps * way / max(gone, HEADWAY * way)
             raise StepFailureError(
                 f"the communication step to t = {self.t_end!r} s would need about {needed:.0e} internal "
                 f"steps, more than {STEP_LIMIT:.0e}: take a shorter one"

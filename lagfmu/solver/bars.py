@@ -28,11 +28,11 @@ from ..names import DEPARTURE_TIME, DEPARTURES, SLIP_TIME, SLIPS, motion, read
 from ..names import name as name_of
 from .advance import advance
 from .failure import StepFailureError
-from .leg import FEWEST_STEPS
 from .observe import Values, observe
 from .restored import restored
 from .state import Settings, State
 from .system import System
+from .thresholds import FEWEST_STEPS_RK4
 
 COARSER = 100.0  # the companion's tolerance, in those of the delivered run
 MARGIN = 10.0  # a bar is so many times what the ratio of local errors leaves of a difference
@@ -60,7 +60,7 @@ def begun(state: State, names: Sequence[str]) -> Bars:
 def asked_step(settings: Settings, rate: float, span: float) -> float:
     """The fixed step [s] that was asked for: solver.step, or what the motion's natural rate says."""
     known = 0 < rate < math.inf
-    return settings.step or (1 / (FEWEST_STEPS * rate) if known else span / FEWEST_STEPS)
+    return settings.step or (1 / (FEWEST_STEPS_RK4 * rate) if known else span / FEWEST_STEPS_RK4)
 
 
 def paired_settings(settings: Settings, state: State, t_end: float) -> tuple[Settings, Settings]:

@@ -23,11 +23,9 @@ from .state import Settings, State
 from .stiffness import Choice
 from .straight import solver_of
 from .system import Matrix, System, Vector
+from .thresholds import FAR, FEWEST_STEPS_RK4, HOPELESS, LEAST_FAR
 
-FAR, LEAST_FAR = 1e3, 1e-6  # how far a projection may move the state: in tolerances, and at least
-HOPELESS = 1.0  # error of one rk4 step, relative to the state, at which it means nothing
 SHIFT = 2.0**-26  # of a size, for a difference quotient: half of a double's digits
-FEWEST_STEPS = 100  # rk4's steps in one natural time of the motion, unless solver.step is set
 AfterStep = Callable[[Any, State], tuple[float, float]]
 
 
@@ -179,7 +177,7 @@ class Leg:
 
     def stepper(self, t: float, y: Vector, t_bound: float, first_step: float | None) -> Any:
         if self.settings.method == "rk4" and not self.settings.step:
-            first_step = 1 / (FEWEST_STEPS * self.state.rate)
+            first_step = 1 / (FEWEST_STEPS_RK4 * self.state.rate)
         elif self.settings.method == "rk4":
             first_step = self.settings.step
         slope, scale = (self.rate, self.jacobian), shared(self.system, self.scale, y)

@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass, field, fields
 from .stiffness import Choice
 
 DEFAULT_TOLERANCE = 1e-8
-SMALLEST_TOLERANCE = 1e-14
 MAXIMUM_STEPS = 5000.0  # that make no headway, in one communication step
 
 

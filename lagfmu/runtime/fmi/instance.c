@@ -11,8 +11,8 @@
 #include "magnitudes.h"
 #include "outputs.h"
 #include "rates.h"
+#include "thresholds.h"
 
-static const double SMALLEST_TOLERANCE = 1e-14;
 
 /* ------------------------------------------------------------------ memory */
 

@@ -14,11 +14,8 @@
 #include "leg.h"
 #include "parts.h"
 #include "magnitudes.h"
+#include "thresholds.h"
 
-enum { CHATTER = 200 }; /* contact events in next to no time after which the step is given up */
-static const double PATIENCE = 200; /* steps after which one is judged by its average step */
-static const double STEP_LIMIT = 1e7; /* internal steps that a communication step may need */
-static const double TINY = 1e-6;      /* part of the natural time; a step shorter than this makes no headway */
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
 static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 
@@ -244,13 +241,13 @@ static Status check_headway(Solver *s, double t_end, double begun, int first) {
     const Integrator *i = &s->integrator;
     const double t = now->event_count > 0 ? now->event_time : i->t;
     const double done = now->steps - first, gone = t - begun, most = s->settings.maximum_steps;
-    if ((t - i->t_old) * now->rate < TINY) now->tiny += 1;
+    if ((t - i->t_old) * now->rate < HEADWAY) now->tiny += 1;
     if (most > 0 && now->tiny > most)
         return fail(&s->why,
                     "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
                     "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
                     "motion's natural time: is there a force that jumps to and fro?",
-                    t_end, t, most, TINY / now->rate, TINY);
+                    t_end, t, most, HEADWAY / now->rate, HEADWAY);
     if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone)
         return fail(&s->why,
                     "the communication step to t = %.17g s would need about %.0e internal "
@@ -317,7 +314,7 @@ Status solver_advance(Solver *s, double t_end) {
         int met;
         if (travel(s, t_end, begun, first, &met) != OK) return FAILED;
         if (!met) continue;
-        if (events == 0 || now->t - since >= 1e-9 / now->rate) {
+        if (events == 0 || now->t - since >= AT_ONCE / now->rate) {
             since = now->t;
             events = 0;
         }

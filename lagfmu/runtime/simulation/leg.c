@@ -10,13 +10,10 @@
 #include "parts.h"
 #include "sensitivity.h"
 #include "step_size.h"
+#include "thresholds.h"
 
-static const double FEWEST_STEPS_RK4 = 100;  /* in one natural time of the motion, 1/rate, ... */
 static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
 static const double SAFETY = 0.25; /* of the tolerance: errors of many steps add up */
-static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may move the state: times the
-                                                  * tolerance, and at least, relative to the state */
-static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the state: it means nothing */
 
 void leg_begin(Solver *s) {
     system_active(s->system, s->state.closed, s->active);

@@ -36,7 +36,7 @@ typedef struct {
     int *iwork_rub;
     Slide *trial_slides;       /* (frictions) of slides.c, with */
     double *work_slides;       /* (2 frictions + 5 n) */
-    int *iwork_slides;         /* (4 frictions + contacts) */
+    int *iwork_slides;         /* (4 frictions + 2 contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and switch.c */
     double *work_switch;       /* (m) of switch.c */
     double *work_impact;       /* of impact.c, see there */
