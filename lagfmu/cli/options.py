@@ -1,9 +1,10 @@
-"""Options of the commands that say what a scene needs, and the scene that they make."""
+"""Options that several commands have: of a run, and what a scene needs, with the scene that they make."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -85,6 +86,15 @@ ErrorBars = Annotated[
 Name = Annotated[
     str | None,
     typer.Option(help="Another name for the FMU.", rich_help_panel="What the scene needs"),
+]
+
+Tolerance = Annotated[
+    float | None, typer.Option(help="Relative tolerance: speed against accuracy.")
+]
+StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
+StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
+InputFile = Annotated[
+    Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
 ]
 
 

@@ -34,7 +34,7 @@ def advance(
 ) -> State:
     """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was.
 
-    `after_step`: with error bars (bars.py), what is done to the integrator after a step, and adds to
+    `after_step`: with error bars (bars.py), what is done to the integrator after a step, and makes of
     State.local.
     """
     begun = state.t
@@ -44,20 +44,7 @@ def advance(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
         )
     with np.errstate(all="ignore"):
-        inputs = system.inputs_at(u, 0.0)
-        if system.floors:  # the inputs may have been set
-            levels = levels_at(system, state.t, np.array(state.q), inputs, p)
-            state = replace(state, levels=levels)
-        at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
-        if system.contacts and system.prescribed:
-            state = at_contacts.released(at, state, state.span)
-        elif system.prescribed:  # whose place and rates may be others than it went by
-            q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
-            q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
-            state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
-        if system.frictions:
-            state = at_slides.renewed(at, state)
-            at = replace(at, slides=state.slides)
+        at, state = beginning(system, state, u, p)
         if is_incomplete(state):
             state = complete(at, settings, state, t_end - state.t)
         headway = Headway(settings, begun, t_end, state.rate)
@@ -71,6 +58,29 @@ def advance(
                     "chatter without end, or a force jumps to and fro"
                 )
     return replace(state, span=t_end - begun)
+
+
+def beginning(
+    system: System, state: State, u: Sequence[float], p: Sequence[float]
+) -> tuple[Instant, State]:
+    """What each step begins with: the inputs may have been set.  Levels of jumps are those of now, contacts
+    whose surface went away open, the others go with it; a prescribed motion may have another place and other
+    rates than it went by.  Raises StepFailureError."""
+    inputs = system.inputs_at(u, 0.0)
+    if system.floors:
+        levels = levels_at(system, state.t, np.array(state.q), inputs, p)
+        state = replace(state, levels=levels)
+    at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
+    if system.contacts and system.prescribed:
+        state = at_contacts.released(at, state, state.span)
+    elif system.prescribed:
+        q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
+        q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
+        state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
+    if system.frictions:
+        state = at_slides.renewed(at, state)
+        at = replace(at, slides=state.slides)
+    return at, state
 
 
 @dataclass
@@ -120,9 +130,9 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
         offered = solver.h_abs
         try:
             leg.step(solver)
+            before_it = local
             if leg.after_step is not None:
-                more = leg.after_step(solver, state)
-                local = local[0] + more[0], local[1] + more[1]
+                local = leg.after_step(solver, state, local)
             y1 = leg.project(solver.t, solver.y)
             if not (
                 leg.system.prescribed and t0 == leg.begun
@@ -139,6 +149,10 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
             event, before = at_events.first_event(leg, solver, t0, y0, y1, before, armed)
             if event is not None:
                 headway.check(t0, event[0])
+                if leg.after_step is not None:  # the way to the event counts, not the whole step
+                    leg.local = before_it
+                    leg.reach(t0, y0, event[0])
+                    local = leg.local
                 step = offered
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)

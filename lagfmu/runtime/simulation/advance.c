@@ -223,6 +223,7 @@ static Status meet(Solver *s) {
     double *y = s->work_advance;
     if (s->system->frictions > 0 && lose(s, t) != OK) return FAILED;
     if (leg_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
+    if (s->alike > 0) PARTS.at_event(s);
     put(s, t, y);
     s->state.now.step = i->t - i->t_old;
     if (s->state.now.choice.implicit) {
@@ -280,20 +281,21 @@ static Status complete_magnitudes(Solver *s, double span) {
     return magnitudes_complete(s, at, span);
 }
 
-/* The inputs may have been set: levels of jumps are those of now, contacts whose surface went away open,
- * the others go with it; a prescribed motion may have another place and other rates than it went by. */
-static Status follow_inputs(Solver *s) {
+Status solver_follow(Solver *s) {
     const System *system = s->system;
     if (!s->state.now.ahead)
         jumps_settle(s, leg_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
-    if (system->prescribed_count == 0) return OK;
-    if (system->contacts == 0)
-        system_active(system, s->state.closed, s->active);
-    else if (PARTS.switch_released(s, s->state.now.span) != OK)
-        return FAILED;
-    const Instant at = leg_instant(s, s->state.now.t);
-    return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                             s->state.size);
+    if (system->prescribed_count > 0) {
+        if (system->contacts == 0)
+            system_active(system, s->state.closed, s->active);
+        else if (PARTS.switch_released(s, s->state.now.span) != OK)
+            return FAILED;
+        const Instant at = leg_instant(s, s->state.now.t);
+        if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                              s->state.size) != OK)
+            return FAILED;
+    }
+    return system->frictions > 0 ? PARTS.slides->renew(s) : OK;
 }
 
 Status solver_advance(Solver *s, double t_end) {
@@ -307,8 +309,7 @@ Status solver_advance(Solver *s, double t_end) {
                     t_end);
     now->tiny = 0;
     resume(s);
-    if (follow_inputs(s) != OK) return FAILED;
-    if (s->system->frictions > 0 && PARTS.slides->renew(s) != OK) return FAILED;
+    if (solver_follow(s) != OK) return FAILED;
     if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
     while (now->t < t_end) {
         int met;

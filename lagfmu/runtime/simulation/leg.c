@@ -153,10 +153,13 @@ Status leg_check_projection(Solver *s, double t, const double *y, const double *
 Status leg_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
     Integrator *i = &s->probe;
     memcpy(y, y0, 2 * (size_t)s->system->n * sizeof *y);
+    memset(&s->local_trial, 0, sizeof s->local_trial);
     if (!(t1 > t0)) return OK;
     integrator_start(i, s->integrator.method, t0, y0, t1 - t0);
-    while (i->t < t1)
+    while (i->t < t1) {
         if (leg_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
+        if (s->alike > 0) PARTS.at_trial(s, i);
+    }
     memcpy(y, i->y, 2 * (size_t)s->system->n * sizeof *y);
     return leg_project(s, t1, y);
 }
