@@ -6,6 +6,7 @@ LAGFMU_GALLERY=hemisphere,belt builds the pages of these models alone, for a qui
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ import jupytext
 from mkdocs.structure.files import File, Files
 
 import lagfmu
-from lagfmu.model.file import load
 
 MODELS = Path(__file__).parent.parent / "models"
-PLACE = "<!-- models -->"
+MODEL = re.compile(r"\[([^\]]+)\]\(\.\./models/(\w+)\.py\)")
+NOTEBOOK = (
+    '`jupytext --to ipynb docs/tutorial.md` makes a notebook of it (`pip install -e ".[docs]"`)'
+)
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -30,14 +33,13 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The table of models in gallery.md."""
-    if PLACE not in markdown:
-        return markdown
-    rows = ["| | |", "| --- | --- |"]
-    for path in _models():
-        what = load(path).model.description
-        rows.append(f"| [{path.stem.replace('_', ' ')}](gallery/{path.stem}.html) | {what} |")
-    return markdown.replace(PLACE, "\n".join(rows))
+    """Links to model files, which the repository has, become links to the live pages, which the site has."""
+    made = {p.stem for p in _models()}
+
+    def link(found: re.Match[str]) -> str:
+        return f"[{found[1]}](gallery/{found[2]}.html)" if found[2] in made else found[1]
+
+    return MODEL.sub(link, markdown).replace(NOTEBOOK, "[tutorial.ipynb](tutorial.ipynb)")
 
 
 def notebook(text: str) -> str:

@@ -17,6 +17,7 @@ What both targets tell alike is told by native in every case, and in files or te
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -57,6 +58,15 @@ FILES = {
     "HalfCar": "half_car",
     "SlippingSphere": "rolling_sphere",  # friction: it rolls, slips, leaves
 }
+EVERY = {  # what is tried of every FMU of models/: that its page is the native FMU
+    **FILES,
+    "Belt": "belt",
+    "Bowling": "bowling",
+    "FallingRod": "falling_rod",
+    "FrictionOscillator": "friction_oscillator",
+    "InclineFriction": "incline_friction",
+    "RoughHemisphere": "rough_hemisphere",
+}
 # one of each kind: forces alone, multipliers eliminated, a contact and velocities, an input, a table and an
 # output and a prescribed motion, nothing left to integrate by rows
 KINDS = ("PendulumAngle", "Hemisphere", "KnifeEdge", "CartPendulum", "HalfCar", "BouncingBall")
@@ -87,7 +97,7 @@ def prepared() -> Callable[[str], Prepared]:
 
     def get(name: str) -> Prepared:
         if name not in made:
-            file = load(MODELS / f"{FILES[name]}.py")
+            file = load(MODELS / f"{EVERY[name]}.py")
             scene = next(s for s in file.scenes if s.name == name)
             made[name] = prepare(file.model, scene)
         return made[name]
@@ -107,7 +117,7 @@ def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _built(prepared: Callable[[str], Prepared], folder: Path, target: str) -> Fmu:
     def get(name: str) -> Path:
-        forms = load(MODELS / f"{FILES[name]}.py").closed_forms
+        forms = load(MODELS / f"{EVERY[name]}.py").closed_forms
 
         def make(place: Path) -> None:
             write(prepared(name), place, forms, target=target)
@@ -159,31 +169,32 @@ def fmu(target: str, request: pytest.FixtureRequest) -> Fmu:
 
 
 @pytest.fixture(scope="session")
-def playable(native_fmu: Fmu) -> Callable[[str], Playable]:
+def playable(native_fmu: Fmu, shared_folder: Path) -> Callable[[str], Playable]:
     """playable(NAME): the parts of the page of an FMU of models/, compiled once."""
     compiler = find_compiler()
     if compiler is None or not compiler.cross:
         pytest.skip("no ziglang: pip install -e '.[native]'")
-    made: dict[str, Playable] = {}
 
     def get(name: str) -> Playable:
-        if name not in made:
-            made[name] = playable_of(native_fmu(name))
-        return made[name]
+        def make(place: Path) -> None:
+            (place / "parts").write_bytes(pickle.dumps(playable_of(native_fmu(name))))
 
-    return get
+        made = once(shared_folder / f"playable-{name}", make) / "parts"
+        found: Playable = pickle.loads(made.read_bytes())
+        return found
+
+    return cache(get)
 
 
 @pytest.fixture(scope="session")
-def page_file(playable: Callable[[str], Playable], tmp_path_factory: pytest.TempPathFactory) -> Any:
+def page_file(playable: Callable[[str], Playable], shared_folder: Path) -> Any:
     """page_file(NAME): the page on disk."""
-    folder = tmp_path_factory.mktemp("pages")
 
     def get(name: str) -> Path:
-        path = folder / f"{name}.html"
-        if not path.exists():
-            path.write_text(render(playable(name)), encoding="utf-8")
-        return path
+        def make(place: Path) -> None:
+            (place / f"{name}.html").write_text(render(playable(name)), encoding="utf-8")
+
+        return once(shared_folder / f"page-{name}", make) / f"{name}.html"
 
     return get
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
+from instance import instance
 from runs import simulate_fmu
 from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
@@ -14,6 +16,7 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import (
     Contact,
     Friction,
+    Input,
     Model,
     Nonholonomic,
     Parameter,
@@ -119,19 +122,20 @@ def ball() -> Model:
     )
 
 
-Make = Callable[[Callable[[], Model]], Path]
+Make = Callable[..., Path]
 
 
 @pytest.fixture(scope="module")
 def native(tmp_path_factory: pytest.TempPathFactory) -> Make:
-    """native(model): path of its native FMU, built once."""
-    made: dict[Callable[[], Model], Path] = {}
+    """native(model[, target]): path of its native FMU, or of the other, built once."""
+    made: dict[tuple[Callable[[], Model], str], Path] = {}
 
-    def get(model: Callable[[], Model]) -> Path:
-        if model not in made:
+    def get(model: Callable[[], Model], target: str = "native") -> Path:
+        if (model, target) not in made:
             prepared = prepare(model(), Scene(model.__name__.title()))
-            made[model] = write(prepared, tmp_path_factory.mktemp("fmu"), (), target="native")
-        return made[model]
+            folder = tmp_path_factory.mktemp("fmu")
+            made[model, target] = write(prepared, folder, (), target=target)
+        return made[model, target]
 
     return get
 
@@ -241,6 +245,109 @@ def test_painleve_is_looked_for_with_each_foot_in_the_air(
         start(2.61)
 
 
+F, rise = dynamicsymbols("F"), symbols("rise")
+push = F + rise * dynamicsymbols._t
+
+
+def pushed() -> Model:
+    """A uniform rod of half length a that stands on its lower end, where F + rise t pushes it along x."""
+    return Model(
+        name="Pushed",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
+        + m * a**2 / 6 * theta.diff() ** 2
+        - m * G * y,
+        coordinates={x: "m", y: "m", theta: "rad"},
+        constraints=[
+            Contact("floor", y - a * sin(theta)),
+            Nonholonomic("foot", x.diff() + a * sin(theta) * theta.diff()),
+            Friction("grip", of=["foot"], normal=multiplier("floor"), static=mu),
+        ],
+        forces={x: push, theta: push * a * sin(theta)},
+        parameters=[
+            *MASS,
+            Parameter(mu, 0.5, "1"),
+            Parameter(a, 1.0, "m"),
+            Parameter(rise, 0.0, "N/s"),
+        ],
+        inputs=[Input(F, "N")],
+        start={y: 2 / 5**0.5, theta: float(np.arctan(2))},
+    )
+
+
+def accelerations(slope: float, force: float, friction: float) -> list[tuple[bool, float, float]]:
+    """All that Coulomb's and Signorini's laws allow the foot of the rod (m = a = 1) that stands still at
+    tan(theta) = slope: (does it part?, N, T)."""
+    s, c = slope / np.hypot(1, slope), 1 / np.hypot(1, slope)
+    nn, tt, nt = 1 + 3 * c * c, 1 + 3 * s * s, -3 * s * c  # G M^-1 G^T of normal and tangent
+    n, t = -g + nt * force, tt * force  # accelerations of the foot without the floor
+    found = [(True, 0.0, 0.0)] if n >= 0 else []
+    N, T = np.linalg.solve([[nn, nt], [nt, tt]], [-n, -t])
+    if N >= 0 and abs(T) <= friction * N:
+        found.append((False, N, T))
+    for way in (1, -1):
+        N = -n / (nn - way * friction * nt)
+        if N >= 0 and way * (t + (nt - way * friction * tt) * N) >= 0:
+            found.append((False, N, -way * friction * N))
+    return found
+
+
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_painleve_is_looked_for_both_ways_at_rest(native: Make, target: str) -> None:
+    """A rod at rest that is pushed at its foot: what has one acceleration is told as it is, however large
+    the friction; what has several (it sticks, slips into the floor, or is thrown off it) is refused."""
+    random, count = np.random.default_rng(1), {1: 0, 3: 0}
+    cases = [(2.0, 1.0 * g, 1.5), (2.0, 1.4 * g, 1.5), (2.0, -1.0 * g, 1.5), (2.0, 1.0 * g, 1.3)]
+    cases += [
+        (float(slope), float(weight) * g, float(friction))
+        for slope, weight, friction in random.uniform((0.3, -2, 0.2), (5, 2, 3), (60, 3))
+    ]
+    for slope, force, friction in cases if target == "native" else cases[:14]:
+        expected = accelerations(slope, force, friction)
+        theta0 = float(np.arctan(slope))
+        constant = np.array([(0.0, force), (1.0, force)], [("time", float), ("F", float)])
+        run = {
+            "start_values": {"theta": theta0, "y": float(np.sin(theta0)), "mu": friction},
+            "inputs": constant,
+            "stop_time": 1e-6,
+            "step_size": 1e-6,
+        }
+        fmu = (native(pushed),) if target == "native" else (pushed(),)
+        options = {} if target == "native" else {"scene": Scene("Pushed")}
+        count[len(expected)] += 1
+        if len(expected) > 1:
+            with pytest.raises(SimulationError, match="'grip': at rest it has several"):
+                simulate(*fmu, **options, **run)
+            continue
+        ((parts, N, T),) = expected
+        first = simulate(*fmu, **options, **run)[0]
+        assert first["contact.floor"] != parts, (slope, force, friction)
+        assert first["lambda.floor"] == pytest.approx(N, rel=1e-9, abs=1e-9)
+        assert first["lambda.foot"] == pytest.approx(T, rel=1e-9, abs=1e-9)
+    assert min(count.values()) > 0
+
+
+@pytest.mark.parametrize("target", ["native", "python"])
+@pytest.mark.parametrize("grows", [True, False])
+def test_what_leaves_its_cone_into_painleve_is_refused(
+    native: Make, target: str, grows: bool
+) -> None:
+    """A rod that begins to tip about its foot, tan(theta) = 2, needs 3/10 m g of friction there and has
+    N = 17/20 m g: pushed outwards it holds until that is mu N, mu = 1.5, less the former, and has not slipped
+    once.  There it would have to slip the way in which the normal force drives itself."""
+    edge = -(1.5 * 17 / 20 - 3 / 10) * g
+    with instance(native(pushed, target)) as one:
+        one.start({"mu": 1.5, "rise": edge / 1e-3 if grows else 0.0})
+        for part in range(9):
+            one.set("F", 0.0 if grows else 0.1 * part * edge)
+            one.step(1e-4)
+            assert one.get("sticks.grip")
+        assert one.get("slipping.grip.count") == 0
+        one.set("F", 0.0 if grows else 1.1 * edge)
+        with pytest.raises(FMICallException):
+            one.step(2e-4)
+        assert any("sliding has no acceleration, or several" in text for *_, text in one.log)
+
+
 @pytest.mark.parametrize(
     ("restitution", "friction"), [(0.0, 0.3), (0.5, 0.3), (0.0, 0.1), (1.0, 0.05)]
 )
@@ -298,3 +405,42 @@ def test_multipliers_that_are_shared_are_told() -> None:
     run = simulate(feet(), scene=Scene("Feet"), stop_time=0.1, step_size=0.1)
     assert not run["unique.low_rests"].any()
     assert not run["unique.up_rests"].any()
+
+
+def carried() -> Model:
+    """A block on a belt whose speed an importer sets."""
+    return Model(
+        name="Carried",
+        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * G * z,
+        coordinates={x: "m", z: "m"},
+        constraints=[
+            Contact("belt", z),
+            Nonholonomic("ride", x.diff() - F),
+            Friction("grip", of=["ride"], normal=multiplier("belt"), static=mu),
+        ],
+        parameters=[*MASS, Parameter(mu, 0.5, "1")],
+        inputs=[Input(F, "m/s")],
+    )
+
+
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_a_belt_that_jumps_away_is_slipped_on_until_the_block_has_its_speed(
+    native: Make, target: str
+) -> None:
+    """The belt is set from rest to v = 1 m/s at once: one start of slipping, which lasts v/(mu g), and gives
+    half of the work of the belt to the block."""
+    with instance(native(carried, target)) as one:
+        one.start({})
+        one.step(0.1)
+        assert one.get("sticks.grip")
+        one.set("F", 1.0)
+        one.step(0.1)
+        assert not one.get("sticks.grip")
+        assert one.get("slipping.grip.count") == 1
+        assert one.get("slipping.grip.time") == pytest.approx(0.1, abs=1e-15)
+        assert one.get("der(x)") == pytest.approx(0.05 * g, rel=1e-9)
+        one.step(0.2)
+        assert one.get("sticks.grip")
+        assert one.get("slipping.grip.count") == 1
+        assert one.get("x") == pytest.approx(0.3 - 1 / (2 * 0.5 * g), rel=1e-8)
+        assert one.get("energy.dissipated") == pytest.approx(0.5, rel=1e-8)

@@ -12,17 +12,30 @@ import numpy as np
 import pytest
 import sympy as sp
 from browser import Page
-from conftest import FILES, MODELS
+from conftest import MODELS
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Arrow, Disk, Holonomic, Line, Model, Parameter, Rod, Scene, Spline, output
+from lagfmu import (
+    Arrow,
+    Contact,
+    Disk,
+    Holonomic,
+    Line,
+    Model,
+    Parameter,
+    Rod,
+    Scene,
+    Spline,
+    output,
+)
 from lagfmu import Path as Curve
+from lagfmu.cli import film
 from lagfmu.errors import BuildError, ModelError
 from lagfmu.live.playable import playable as playable_of
 from lagfmu.live.render import render
 from lagfmu.model.file import load
 from lagfmu.page.picture import as_bytes, direction, pack, picture_of, read_picture, values
-from lagfmu.prepare.prepare import Prepared, prepare
+from lagfmu.prepare.prepare import prepare
 
 x, y, theta = dynamicsymbols("x y theta")
 L = sp.symbols("L", positive=True)
@@ -169,31 +182,6 @@ def test_every_model_has_a_picture(name: str) -> None:
     assert any(not isinstance(s, Arrow) for s in shapes)
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_the_mechanism_is_drawn(
-    name: str,
-    opened: Callable[..., Page],
-    prepared: Callable[[str], Prepared],
-    native_fmu: Callable[[str], Path],
-) -> None:
-    """At the start, in the middle and at the end every shape has its place on the screen, and the picture
-    in the FMU is the model's."""
-    picture = picture_of(prepared(name))
-    assert picture is not None
-    assert playable_of(native_fmu(name)).facts["picture"] == picture
-    page = opened(name)
-    page.until("lagfmu.runs")
-    for key in ("Home", "PageUp", "End"):
-        page.tab.locator("#scrub").focus()
-        page.tab.keyboard.press(key)
-        drawn = page.tab.evaluate("() => document.getElementById('picture').innerHTML")
-        assert "NaN" not in drawn
-        assert "Infinity" not in drawn
-    assert page.tab.evaluate("() => document.querySelectorAll('#picture *').length") >= len(
-        picture["shapes"]
-    )
-
-
 def test_the_arrow_is_as_long_as_the_force(opened: Callable[..., Page]) -> None:
     """At rest on top of the hemisphere the arrow says m g cos(theta0), upward; in flight there is none."""
     page = opened("Hemisphere")
@@ -209,7 +197,6 @@ def test_the_arrow_is_as_long_as_the_force(opened: Callable[..., Page]) -> None:
 
 def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
     """A spherical pendulum: z stays upward on the screen as the view is turned."""
-    from lagfmu.live.playable import playable as playable_of
 
     z = dynamicsymbols("z")
     m, g = sp.symbols("m g", positive=True)
@@ -247,6 +234,54 @@ def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
     assert places[0] != places[1]
     page.close()
     assert page.problems == []
+
+
+def test_a_slack_string_hangs(tmp_path: Path, browser: Any) -> None:
+    """A bob on a string of 1 m, thrown up from 0.5 m below its peg: until it falls into the string that hangs
+    below the straight line and is as long as ever, and at the end it is straight; in a film, too."""
+    m, g = sp.symbols("m g", positive=True)
+    model = Model(
+        name="Thrown",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+        coordinates={x: "m", y: "m"},
+        constraints=[Contact("string", L**2 - x**2 - y**2)],
+        parameters=[Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1, "m")],
+        start={x: 0.3, y: -0.5, y.diff(): 1.0},
+        picture=[Line((0, 0), (x, y), length=L), Disk((x, y))],
+    )
+    prepared = prepare(model, Scene("Thrown", stop_time=0.7, step_size=0.01))
+    out = tmp_path / "thrown.html"
+    out.write_text(render(playable_of(prepared)), encoding="utf-8")
+    page = Page(browser, out)
+    page.until("lagfmu.runs")
+    lengths, drops = [], []
+    for key in ("Home", "End"):
+        page.tab.locator("#scrub").focus()
+        page.tab.keyboard.press(key)
+        text = str(page.tab.locator("#picture .line").get_attribute("points"))
+        points = np.array([[float(n) for n in p.split(",")] for p in text.split()])
+        lengths.append(np.hypot(*np.diff(points, axis=0).T).sum())
+        drops.append(points[:, 1].max() - points[[0, -1], 1].max())  # pixels, down
+    page.close()
+    assert page.problems == []
+    assert lengths[0] == pytest.approx(lengths[1], rel=1e-3)
+    assert drops[0] > 10
+    assert drops[1] < 1
+    picture = picture_of(prepared)
+    assert picture is not None
+    assert read_picture(as_bytes(picture)) == picture
+    (string, _) = (
+        film._Moving(s, {"x": 0.3, "y": -0.5, "L": 1.0}.__getitem__, 1) for s in picture["shapes"]
+    )
+    hung = np.array(string.points)[:, 0]
+    assert np.hypot(*np.diff(hung, axis=0).T).sum() == pytest.approx(1.0, rel=1e-5)
+    assert hung[:, 1].min() < -0.55
+
+
+def test_a_length_is_that_of_a_string_between_two_points() -> None:
+    """A line through three points has none."""
+    with pytest.raises(ModelError, match="3 points and a length, expected two"):
+        pendulum(picture=[Line((0, 0), (x, y), (1, 1), length=L)])
 
 
 @pytest.mark.parametrize("ends", ["natural", "periodic"])

@@ -15,6 +15,7 @@ import pytest
 import typer.main
 from typer.testing import CliRunner
 
+import lagfmu
 from lagfmu import simulate, verify
 from lagfmu.cli.app import app
 from lagfmu.fmu.compiler import find_compiler
@@ -30,6 +31,7 @@ REPOSITORY = Path(__file__).parent.parent
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
 PAGES = sorted((REPOSITORY / "docs").glob("*.md"))
 TEXT = "\n".join([README, *(page.read_text(encoding="utf-8") for page in PAGES)])
+GALLERY = (REPOSITORY / "docs" / "gallery.md").read_text(encoding="utf-8")
 TUTORIAL = (REPOSITORY / "docs" / "tutorial.md").read_text(encoding="utf-8")
 
 
@@ -82,6 +84,41 @@ def test_the_commands_and_the_examples_run_as_printed(tmp_path, monkeypatch, pyt
             [sys.executable, "-c", block], capture_output=True, text=True, timeout=200, check=False
         )
         assert run.returncode == 0, run.stderr[-2000:]
+
+
+def test_the_pieces_of_a_model_are_what_they_say(tmp_path, monkeypatch):
+    """The blocks of Python that are part of a file: with the bead of the README, and with symbols of the
+    names that they take from the text around them, each one runs."""
+    from sympy import Abs, symbols
+    from sympy.physics.mechanics import dynamicsymbols
+
+    (tmp_path / "bead.py").write_text(BLOCKS[0], encoding="utf-8")
+    rows = ["way,height", *(f"{k},{0.01 * k}" for k in range(5))]
+    (tmp_path / "road.csv").write_text("\n".join(rows), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    around = {name: getattr(lagfmu, name) for name in lagfmu.__all__}
+    around |= {str(s.func): s for s in dynamicsymbols("x y z s theta")}
+    around |= {str(s): s for s in symbols("R L F mu_s mu_k", positive=True)}
+    around |= {"Abs": Abs, "Path": Path, "__file__": str(tmp_path / "model.py"), "lagfmu": lagfmu}
+    around |= {"damper": lagfmu.Spline("damper", [-1, 1], [-2, 2], "m/s", "N")}
+    around["model"] = load(REPOSITORY / "models" / "hemisphere.py").model
+    pieces = [
+        block
+        for page in (
+            "README.md",
+            *(f"docs/{name}.md" for name in ("error_bars", "friction", "outputs")),
+        )
+        for block in re.findall(
+            r"```python\n(.*?)```", (REPOSITORY / page).read_text("utf-8"), re.DOTALL
+        )
+        if "fmpy" not in block
+    ]
+    assert len(pieces) >= 7
+    for piece in pieces:
+        own = dict(around)
+        if "Model(\n    ...," in piece:  # a part of a model: its outputs alone
+            own["Model"] = lambda *_, **fields: fields
+        exec(piece, own)
 
 
 def test_the_bead_keeps_its_energy_and_its_wire(tmp_path):
@@ -154,6 +191,29 @@ def test_the_tutorial_runs_as_a_notebook(tmp_path, monkeypatch):
     assert any(page.startswith("<iframe") for page in pages)
 
 
+def test_every_public_name_stands_in_the_reference():
+    """What can be imported from lagfmu is documented under its name, once."""
+    told = re.findall(
+        r"^::: \S+\.(\w+)$", (REPOSITORY / "docs/reference.md").read_text(), re.MULTILINE
+    )
+    assert sorted(told) == sorted(lagfmu.__all__)
+
+
+def test_the_gallery_names_every_model():
+    """In the repository each row opens the model's file, and says what the model says of itself."""
+    rows = re.findall(r"^\| \[[^\]]+\]\(\.\./(\S+)\) \| (.*) \|$", GALLERY, re.MULTILINE)
+    files = sorted(p.relative_to(REPOSITORY) for p in (REPOSITORY / "models").glob("*.py"))
+    assert [Path(path) for path, _ in rows] == files
+    assert [text for _, text in rows] == [load(REPOSITORY / f).model.description for f in files]
+
+
+def test_links_of_the_pages_lead_somewhere():
+    """In the repository as it is cloned, before any site is built."""
+    for page in [REPOSITORY / "README.md", *PAGES]:
+        for link in re.findall(r"\]\(([^)#]+?)(?:#[\w-]+)?\)", page.read_text(encoding="utf-8")):
+            assert "://" in link or (page.parent / link).exists(), (page.name, link)
+
+
 def test_the_site_builds_strictly(tmp_path, monkeypatch):
     """Every page in the navigation, no broken link, every name of the reference documented; the gallery
     holds live pages (of two models here), the tutorial is there as a notebook."""
@@ -177,3 +237,4 @@ def test_the_site_builds_strictly(tmp_path, monkeypatch):
     assert "lagfmu" in (site / "gallery" / "belt.html").read_text(encoding="utf-8")
     assert 'href="hemisphere.html"' in (site / "gallery" / "index.html").read_text(encoding="utf-8")
     assert (site / "tutorial.ipynb").is_file()
+    assert 'href="../tutorial.ipynb"' in (site / "tutorial" / "index.html").read_text("utf-8")

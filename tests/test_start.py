@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linkages import pinned_rod
+from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
-from lagfmu import simulate
+from lagfmu import Model, Parameter, simulate
 from lagfmu.cli.app import app
-from lagfmu.errors import ModelError
+from lagfmu.errors import ModelError, SimulationError
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
 from lagfmu.prepare.prepare import prepare
@@ -99,6 +100,7 @@ def test_a_model_whose_own_start_contradicts_itself_is_not_built(tmp_path):
     text = str(refused.value)
     assert "start gives theta = 0.3" in text
     assert "start gives x = 0.5" in text
+    assert "misses the constraints ('pinx' by -0.217 m)" in text
     assert not list(tmp_path.iterdir())
 
 
@@ -120,3 +122,45 @@ def test_every_move_is_said_by_show_simulate_and_build(tmp_path):
         assert repr(near) in said, command
         assert "x = " in said, command
         assert "y has no start value" in said or "y is left out" in said, command
+
+
+def spherical(angle: float) -> Model:
+    """A spherical pendulum in the angle from below and the azimuth, which has no inertia below."""
+    phi = dynamicsymbols("phi")
+    m, g, length = symbols("m g l", positive=True)
+    speed = theta.diff() ** 2 + sin(theta) ** 2 * phi.diff() ** 2
+    return Model(
+        name="Spherical",
+        lagrangian=m * length**2 * speed / 2 + m * g * length * cos(theta),
+        coordinates={theta: "rad", phi: "rad"},
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(length, 1.0, "m"),
+        ],
+        start={theta: angle, phi.diff(): 0.5},
+    )
+
+
+def test_a_coordinate_without_inertia_is_named():
+    """Below the pivot the azimuth means nothing, m l^2 sin(theta)^2 = 0: the model is refused with phi, and
+    with what to do: elsewhere phi has inertia."""
+    with pytest.raises(ModelError, match=r"'phi' has neither mass .* elsewhere it has: start at"):
+        prepare(spherical(0.0))
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_start_without_inertia_is_refused_by_the_fmu(target, tmp_path):
+    """The same when an importer sets theta = 0: the FMU's message names phi."""
+    if target == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    fmu = write(prepare(spherical(0.5)), tmp_path, target=target)
+    with pytest.raises(SimulationError, match=r"a coordinate has no mass \(phi\)"):
+        simulate(fmu, start_values={"theta": 0.0})
+
+
+def test_a_start_in_parameters_is_no_number():
+    """x = l/2 cos(theta) as a start value: it would be wrong as soon as l is set; what to do is said."""
+    length = symbols("l", positive=True)
+    with pytest.raises(ModelError, match=r"start of x is the expression l/2, expected a number"):
+        pinned_rod({theta: 0.0, x: length / 2})

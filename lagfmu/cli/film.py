@@ -125,18 +125,34 @@ class _Moving:
         else:
             keys = shape.get("points") or [shape.get("center") or shape["at"]]
             self.points = [self._point(p, look)[0] for p in keys]
+            if "length" in shape:
+                self.points = self._hanging(keys, self._all(values(shape["length"], look)), look)
         single = {k: self._all(values(shape[k], look)) for k in ("radius", "angle") if k in shape}
         self.radius, self.angle = single.get("radius"), single.get("angle")
         self.force: Array | None = None
         if self.kind == "arrow":
             self.force, self.length = self._point(shape["vector"], look)
 
+    def _hanging(self, ends: Any, length: Array, look: Callable[[str], Any]) -> list[Array]:
+        """Points of a string, a parabola that is as long as it, or straight: as web/picture.js has them."""
+        a, b = (np.stack([self._all(values(e, look)) for e in end]) for end in ends)
+        part = np.linspace(0.0, 1.0, 25)[:, None, None]
+        low, high = np.zeros(self.frames), length.copy()
+        for _ in range(20):
+            sag = (low + high) / 2
+            points = _hung(a, b, sag, part)
+            short = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum(axis=0) < length
+            low, high = np.where(short, sag, low), np.where(short, high, sag)
+        return [self._seen(list(point))[0] for point in _hung(a, b, low, part)]
+
     def _all(self, value: Any) -> Array:
         return np.broadcast_to(np.asarray(value, dtype=float), (self.frames,))
 
     def _point(self, point: Any, look: Callable[[str], Any]) -> tuple[Array, Array]:
         """(frames, 2) in the plane that is seen, and (frames) the length of what was projected."""
-        parts = [self._all(values(e, look)) for e in point]
+        return self._seen([self._all(values(e, look)) for e in point])
+
+    def _seen(self, parts: list[Array]) -> tuple[Array, Array]:
         length = np.sqrt(sum(p**2 for p in parts))
         if len(parts) == 2:
             return np.stack(parts, axis=1), length
@@ -183,6 +199,13 @@ class _Moving:
         style = {"arrowstyle": "-|>", "color": FORCE, "lw": 2, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tip, at, arrowprops=style, annotation_clip=False)
         axes.annotate(f" {self.shape['name']} {size:.3g} N", tip, color=FORCE, fontsize=8)
+
+
+def _hung(a: Array, b: Array, sag: Array, part: Array) -> Array:
+    """(points, dimensions, frames): from a to b, the last dimension lowered by `sag` in the middle."""
+    points: Array = a + part * (b - a)
+    points[:, -1] -= 4 * sag * part[:, 0] * (1 - part[:, 0])
+    return points
 
 
 def _with(look: Callable[[str], Any], name: str, value: Any) -> Callable[[str], Any]:

@@ -43,8 +43,9 @@ def write(
     """
     if target not in TARGETS:
         raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
-    check_given(prepared.model.name, prepared.structure.start.moved)
-    tell(prepared.structure.start.moved)
+    moved, missed = prepared.structure.start.moved, prepared.structure.missed
+    check_given(prepared.model.name, moved, missed)
+    tell(moved)
     prepared = _as_built(prepared, target)
     extra = {
         PAGE: page(prepared, choice, bool(live)).encode(),

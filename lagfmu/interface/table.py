@@ -404,7 +404,8 @@ class _Builder:
                 text = f"velocity residual of {what}"
                 behind = self._rates(k)
             else:
-                text = f"position residual of {what}"
+                kind = "gap, zero while closed," if isinstance(c, Contact) else "position residual"
+                text = f"{kind} of {what}"
                 behind = self.symbols(self.eom.f[k])
             if c.name in self.eom.limited and not isinstance(c, Nonholonomic):
                 unit = unit.per_second()

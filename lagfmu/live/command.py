@@ -69,6 +69,7 @@ def _playable(target: Model | Path, scene: Scene | None) -> Playable:
         file = load(target)
         target, scene = file.model, scene or file.scenes[0]
     prepared = prepare(target, scene)
-    check_given(target.name, prepared.structure.start.moved)
-    tell(prepared.structure.start.moved)
+    moved = prepared.structure.start.moved
+    check_given(target.name, moved, prepared.structure.missed)
+    tell(moved)
     return playable(prepared)

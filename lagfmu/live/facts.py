@@ -13,7 +13,7 @@ import fmpy
 
 from .. import names
 from ..fmu.archive import pack
-from .markup import shown_name
+from ..model.units import for_reading
 
 NUMBERS = ("Real", "Integer", "Boolean")
 GROUPS = {  # by the kind of what a variable is of
@@ -21,7 +21,7 @@ GROUPS = {  # by the kind of what a variable is of
     **dict.fromkeys(names.OF_FRICTION, "Friction"),
     names.FORCE: "Generalized forces of constraint",
     names.ENERGY: "Energies",
-    **dict.fromkeys((names.RESIDUAL, names.UNIQUE), "Residuals"),
+    **dict.fromkeys((names.RESIDUAL, names.UNIQUE), "Residuals, zero where a constraint acts"),
     **dict.fromkeys((names.CONTACT, names.DEPARTURE), "Contacts and departures"),
     names.ERROR: "Error bars",
     names.SOLVER: "Solver",
@@ -50,7 +50,8 @@ def facts(description: bytes, picture: dict[str, Any] | None) -> dict[str, Any]:
 
 
 def _variable(v: Any, named: set[str]) -> dict[str, Any]:
-    """One variable.  `column`: a run records it; `event`: the count of an event whose time is known."""
+    """One variable.  `column`: a run records it; `event`: the count of an event whose time is known;
+    `counted`: the count without which it says nothing (names.counted)."""
     role = _role(v)
     return {
         "name": v.name,
@@ -58,7 +59,7 @@ def _variable(v: Any, named: set[str]) -> dict[str, Any]:
         "type": v.type,
         "role": role,
         "group": _group(v, role, named),
-        "unit": shown_name(v.unit),
+        "unit": for_reading(v.unit),
         "start": _number(v),
         "items": _items(v),
         "min": None if v.min is None else float(v.min),
@@ -67,6 +68,7 @@ def _variable(v: Any, named: set[str]) -> dict[str, Any]:
         "column": v.causality == "output" and v.type in NUMBERS,
         "discrete": v.variability == "discrete",
         "event": names.read(v.name).quantity in (names.DEPARTURES, names.SLIPS),
+        "counted": count if (count := names.counted(v.name)) in named else "",
     }
 
 
@@ -98,6 +100,8 @@ def _group(v: Any, role: str, named: set[str]) -> str:
     of = names.read(v.name)
     if of.quantity == names.FORCE and of.constraint:
         return "Forces of each constraint"
+    if of.quantity == names.RESIDUAL and names.name(names.CONTACT, of.constraint) in named:
+        return "Gaps of contacts"
     if of.head in GROUPS:
         return GROUPS[of.head]
     if of.order:

@@ -10,7 +10,6 @@ import lxml.html
 from lxml import etree
 from markupsafe import Markup, escape
 
-SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 KNOWN_TAGS = (
     "math mrow mi mo mn ms mtext mspace msup msub msubsup mfrac msqrt mroot mover munder munderover "
     "mtable mtr mtd mstyle mpadded mphantom mfenced menclose"
@@ -23,14 +22,6 @@ TAGS, ATTRIBUTES = frozenset(KNOWN_TAGS.split()), frozenset(KNOWN_ATTRIBUTES.spl
 VALUE = re.compile(r"[\w .%+|(){}\[\]-]*\Z")
 
 Section = tuple[str, str, list[tuple[str, Markup, str]]]  # title, remark, (label, MathML, text)
-
-
-def shown_name(unit: str | None) -> str:
-    """A unit for reading: kg·m² for kg.m2; nothing for a plain number."""
-    if unit is None or unit == "1":
-        return ""
-    name = re.sub(r"(?<=[A-Za-z])(-?\d+)", lambda m: m[1].translate(SUPERSCRIPT), unit)
-    return name.replace(".", "·")
 
 
 def as_json(value: Any) -> Markup:

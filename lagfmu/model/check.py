@@ -122,6 +122,13 @@ def _check_start(
                 f"{what} names {plain(state)}, which is neither a coordinate nor the first "
                 "derivative of one"
             )
+        if isinstance(value, sp.Basic) and value.free_symbols:
+            problems.append(
+                f"{what} of {plain(state)} is the expression {plain(value)}, expected a number, because "
+                "parameters can be set in the FMU: write its value, or leave it out: what is left out "
+                "follows from the constraints, also where an importer changes a parameter"
+            )
+            continue
         _finite(f"{what} of {plain(state)}", value, problems)
 
 

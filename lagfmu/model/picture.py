@@ -21,12 +21,17 @@ Point = tuple[Expr, ...]
 
 @dataclass(frozen=True, init=False)
 class Line:
-    """A thin line through points: a string, a wire, the outline of a cart."""
+    """A thin line through points: a string, a wire, the outline of a cart.
+
+    A string between two points that has a `length` [m] hangs slack where they are nearer than that.
+    """
 
     points: tuple[Point, ...]
+    length: Expr | None
 
-    def __init__(self, *points: Point) -> None:
+    def __init__(self, *points: Point, length: Expr | None = None) -> None:
         object.__setattr__(self, "points", points)
+        object.__setattr__(self, "length", length)
 
 
 @dataclass(frozen=True)
@@ -125,6 +130,11 @@ def check_picture(model: ModelFields, problems: list[str]) -> None:
         sizes |= {len(p) for p in points_of(shape)}
         if isinstance(shape, Line) and len(shape.points) < 2:
             problems.append(f"{what}: {len(shape.points)} points, expected two or more")
+        if isinstance(shape, Line) and shape.length is not None and len(shape.points) > 2:
+            problems.append(
+                f"{what}: {len(shape.points)} points and a length, expected two: what hangs slack is a "
+                "string between two points"
+            )
         if isinstance(shape, Arrow):
             _check_arrow(model, shape, what, problems)
         problems += [
@@ -163,6 +173,8 @@ def expressions_of(shape: Shape) -> Iterator[Expr]:
         yield from (sp.sympify(x) for x in point)
     if isinstance(shape, Disk):
         yield from (sp.sympify(x) for x in (shape.radius, shape.angle) if x is not None)
+    if isinstance(shape, Line) and shape.length is not None:
+        yield sp.sympify(shape.length)
     if isinstance(shape, Path):
         yield from (sp.sympify(x) for x in (shape.first, shape.last))
 

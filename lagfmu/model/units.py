@@ -28,6 +28,7 @@ from ..errors import UnitError
 from .parts import Expr
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
+SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _EXAMPLES = "'m', 'rad', 'N.m', 'm/s2', 'kg.m2' or '1'"
 _REGISTRY: pint.UnitRegistry[Any] = pint.UnitRegistry()
 _REGISTRY.define("@alias ohm = Ohm")
@@ -137,6 +138,14 @@ ONE = _unit({})
 SECOND, METRE, ENERGY, POWER, FORCE = (
     _unit({name: Fraction(1)}) for name in ("s", "m", "J", "W", "N")
 )
+
+
+def for_reading(name: str | None) -> str:
+    """An FMU's name of a unit as people write it: kg·m² for kg.m2; nothing for a plain number."""
+    if name is None or name == "1":
+        return ""
+    name = re.sub(r"(?<=[A-Za-z])(-?\d+)", lambda m: m[1].translate(SUPERSCRIPT), name)
+    return name.replace(".", "·")
 
 
 def parse_unit(text: str, what: str) -> Unit:

@@ -19,11 +19,11 @@ from markupsafe import Markup
 from .. import names
 from ..interface.variables import Variable
 from ..model.model import Contact, Holonomic, Nonholonomic
-from ..model.units import Unit
+from ..model.units import Unit, for_reading
 from ..prepare.prepare import Prepared
 from ..solver.precedence import OMITTED
 from .savings import savings
-from .typeset import SUPERSCRIPT, typeset
+from .typeset import typeset
 
 MEANING = {
     "multipliers": "Lagrange's equations and the constraints, differentiated to accelerations, are "
@@ -139,10 +139,7 @@ def mathml(latex: str) -> Markup:
 
 def shown(unit: Unit | None) -> str:
     """A unit for reading: kg·m² for kg.m2; nothing for a plain number."""
-    if unit is None or unit.name == "1":
-        return ""
-    name = re.sub(r"(?<=[A-Za-z])(\d+)", lambda m: m[1].translate(SUPERSCRIPT), unit.name)
-    return name.replace(".", "·")
+    return for_reading(None if unit is None else unit.name)
 
 
 def _grouped(variables: Sequence[Variable]) -> list[tuple[str, str, list[Line]]]:

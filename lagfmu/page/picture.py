@@ -52,7 +52,7 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     **{"min": lambda *x: np.minimum.reduce(x), "max": lambda *x: np.maximum.reduce(x)},
 }
 FIELDS = {  # kind -> names of its points, lists of points, single expressions, and the rest
-    "line": ((), ("points",), (), ()),
+    "line": ((), ("points",), ("length",), ()),
     "rod": ((), ("points",), (), ()),
     "spring": ((), ("points",), (), ("coils",)),
     "ground": ((), ("points",), (), ()),
@@ -98,7 +98,8 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
         return [expression(x) for x in p]
 
     if isinstance(shape, Line):
-        return {"kind": "line", "points": [point(p) for p in shape.points]}
+        slack = {} if shape.length is None else {"length": expression(sp.sympify(shape.length))}
+        return {"kind": "line", "points": [point(p) for p in shape.points], **slack}
     if isinstance(shape, Rod):
         return {"kind": "rod", "points": [point(shape.start), point(shape.end)]}
     if isinstance(shape, Ground):
@@ -182,7 +183,7 @@ def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
 def _names(packed: Any) -> set[str]:
     """The variables of a shape, and what its path runs over."""
     if isinstance(packed, Mapping):
-        keys = ("points", "center", "radius", "angle", "point", "range", "at", "vector")
+        keys = ("points", "length", "center", "radius", "angle", "point", "range", "at", "vector")
         return set().union(*(_names(packed[k]) for k in keys if k in packed))
     if isinstance(packed, str):
         return set() if packed in OPERATIONS else {packed}

@@ -28,6 +28,7 @@ from ..mechanics.formulations.nullspace import lambda_free, largest_group
 from ..model.model import Contact, Nonholonomic
 from ..model.parts import Expr
 from ..model.reactions import multiplier
+from ..model.units import SUPERSCRIPT
 from ..names import derivative, read
 
 Printed = tuple[str, str]  # LaTeX, text
@@ -36,7 +37,6 @@ LONGEST = 500  # operations beyond which an expression is not printed
 MINORS = 3  # constraints in one group beyond which lambda is not eliminated in symbols
 GREEK = {*greeks, *(name.capitalize() for name in greeks), "lambda", "Lambda"}
 PARTS = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
-SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 DOTS = ("", "\u0307", "\u0308", "\u20db")
 

@@ -19,20 +19,24 @@ from ..errors import DerivationError, ModelError
 from ..interface.variables import VariableTable
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
-from ..names import derivative
+from ..model.units import ONE, for_reading
+from ..names import RESIDUAL, derivative, motion, name
 from ..solver.afar import project_from_afar
 from ..solver.failure import OmittedStartError, StepFailureError
 from ..solver.initial import Start, start
 from ..solver.instant import Instant
 from ..solver.jumps import levels_at
+from ..solver.magnitudes import Mask
 from ..solver.observe import expand, observe
-from ..solver.solution import RANK
+from ..solver.precedence import GIVEN
 from ..solver.state import Settings
-from ..solver.system import Matrix, System, Vector
+from ..solver.system import NONHOLONOMIC, Matrix, System, Vector
+from ..solver.thresholds import RANK
 from .diagnosis import cause_of_failure, negative_energy
 from .starts import ranks
 
 TRIALS = 5
+MISSED = 1e-9  # part of a constraint's terms by which it is missed
 
 
 class RedundantConstraintWarning(UserWarning):
@@ -42,7 +46,7 @@ class RedundantConstraintWarning(UserWarning):
 @dataclass(frozen=True)
 class Structure:
     """n, m, rank of G with all constraints acting, degrees of freedom, redundant constraints, all whose
-    multipliers are not unique, start."""
+    multipliers are not unique, start, and the constraints that the given start values miss, in words."""
 
     n: int
     m: int
@@ -50,6 +54,7 @@ class Structure:
     redundant: tuple[str, ...]
     shared: tuple[str, ...]
     start: Start
+    missed: tuple[str, ...]
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -102,7 +107,44 @@ def examine(
             RedundantConstraintWarning,
             stacklevel=3,
         )
-    return Structure(eom.n, eom.m, rank, redundant, shared, begun)
+    missed = _missed(table, system, begun, u, p)
+    return Structure(eom.n, eom.m, rank, redundant, shared, begun, missed)
+
+
+def _missed(
+    table: VariableTable, system: System, begun: Start, u: Sequence[float], p: Sequence[float]
+) -> tuple[str, ...]:
+    """The constraints that act at the start and that the values of the model miss: by how much."""
+    n, rows = system.n, system.active(begun.state.closed)
+    q, v = np.array(begun.state.q), np.array(begun.state.v)
+    free = np.ones(2 * n, dtype=bool)  # nobody said what these are: they follow
+    for j, state in enumerate(motion(system.coordinates)):
+        free[j] = not table[state].given
+    place = {state: j for j, state in enumerate(motion(system.coordinates))}
+    for m in begun.moved:
+        if m.rank == GIVEN:
+            (q if place[m.name] < n else v)[place[m.name] % n] = m.given
+    levels = levels_at(system, 0.0, q, u, p)
+    at = Instant(system, 0.0, [*system.inputs_at(u, 0.0), *levels], p)
+    _, _, G, nu, _ = at.evaluate(q, v)
+    places = _uncured(at.residual(q)[rows], G[rows], np.abs(q), free[:n])
+    rates = _uncured((G @ v - nu)[rows], G[rows], np.abs(v), free[n:])
+    units = {r.name: r.unit or ONE for r in table.those(RESIDUAL)}
+    found = []
+    for k, place_by, rate_by in zip(rows, places.tolist(), rates.tolist(), strict=True):
+        unit = units.get(name(RESIDUAL, system.rows[k].name), ONE)
+        if rate_by and not place_by and system.rows[k].kind != NONHOLONOMIC:
+            unit = unit.per_second()
+        if by := place_by or rate_by:
+            found.append(f"{system.rows[k].name!r} by {by:.3g} {for_reading(unit.name)}".rstrip())
+    return tuple(found)
+
+
+def _uncured(miss: Vector, G: Matrix, size: Vector, free: Mask) -> Vector:
+    """What is left of a miss (rows) once the free values (n) have followed; 0 for rounding."""
+    follow = np.linalg.lstsq(G[:, free], miss, rcond=RANK)[0] if free.any() else np.zeros(0)
+    left = miss - G[:, free] @ follow
+    return np.where(np.abs(left) > MISSED * (np.abs(G) @ size), left, 0.0)
 
 
 def _begun(

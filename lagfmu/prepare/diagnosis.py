@@ -12,8 +12,8 @@ import numpy as np
 from ..solver.afar import project_from_afar
 from ..solver.failure import StepFailureError
 from ..solver.instant import Instant
-from ..solver.solution import RANK
 from ..solver.system import Matrix, System, Vector
+from ..solver.thresholds import RANK
 
 NEGATIVE = 1e-12  # a mass below this fraction of its neighbours' is rounding
 INDEFINITE = 1e-8  # an eigenvalue of the scaled mass matrix above -this is rounding
@@ -44,9 +44,14 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
         rows = list(system.permanent)
         loose = _massless(system, M, G[rows])
         if loose:
+            remedy = "give it a mass, or a constraint"
+            aside = q + 0.1 * np.maximum(np.abs(q).max(initial=0.0), 1.0)
+            M, _, G, _, _ = at.evaluate(aside, v)
+            if not _massless(system, M, G[rows]):
+                remedy = f"elsewhere it has: start at another place than {values}, or take other coordinates"
             return (
                 f"the mass matrix is singular on the constraint surface: {loose} has neither mass "
-                "nor a constraint that determines its acceleration; give it a mass, or a constraint"
+                f"nor a constraint that determines its acceleration; {remedy}"
             )
         if _projected(at, q, v, rows) is None:
             return _missed(at, q, v, rows, f, values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..errors import ModelError
@@ -39,15 +39,18 @@ def tell(moved: Iterable[Moved | str]) -> None:
         warnings.warn(str(m), StartMovedWarning, stacklevel=3)
 
 
-def check_given(model: str, moved: Iterable[Moved]) -> None:
-    """Raises ModelError naming the values in the model's `start` that miss the constraints, all at once."""
+def check_given(model: str, moved: Iterable[Moved], missed: Sequence[str]) -> None:
+    """Raises ModelError naming the values in the model's `start` that miss the constraints, all at once.
+
+    `missed`: the constraints that they miss, and by how much.
+    """
     wrong = [m for m in moved if m.rank == GIVEN and abs(m.used - m.given) > ALLOWED * m.size]
     if wrong:
         raise ModelError(
             model,
             [
-                f"start gives {m.name} = {m.given!r}, which misses the constraints; the nearest "
-                f"start that satisfies them has {m.used!r}: correct the start, or leave it out"
+                f"start gives {m.name} = {m.given!r}, which misses the constraints ({', '.join(missed)}); "
+                f"the nearest start that satisfies them has {m.used!r}: correct the start, or leave it out"
                 for m in wrong
             ],
         )

@@ -2,6 +2,7 @@
 
 from .rubbing import rubbed
 from .slides import (
+    Contacts,
     begun,
     dissipated,
     indicators,
@@ -14,6 +15,7 @@ from .slides import (
 )
 
 __all__ = [
+    "Contacts",
     "begun",
     "dissipated",
     "indicators",

@@ -2,9 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class StepFailureError(Exception):
     """A numerical or physical reason for which the solver refuses to go on."""
+
+
+class MasslessError(StepFailureError):
+    """Coordinates, by number, of which nothing says how they accelerate; the message lacks their names."""
+
+    def __init__(self, message: str, coordinates: Sequence[int]) -> None:
+        super().__init__(message)
+        self.coordinates = tuple(coordinates)
+
+    def named(self, names: Sequence[str]) -> StepFailureError:
+        """The same, with the names of the coordinates of the system."""
+        return StepFailureError(f"{self} ({', '.join(names[j] for j in self.coordinates)})")
 
 
 class StartFailureError(StepFailureError):

@@ -19,13 +19,13 @@ from .afar import project_from_afar, velocities_from_afar
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .jumps import levels_at, settled
-from .magnitudes import TOUCH, complete, motion_speeds, sizes
+from .magnitudes import complete, motion_speeds, sizes
 from .motion import EPS, project
 from .precedence import GIVEN, OMITTED
 from .state import Departure, Settings, State
 from .system import Matrix, System, Vector
+from .thresholds import LARGEST_ANGLE, TOUCH
 
-LARGEST_ANGLE = 1e-3 / EPS  # [rad] beyond which neighbouring numbers are more than 1e-3 rad apart
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
 
 
@@ -128,7 +128,8 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
             return at_contacts.complementary_modes(at, q, v, shut, touching)
 
         at = replace(at, slides=at_slides.begun(at, q, v, size))
-        at, modes = at_slides.settle(at, q, v, modes, contacts_at)
+        contacts = at_slides.Contacts(contacts_at, contacts_at, touching)
+        at, modes = at_slides.settle(at, q, v, modes, contacts)
         limited = [row.friction is not None for row in system.rows]
         offset = np.where(limited, at.residual(q), 0.0)
     q, v = project(at, q, v, system.active(modes), offset, size, dependent=True)
@@ -234,7 +235,7 @@ def _velocities(
     M, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
     unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)
-    missed = [k for k in rows if abs(G[k] @ v - nu[k]) > 1e-9 * unit[k]]
+    missed = [k for k in rows if abs(G[k] @ v - nu[k]) > TOUCH * unit[k]]
     if missed:
         names = ", ".join(repr(system.rows[k].name) for k in missed)
         raise StartFailureError(

@@ -14,11 +14,14 @@ from __future__ import annotations
 import numpy as np
 
 from . import dependent
-from .failure import StepFailureError
+from .failure import MasslessError, StepFailureError
 from .kkt import kkt
 from .schur import schur
-from .solution import ON, Solution, loose
+from .solution import Solution, loose
 from .system import Matrix, Vector
+from .thresholds import ON_CONSTRAINTS
+
+TAKES_PART = 1e-6  # part of a motion by which a coordinate counts as moving
 
 
 def solve(
@@ -39,17 +42,24 @@ def solve(
     found = schur(M, b, G, c, least) or kkt(M, b, G, c, least)
     if found is None:
         if dependent.orthogonal is None:
-            raise StepFailureError(
-                "the mass matrix is singular at this state: a coordinate has no mass"
+            raise MasslessError(
+                "the mass matrix is singular at this state: a coordinate has no mass", _massless(M)
             )
         found = dependent.orthogonal(M, b, G, c, nearest, off)
     return _finite(found)
 
 
+def _massless(M: Matrix) -> list[int]:
+    """The coordinates that take part in the motion with the least kinetic energy, masses scaled to 1."""
+    size = np.sqrt(np.where(M.diagonal() > 0, M.diagonal(), 1.0))
+    motion = np.linalg.eigh(M / size / size[:, None])[1][:, 0]
+    return [int(j) for j in np.flatnonzero(np.abs(motion) > TAKES_PART)]
+
+
 def solve_nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector, off: float = 0.0) -> Solution:
     """The same by nullspace.py, where that is safe."""
     _check_finite(M, b, G, c)
-    found = dependent.nullspace(M, b, G, c) if len(G) and off <= ON else None
+    found = dependent.nullspace(M, b, G, c) if len(G) and off <= ON_CONSTRAINTS else None
     return solve(M, b, G, c, off=off) if found is None else _finite(found)
 
 

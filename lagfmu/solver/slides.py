@@ -6,13 +6,16 @@ s' = G_t vdot - gamma_t of the equations of sliding.  For one row that is a choi
 root on the circle, the one nearest to "against lambda_t".  All frictions that stand at s = 0 are settled
 together: the worst slips first; where that goes wrong, every combination is tried, most sticking first
 (Pfeiffer & Glocker 1996, chs. 5 and 6).
+
+Where sliding one way is Painleve's paradox, a body at rest may have several accelerations: it sticks, or its
+contact opens (Genot & Brogliato 1999).  Both are looked at wherever the one or the other begins.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,20 +30,42 @@ from .painleve import paradox
 from .ranges import Range, first_of_frictions
 from .state import Departure, Slide, State
 from .system import Matrix, System, Vector
+from .thresholds import (
+    SLIDES_ANGLES,
+    SLIDES_BACK,
+    SLIDES_JUMP,
+    SLIDES_MOST,
+    SLIDES_ROUNDS,
+    SLIDES_SLACK,
+)
 
-MOST = 6  # frictions whose combinations are tried one by one
-SLACK = 1e-12  # of the cone, and of the slip velocities that rounding leaves
-BACK = 1e-9  # of the accelerations at work, against its own direction, that counts as none
-JUMP = 1e3  # times the noise: a slip velocity that no rounding makes
-ANGLES = 48  # directions that are tried on the circle
-ROUNDS = 50
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)  # of the work done by friction within a step
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """The contacts at a state, for given frictions and from a guess of their modes.
+
+    settled(at, closed): the modes; complementary(at, closed): by the accelerations alone; `touching` and
+    `leaving`: positions, as in contacts.py.
+    """
+
+    settled: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]]
+    complementary: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]]
+    touching: Collection[int]
+    leaving: Collection[int] = ()
 
 
 def noises(system: System, G: Matrix, nu: Vector, speed: Vector) -> Vector:
     """The slip velocity [m/s] of each friction that rounding of velocities of the size `speed` makes."""
     unit = np.abs(G) @ np.abs(speed) + np.abs(nu)
-    return np.array([SLACK * unit[list(f.rows)].sum() for f in system.frictions])
+    return np.array([SLIDES_SLACK * unit[list(f.rows)].sum() for f in system.frictions])
+
+
+def _noises(at: Instant, q: Vector, v: Vector, state: State) -> Vector:
+    """That of the motion as it is."""
+    _, _, G, nu, _ = at.evaluate(q, v)
+    return noises(at.system, G, nu, np.maximum(np.abs(v), np.array(state.size) * state.rate))
 
 
 def begun(at: Instant, q: Vector, v: Vector, size: Vector) -> tuple[Slide, ...]:
@@ -69,19 +94,21 @@ def settle(
     q: Vector,
     v: Vector,
     closed: tuple[bool, ...],
-    contacts: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]],
+    contacts: Contacts,
     ended: Collection[int] = (),
     begins: Collection[int] = (),
 ) -> tuple[Instant, tuple[bool, ...]]:
     """The modes of frictions and contacts together: the instant with its frictions, and the contacts.
 
-    `contacts` settles those for given frictions.  `ended`: frictions whose slip velocity has just come to
-    zero; `begins`: those that have just reached the edge of their cone, where rounding must not decide.
+    `ended`: frictions whose slip velocity has just come to zero; `begins`: those that have just reached
+    the edge of their cone, where rounding must not decide.
     """
-    for _ in range(ROUNDS):
+    stuck = [slide.sticks for slide in at.slides]
+    for _ in range(SLIDES_ROUNDS):
         at = replace(at, slides=_choose(at, q, v, closed, ended, begins))
-        found = contacts(at, closed)
+        found = contacts.settled(at, closed)
         if found == closed:
+            _check_rest(at, q, v, closed, stuck, contacts)
             return at, closed
         closed = found
     raise StepFailureError(
@@ -109,7 +136,7 @@ def _choose(
     for i, slide in enumerate(at.slides):
         length = float(np.hypot(s[i, 0], s[i, 1]))
         still = length <= slide.noise
-        still |= (slide.sticks or i in ended) and length <= JUMP * slide.noise
+        still |= (slide.sticks or i in ended) and length <= SLIDES_JUMP * slide.noise
         if on[i] and still:
             resting.append(i)
         else:
@@ -118,6 +145,45 @@ def _choose(
     if not resting:
         return _signed(now, slides)
     return _Rest(now, resting, slides, begins).settled()
+
+
+def _check_rest(
+    at: Instant,
+    q: Vector,
+    v: Vector,
+    closed: tuple[bool, ...],
+    stuck: Sequence[bool],
+    contacts: Contacts,
+) -> None:
+    """Raises StepFailureError if a friction at rest that begins to stick might as well let its contact
+    open, or one whose contact is open might as well stick.  `stuck`: those that stuck before."""
+    system = at.system
+    _, _, G, nu, _ = at.evaluate(q, v)
+    s = slip_velocity(system, G, v, nu)
+    on = loaded(system, system.active(closed))
+    for i, (f, slide) in enumerate(zip(system.frictions, at.slides, strict=True)):
+        if not f.gated or (stuck[i] if on[i] else not np.hypot(*s[i]) <= slide.noise):
+            continue
+        own = {c for c, k in enumerate(system.contacts) if k in f.normal and c in contacts.touching}
+        if not own or own & {*contacts.leaving} or (on[i] and not slide.sticks):
+            continue
+        other = tuple(not on[i] if c in own else shut for c, shut in enumerate(closed))
+        slides = list(at.slides)
+        slides[i] = replace(slide, sticks=not on[i])
+        trial = replace(at, slides=tuple(slides))
+        try:
+            if contacts.complementary(trial, other) != other:
+                continue
+            now = motion(trial, q, v, system.active(other))
+        except StepFailureError:
+            continue
+        if on[i] or now.press.reserve[i] >= 0:
+            raise StepFailureError(
+                f"friction {f.name!r}: at rest it has several accelerations at t = {float(at.t)!r} s: it "
+                "sticks, or its contact opens (Painleve's paradox: in one direction of slip the normal "
+                "force would drive itself): use a smaller coefficient of friction, or let the bodies "
+                "deform (a spring in the contact)"
+            )
 
 
 class _Now:
@@ -150,7 +216,7 @@ def _pulling(now: _Now, found: Motion, slides: Sequence[Slide]) -> list[int]:
         for i, slide in enumerate(slides)
         if not slide.sticks
         and not frictions[i].gated
-        and found.press.normal[i] < -SLACK * abs(found.lam).max(initial=0.0)
+        and found.press.normal[i] < -SLIDES_SLACK * abs(found.lam).max(initial=0.0)
     ]
 
 
@@ -169,19 +235,21 @@ class _Rest:
         held = self.now.motion(stuck)
         against = {i: self._against(held, i) for i in self.resting}
         sticking = [i for i in self.resting if i not in self.begins]
+        if self.begins:  # beyond its cone it slips against lambda_t, or not at all
+            _signed(self.now, self._with(sticking, against))
         while True:  # the worst slips first
             found = self._trial(sticking, against)
             if found is None:
                 break
             slides, now = found
-            over = [i for i in sticking if now.press.reserve[i] < -SLACK]
+            over = [i for i in sticking if now.press.reserve[i] < -SLIDES_SLACK]
             if not over:
                 return slides
             worst = min(over, key=lambda i: now.press.reserve[i])
             against[worst] = self._against(now, worst)
             sticking = [i for i in sticking if i != worst]
         for slides, now in self._all(against):
-            if all(now.press.reserve[i] >= -SLACK for i in self.resting if slides[i].sticks):
+            if all(now.press.reserve[i] >= -SLIDES_SLACK for i in self.resting if slides[i].sticks):
                 return slides
         raise paradox(self.now.at, self.resting, 0.0)
 
@@ -210,7 +278,7 @@ class _Rest:
         towards = dict(guess)
         slipping = [i for i in self.resting if i not in sticking]
         slides = self._with(sticking, towards)
-        for _ in range(ROUNDS):
+        for _ in range(SLIDES_ROUNDS):
             try:
                 slides = list(_signed(self.now, slides))
                 turned = False
@@ -233,7 +301,7 @@ class _Rest:
         self, guess: dict[int, tuple[float, float]]
     ) -> Iterator[tuple[tuple[Slide, ...], Motion]]:
         """Every combination, those with most sticking first."""
-        free = self.resting[:MOST]
+        free = self.resting[:SLIDES_MOST]
         for count in range(len(free) + 1):
             for slipping in itertools.combinations(free, count):
                 sticking = [i for i in self.resting if i not in slipping]
@@ -254,7 +322,7 @@ class _Rest:
         mass = now.M.diagonal()
         forces = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
         free = np.maximum(np.abs(now.vdot), forces / np.where(mass > 0, mass, np.inf))
-        floor = BACK * (np.abs(now.gamma[rows]) + np.abs(now.G[rows]) @ free).sum()
+        floor = SLIDES_BACK * (np.abs(now.gamma[rows]) + np.abs(now.G[rows]) @ free).sum()
         return rate, float(floor)
 
     def _steered(self, slides: list[Slide], i: int) -> tuple[float, float] | None:
@@ -286,8 +354,8 @@ class _Rest:
         c, along, floor = across(0.0)
         if abs(c) <= floor and along >= -floor:
             return at(0.0)
-        step = 2 * np.pi / ANGLES
-        for k in range(ANGLES // 2 + 1):  # nearest first, both ways
+        step = 2 * np.pi / SLIDES_ANGLES
+        for k in range(SLIDES_ANGLES // 2 + 1):  # nearest first, both ways
             for side in (1.0, -1.0):
                 low, high = side * k * step, side * (k + 1) * step
                 f_low, f_high = across(low)[0], across(high)[0]
@@ -354,11 +422,15 @@ def renewed(at: Instant, state: State) -> State:
     q, v = np.array(state.q), np.array(state.v)
     _, _, G, nu, _ = at.evaluate(q, v)
     s = slip_velocity(at.system, G, v, nu)
-    moved = tuple(
-        _along(slide, x) if slide.sticks and np.hypot(x[0], x[1]) > JUMP * slide.noise else slide
-        for slide, x in zip(state.slides, s, strict=True)
-    )
-    return state if moved == state.slides else replace(state, slides=moved)
+    noise = _noises(at, q, v, state)  # at the start nothing may have been at work
+    slides = [replace(x, noise=float(n)) for x, n in zip(state.slides, noise, strict=True)]
+    moved, slippings = [], list(state.slippings)
+    for i, (slide, x) in enumerate(zip(slides, s, strict=True)):
+        away = slide.sticks and np.hypot(x[0], x[1]) > SLIDES_JUMP * slide.noise
+        moved.append(_along(slide, x) if away else slide)
+        if away:
+            slippings[i] = Departure(slippings[i].count + 1, state.t, state.q, state.v)
+    return replace(state, slides=tuple(moved), slippings=tuple(slippings))
 
 
 def switched_slides(
@@ -368,7 +440,7 @@ def switched_slides(
     arriving: Vector,
     state: State,
     left: Collection[int],
-    contacts: Callable[[Instant, tuple[bool, ...]], tuple[bool, ...]],
+    contacts: Contacts,
 ) -> tuple[Instant, State]:
     """After the event at which the indicators `left` left their ranges, and after its impacts: the
     frictions and contacts settled together, with the level that sticking rows keep, what impacts have
@@ -379,8 +451,7 @@ def switched_slides(
     system, before = at.system, at.slides
     mine = [i - first_of_frictions(system) for i in left if i >= first_of_frictions(system)]
     M, _, G, nu, _ = at.evaluate(q, v)
-    speed = np.maximum(np.abs(v), np.array(state.size) * state.rate)
-    noise = noises(system, G, nu, speed)
+    noise = _noises(at, q, v, state)
     slides = [replace(s, noise=float(n)) for s, n in zip(before, noise, strict=True)]
     for i in mine:
         if i % 2:  # the normal force of a bilateral constraint turns over
@@ -463,5 +534,8 @@ def ranges(leg: Leg) -> list[Range]:
     """The range of each; what begins on the edge has to get inside before it can leave there."""
     found = []
     for slide in leg.state.slides:
-        found += [Range(0.0, slack=SLACK if slide.sticks else slide.noise, rises=True), Range(0.0)]
+        found += [
+            Range(0.0, slack=SLIDES_SLACK if slide.sticks else slide.noise, rises=True),
+            Range(0.0),
+        ]
     return found

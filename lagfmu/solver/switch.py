@@ -17,8 +17,7 @@ from .leg import Leg
 from .motion import motion, project
 from .state import Departure, State
 from .system import Vector
-
-SLOW = 1e-9  # speed of a gap, relative to the motion's own, that counts as none
+from .thresholds import SLOW
 
 
 def released(at: Instant, state: State, span: float) -> State:
@@ -82,16 +81,23 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list
     struck: Collection[int] = ()
     if landing:
         v, struck = impacts(at, q, v, near, slow, at_slides.rubbed if system.frictions else None)
-    modes = _settled(at, q, v, state, closed, near, leaving - set(struck), {*struck, *landing})
+    bounced = {*struck, *landing}
+    leaving -= {*struck}
+    modes = _settled(at, q, v, state, closed, near, leaving, bounced)
     offset = _levels(at, q, state, modes)
     if system.frictions:
 
         def settled(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
-            own = leaving - set(struck), {*struck, *landing}
-            return _settled(at, q, v, state, shut, near, *own)
+            return _settled(at, q, v, state, shut, near, leaving, bounced)
 
+        touching = _touching(at, q, v, state, near)
+
+        def complementary(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
+            return complementary_modes(at, q, v, shut, touching, leaving)
+
+        found = at_slides.Contacts(settled, complementary, touching, leaving)
         here = replace(state, t=t, closed=modes, offset=tuple(offset.tolist()))
-        at, here = at_slides.switched_slides(at, q, v, arriving, here, left, settled)
+        at, here = at_slides.switched_slides(at, q, v, arriving, here, left, found)
         state, modes, offset = (
             replace(here, closed=state.closed),
             here.closed,
@@ -112,7 +118,7 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list
         armed=tuple(a and c not in contacts and c not in struck for c, a in enumerate(state.armed)),
         offset=tuple(offset.tolist()),
         departures=tuple(departures),
-        strikes=state.strikes + len({*struck, *landing}),
+        strikes=state.strikes + len(bounced),
     )
 
 
@@ -122,6 +128,13 @@ def _slow(at: Instant, q: Vector, v: Vector, state: State) -> Vector:
     natural = np.array(state.size) * state.rate
     speed = np.maximum(G @ natural, G @ np.array(state.scale[at.system.n :]))
     return np.asarray(SLOW * speed)
+
+
+def _touching(at: Instant, q: Vector, v: Vector, state: State, near: Collection[int]) -> set[int]:
+    """Contacts with f = 0 and df/dt = 0: the accelerations decide."""
+    slow = _slow(at, q, v, state)
+    _, _, G, nu, _ = at.evaluate(q, v)
+    return {c for c in near if abs((G @ v - nu)[k := at.system.contacts[c]]) <= slow[k]}
 
 
 def _settled(
@@ -138,11 +151,11 @@ def _settled(
 
     Contacts that were struck rest if the rebound would not rise above the gap (contacts.py).
     """
+    touching = _touching(at, q, v, state, near)
     slow = _slow(at, q, v, state)
     _, _, G, nu, _ = at.evaluate(q, v)
     slip = (G @ v - nu)[list(at.system.contacts)]
     limit = slow[list(at.system.contacts)]
-    touching = {c for c in near if abs(slip[c]) <= limit[c]}
     guess = [c in touching and (shut or c in bounced) for c, shut in enumerate(closed)]
     modes = complementary_modes(at, q, v, guess, touching, leaving)
     parting = [c for c in near if (closed[c] or c in bounced) and slip[c] > limit[c]]

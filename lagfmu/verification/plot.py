@@ -1,4 +1,4 @@
-"""A picture of a simulation: multipliers on top, the motion below, departures marked."""
+"""A picture of a simulation: multipliers on top, the motion below, departures and slips marked."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ import numpy as np
 
 from .. import names
 from ..errors import BuildError
+from ..model.units import for_reading
 from .simulate import Trajectory
 
 COLOURS = ("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72", "#6940a5", "#64473a")
 DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # once the colours are used up
+SAID = {names.DEPARTURES: "leaves", names.SLIPS: "slips"}  # and the times of those events:
+TIMES = {names.DEPARTURES: names.DEPARTURE_TIME, names.SLIPS: names.SLIP_TIME}
 PER_COLUMN = 8  # curves in one column of a legend, which stands beside its panel
 
 
@@ -107,9 +110,9 @@ def panels(
                     linewidth=1.8,
                 )
                 _band(axis, result, n, COLOURS[colour])
-            axis.set_ylabel(unit if unit != "1" else "")
+            axis.set_ylabel(f"[{for_reading(unit)}]" if for_reading(unit) else "")
             axis.margins(x=0)
-            _mark_departures(axis, result, known, named=axis is axes[0, 0])
+            _mark_events(axis, result, known, named=axis is axes[0, 0])
             axis.legend(
                 frameon=False,
                 loc="upper left",
@@ -118,7 +121,7 @@ def panels(
                 borderaxespad=0.0,
                 ncols=1 + (len(members) - 1) // PER_COLUMN,
             )
-        axes[-1, 0].set_xlabel("time in s")
+        axes[-1, 0].set_xlabel("time [s]")
         yield figure, list(axes[:, 0])
 
 
@@ -147,18 +150,30 @@ def _band(axis: Any, result: Trajectory, name: str, colour: str) -> None:
         )
 
 
-def _mark_departures(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:
-    for contact in names.constraints(known, names.DEPARTURES):
-        if result[names.name(names.DEPARTURES, contact)][-1] > 0:
-            moment = float(result[names.name(names.DEPARTURE_TIME, contact)][-1])
-            axis.axvline(moment, color="#888888", linewidth=1, linestyle="--")
-            if named:
-                axis.annotate(
-                    f" leaves {contact} ",
-                    (moment, 1.0),
-                    xycoords=("data", "axes fraction"),
-                    ha="right" if moment > result["time"][-1] / 2 else "left",
-                    va="top",
-                    fontsize=9,
-                    color="#555555",
-                )
+def moments(result: Trajectory, events: str, of: str) -> list[float]:
+    """The times [s] at which a contact departed or a friction began to slip, of those that the run tells: of
+    several within one communication step the latest."""
+    count, when = names.name(events, of), names.name(TIMES[events], of)
+    if when not in (result.dtype.names or ()):
+        return []
+    told = np.diff(result[count].astype(float), prepend=0.0) > 0
+    return [float(x) for x in result[when][told]]
+
+
+def _mark_events(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:
+    """A dashed line at each departure and slip; the first of each is named."""
+    for events, word in SAID.items():
+        for of in names.constraints(known, events):
+            for k, moment in enumerate(moments(result, events, of)):
+                axis.axvline(moment, color="#888888", linewidth=1, linestyle="--")
+                if named and k == 0:
+                    late = moment > result["time"][-1] / 2
+                    axis.annotate(
+                        f" {word} {of} " if events == names.DEPARTURES else f" {of} {word} ",
+                        (moment, 1.0),
+                        xycoords=("data", "axes fraction"),
+                        ha="right" if late else "left",
+                        va="top",
+                        fontsize=9,
+                        color="#555555",
+                    )

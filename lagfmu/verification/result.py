@@ -9,9 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from .. import names
 from ..errors import SimulationError
+from ..model.units import for_reading
 
 SHOWN = 24  # rows of a table
+NOT_YET = "none"  # the time and the state of an event that has not happened
+
+
+def as_text(value: Any, digits: int = 6) -> str:
+    """A number of a run for reading: a zero has no sign."""
+    if np.asarray(value).dtype.kind != "f":
+        return str(value)
+    return f"{float(value) + 0.0:.{digits}g}"
 
 
 class Result(np.ndarray):  # type: ignore[type-arg]
@@ -44,14 +54,20 @@ class Result(np.ndarray):  # type: ignore[type-arg]
         """Variable, smallest, largest and last value, unit."""
         rows = []
         for n in self.dtype.names or ():
-            column = np.atleast_1d(self[n])
-            if not len(column):
+            if not len(self[n]):
                 continue
-            ends = (column.min(), column.max(), column[-1])
-            real = column.dtype.kind == "f"
-            cells = [f"{float(x):.6g}" if real else str(x) for x in ends]
-            rows.append((n, *cells, self.units.get(n, "")))
+            column = self[n][self.known(n)]
+            ends = (column.min(), column.max(), column[-1]) if len(column) else ()
+            cells = [as_text(x) for x in ends] or [NOT_YET] * 3
+            rows.append((n, *cells, for_reading(self.units.get(n))))
         return rows  # type: ignore[return-value]
+
+    def known(self, name: str) -> Any:
+        """Where a variable says something (len): the time and the state of an event from the first one on."""
+        count = names.counted(name)
+        if count not in (self.dtype.names or ()):
+            return np.ones(len(self), dtype=bool)
+        return self[count] > 0
 
     def __repr__(self) -> str:
         if self.dtype.names is None:

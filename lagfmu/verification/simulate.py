@@ -30,7 +30,8 @@ from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import observe
 from ..solver.rates import Past, estimated
-from ..solver.state import SMALLEST_TOLERANCE, Settings
+from ..solver.state import Settings
+from ..solver.thresholds import SMALLEST_TOLERANCE
 from .result import Result
 
 STARTS = re.compile(

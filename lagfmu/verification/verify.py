@@ -288,7 +288,23 @@ def check_closed_form(
     error = float(np.abs(actual - expected).max())
     if not math.isfinite(error):
         return Check(closed_form.name, math.inf, allowed, count, "not a finite number")
-    return Check(closed_form.name, error / scale if scale > 0 else error, allowed, count)
+    misses = np.abs(actual - expected) > allowed * (scale if scale > 0 else 1.0)
+    detail = _first_miss(result, np.flatnonzero(chosen)[misses])
+    return Check(closed_form.name, error / scale if scale > 0 else error, allowed, count, detail)
+
+
+def _first_miss(result: Trajectory, missed: NDArray[np.int_]) -> str:
+    """When a statement is missed first (`missed`: numbers of rows), and which contact changed then."""
+    if not len(missed):
+        return ""
+    k = int(missed[0])
+    text = f"first missed at t = {float(result['time'][k]):.9g} s"
+    contacts = names.constraints(result.dtype.names or (), names.CONTACT)
+    for c in contacts if k else ():
+        before, now = (bool(result[names.name(names.CONTACT, c)][i]) for i in (k - 1, k))
+        if before != now:
+            text += f", where contact {c!r} has just {'closed' if now else 'opened'}"
+    return text
 
 
 def _with_modes(result: Trajectory) -> Trajectory:

@@ -1,9 +1,12 @@
 /* main.js -- the page: a change of a setting, a run in the worker, and everything shown anew. */
 
+const MOST_EVENTS = 200; // in the list
+
 const settings = new Settings();
 let trajectory = null;
 let under = false; // a run is under way
 let again = false; // and the settings changed since
+let stale = false; // what is shown is of an earlier run: the latest was refused
 let asked = 0; // when the change was made that is not yet drawn [ms]
 
 const picture = FACTS.picture ? new Picture(byId("picture"), FACTS.picture) : null;
@@ -41,6 +44,7 @@ async function run() {
     refused(found.failed);
   } catch (error) {
     refused(error.message);
+    showLog(error.log || []);
   }
   under = false;
   window.lagfmu.latency = performance.now() - since;
@@ -55,23 +59,37 @@ async function run() {
 /* The FMU's own words; what is shown then is of the last run that went through. */
 function refused(message) {
   const box = byId("refused");
+  stale = Boolean(message) && (!trajectory || !trajectory.failed);
   box.hidden = !message;
   if (box.textContent !== (message || "")) box.textContent = message || "";
-  byId("play").classList.toggle("stale", Boolean(message) && (!trajectory || !trajectory.failed));
+  byId("play").classList.toggle("stale", stale);
+  if (stale) tell();
 }
 
 function show() {
   charts.show(trajectory);
   if (picture) picture.show(trajectory);
   player.setEnd(trajectory.end, settings.stepSize);
-  const events = trajectory.events.slice(0, 40).map((event) => {
+  showEvents(trajectory.events);
+  showLog(trajectory.log);
+}
+
+function showEvents(events) {
+  const items = events.slice(0, MOST_EVENTS).map((event) => {
     const jump = element("button", { type: "button" }, `${shown(event.time, 10)} s`);
     jump.addEventListener("click", () => player.seek(event.time));
-    return element("li", {}, jump, ` ${event.text}${event.truth ? " (by then)" : ""}`);
+    const after = event.truth ? `, after ${shown(event.since, 10)} s` : "";
+    return element("li", {}, jump, ` ${event.text}${after}`);
   });
-  byId("events").replaceChildren(...events);
+  const more = events.length - items.length;
+  if (more) items.push(element("li", {}, `and ${more} more, all of them in the CSV file`));
+  byId("events").replaceChildren(...items);
+  byId("events-count").textContent = events.length;
   byId("events-box").hidden = !events.length;
-  const said = trajectory.log.filter((m) => m.status !== "ok");
+}
+
+function showLog(log) {
+  const said = log.filter((m) => m.status !== "ok");
   byId("log").replaceChildren(...said.map((m) => element("li", {}, `${m.status}: ${m.message}`)));
   byId("log-box").hidden = !said.length;
 }
@@ -102,16 +120,20 @@ function showValues(t) {
   const place = trajectory.place(t);
   COLUMNS.forEach((v, k) => {
     const value = trajectory.at(v.name, place);
-    cells[k].textContent = v.type === "Boolean" ? shown(Boolean(value)) : shown(value, 10);
+    if (!trajectory.isKnown(v, place)) cells[k].textContent = "none yet";
+    else cells[k].textContent = v.type === "Boolean" ? shown(Boolean(value)) : shown(value, 10);
   });
 }
 
 /* For those who hear the page. */
 function tell() {
-  if (!trajectory) return;
+  if (!trajectory || stale) {
+    byId("status").textContent = trajectory ? "Shown is the last run that went through." : "";
+    return;
+  }
   const steps = STEPS === undefined ? "" : `, ${trajectory.columns[STEPS].at(-1)} steps`;
   const took = trajectory.milliseconds !== null ? `, ${shown(trajectory.milliseconds, 2)} ms` : "";
-  const events = trajectory.events.slice(0, 3).map((e) => `${e.text} at ${shown(e.time)} s`);
+  const events = trajectory.events.slice(0, 3).map((e) => `${e.text} ${e.truth ? "by" : "at"} ${shown(e.time)} s`);
   const end = `Run to ${shown(trajectory.end)} s${steps}${took}`;
   byId("status").textContent = [end, ...events].join("; ");
 }
@@ -185,6 +207,13 @@ if (picture) {
     picture.now(player.t);
   });
 }
+
+/* For scripts: what the page shows now. */
+window.lagfmu.shown = () => ({
+  settings: settings.forRun(),
+  events: trajectory.events.map(({ time, text }) => ({ time, text })),
+  ...byName(trajectory),
+});
 
 const missing = openLink();
 window.addEventListener("hashchange", () => {

@@ -2,6 +2,8 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 const SAMPLES = 120; // points of a path; rows that the view is fitted to
+const HANGING = 24; // pieces of a slack string
+const HALVINGS = 20; // until its length is found, to a millionth
 const MARGIN = 44;
 const LONGEST = 0.22; // of the view: the arrow of the largest force
 
@@ -17,9 +19,9 @@ const pointsOf = (list) => list.map(([x, y]) => `${x.toFixed(2)},${y.toFixed(2)}
 const SHAPES = {
   line: {
     make: () => [svg("polyline", { class: "line" })],
-    points: (s, look) => s.points.map((p) => p(look)),
+    points: (s, look) => [...s.points.map((p) => p(look)), ...lowest(s, look)],
     draw: ([line], s, look, view) =>
-      line.setAttribute("points", pointsOf(s.points.map((p) => view.screen(p(look))))),
+      line.setAttribute("points", pointsOf(linePoints(s, look).map(view.screen))),
   },
   rod: {
     make: () => [
@@ -142,6 +144,44 @@ function setCenter(circle, [cx, cy]) {
   circle.setAttribute("cy", cy);
 }
 
+/* Points from a to b that hang by `sag` in the middle: a parabola. */
+function hanging(a, b, sag) {
+  const up = a.length - 1;
+  return Array.from({ length: HANGING + 1 }, (_, k) => {
+    const part = k / HANGING;
+    const drop = 4 * sag * part * (1 - part);
+    return a.map((x, i) => x + part * (b[i] - x) - (i === up ? drop : 0));
+  });
+}
+
+const between = (a, b) => Math.hypot(...a.map((x, i) => b[i] - x));
+
+/* A point that no string of that length between its ends hangs below: the tip of two straight halves. */
+function lowest(s, look) {
+  if (!s.length) return [];
+  const [a, b] = s.points.map((p) => p(look));
+  const slack = s.length(look) ** 2 - between(a, b) ** 2;
+  return slack > 0 ? hanging(a, b, Math.sqrt(slack) / 2).slice(HANGING / 2, HANGING / 2 + 1) : [];
+}
+
+/* A string that is longer than the way between its ends hangs, and keeps its length (so in cli/film.py). */
+function linePoints(s, look) {
+  const ends = s.points.map((p) => p(look));
+  if (!s.length) return ends;
+  const [a, b] = ends;
+  const length = s.length(look);
+  if (!(length > between(a, b))) return ends;
+  let [low, high] = [0, length];
+  for (let k = 0; k < HALVINGS; k++) {
+    const sag = (low + high) / 2;
+    const found = hanging(a, b, sag);
+    const long = found.reduce((sum, p, i) => (i ? sum + between(found[i - 1], p) : 0), 0);
+    if (long < length) low = sag;
+    else high = sag;
+  }
+  return hanging(a, b, low);
+}
+
 function pathPoints(s, look) {
   const [low, high] = s.range.map((f) => f(look));
   const found = [];
@@ -161,7 +201,7 @@ function compiledShape(s) {
   const found = { ...s };
   if (s.points) found.points = s.points.map(compiledPoint);
   for (const key of ["center", "at", "point", "vector"]) if (s[key]) found[key] = compiledPoint(s[key]);
-  for (const key of ["radius", "angle"]) if (s[key] !== undefined) found[key] = compiled(s[key]);
+  for (const key of ["radius", "angle", "length"]) if (s[key] !== undefined) found[key] = compiled(s[key]);
   if (s.range) found.range = s.range.map(compiled);
   return found;
 }

@@ -43,6 +43,11 @@ class Trajectory {
     return here + part * (column[row + 1] - here);
   }
 
+  /* Whether a variable says something there: the time and the state of an event from the first one on. */
+  isKnown(variable, [row]) {
+    return !variable.counted || this.columns[PLACE.get(variable.counted)][row] > 0;
+  }
+
   /* [{time, text}]: counted events at their time, else a truth that changes, at the row that shows it. */
   happened() {
     const found = [];

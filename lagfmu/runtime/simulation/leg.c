@@ -10,13 +10,10 @@
 #include "parts.h"
 #include "sensitivity.h"
 #include "step_size.h"
+#include "thresholds.h"
 
-static const double FEWEST_STEPS_RK4 = 100;  /* in one natural time of the motion, 1/rate, ... */
 static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
 static const double SAFETY = 0.25; /* of the tolerance: errors of many steps add up */
-static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may move the state: times the
-                                                  * tolerance, and at least, relative to the state */
-static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the state: it means nothing */
 
 void leg_begin(Solver *s) {
     system_active(s->system, s->state.closed, s->active);
@@ -180,10 +177,13 @@ Status leg_check_projection(Solver *s, double t, const double *y, const double *
 Status leg_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
     Integrator *i = &s->probe;
     memcpy(y, y0, 2 * (size_t)s->system->n * sizeof *y);
+    memset(&s->local_trial, 0, sizeof s->local_trial);
     if (!(t1 > t0)) return OK;
     integrator_start(i, s->integrator.method, t0, y0, t1 - t0);
-    while (i->t < t1)
+    while (i->t < t1) {
         if (leg_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
+        if (s->alike > 0) PARTS.at_trial(s, i);
+    }
     memcpy(y, i->y, 2 * (size_t)s->system->n * sizeof *y);
     return leg_project(s, t1, y);
 }

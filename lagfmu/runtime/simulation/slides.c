@@ -2,7 +2,10 @@
  *
  * All frictions that stand at s = 0 are settled together: the worst slips first; where that goes wrong,
  * every combination is tried, most sticking first.  For one row the direction is a choice of two; for two
- * rows a root on the circle, the one nearest to "against lambda_t". */
+ * rows a root on the circle, the one nearest to "against lambda_t".
+ *
+ * Where sliding one way is Painleve's paradox, a body at rest may have several accelerations: it sticks, or
+ * its contact opens (Genot & Brogliato 1999).  Both are looked at wherever the one or the other begins. */
 #include "slides.h"
 
 #include <string.h>
@@ -10,12 +13,9 @@
 #include "digits.h"
 #include "leg.h"
 #include "parts.h"
+#include "thresholds.h"
 
-enum { MOST = 6 };                /* frictions whose combinations are tried one by one */
-enum { ROUNDS = 50, ANGLES = 48, HALVINGS = 60 };
-static const double SLACK = 1e-12; /* of the cone, and of the slip velocities that rounding leaves */
-static const double BACK = 1e-9;   /* of the accelerations at work, against its own direction: none */
-static const double JUMP = 1e3;    /* times the noise: a slip velocity that no rounding makes */
+enum { HALVINGS = 60 };
 static const double PI = 3.14159265358979323846;
 
 /* Frictions at s = 0, settled together; contacts as in `active`. */
@@ -39,9 +39,17 @@ static void set_noise(Solver *s, const double *speed, Slide *slides) {
         slides[i].noise = 0;
         for (int r = 0; r < s->system->friction[i].rows; r++) {
             const int k = s->system->friction[i].row[r];
-            slides[i].noise += SLACK * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
+            slides[i].noise += SLIDES_SLACK * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
         }
     }
+}
+
+/* The noise of the motion as it is, of the G that was evaluated last. */
+static void renew_noise(Solver *s, Slide *slides) {
+    double *speed = s->work_contacts;
+    for (int j = 0; j < s->system->n; j++)
+        speed[j] = fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
+    set_noise(s, speed, slides);
 }
 
 /* Slipping along v's slip velocity, where that is not rounding. */
@@ -69,7 +77,7 @@ static Status find_signs(Rest *x) {
     for (int round = 0; round <= s->frictions; round++) {
         int wrong = 0;
         if (motion(x) != OK) return FAILED;
-        const double zero = -SLACK * largest(s->m, b->lambda);
+        const double zero = -SLIDES_SLACK * largest(s->m, b->lambda);
         for (int i = 0; i < s->frictions; i++) {
             if (x->slides[i].sticks || s->friction[i].gated) continue;
             if (!(b->friction->normal[i] < zero)) continue;
@@ -110,7 +118,7 @@ static Status find_rate(Rest *x, int i, double rate[2], double *floor) {
     for (int r = 0; r < s->friction[i].rows; r++) {
         const int k = s->friction[i].row[r];
         rate[r] = mechanism_row(b, k, b->vdot) - b->gamma[k];
-        *floor += BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
+        *floor += SLIDES_BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
     }
     return OK;
 }
@@ -147,11 +155,11 @@ static Status close_in(Rest *x, int i, double low, double high, double f_low, do
 /* A direction of two rows that agrees with its acceleration, the nearest to the present one. */
 static Status turn_on_circle(Rest *x, int i, int *found) {
     const double begin = atan2(x->slides[i].direction[1], x->slides[i].direction[0]);
-    const double step = 2 * PI / ANGLES;
+    const double step = 2 * PI / SLIDES_ANGLES;
     double across, along, floor;
     if (look_along(x, i, begin, &across, &along, &floor) != OK) return FAILED;
     *found = fabs(across) <= floor && along >= -floor;
-    for (int k = 0; k <= ANGLES / 2 && !*found; k++)
+    for (int k = 0; k <= SLIDES_ANGLES / 2 && !*found; k++)
         for (int side = 1; side >= -1 && !*found; side -= 2) {
             const double low = begin + side * k * step, high = begin + side * (k + 1) * step;
             double f_low, f_high, angle;
@@ -179,12 +187,10 @@ static Status steer(Rest *x, int i, int *found) {
     return OK;
 }
 
-/* The resting ones stick as in x->sticking, the others slip, each in a direction of its own acceleration.
- * If found, the latest motion is that of these modes. */
-static int try_modes(Rest *x) {
-    const int count = x->s->system->frictions;
+/* The resting ones stick as in x->sticking, the others slip as in x->guess; how many. */
+static int set_modes(Rest *x) {
     int slipping = 0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < x->s->system->frictions; i++) {
         if (!x->resting[i]) continue;
         x->slides[i].sticks = x->sticking[i];
         if (x->sticking[i]) continue;
@@ -192,7 +198,14 @@ static int try_modes(Rest *x) {
         x->slides[i].direction[0] = x->guess[2 * i];
         x->slides[i].direction[1] = x->guess[2 * i + 1];
     }
-    for (int round = 0; round < ROUNDS; round++) {
+    return slipping;
+}
+
+/* The resting ones stick as in x->sticking, the others slip, each in a direction of its own acceleration.
+ * If found, the latest motion is that of these modes. */
+static int try_modes(Rest *x) {
+    const int count = x->s->system->frictions, slipping = set_modes(x);
+    for (int round = 0; round < SLIDES_ROUNDS; round++) {
         int turned = 0;
         if (find_signs(x) != OK) return 0;
         for (int i = 0; i < count; i++) {
@@ -212,7 +225,7 @@ static int furthest_out(const Rest *x) {
     const double *reserve = x->s->stepped.friction->reserve;
     int worst = -1;
     for (int i = 0; i < x->s->system->frictions; i++)
-        if (x->resting[i] && x->sticking[i] && reserve[i] < -SLACK &&
+        if (x->resting[i] && x->sticking[i] && reserve[i] < -SLIDES_SLACK &&
             (worst < 0 || reserve[i] < reserve[worst]))
             worst = i;
     return worst;
@@ -227,9 +240,9 @@ static int bits(unsigned mask) {
 /* Every combination, those with most sticking first, each direction of slip both ways. */
 static int try_all(Rest *x) {
     const int frictions = x->s->system->frictions;
-    int which[MOST], count = 0;
-    double straight[2 * MOST];
-    for (int i = 0; i < frictions && count < MOST; i++)
+    int which[SLIDES_MOST], count = 0;
+    double straight[2 * SLIDES_MOST];
+    for (int i = 0; i < frictions && count < SLIDES_MOST; i++)
         if (x->resting[i]) which[count++] = i;
     for (int i = 0; i < count; i++) memcpy(straight + 2 * i, x->guess + 2 * which[i], 2 * sizeof *straight);
     for (int slipping = 0; slipping <= count; slipping++)
@@ -259,12 +272,18 @@ static Status no_modes(Rest *x) {
 
 static Status settle_resting(Rest *x) {
     const int count = x->s->system->frictions;
+    int begins = 0;
     for (int i = 0; i < count; i++)
         if (x->resting[i]) x->slides[i].sticks = 1;
     if (motion(x) != OK) return FAILED;
     for (int i = 0; i < count; i++) {
         if (x->resting[i]) aim(x, i);
         x->sticking[i] = x->resting[i] && !x->begins[i];
+        if (x->begins[i]) begins = 1;
+    }
+    if (begins) { /* beyond its cone it slips against lambda_t, or not at all */
+        set_modes(x);
+        if (find_signs(x) != OK) return FAILED;
     }
     while (try_modes(x)) { /* the worst slips first */
         const int worst = furthest_out(x);
@@ -288,12 +307,70 @@ static Status choose(Rest *x, const int *ended) {
         friction_slip(b, i, s->state.v, slip);
         const double length = hypot(slip[0], slip[1]);
         const int still = length <= slide->noise || ((slide->sticks || (ended != NULL && ended[i])) &&
-                                                     length <= JUMP * slide->noise);
+                                                     length <= SLIDES_JUMP * slide->noise);
         x->resting[i] = b->friction->loaded[i] && still;
         any |= x->resting[i];
         if (!x->resting[i]) slide_along(b, i, s->state.v, slide);
     }
     return any ? settle_resting(x) : find_signs(x);
+}
+
+/* The trial modes of contacts are complementary as they are. */
+static int fits(Rest *x, int *trial, const int *touching, const int *leaving) {
+    Solver *s = x->s;
+    const size_t bytes = (size_t)s->system->contacts * sizeof *trial;
+    int *settled = trial + s->system->contacts;
+    memcpy(settled, trial, bytes);
+    return PARTS.contacts_modes(s, x->at, s->state.q, s->state.v, settled, touching, leaving) == OK &&
+           memcmp(settled, trial, bytes) == 0;
+}
+
+/* The contacts that press friction i and touch become as `shut`; 0 if there are none, or one is leaving. */
+static int turn_contacts(const System *s, int i, int shut, int *closed, const int *touching,
+                         const int *leaving) {
+    const Friction *law = &s->friction[i];
+    int any = 0;
+    for (int c = 0; c < s->contacts; c++)
+        for (int k = law->first; k < law->first + law->normals; k++) {
+            if (s->press[k] != s->contact[c] || !touching[c]) continue;
+            if (leaving != NULL && leaving[c]) return 0;
+            closed[c] = shut;
+            any = 1;
+        }
+    return any;
+}
+
+/* FAILED if a friction at rest that begins to stick might as well let its contact open, or one whose contact
+ * is open might as well stick. */
+static Status check_rest(Rest *x, const int *closed, const int *touching, const int *leaving) {
+    Solver *s = x->s;
+    const System *system = s->system;
+    struct Frictions *f = s->stepped.friction;
+    int *trial = s->iwork_slides + 4 * system->frictions, any = 0;
+    for (int i = 0; i < system->frictions; i++) {
+        const Slide held = x->slides[i];
+        const int on = f->loaded[i];
+        double slip[2];
+        friction_slip(&s->stepped, i, s->state.v, slip);
+        const int still = hypot(slip[0], slip[1]) <= held.noise;
+        if (!system->friction[i].gated || (on ? s->state.slide[i].sticks || !held.sticks : !still))
+            continue;
+        memcpy(trial, closed, (size_t)system->contacts * sizeof *trial);
+        if (!turn_contacts(system, i, !on, trial, touching, leaving)) continue;
+        x->slides[i].sticks = !on;
+        const int other = fits(x, trial, touching, leaving) && (on || f->reserve[i] >= 0);
+        x->slides[i] = held;
+        if (other)
+            return fail(&s->why,
+                        "friction '%s': at rest it has several accelerations at t = %s s: it sticks, or "
+                        "its contact opens (Painleve's paradox: in one direction of slip the normal "
+                        "force would drive itself): use a smaller coefficient of friction, or let the "
+                        "bodies deform (a spring in the contact)",
+                        system->friction[i].name, digits(x->at.t).text);
+        (void)s->stepped.sliding->acting(&s->stepped, x->active); /* what is loaded */
+        any = 1;
+    }
+    return any ? motion(x) : OK;
 }
 
 /* The modes of frictions and contacts together, from those in x->slides and `closed`. */
@@ -303,14 +380,14 @@ static Status settle(Rest *x, int *closed, const int *ended, const int *touching
     const size_t bytes = (size_t)s->system->contacts * sizeof *closed;
     int *active = s->active, *before = s->iwork_slides + 4 * s->system->frictions;
     x->active = active;
-    for (int round = 0; round < ROUNDS; round++) {
+    for (int round = 0; round < SLIDES_ROUNDS; round++) {
         system_active(s->system, closed, active);
         if (choose(x, ended) != OK) return FAILED;
         memcpy(before, closed, bytes);
         if (s->system->contacts == 0) return OK;
         if (PARTS.contacts_modes(s, x->at, s->state.q, s->state.v, closed, touching, leaving) != OK)
             return FAILED;
-        if (memcmp(before, closed, bytes) == 0) return OK;
+        if (memcmp(before, closed, bytes) == 0) return check_rest(x, closed, touching, leaving);
     }
     return fail(&s->why,
                 "no combination of sticking, slipping and open contacts satisfies their laws at t = %s "
@@ -404,14 +481,11 @@ static Status change(Solver *s, Instant at, const int *left, const double *arriv
                      const int *touching, const int *leaving) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
-    double *speed = s->work_contacts;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     if (arriving != NULL && lose(s, arriving) != OK) return FAILED;
-    for (int j = 0; j < system->n; j++)
-        speed[j] = fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
     Rest x = rest(s, at);
     int *ended = s->iwork_slides + 3 * system->frictions;
-    set_noise(s, speed, x.slides);
+    renew_noise(s, x.slides);
     for (int i = 0; i < system->frictions; i++) {
         x.begins[i] = left[2 * i] && s->state.slide[i].sticks;
         ended[i] = left[2 * i] && !s->state.slide[i].sticks;
@@ -438,11 +512,12 @@ static Status renew(Solver *s) {
     if (!any || s->system->inputs == 0) return OK;
     const Instant at = leg_instant(s, s->state.now.t);
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
+    renew_noise(s, s->state.slide); /* at the start nothing may have been at work */
     for (int i = 0; i < s->system->frictions; i++) {
         double slip[2];
         friction_slip(b, i, s->state.v, slip);
         if (!s->state.slide[i].sticks) continue;
-        if (hypot(slip[0], slip[1]) <= JUMP * s->state.slide[i].noise) continue;
+        if (hypot(slip[0], slip[1]) <= SLIDES_JUMP * s->state.slide[i].noise) continue;
         slide_along(b, i, s->state.v, &s->state.slide[i]);
         note_slipping(s, i);
     }
@@ -466,7 +541,7 @@ static void indicators(const Solver *s, double *values) {
 static Range range(const Solver *s, int which) {
     const Slide *slide = &s->state.slide[which / 2];
     if (which % 2 == 1) return (Range){0, HUGE_VAL, 0, 0};
-    return (Range){0, HUGE_VAL, slide->sticks ? SLACK : slide->noise, 1};
+    return (Range){0, HUGE_VAL, slide->sticks ? SLIDES_SLACK : slide->noise, 1};
 }
 
 static int turns(const Solver *s) {

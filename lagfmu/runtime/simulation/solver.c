@@ -77,7 +77,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->iwork_rub = arena_take(scratch, some ? PARTS.slides->ints(system) : 0, sizeof(int));
     s->trial_slides = arena_take(scratch, (size_t)frictions, sizeof *s->trial_slides);
     s->work_slides = arena_doubles(scratch, some * (2 * frictions + 5 * n));
-    s->iwork_slides = arena_ints(scratch, some * (4 * frictions + contacts));
+    s->iwork_slides = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
     s->iwork_events = arena_ints(scratch, 6 * contacts);
     s->work_switch = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m);
     s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(n, m, contacts));

@@ -13,6 +13,7 @@ typedef struct {
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
     double alike;              /* with error bars, else 0: see companion.h */
+    LocalErrors local_trial;   /* of the latest trial of an event's time */
     State state;
     Drive drive;
     double *p;                 /* (parameters) */
@@ -36,7 +37,7 @@ typedef struct {
     int *iwork_rub;
     Slide *trial_slides;       /* (frictions) of slides.c, with */
     double *work_slides;       /* (2 frictions + 5 n) */
-    int *iwork_slides;         /* (4 frictions + contacts) */
+    int *iwork_slides;         /* (4 frictions + 2 contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and switch.c */
     double *work_switch;       /* (m) of switch.c */
     double *work_impact;       /* of impact.c, see there */
@@ -63,6 +64,11 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
 /* advance.c -- from state.now.t to t_end [s].  FAILED leaves the state in disorder: the caller
  * puts the saved one back (it keeps a copy). */
 Status solver_advance(Solver *s, double t_end);
+
+/* The inputs may have been set: levels of jumps are those of now, contacts whose surface went away open, the
+ * others go with it; a prescribed motion may have another place and other rates than it went by.  What each
+ * step begins with.  FAILED leaves the state in disorder. */
+Status solver_follow(Solver *s);
 
 /* q and v at the communication point, where they are still to be found (on_demand).  FAILED: they cannot
  * be projected onto the constraints. */

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import BuildError
+from ...model.units import for_reading
 from .measure import Tradeoff
 from .quantities import EVENT, FORCE, MULTIPLIER, OWN
 
@@ -230,8 +231,8 @@ def _error_label(found: Tradeoff, group: str) -> str:
     members = [q for q in found.known if q.group == group]
     if len(members) == 1:
         q = members[0]
-        unit = "" if q.unit == "1" else f" {q.unit.replace('.', '·')}"
-        return f"error of {q.name}, relative to {found.reference.scale[q.name]:.3g}{unit}"
+        scale = f"{found.reference.scale[q.name]:.3g} {for_reading(q.unit)}".rstrip()
+        return f"error of {q.name}, relative to {scale}"
     return {
         EVENT: "largest error of an event time, relative to the time",
         MULTIPLIER: "largest error of a λ, relative to its largest magnitude",

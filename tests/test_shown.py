@@ -1,0 +1,94 @@
+"""How a run is told: tables and figures for people, whatever the numbers are for machines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import MODELS
+from typer.testing import CliRunner
+
+import lagfmu
+from lagfmu import Conserved, Result, output
+from lagfmu.cli.app import app
+from lagfmu.fmu.closed_forms import carried
+from lagfmu.model.file import load
+from lagfmu.verification.plot import moments
+from lagfmu.verification.verify import check_closed_form
+
+
+def simulated(*words: object) -> dict[str, list[str]]:
+    """The rows that lagfmu simulate prints, by variable."""
+    done = CliRunner().invoke(app, ["simulate", *map(str, words)])
+    assert done.exit_code == 0, done.output
+    rows = [line.split() for line in done.output.splitlines() if line.strip()]
+    return {row[0]: row[1:] for row in rows if len(row) in (2, 3) and row[0] != "wrote"}
+
+
+def test_a_departure_that_has_not_been_has_no_time() -> None:
+    """The particle leaves the hemisphere at 1.64 s: a run of 1 s knows no time and no place of it, one of 2 s
+    does; nor does the table count the 0 before it as the smallest time."""
+    model = MODELS / "hemisphere.py"
+    early, late = simulated(model, "--stop-time", 1), simulated(model)
+    for n in ("departure.surface.time", "departure.surface.theta"):
+        assert early[n][0] == "none"
+        assert float(late[n][0]) > 0.8
+    assert early["departure.surface.count"][0] == "0"
+    run = lagfmu.simulate(load(model).model, 2.0, 0.01)
+    row = next(r for r in run._rows() if r[0] == "departure.surface.time")
+    assert row[1] == row[2] == row[3]
+    assert float(row[1]) == pytest.approx(1.641, abs=1e-3)
+
+
+def test_units_are_written_as_people_write_them() -> None:
+    """N·m, kg·m²: the same in tables, figures and pages; names for machines stay as FMI has them."""
+    run = lagfmu.simulate(load(MODELS / "incline_disk.py").model, 1.0, 0.25)
+    assert run.units["Q.theta"] == "N.m"
+    assert "N·m" in repr(run)
+    assert "N·m" in run._repr_html_()
+    axes = run.plot("Q.theta", "y").axes
+    assert [a.get_ylabel() for a in axes] == ["[N·m]", "[m]"]
+    assert axes[-1].get_xlabel() == "time [s]"
+    assert simulated(MODELS / "incline_disk.py")["Q.theta"][1] == "N·m"
+
+
+def test_a_zero_has_no_sign() -> None:
+    """-0.0 is rounding's way to say 0."""
+    table = np.zeros(2, dtype=[("time", float), ("x", float)])
+    table["x"] = -0.0
+    assert "-0" not in repr(Result(table, {"x": "m"}, "Zero"))
+
+
+def test_every_slip_is_marked_in_the_figure() -> None:
+    """The block on the belt slips again and again: a dashed line at each of the times that the run tells."""
+    run = lagfmu.simulate(load(MODELS / "belt.py").model, 3.0, 0.01)
+    told = moments(run, "slipping.count", "grip")
+    assert len(told) == run["slipping.grip.count"][-1] > 3
+    assert told == sorted(set(told))
+    (axes,) = run.plot("lambda.ride").axes
+    dashed = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == "--"]
+    assert dashed == told
+
+
+def test_with_a_film_the_table_is_short(tmp_path: Path) -> None:
+    """What one looks for first; every row only without a file, and what -v names."""
+    model = MODELS / "hemisphere.py"
+    whole = simulated(model, "--stop-time", 0.1)
+    short = simulated(model, "--stop-time", 0.1, "--animate", tmp_path / "a.html")
+    assert {"lambda.surface", "theta", "departure.surface.time"} <= short.keys() < whole.keys()
+    assert "energy.total" not in short
+    named = simulated(model, "--stop-time", 0.1, "--csv", tmp_path / "a.csv", "-v", "energy.total")
+    assert "energy.total" in named
+
+
+def test_a_landing_without_rebound_takes_energy() -> None:
+    """A ball that falls 1 m and stays: m g h is gone at sqrt(2 h/g) = 0.4515 s, and the statement that energy
+    is conserved says when it was missed first, and what happened there."""
+    file = load(MODELS / "bouncing_ball.py")
+    run = lagfmu.simulate(file.model, start_values={"e": 0.0})
+    (form,) = carried(file.scenes[0], [Conserved("energy", output("energy.total"))])
+    check = check_closed_form(form, run, {"m": 1.0, "g": 9.81, "e": 0.0}, 1e-8)
+    assert not check.passed
+    assert check.error == pytest.approx(1.0)
+    assert "first missed at t = 0.46 s, where contact 'floor' has just closed" in str(check)
