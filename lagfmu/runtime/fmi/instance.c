@@ -447,6 +447,7 @@ static void move_inputs(Instance *x, double t) {
 
 static void report_events(Instance *x) {
     const State *now = &x->solver.state;
+    if (x->quiet) return;
     for (int c = 0; c < x->solver.system->contacts; c++) {
         const char *name = x->solver.system->rows[x->solver.system->contact[c]].name;
         if (now->count[c] != x->count[c])
