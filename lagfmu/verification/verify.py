@@ -208,7 +208,7 @@ def closed_forms_in(path: Path) -> list[CarriedForm]:
             if RECORD not in archive.namelist():
                 raise VerificationError(
                     f"{str(path)!r} carries no closed forms ({RECORD} is missing): it was not built "
-                    "by lagfmu, and there is nothing to hold it against"
+                    "by lagfmu, and there is nothing to hold it against: give it a --reference"
                 )
             closed_forms = unpack_closed_forms(_record(archive), str(path))
     except (zipfile.BadZipFile, OSError) as error:

@@ -445,10 +445,22 @@ static void move_inputs(Instance *x, double t) {
     drive->since = t;
 }
 
+static void report_strike(Instance *x, int c, const char *name) {
+    const Solver *s = &x->solver;
+    char latest[32] = "";
+    if (s->strikes[c] > 1)
+        (void)snprintf(latest, sizeof latest, ", the latest of %d", s->strikes[c]);
+    (void)snprintf(x->note, sizeof x->note,
+                   "contact %s was struck at t = %s s, impulse %s (of its lambda times s)%s", name,
+                   digits(s->struck_at[c]).text, digits(s->impulse[c]).text, latest);
+    x->tell(x->context, NOTE_EVENT, x->note);
+}
+
 static void report_events(Instance *x) {
     const State *now = &x->solver.state;
     for (int c = 0; c < x->solver.system->contacts; c++) {
         const char *name = x->solver.system->rows[x->solver.system->contact[c]].name;
+        if (x->solver.strikes[c] > 0) report_strike(x, c, name);
         if (now->count[c] != x->count[c])
             (void)snprintf(x->note, sizeof x->note, "contact %s opened at t = %s s", name,
                            digits(now->departure_time[c]).text);
@@ -476,6 +488,7 @@ static void note_modes(Instance *x) {
     const size_t size = (size_t)s->contacts * sizeof *x->closed;
     memcpy(x->closed, x->solver.state.closed, size);
     memcpy(x->count, x->solver.state.count, size);
+    memset(x->solver.strikes, 0, size);
     for (int i = 0; i < s->frictions; i++) {
         x->stuck[i] = x->solver.state.slide[i].sticks;
         x->slips[i] = x->solver.state.slip_count[i];
@@ -498,9 +511,12 @@ static void tell_of_method(Instance *x, double product, int implicit) {
 
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
+    if (solver_pass(s, t_end)) {
+        x->observed = x->evaluated = 0;
+        return OK;
+    }
     unfollow(x);
-    const int passed = solver_passed(s, t_end);
-    if (!passed) instance_save(x, x->backup);
+    instance_save(x, x->backup);
     if (s->system->estimated_count > 0) estimate_rates(x);
     if (s->system->prescribed_count > 0) warn_of_rates(x);
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
@@ -510,7 +526,7 @@ Status instance_step(Instance *x, double t_end) {
     const double product = s->state.now.choice.product;
     const int implicit = s->state.now.choice.implicit;
     if (solver_advance(s, t_end) != OK) {
-        if (!passed) instance_restore(x, x->backup);
+        instance_restore(x, x->backup);
         return FAILED;
     }
     if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
@@ -649,8 +665,8 @@ void instance_save(Instance *x, char *record) {
     head.running = x->running;
     head.warned = x->warned;
     if (ERROR_BARS != NULL) ERROR_BARS->save(x);
-    memset(record, 0, record_head());
     memcpy(record, &head, sizeof head);
+    memset(record + sizeof head, 0, record_head() - sizeof head);
     memcpy(record + record_head(), x->saved, x->saved_size);
 }
 

@@ -23,6 +23,8 @@ typedef struct {
     double *scale;             /* (2 n) of errors, in the present step */
     double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
+    int *strikes;              /* (contacts) impacts since the caller set them to 0 */
+    double *struck_at, *impulse; /* (contacts) of the latest: time [s], impulse [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
     double *work_initial;      /* (6 n + 3 m) of initial.c, afar.c and magnitudes.c */
@@ -74,8 +76,9 @@ Status solver_follow(Solver *s);
  * be projected onto the constraints. */
 Status solver_arrive(Solver *s);
 
-/* 1: the integrator has been beyond t_end already, and to advance there on demand cannot fail. */
-int solver_passed(const Solver *s, double t_end);
+/* The same where the integrator has been beyond t_end already, and q and v there are found on demand: nothing
+ * is left to do, and nothing can fail.  0: it has not been there, and nothing was done. */
+int solver_pass(Solver *s, double t_end);
 
 /* The inputs were set: what was integrated ahead with the old ones is dropped. */
 void solver_inputs_changed(Solver *s);
