@@ -159,7 +159,7 @@ class Session:
                 modelIdentifier=self.plug.identifier,
                 unzipDirectory=self.plug.folder,
             )
-            ours = hasattr(self.slave.dll, "lagfmu_batch")  # gives reasons without being asked to log
+            ours = hasattr(self.slave.dll, "lagfmu_batch")  # it gives its reasons unasked
             self.slave.instantiate(callbacks=callbacks, loggingOn=not ours)
         except Exception as error:
             told = reason() if MESSAGES else str(error)
