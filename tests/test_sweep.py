@@ -196,6 +196,20 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped(hemisphere, tmp_path):
     assert len(facts["fmu_sha256"]) == 64
 
 
+def test_what_was_refused_before_an_interruption_counts(hemisphere, tmp_path):
+    """The first run has no radius; the client stops after it and goes on."""
+    values, out = {"a": [-1.0, *np.linspace(0.5, 1, 9)]}, tmp_path / "runs.nc"
+
+    def stop(done, total, refused):
+        if done >= 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        lagfmu.sweep(hemisphere, values, out=out, progress=stop, workers=1)
+    found = lagfmu.sweep(hemisphere, values, out=out, resume=True)
+    assert found.attrs["refused"] == 1
+
+
 def test_inputs_come_from_a_table(native_fmu):
     """A cart that is pushed harder and harder goes where it goes when it is simulated alone."""
     inputs = np.zeros(3, dtype=[("time", float), ("F", float)])
@@ -245,7 +259,9 @@ def test_axes_are_crossed_in_the_order_in_which_they_are_given():
         (["--sample", "m ~ uniform(2, 1)", "--runs", "5"], "low = 2.0"),
         (["--vary", "theta=1,2", "--keep", "lambda.surfce:max"], "did you mean 'lambda.surface'?"),
         (["--vary", "theta=1,2", "--keep", "lambda.surface:peak"], "time-of-max"),
-        (["--vary", "theta=1,2", "--out", "runs.xls"], ".parquet, .nc or .zarr"),
+        (["--vary", "theta=1,2", "--out", "runs.xls"], ".parquet, .csv, .nc, .zarr"),
+        (["--vary", "xyz=1"], "expected one of m, g, a, r, der(r), theta, der(theta), solver."),
+        (["--vary", "theta=1,2", "--vary", "theta=3"], "theta varies in two ways"),
         ([], "nothing varies"),
         (["--vary", "theta=1,2", "--step-size", "0"], "step_size = 0.0"),
         (["--vary", "theta=1,2", "--workers", "0"], "workers = 0, expected a whole number from 1"),
@@ -309,6 +325,73 @@ def test_the_command_draws_what_was_refused(hemisphere, tmp_path):
     assert "6 runs, 3 refused" in done.output
     assert "and 2 like it" in done.output
     assert "refused" in figure.read_text()
+
+
+def swept(*words: object) -> str:
+    """What the command prints, by words."""
+    done = CliRunner().invoke(app, ["sweep", *map(str, words)])
+    assert done.exit_code == 0, done.output
+    return " ".join(done.output.split())
+
+
+def test_few_runs_are_printed_each_by_itself(hemisphere):
+    """Where no particle leaves there is no time of it, though the FMU's variable is 0 s; a run that is
+    refused has a status in place of numbers."""
+    said = swept(hemisphere, "--vary", "theta=0.01,0.5", "--vary", "a=-1,1", "--stop-time", 1)
+    assert "4 runs, 2 refused" in said
+    assert "0.01 1 9.80951 0 never ok" in said
+    assert "0.5 1 8.60908 1 0.411351 ok" in said
+    assert "0.5 -1 error" in said
+
+
+@pytest.mark.parametrize("kept", [[], ["--keep", "departure.surface.time:last"]])
+def test_of_many_runs_the_ranges_are_printed_without_what_never_happened(
+    hemisphere, kept, tmp_path
+):
+    """From rest at 0.01 rad the particle stays for 1.64 s: within 1 s it leaves from 0.07 rad on, and the
+    zeros that stand for no departure are no times; the data are as the FMU gives them."""
+    out = tmp_path / "runs.parquet"
+    said = swept(hemisphere, "--vary", "theta=0.01:1:30", "--stop-time", 1, "--out", out, *kept)
+    assert "departure.surface.time:last: 0.219213 ... 0.984895 s" in said
+    assert "never in 2 runs" in said
+    import pyarrow.parquet as pq
+
+    times = pq.read_table(out)["departure.surface.time:last"].to_numpy()
+    assert (times[:2] == 0).all()
+    assert times[2:].max() < 1
+
+
+def test_a_table_as_csv_has_every_bit_and_its_units_beside_it(hemisphere, tmp_path):
+    """What spreadsheets and pandas read without a word of explanation; units and the FMU's hash by the W3C's
+    vocabulary for tabular data; a reason holds commas and quotes."""
+    import pandas as pd
+
+    out = tmp_path / "runs.csv"
+    swept(hemisphere, "--vary", "theta=0.05:1:7", "--vary", "a=1,-1", "--out", out)
+    found = pd.read_csv(out)
+    alone = lagfmu.sweep(hemisphere, {"theta": np.linspace(0.05, 1, 7), "a": [1, -1]})
+    for name in ("lambda.surface:max", "departure.surface.time:last", "reached"):
+        assert found[name].to_numpy(float).tobytes() == alone[name].values.tobytes(), name
+    assert found["reason"][1] == alone["reason"].values[0, 1]
+    about = json.loads((tmp_path / "runs.csv-metadata.json").read_text())
+    assert about["url"] == "runs.csv"
+    columns = {c["titles"]: c for c in about["tableSchema"]["columns"]}
+    assert list(columns) == list(found.columns)
+    assert columns["theta"]["schema:unitText"] == "rad"
+    assert columns["lambda.surface:max"]["schema:unitText"] == "N"
+    assert columns["run"]["datatype"] == "integer"
+    digest = hashlib.sha256(hemisphere.read_bytes()).hexdigest()
+    assert about["notes"][0]["fmu_sha256"] == digest
+    again = lagfmu.sweep(hemisphere, rows={"theta": found["theta"], "a": found["a"]})
+    assert (again["lambda.surface:max"].values[::2] == found["lambda.surface:max"][::2]).all()
+
+
+def test_the_help_fits_a_terminal(monkeypatch):
+    """Nothing that stands for a value is broken at 80 columns."""
+    monkeypatch.setenv("COLUMNS", "80")
+    said = CliRunner().invoke(app, ["sweep", "--help"]).output
+    for word in ("NAME=RANGE", "'NAME ~ LAW'", "NAME:HOW", "ADDRESS", "<float>", "<path>"):
+        assert f" {word} " in said, word
 
 
 def test_a_model_file_is_built_first(tmp_path):

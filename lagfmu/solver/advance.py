@@ -34,7 +34,7 @@ def advance(
 ) -> State:
     """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was.
 
-    `after_step`: with error bars (bars.py), what is done to the integrator after a step, and adds to
+    `after_step`: with error bars (bars.py), what is done to the integrator after a step, and makes of
     State.local.
     """
     begun = state.t
@@ -130,9 +130,9 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
         offered = solver.h_abs
         try:
             leg.step(solver)
+            before_it = local
             if leg.after_step is not None:
-                more = leg.after_step(solver, state)
-                local = local[0] + more[0], local[1] + more[1]
+                local = leg.after_step(solver, state, local)
             y1 = leg.project(solver.t, solver.y)
             if not (
                 leg.system.prescribed and t0 == leg.begun
@@ -149,6 +149,10 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
             event, before = at_events.first_event(leg, solver, t0, y0, y1, before, armed)
             if event is not None:
                 headway.check(t0, event[0])
+                if leg.after_step is not None:  # the way to the event counts, not the whole step
+                    leg.local = before_it
+                    leg.reach(t0, y0, event[0])
+                    local = leg.local
                 step = offered
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)

@@ -19,14 +19,14 @@ from .instant import Instant, Motion
 from .magnitudes import shared
 from .methods import share, stepper
 from .motion import distance, independent, motion, project
-from .state import Settings, State
+from .state import NO_LOCAL, Local, Settings, State
 from .stiffness import Choice
 from .straight import solver_of
 from .system import Matrix, System, Vector
 from .thresholds import FAR, FEWEST_STEPS_RK4, HOPELESS, LEAST_FAR
 
 SHIFT = 2.0**-26  # of a size, for a difference quotient: half of a double's digits
-AfterStep = Callable[[Any, State], tuple[float, float]]
+AfterStep = Callable[[Any, State, Local], Local]
 
 
 @dataclass
@@ -51,6 +51,7 @@ class Leg:
         self.scale = np.array(self.state.scale)
         self.size = np.array(self.state.size)
         self.cause = ""
+        self.local = NO_LOCAL
         self.auto = self.settings.method == "auto"
         if self.auto:
             self.choose(self.state.choice)
@@ -208,10 +209,12 @@ class Leg:
         return StepFailureError(f"the integration stops at t = {float(t)!r} s, {message}{cause}")
 
     def reach(self, t: float, y: Vector, t1: float) -> Vector:
-        """The state at t1, integrated from (t, y) and projected."""
+        """The state at t1, integrated from (t, y) and projected; the way goes on counting in `local`."""
         if t1 <= t:
             return y
         solver = self.stepper(t, y, t1, t1 - t)
         while solver.status == "running":
             self.step(solver)
+            if self.after_step is not None:
+                self.local = self.after_step(solver, self.state, self.local)
         return self.project(t1, solver.y)

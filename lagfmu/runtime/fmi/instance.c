@@ -498,9 +498,12 @@ static void tell_of_method(Instance *x, double product, int implicit) {
 
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
+    if (solver_pass(s, t_end)) {
+        x->observed = x->evaluated = 0;
+        return OK;
+    }
     unfollow(x);
-    const int passed = solver_passed(s, t_end);
-    if (!passed) instance_save(x, x->backup);
+    instance_save(x, x->backup);
     if (s->system->estimated_count > 0) estimate_rates(x);
     if (s->system->prescribed_count > 0) warn_of_rates(x);
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
@@ -510,7 +513,7 @@ Status instance_step(Instance *x, double t_end) {
     const double product = s->state.now.choice.product;
     const int implicit = s->state.now.choice.implicit;
     if (solver_advance(s, t_end) != OK) {
-        if (!passed) instance_restore(x, x->backup);
+        instance_restore(x, x->backup);
         return FAILED;
     }
     if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
@@ -649,8 +652,8 @@ void instance_save(Instance *x, char *record) {
     head.running = x->running;
     head.warned = x->warned;
     if (ERROR_BARS != NULL) ERROR_BARS->save(x);
-    memset(record, 0, record_head());
     memcpy(record, &head, sizeof head);
+    memset(record + sizeof head, 0, record_head() - sizeof head);
     memcpy(record + record_head(), x->saved, x->saved_size);
 }
 

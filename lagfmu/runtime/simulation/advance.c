@@ -24,11 +24,9 @@ static const Method *method_of(const Solver *s) {
 }
 
 /* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not
- * at a fixed step, which divides the communication step; not on the way to an obstacle. */
+ * at a fixed step, which divides the communication step; not where a slip may come to rest on the way. */
 static int runs_ahead(const Solver *s) {
     if (s->system->inputs > 0 || method_of(s)->fixed) return 0;
-    for (int c = 0; c < s->system->contacts; c++)
-        if (!s->state.closed[c]) return 0;
     return s->system->frictions == 0 || !PARTS.slides->turns(s);
 }
 
@@ -180,10 +178,16 @@ Status solver_arrive(Solver *s) {
     return put_between(s, s->state.now.t);
 }
 
-int solver_passed(const Solver *s, double t_end) {
-    const Numbers *now = &s->state.now;
-    return now->ahead && now->t_integrator > t_end &&
-           !(now->event_count > 0 && now->event_time <= t_end) && waits(s);
+int solver_pass(Solver *s, double t_end) {
+    Numbers *now = &s->state.now;
+    if (!(now->ahead && now->t_integrator > t_end && t_end > now->t)) return 0;
+    if ((now->event_count > 0 && now->event_time <= t_end) || !waits(s)) return 0;
+    now->tiny = 0;
+    now->step = now->h_next;
+    now->span = t_end - now->t;
+    now->t = t_end;
+    now->between = 1;
+    return 1;
 }
 
 /* What frictions have dissipated at t, within the step just taken. */
@@ -223,6 +227,7 @@ static Status meet(Solver *s) {
     double *y = s->work_advance;
     if (s->system->frictions > 0 && lose(s, t) != OK) return FAILED;
     if (leg_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
+    if (s->alike > 0) PARTS.at_event(s);
     put(s, t, y);
     s->state.now.step = i->t - i->t_old;
     if (s->state.now.choice.implicit) {

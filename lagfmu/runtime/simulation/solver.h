@@ -13,6 +13,7 @@ typedef struct {
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
     double alike;              /* with error bars, else 0: see companion.h */
+    LocalErrors local_trial;   /* of the latest trial of an event's time */
     State state;
     Drive drive;
     double *p;                 /* (parameters) */
@@ -73,8 +74,9 @@ Status solver_follow(Solver *s);
  * be projected onto the constraints. */
 Status solver_arrive(Solver *s);
 
-/* 1: the integrator has been beyond t_end already, and to advance there on demand cannot fail. */
-int solver_passed(const Solver *s, double t_end);
+/* The same where the integrator has been beyond t_end already, and q and v there are found on demand: nothing
+ * is left to do, and nothing can fail.  0: it has not been there, and nothing was done. */
+int solver_pass(Solver *s, double t_end);
 
 /* The inputs were set: what was integrated ahead with the old ones is dropped. */
 void solver_inputs_changed(Solver *s);
