@@ -550,8 +550,8 @@ def test_units_scale_lambda_as_its_own_unit_says(solver, case, kilogram, metre, 
 @pytest.mark.parametrize("inertia", [3e-3, 1e-20, 1e-30, 1e-100, 1e-300])
 @pytest.mark.parametrize("engine", ["C", "python"])
 def test_a_light_carrier_hides_no_teeth(ladder, engine, inertia):
-    """A planetary gear whose ring is held, with Willis' equation besides: i = 3.5 turns of the sun are one of
-    the carrier, J carrier'' = i tau with J = J_c + i^2 J_s + k^2 J_p, and a carrier without mass is the limit."""
+    """A planetary gear whose ring is held, with Willis' equation besides: i = 3.5 turns of the sun are one
+    of the carrier, J carrier'' = i tau with J = J_c + i^2 J_s + k^2 J_p; without J_c that is the limit."""
     sun, planet, teeth, ring = 2e-4, 1e-4, 2.0, 5e-3
     M, b = np.diag([sun, planet, inertia, ring]), np.array([0.5, 0, 0, 0])
     G = np.array([[teeth, 1.5, -3.5, 0], [0, -1.5, -3.5, 5], [teeth, 0, -7, 5], [0, 0, 0, 1]])

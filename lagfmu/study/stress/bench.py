@@ -134,9 +134,10 @@ class Bench:
         times: list[float],
         tolerance: float | None = None,
         drive: Drive | None = None,
+        late: bool = False,
     ) -> Run:
-        """A run on the bench's instance."""
-        return play(self.player, values, times, tolerance, drive)
+        """A run on the bench's instance; `late` as in play()."""
+        return play(self.player, values, times, tolerance, drive, late=late)
 
     def checks(self, run: Run, span: float | None = None) -> list[Check]:
         """The invariants; `span` [s] is what counts as the default experiment at these values."""
