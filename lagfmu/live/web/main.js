@@ -89,9 +89,12 @@ function showEvents(events) {
 }
 
 function showLog(log) {
-  const said = log.filter((m) => m.status !== "ok");
-  byId("log").replaceChildren(...said.map((m) => element("li", {}, `${m.status}: ${m.message}`)));
-  byId("log-box").hidden = !said.length;
+  const items = log
+    .slice(0, MOST_EVENTS)
+    .map((m) => element("li", {}, m.status === "ok" ? m.message : `${m.status}: ${m.message}`));
+  if (log.length > MOST_EVENTS) items.push(element("li", {}, `and ${log.length - MOST_EVENTS} more`));
+  byId("log").replaceChildren(...items);
+  byId("log-box").hidden = !log.length;
 }
 
 function showTime(t) {
