@@ -197,10 +197,9 @@ static void widen(Instance *x) {
     }
 }
 
-/* The magnitudes at the start; of fixed steps, n to t_end for the companion and 2 n for the delivered run. */
+/* Of fixed steps, n to t_end for the companion and 2 n for the delivered run. */
 static void begin_step(Instance *x, double t_end) {
     const double span = t_end - x->solver.state.now.t;
-    if (x->solver.state.now.t == x->start_time) widen(x);
     if (!has_fixed_step(x) || !(span > 0) || !isfinite(span)) return;
     const double steps = fmax(ceil(span / asked_step(x, span) * (1 - 1e-12)), 1);
     x->bars->solver.settings.step = span / steps;
@@ -249,5 +248,5 @@ static Status restored(Instance *x) {
     return restored_solver(x, &b->solver);
 }
 
-const ErrorBars BARS = {layout,         start, begin_step, follow,  widen,
-                        inputs_changed, turn,  get,        save,    restore, restored};
+const ErrorBars BARS = {layout,         start, widen, begin_step, follow,
+                        inputs_changed, turn,  get,   save,       restore, restored};

@@ -516,6 +516,7 @@ Status instance_step(Instance *x, double t_end) {
         x->observed = x->evaluated = 0;
         return OK;
     }
+    if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
     unfollow(x);
     instance_save(x, x->backup);
     if (s->system->estimated_count > 0) estimate_rates(x);
@@ -535,7 +536,6 @@ Status instance_step(Instance *x, double t_end) {
     if (s->system->lookup_count > 0) warn_of_tables(x);
     if (s->system->contacts + s->system->frictions > 0) report_events(x);
     tell_of_method(x, product, implicit);
-    if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
     return OK;
 }
 
