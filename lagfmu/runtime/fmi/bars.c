@@ -36,6 +36,7 @@ static void layout(Instance *x, Arena *saved, Arena *scratch) {
     const int count = b->end - b->first;
     solver_layout(&b->solver, saved, scratch, MODEL_SYSTEM);
     b->solver.p = x->solver.p;
+    b->solver.on_demand = 1;
     b->solver.alike = companion_alike(BAR_COARSER);
     x->solver.alike = HUGE_VAL;
     observed_layout(&b->seen, scratch, MODEL_SYSTEM);
@@ -112,6 +113,7 @@ static void follow(Instance *x, double t_end) {
     b->observed = 0;
     if (*b->lost) return;
     share(x);
+    if (solver_pass(&b->solver, t_end)) return;
     if (solver_advance(&b->solver, t_end) != OK) lose(x, b->solver.why.text);
 }
 
@@ -145,7 +147,7 @@ static Status look(Instance *x) {
     if (instance_observe(x) != OK) return FAILED;
     if (*b->lost || b->observed) return OK;
     share(x);
-    if (solver_observe(&b->solver, &b->seen) == OK)
+    if (solver_arrive(&b->solver) == OK && solver_observe(&b->solver, &b->seen) == OK)
         b->observed = 1;
     else
         lose(x, b->solver.why.text);
