@@ -22,6 +22,7 @@ STICKS, MARGIN, POWER, SLIPPING = "sticks", "margin", "power", "slipping"  # of 
 SLIP = "slip"  # of a constraint that holds by friction
 DEPARTURES, DEPARTURE_TIME = "departure.count", "departure.time"
 SLIPS, SLIP_TIME = "slipping.count", "slipping.time"
+COUNT_OF = {DEPARTURE_TIME: DEPARTURES, SLIP_TIME: SLIPS}  # of the events whose latest time it is
 KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
 ENERGY, SOLVER = "energy", "solver"
@@ -69,7 +70,7 @@ def name(quantity: str, constraint: str = "", coordinate: str = "", order: int =
     if quantity in (VALUE, OWN):
         return derivative(coordinate, order)
     head, _, tail = quantity.partition(".")
-    if quantity == ERROR and (rate := RATE.fullmatch(coordinate)):
+    if quantity == ERROR and (rate := RATE.fullmatch(coordinate)) and rate[2] is None:
         coordinate, order = rate[1], 1  # a structured name has der() around it or not at all
     words = (head, constraint, tail, "velocity" if order else "", coordinate)
     return ".".join(word for word in words if word)

@@ -4,14 +4,15 @@ output: nobody who asks can tell.  Communication steps are powers of two, so tha
 from __future__ import annotations
 
 import ctypes
+import math
 from ctypes import byref, c_double, c_size_t
 
 import pytest
 from fmi2 import DISCARD, Library
-from sympy import sqrt, symbols
+from sympy import Rational, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Model, Parameter, build_fmu
+from lagfmu import Contact, Holonomic, Model, Parameter, build_fmu
 from lagfmu.fmu.compiler import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -114,7 +115,86 @@ def test_an_event_ahead_is_invisible_until_its_time(library, step):
     one.free()
 
 
-@pytest.mark.parametrize("name", ["PendulumCartesian", "Hemisphere", "Loop", "DoublePendulum"])
+@pytest.mark.parametrize("name", ["Hemisphere", "BouncingBall"])
+def test_in_flight_the_communication_step_changes_nothing_to_the_last_bit(library, name):
+    """On the way to an obstacle as anywhere: from 0.25 s to 0.1 ms the same internal steps, departures and
+    landings; no step of the parabola for each communication point."""
+    ends = []
+    for step in STEPS[1:]:
+        one = library(name)(logging=False).start(
+            {"theta": 0.3} if name == "Hemisphere" else None, 1e-8
+        )
+        seen = []
+        for until in (0.5, 1.0, 2.0):
+            run(one, step, until)
+            seen.append((one.outputs(), integer(one, "solver.steps")))
+        ends.append(seen)
+        one.free()
+    assert all(end == ends[0] for end in ends)
+    assert ends[0][2][1] < 200
+
+
+@pytest.mark.parametrize("step", STEPS[1:])
+def test_a_landing_ahead_is_invisible_until_its_time(library, step):
+    """A ball let go at 1 m meets the floor at sqrt(2 h/g) = 0.45 s, which is found while the integrator
+    stands far ahead, below the floor.  Until then the ball falls, above the floor, at -g t; from then on it
+    rises with e of the speed."""
+    g, e = 9.81, 0.7
+    landing = math.sqrt(2 / g)
+    one = library("BouncingBall")(logging=False).start(None, 1e-9)
+    for _ in range(round(0.5 / step)):
+        one.step(step)
+        height, speed = one.reals(["y", "der(y)"])
+        if one.time < landing:
+            assert height == pytest.approx(1 - g * one.time**2 / 2, rel=1e-12)
+            assert speed == pytest.approx(-g * one.time, rel=1e-12)
+        else:
+            assert speed == pytest.approx(e * g * landing - g * (one.time - landing), rel=1e-9)
+            assert height > 0
+    one.free()
+
+
+def lifted(folder) -> Library:
+    """A ball lifted by a force that has no value deeper than 1 cm below the floor: P sqrt(y/l + 0.01)."""
+    y = dynamicsymbols("y")
+    m, g, P, l = symbols("m g P l", positive=True)  # noqa: E741
+    model = Model(
+        name="Lifted",
+        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
+        forces={y: P * sqrt(y / l + Rational(1, 100))},
+        coordinates={y: "m"},
+        constraints=[Contact("floor", y)],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(P, 3.0, "N"),
+            Parameter(l, 1.0, "m"),
+        ],
+        start={y: 1.0},
+    )
+    return Library(build_fmu(model, folder, target="native", check=False), folder / "library")
+
+
+@pytest.mark.parametrize("step", [1.0, 2.0**-6])
+def test_what_lies_behind_an_obstacle_need_not_be_defined(tmp_path, step):
+    """On its way to the floor the integrator meets a force that has no value behind it.  The ball lands all
+    the same, no faster than the work v^2/2 = g h - (P/m) 2/3 (1.01^(3/2) - 0.01^(3/2)) h allows, and lies
+    there: lambda = m g - 0.1 P."""
+    one = lifted(tmp_path)().start(None, 1e-9)
+    fastest = 0.0
+    while one.time < 2.0:
+        one.step(step)
+        fastest = max(fastest, -one.get("der(y)"))
+    assert fastest <= math.sqrt(2 * (9.81 - 3.0 * 2 / 3 * (1.01**1.5 - 0.01**1.5)))
+    lying = one.reals(["y", "der(y)", "lambda.floor"])
+    assert lying == pytest.approx([0, 0, 9.81 - 0.3], abs=1e-12)
+    assert not [text for status, _, text in one.log if status >= DISCARD]
+    one.free()
+
+
+@pytest.mark.parametrize(
+    "name", ["PendulumCartesian", "Hemisphere", "BouncingBall", "Loop", "DoublePendulum"]
+)
 def test_rollback_within_a_step_ahead_is_exact(library, name):
     """Saved where dense output answers, in the middle of an internal step: the same future from the state
     and from its bytes in another instance, to the last bit, asked at other instants in between too."""

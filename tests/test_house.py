@@ -106,3 +106,13 @@ def test_names_of_variables_are_composed_in_one_place() -> None:
     for path in MODULES:
         if path.name != "names.py":
             assert not made.search(path.read_text(encoding="utf-8")), path.name
+
+
+def test_what_a_header_defines_is_defined_nowhere_else() -> None:
+    """An FMU carries the runtime as one C file, where a constant of a header and one of a file's own would be
+    two of one name."""
+    defined = re.compile(r"^static const \w+ (\w+)", re.MULTILINE)
+    shared = {n: p for p in ROOT.glob("runtime/*/*.h") for n in defined.findall(p.read_text())}
+    for path in ROOT.glob("runtime/*/*.c"):
+        twice = set(defined.findall(path.read_text())) & shared.keys()
+        assert not twice, (path.name, twice)

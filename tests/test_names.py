@@ -33,3 +33,10 @@ def test_a_name_tells_of_which_constraint_and_coordinate_a_variable_is(
     """Who reads an FMU's description knows what each variable is of, as DESIGN section 4 names them."""
     assert names.read(text) == meant
     assert meant.name == text
+
+
+def test_a_bar_is_of_one_variable():
+    """The bar of a velocity has a structured name; an acceleration, which has none, does not take it."""
+    assert names.bar("der(x)") == "error.velocity.x"
+    assert names.bar("der(x,2)") not in (names.bar("der(x)"), names.bar("x"))
+    assert names.barred(names.bar("der(x)")) == "der(x)"

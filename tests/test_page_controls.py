@@ -112,6 +112,18 @@ def test_a_refused_value_is_told_and_the_curves_stay(opened: Opened) -> None:
     page.until(f"{status}.startsWith('Run to 2 s')")
 
 
+def test_bounces_are_told_with_time_and_impulse(opened: Opened) -> None:
+    """A ball that falls 1 m strikes the floor at 0.4515 s with m sqrt(2 g h) (1 + e) = 7.53 N s: the FMU says
+    so, and the page shows what it says."""
+    page = opened("BouncingBall")
+    page.until("lagfmu.runs")
+    first = page.tab.locator("#log li").all_text_contents()[0]
+    words = first.replace(",", "").split()
+    assert first.startswith("contact floor was struck at t = ")
+    assert float(words[7]) == pytest.approx((2 / 9.81) ** 0.5, rel=1e-8)
+    assert float(words[10]) == pytest.approx((2 * 9.81) ** 0.5 * 1.7, rel=1e-8)
+
+
 def test_a_departure_that_has_not_been_has_no_time(opened: Opened) -> None:
     """Before 1.641 s the particle is on the hemisphere: among all values its departure is none yet."""
     page = opened("Hemisphere")
@@ -128,6 +140,7 @@ def test_the_gap_of_a_contact_is_no_residual(opened: Opened) -> None:
     told = page.tab.locator("#charts figcaption").all_inner_texts()
     assert "Gaps of contacts [m]" in told
     assert not any(t.startswith("Residuals") for t in told)
+    assert "Residuals" not in page.tab.locator("#chart-choices").inner_text()
 
 
 def test_the_file_holds_the_run(opened: Opened, tmp_path: Path) -> None:
@@ -166,17 +179,92 @@ def test_a_link_brings_the_settings(opened: Opened, page_file: Any, browser: Any
     other.close()
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("width", [400, 1280])
-def test_it_fits_the_screen(width: int, theme: str, opened: Opened, tmp_path: Path) -> None:
-    """At 400 pixels and on a desktop nothing is cut off sideways, and the theme is the reader's."""
-    page = opened("Hemisphere", viewport={"width": width, "height": 900}, color_scheme=theme)
+def test_a_slider_has_the_bounds_and_the_unit_of_its_variable(opened: Opened) -> None:
+    """Restitution lies in 0..1, a mass is at least 0 kg: so do the ends of their sliders; the number beside
+    takes what is typed, and the run follows."""
+    page = opened("BouncingBall")
     page.until("lagfmu.runs")
-    assert page.tab.evaluate("() => document.documentElement.scrollWidth") <= width
-    paper = page.tab.evaluate("() => getComputedStyle(document.body).backgroundColor")
-    light = sum(int(c) for c in paper.removeprefix("rgb(").removesuffix(")").split(",")) > 384
-    assert light == (theme == "light")
-    page.tab.screenshot(path=str(tmp_path / f"{theme}-{width}.png"), full_page=True)
+    ends = """(name) => {
+        const slider = document.querySelector(`input[data-name="${name}"]`);
+        const unit = slider.closest(".dial").querySelector(".unit").textContent;
+        return [Number(slider.min), Number(slider.max), unit];
+    }"""
+    assert page.tab.evaluate(ends, "e") == [0, 1, ""]
+    assert page.tab.evaluate(ends, "m")[::2] == [0, "kg"]
+    before = page.until("lagfmu.runs")
+    page.tab.locator("#dials input[type=number][aria-label^='y, as a number']").fill("0.5")
+    page.until(f"lagfmu.runs > {before}")
+    assert page.tab.evaluate("() => lagfmu.shown().values.y[0]") == 0.5
+
+
+def test_another_method_is_another_run(opened: Opened) -> None:
+    """The menu of methods is the FMU's: radau5 takes other steps, and says so."""
+    page = opened("PendulumCartesian")
+    page.until("lagfmu.runs")
+    script = "() => lagfmu.shown().values['solver.steps'].at(-1)"
+    steps, before = page.tab.evaluate(script), page.until("lagfmu.runs")
+    page.tab.locator("#method").select_option("radau5")
+    page.until(f"lagfmu.runs > {before}")
+    assert page.tab.evaluate(script) != steps
+    assert page.tab.evaluate("() => lagfmu.shown().settings.method") == "radau5"
+
+
+def test_the_page_goes_on_while_the_fmu_computes(opened: Opened) -> None:
+    """The computation is in a worker: during a run of an hour the page's own thread has its turns."""
+    page = opened("PendulumCartesian")
+    page.until("lagfmu.runs")
+    turns = page.tab.evaluate(
+        """async () => {
+            let turns = 0, done = false;
+            const run = lagfmu.run({ stopTime: 3600, stepSize: 1 }).then(() => (done = true));
+            while (!done) {
+                await new Promise((next) => setTimeout(next, 1));
+                turns++;
+            }
+            await run;
+            return turns;
+        }"""
+    )
+    assert turns > 5
+
+
+def test_twice_the_speed_is_half_the_time(opened: Opened) -> None:
+    """At a speed of 5 the run of 2 s is over in 0.4 s and stops at its end; at 1/20 it has hardly begun."""
+    page = opened("Hemisphere")
+    page.until("lagfmu.runs")
+    page.tab.locator("#speed").select_option("5")
+    page.tab.locator("#play-button").click()
+    page.until("document.getElementById('play-button').textContent === 'Run'")
+    assert float(page.tab.locator("#scrub").input_value()) == 2.0
+    page.tab.locator("#speed").select_option("0.05")
+    page.tab.locator("#play-button").click()
+    page.tab.wait_for_timeout(300)
+    assert 0 < float(page.tab.locator("#scrub").input_value()) < 1.0
+
+
+def test_what_is_drawn_has_its_headings(opened: Opened) -> None:
+    """Multipliers, own outputs, forces of constraint, energies, friction, residuals and gaps, with units; the
+    equations; and the library that draws, with its licence."""
+    page = opened("Belt")
+    page.until("lagfmu.runs")
+    told = page.tab.locator("#charts figcaption").all_inner_texts()
+    for heading in (
+        *(
+            "Multipliers λ [N]",
+            "Outputs [W]",
+            "Energies [J]",
+            "Generalized forces of constraint [N]",
+        ),
+        *(
+            "Friction [m/s]",
+            "Residuals, zero where a constraint acts [m/s]",
+            "Gaps of contacts [m]",
+        ),
+    ):
+        assert heading in told
+    assert page.tab.locator("math").count() >= 8
+    assert "MIT" in page.tab.content()
+    assert "Copyright (c)" in page.tab.content()
 
 
 def test_the_keyboard_reaches_everything_in_the_order_of_the_page(opened: Opened) -> None:

@@ -13,7 +13,7 @@ from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Input, Model, Parameter, build_fmu
+from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu
 from lagfmu.errors import ModelError
 from lagfmu.model.file import load
 
@@ -60,13 +60,11 @@ def test_a_motion_that_is_connected_is_not_told(native_fmu, h):
     assert told(native_fmu("Crane"), h, 2, still=True) == []
 
 
-@pytest.mark.parametrize("target", ["python", "native"])
-def test_a_rate_counts_from_the_moment_at_which_it_is_set(tmp_path, target):
-    """A bead on a wire that is turned from outside runs outward as r'' = r omega^2: with 1 rad/s for 0.1 s,
-    from there with the 3 rad/s that are set, of which the first internal step knows already."""
+def turned_wire() -> Model:
+    """A bead on a wire that is turned from outside, by phi."""
     r, turn, phi = dynamicsymbols("r turn phi")
     m = symbols("m", positive=True)
-    model = Model(
+    return Model(
         name="Wire",
         lagrangian=m * (r.diff() ** 2 + r**2 * turn.diff() ** 2) / 2,
         coordinates={r: "m", turn: "rad"},
@@ -75,7 +73,13 @@ def test_a_rate_counts_from_the_moment_at_which_it_is_set(tmp_path, target):
         inputs=[Input(phi, "rad", 0.0, rate=1.0)],
         start={r: 1.0, turn.diff(): 1.0},
     )
-    fmu = build_fmu(model, tmp_path, target=target, check=False)
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_rate_counts_from_the_moment_at_which_it_is_set(tmp_path, target):
+    """A bead on a wire that is turned from outside runs outward as r'' = r omega^2: with 1 rad/s for 0.1 s,
+    from there with the 3 rad/s that are set, of which the first internal step knows already."""
+    fmu = build_fmu(turned_wire(), tmp_path, target=target, check=False)
     with instance(fmu) as one:
         one.start(tolerance=1e-10)
         one.step(0.1)
@@ -84,6 +88,76 @@ def test_a_rate_counts_from_the_moment_at_which_it_is_set(tmp_path, target):
         place, speed = np.cosh(0.1), np.sinh(0.1)
         expected = place * np.cosh(0.3) + speed * np.sinh(0.3) / 3
         assert one.get("r") == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize("bars", [False, True])
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_what_is_read_after_a_rate_was_set_belongs_to_it(tmp_path, target, bars):
+    """The torque that turns the wire is 2 m r r' omega: of the new omega as soon as that is set, before any
+    step; the wire turns at it, and the energy is that of its speed.  To have read, saved and read again
+    leaves no trace in the steps that follow."""
+    scene = Scene("Wire", error_bars=bars)
+    fmu = build_fmu(turned_wire(), tmp_path, scene=scene, target=target, check=False)
+    ends = []
+    for looks in (False, True):
+        with instance(fmu) as one:
+            one.start(tolerance=1e-10)
+            one.step(0.1)
+            r, speed = one.get("r"), one.get("der(r)")
+            for omega in (2.0, 3.0):
+                one.set("der(phi)", omega)
+                if not looks:
+                    continue
+                assert one.get("lambda.drive") == pytest.approx(2 * r * speed * omega, rel=1e-12)
+                assert one.get("der(turn)") == pytest.approx(omega, rel=1e-14)
+                energy = (speed**2 + (r * omega) ** 2) / 2
+                assert one.get("energy.kinetic") == pytest.approx(energy, rel=1e-14)
+                assert abs(one.get("residual.drive")) < 1e-15
+                seen = one.outputs()
+                state = one.fmu.getFMUstate()
+                assert one.outputs() == seen
+                one.fmu.setFMUState(state)
+                assert one.outputs() == seen
+            one.step(0.1)
+            ends.append(one.outputs())
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_floor_that_was_pulled_away_is_left_as_soon_as_that_is_read(tmp_path, target):
+    """A block on a floor that drops by 1 m at once: nothing pushes it any more, before the next step too;
+    the step tells of one departure, whether somebody has looked or not."""
+    z, u = dynamicsymbols("z u")
+    m, g = symbols("m g", positive=True)
+    model = Model(
+        name="Block",
+        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
+        coordinates={z: "m"},
+        constraints=[Contact("floor", z - u)],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(g, 9.81, "m/s^2")],
+        inputs=[Input(u, "m")],
+        start={z: 0.0},
+    )
+    fmu = build_fmu(model, tmp_path, target=target, check=False)
+    ends = []
+    for looks in (False, True):
+        with instance(fmu) as one:
+            one.start()
+            one.step(0.1)
+            assert one.get("lambda.floor") == pytest.approx(9.81)
+            one.set("u", -1.0)
+            if looks:
+                assert one.get("lambda.floor") == 0.0
+                assert not one.get("contact.floor")
+                assert one.get("residual.floor") == 1.0
+                one.set("u", 0.0)  # it was not meant
+                assert one.get("contact.floor")
+                assert one.get("lambda.floor") == pytest.approx(9.81)
+                one.set("u", -1.0)
+            one.step(0.1)
+            assert one.get("departure.floor.count") == 1
+            ends.append(one.outputs())
+    assert ends[0] == ends[1]
 
 
 # ---------------------------------------------------------------------------- estimated

@@ -86,6 +86,41 @@ def test_the_commands_and_the_examples_run_as_printed(tmp_path, monkeypatch, pyt
         assert run.returncode == 0, run.stderr[-2000:]
 
 
+def test_the_pieces_of_a_model_are_what_they_say(tmp_path, monkeypatch):
+    """The blocks of Python that are part of a file: with the bead of the README, and with symbols of the
+    names that they take from the text around them, each one runs."""
+    from sympy import Abs, symbols
+    from sympy.physics.mechanics import dynamicsymbols
+
+    (tmp_path / "bead.py").write_text(BLOCKS[0], encoding="utf-8")
+    rows = ["way,height", *(f"{k},{0.01 * k}" for k in range(5))]
+    (tmp_path / "road.csv").write_text("\n".join(rows), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    around = {name: getattr(lagfmu, name) for name in lagfmu.__all__}
+    around |= {str(s.func): s for s in dynamicsymbols("x y z s theta")}
+    around |= {str(s): s for s in symbols("R L F mu_s mu_k", positive=True)}
+    around |= {"Abs": Abs, "Path": Path, "__file__": str(tmp_path / "model.py"), "lagfmu": lagfmu}
+    around |= {"damper": lagfmu.Spline("damper", [-1, 1], [-2, 2], "m/s", "N")}
+    around["model"] = load(REPOSITORY / "models" / "hemisphere.py").model
+    pieces = [
+        block
+        for page in (
+            "README.md",
+            *(f"docs/{name}.md" for name in ("error_bars", "friction", "outputs")),
+        )
+        for block in re.findall(
+            r"```python\n(.*?)```", (REPOSITORY / page).read_text("utf-8"), re.DOTALL
+        )
+        if "fmpy" not in block
+    ]
+    assert len(pieces) >= 7
+    for piece in pieces:
+        own = dict(around)
+        if "Model(\n    ...," in piece:  # a part of a model: its outputs alone
+            own["Model"] = lambda *_, **fields: fields
+        exec(piece, own)
+
+
 def test_the_bead_keeps_its_energy_and_its_wire(tmp_path):
     """A bead on z = k x^2 keeps m g z + m v^2/2, also on another parabola; the wire bears it."""
     blocks = re.findall(r"```python\n(.*?)```", README, re.DOTALL)

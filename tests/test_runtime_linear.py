@@ -531,7 +531,7 @@ def test_a_row_that_does_not_act_is_not_there(library, case, formulation):
 
 
 @pytest.mark.parametrize("case", ["diagonal", "coupled", "light", "duplicated"])
-@pytest.mark.parametrize("kilogram", [1e-9, 1e9])
+@pytest.mark.parametrize("kilogram", [1e-200, 1e-9, 1e9, 1e200])
 @pytest.mark.parametrize("metre", [1e-9, 1e9])
 @pytest.mark.parametrize("second", [1e-9, 1e9])
 def test_units_scale_lambda_as_its_own_unit_says(solver, case, kilogram, metre, second):

@@ -19,7 +19,8 @@ from lagfmu.solver import advance as advancing
 from lagfmu.solver import leg
 from lagfmu.solver.initial import start
 from lagfmu.solver.state import Settings, State
-from lagfmu.solver.stiffness import DEARER, STIFF, Choice, Slope, explicit, explicit_step
+from lagfmu.solver.stiffness import DEARER, Choice, Slope, explicit, explicit_step
+from lagfmu.solver.thresholds import STIFF_STEPS
 
 G = 9.81
 x, y = dynamicsymbols("x y")
@@ -357,7 +358,7 @@ def test_a_method_that_did_not_pay_has_to_wait_four_times_as_long():
             count += 1
         waits.append(count)
         choice = explicit(choice, paid=False)
-    assert waits == [STIFF, STIFF * DEARER, STIFF * DEARER**2]
+    assert waits == [STIFF_STEPS, STIFF_STEPS * DEARER, STIFF_STEPS * DEARER**2]
 
 
 def test_where_radau5_fails_dop853_goes_on(prepared, monkeypatch):

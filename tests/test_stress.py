@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy as sp
 from conftest import FILES, MODELS
 from rich.console import Console
 from typer.testing import CliRunner
@@ -22,10 +23,12 @@ import lagfmu
 from lagfmu.cli import stress as command
 from lagfmu.cli.app import app
 from lagfmu.cli.stress import stress
+from lagfmu.fmu.closed_forms import CarriedForm
 from lagfmu.fmu.session import RefusalError
 from lagfmu.model.model import name_of
 from lagfmu.study.stress import worker
 from lagfmu.study.stress.bench import Bench, Finding
+from lagfmu.study.stress.closed_forms import judged as judged_forms
 from lagfmu.study.stress.closed_forms import magnitude
 from lagfmu.study.stress.judge import Check, first_landing
 from lagfmu.study.stress.lagrange import lay_beside
@@ -321,6 +324,19 @@ def test_terms_count_in_full():
     assert float(magnitude(1 - cos(x)).subs(x, 1e-3)) == pytest.approx(2, rel=1e-5)
     assert float(magnitude(a**2 * b).subs({a: -2, b: -3})) == 12
     assert magnitude(3 * sign(x)).subs(x, -1e-3) == 3  # its slope is none that counts
+
+
+def test_a_scale_of_a_difference_is_none_of_its_magnitudes(bench):
+    """What is relative to |a - b| is so in every run; the magnitudes that both have at least, by the largest
+    of their peers, say nothing of their difference (0, so that rounding was called wrong)."""
+    theta, r = sp.symbols("theta r", real=True)
+    small, zero = 1e-15 * theta, sp.Integer(0)
+    law = CarriedForm("law", small, zero, *[None] * 4, theta - 2 * r, 10.0, 1e-12)
+    (form,) = judged_forms((law,), set())
+    run = bench.ordinary
+    rows = np.ones(len(run.rows))
+    error, allowed, _ = form.judge(run, rows, rows == 1, {"theta": 2.0, "r": 1.0})
+    assert 0 < error < 1e-3 * allowed
 
 
 def test_probes_cover_the_ranges(bench):

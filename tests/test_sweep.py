@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu.cli import app
-from lagfmu.errors import SimulationError
+from lagfmu.errors import LagfmuError, SimulationError
 from lagfmu.fmu.archive import version
 from lagfmu.fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, Session, plug
 from lagfmu.study.sweep import engine
@@ -196,6 +197,20 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped(hemisphere, tmp_path):
     assert len(facts["fmu_sha256"]) == 64
 
 
+def test_what_was_refused_before_an_interruption_counts(hemisphere, tmp_path):
+    """The first run has no radius; the client stops after it and goes on."""
+    values, out = {"a": [-1.0, *np.linspace(0.5, 1, 9)]}, tmp_path / "runs.nc"
+
+    def stop(done, total, refused):
+        if done >= 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        lagfmu.sweep(hemisphere, values, out=out, progress=stop, workers=1)
+    found = lagfmu.sweep(hemisphere, values, out=out, resume=True)
+    assert found.attrs["refused"] == 1
+
+
 def test_inputs_come_from_a_table(native_fmu):
     """A cart that is pushed harder and harder goes where it goes when it is simulated alone."""
     inputs = np.zeros(3, dtype=[("time", float), ("F", float)])
@@ -245,7 +260,9 @@ def test_axes_are_crossed_in_the_order_in_which_they_are_given():
         (["--sample", "m ~ uniform(2, 1)", "--runs", "5"], "low = 2.0"),
         (["--vary", "theta=1,2", "--keep", "lambda.surfce:max"], "did you mean 'lambda.surface'?"),
         (["--vary", "theta=1,2", "--keep", "lambda.surface:peak"], "time-of-max"),
-        (["--vary", "theta=1,2", "--out", "runs.xls"], ".parquet, .nc or .zarr"),
+        (["--vary", "theta=1,2", "--out", "runs.xls"], ".parquet, .csv, .nc, .zarr"),
+        (["--vary", "xyz=1"], "expected one of m, g, a, r, der(r), theta, der(theta), solver."),
+        (["--vary", "theta=1,2", "--vary", "theta=3"], "theta varies in two ways"),
         ([], "nothing varies"),
         (["--vary", "theta=1,2", "--step-size", "0"], "step_size = 0.0"),
         (["--vary", "theta=1,2", "--workers", "0"], "workers = 0, expected a whole number from 1"),
@@ -309,6 +326,73 @@ def test_the_command_draws_what_was_refused(hemisphere, tmp_path):
     assert "6 runs, 3 refused" in done.output
     assert "and 2 like it" in done.output
     assert "refused" in figure.read_text()
+
+
+def swept(*words: object) -> str:
+    """What the command prints, by words."""
+    done = CliRunner().invoke(app, ["sweep", *map(str, words)])
+    assert done.exit_code == 0, done.output
+    return " ".join(done.output.split())
+
+
+def test_few_runs_are_printed_each_by_itself(hemisphere):
+    """Where no particle leaves there is no time of it, though the FMU's variable is 0 s; a run that is
+    refused has a status in place of numbers."""
+    said = swept(hemisphere, "--vary", "theta=0.01,0.5", "--vary", "a=-1,1", "--stop-time", 1)
+    assert "4 runs, 2 refused" in said
+    assert "0.01 1 9.80951 0 never ok" in said
+    assert "0.5 1 8.60908 1 0.411351 ok" in said
+    assert "0.5 -1 error" in said
+
+
+@pytest.mark.parametrize("kept", [[], ["--keep", "departure.surface.time:last"]])
+def test_of_many_runs_the_ranges_are_printed_without_what_never_happened(
+    hemisphere, kept, tmp_path
+):
+    """From rest at 0.01 rad the particle stays for 1.64 s: within 1 s it leaves from 0.07 rad on, and the
+    zeros that stand for no departure are no times; the data are as the FMU gives them."""
+    out = tmp_path / "runs.parquet"
+    said = swept(hemisphere, "--vary", "theta=0.01:1:30", "--stop-time", 1, "--out", out, *kept)
+    assert "departure.surface.time:last: 0.219213 ... 0.984895 s" in said
+    assert "never in 2 runs" in said
+    import pyarrow.parquet as pq
+
+    times = pq.read_table(out)["departure.surface.time:last"].to_numpy()
+    assert (times[:2] == 0).all()
+    assert times[2:].max() < 1
+
+
+def test_a_table_as_csv_has_every_bit_and_its_units_beside_it(hemisphere, tmp_path):
+    """What spreadsheets and pandas read without a word of explanation; units and the FMU's hash by the W3C's
+    vocabulary for tabular data; a reason holds commas and quotes."""
+    import pandas as pd
+
+    out = tmp_path / "runs.csv"
+    swept(hemisphere, "--vary", "theta=0.05:1:7", "--vary", "a=1,-1", "--out", out)
+    found = pd.read_csv(out)
+    alone = lagfmu.sweep(hemisphere, {"theta": np.linspace(0.05, 1, 7), "a": [1, -1]})
+    for name in ("lambda.surface:max", "departure.surface.time:last", "reached"):
+        assert found[name].to_numpy(float).tobytes() == alone[name].values.tobytes(), name
+    assert found["reason"][1] == alone["reason"].values[0, 1]
+    about = json.loads((tmp_path / "runs.csv-metadata.json").read_text())
+    assert about["url"] == "runs.csv"
+    columns = {c["titles"]: c for c in about["tableSchema"]["columns"]}
+    assert list(columns) == list(found.columns)
+    assert columns["theta"]["schema:unitText"] == "rad"
+    assert columns["lambda.surface:max"]["schema:unitText"] == "N"
+    assert columns["run"]["datatype"] == "integer"
+    digest = hashlib.sha256(hemisphere.read_bytes()).hexdigest()
+    assert about["notes"][0]["fmu_sha256"] == digest
+    again = lagfmu.sweep(hemisphere, rows={"theta": found["theta"], "a": found["a"]})
+    assert (again["lambda.surface:max"].values[::2] == found["lambda.surface:max"][::2]).all()
+
+
+def test_the_help_fits_a_terminal(monkeypatch):
+    """Nothing that stands for a value is broken at 80 columns."""
+    monkeypatch.setenv("COLUMNS", "80")
+    said = CliRunner().invoke(app, ["sweep", "--help"]).output
+    for word in ("NAME=RANGE", "'NAME ~ LAW'", "NAME:HOW", "ADDRESS", "<float>", "<path>"):
+        assert f" {word} " in said, word
 
 
 def test_a_model_file_is_built_first(tmp_path):
@@ -381,6 +465,115 @@ def test_the_client_never_loads_the_binary(hemisphere):
     if not Path("/proc/self/maps").exists():
         pytest.skip("no /proc on this machine")
     subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
+
+
+OTHER = """
+import math
+from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
+
+class Decay(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.k, self.u, self.x = 1.0, 0.0, 1.0
+        fixed = Fmi2Variability.fixed
+        self.register_variable(Real("k", causality=Fmi2Causality.parameter, variability=fixed))
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("x", causality=Fmi2Causality.output, initial=Fmi2Initial.exact))
+
+    def do_step(self, t, h):
+        self.x = self.x * math.exp(-self.k * h) + self.u * h
+        return self.k > 0
+"""
+
+
+@pytest.fixture(scope="module")
+def decay(tmp_path_factory) -> Path:
+    """An FMU that pythonfmu built, without lagfmu: x' = -k x + u."""
+    from pythonfmu import FmuBuilder
+
+    folder = tmp_path_factory.mktemp("other")
+    (folder / "decay.py").write_text(OTHER)
+    return Path(FmuBuilder.build_FMU(folder / "decay.py", dest=folder))
+
+
+def test_an_fmu_of_another_tool_is_swept_as_well(decay, tmp_path):
+    """x = exp(-k t), kept without being asked for, since there is no multiplier; what it refuses is a row;
+    the input of a table drives it."""
+    found = lagfmu.sweep(decay, {"k": [0.5, -1.0, 2.0]}, stop_time=1.0, step_size=0.1)
+    assert found["x:last"].values[[0, 2]] == pytest.approx(np.exp([-0.5, -2.0]), rel=1e-12)
+    assert found.status.values.tolist() == ["ok", "discard", "ok"]
+    inputs = np.zeros(2, dtype=[("time", float), ("u", float)])
+    inputs["time"], inputs["u"] = [0, 1], 1.0
+    driven = lagfmu.sweep(decay, {"k": [1e-9]}, stop_time=1.0, step_size=0.1, inputs=inputs)
+    assert driven["x:last"].values == pytest.approx(2.0)
+
+
+THREE = b"""<fmiModelDescription fmiVersion="3.0" modelName="Three" instantiationToken="1">
+<CoSimulation modelIdentifier="Three"/><ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+</ModelVariables><ModelStructure/></fmiModelDescription>"""
+
+
+@pytest.mark.parametrize(
+    ("change", "gone", "message"),
+    [
+        (lambda text: THREE, "", "is an FMU of FMI 3.0: a sweep drives FMI 2.0"),
+        (lambda text: text.replace(b"CoSimulation", b"Other"), "", "has no co-simulation"),
+        (lambda text: text, "binaries/", "has no binary for this machine"),
+    ],
+)
+def test_an_fmu_that_cannot_be_swept_is_refused_by_name(decay, tmp_path, change, gone, message):
+    """Another version of FMI, model exchange alone, no binary: said before anything is run."""
+    path = tmp_path / "odd.fmu"
+    with zipfile.ZipFile(decay) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "modelDescription.xml":
+                content = change(content)
+            if not (gone and name.startswith(gone)):
+                new.writestr(name, content)
+    with pytest.raises(LagfmuError, match=message) as told:
+        lagfmu.sweep(path, {"k": [1.0]})
+    assert "odd.fmu" in str(told.value)
+
+
+@pytest.mark.parametrize("command", [["sweep", "--vary", "k=1,2"], ["simulate"], ["verify"]])
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,u\n0,1\n1,2\n", "there is no column 'time', found t, u"),
+        ("time,u\n0,1\n2,1\n1,1\n", "the times are not sorted, expected rising seconds"),
+        ("time,u\n0,1\n1,one\n", "row 2 is '1,one'"),
+        ("time,u,u\n0,1,2\n1,1,2\n", "u stands in two columns"),
+        ("time,v\n0,1\n1,2\n", "'v' is no input, expected one of u"),
+        ("", "is no table"),
+        (None, "cannot be read: No such file"),
+    ],
+)
+def test_a_bad_table_of_inputs_is_told_by_every_command(decay, tmp_path, command, text, message):
+    """As wrong usage, with what was found and what was expected."""
+    table = tmp_path / "in.csv"
+    if text is not None:
+        table.write_text(text)
+    name, *options = command
+    words = [name, str(decay), *options, "--input", str(table), "--stop-time", "1"]
+    if name == "verify":  # an FMU of another tool is held against a reference
+        (tmp_path / "ref.csv").write_text("time,x\n0,1\n")
+        words += ["--reference", str(tmp_path / "ref.csv")]
+    done = CliRunner().invoke(app, words)
+    assert message in " ".join(done.output.split())
+    assert done.exit_code == 2
+
+
+def test_a_folder_of_something_else_is_left_alone(decay, tmp_path):
+    """What lies where the finished chunks would go is no sweep's: nothing is touched."""
+    parts = tmp_path / "runs.parquet.parts"
+    parts.mkdir()
+    (parts / "letter.txt").write_text("dear")
+    for options in ({}, {"resume": True}):
+        with pytest.raises(SimulationError, match="is not the folder of a sweep"):
+            lagfmu.sweep(decay, {"k": [1.0]}, out=tmp_path / "runs.parquet", **options)
+    assert (parts / "letter.txt").read_text() == "dear"
 
 
 @contextlib.contextmanager

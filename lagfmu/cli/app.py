@@ -6,19 +6,16 @@ import contextlib
 import difflib
 import enum
 import sys
-import tempfile
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 
 from ..api import package
-from ..errors import CannotStartError, LagfmuError, SettingError, SimulationError, VerificationError
+from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.native import takes_long
@@ -41,7 +38,7 @@ from ..study.stress.report import all_as_json as probed_as_json
 from ..study.tradeoff.page import section
 from ..study.tradeoff.report import all_as_json as measured_as_json
 from ..verification.crosscheck import as_csv, write_crosscheck
-from ..verification.pipeline import WRONG_USAGE, Suite, UsageError, as_junit, exit_code
+from ..verification.pipeline import Suite, UsageError, as_junit, exit_code
 from ..verification.plot import default_names
 from ..verification.reference import read_table
 from ..verification.report import as_json
@@ -50,25 +47,23 @@ from ..verification.simulate import read_description, simulate
 from ..verification.verify import Verification
 from .film import film
 from .options import (
+    NARROWING,
+    OPTIONS,
     AddOutput,
     Arguments,
-    Contacts,
-    Derivatives,
     ErrorBars,
-    Fixed,
-    Formulation,
-    Frictions,
-    Inputs,
-    Method,
-    Methods,
-    Name,
-    Outputs,
-    RealsOnly,
+    InputFile,
+    Needs,
+    StepSize,
+    StopTime,
+    Tolerance,
     narrowed,
+    takes,
 )
 from .stress import LIMIT
 from .stress import stress as stress_fmus
-from .terminal import new_table, prepare_streams, print_whole
+from .sweep import sweep
+from .terminal import console, errors, new_table, plainly, prepare_streams, print_whole
 from .tradeoff import chosen_for, compare
 from .verify import examine
 
@@ -77,8 +72,6 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-console = Console()
-errors = Console(stderr=True)
 
 
 def _version(wanted: bool) -> None:
@@ -111,52 +104,12 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter or start value; repeatable."),
 ]
-Tolerance = Annotated[
-    float | None, typer.Option(help="Relative tolerance: speed against accuracy.")
-]
-StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
-StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
-InputFile = Annotated[
-    Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
-]
 JsonFile = Annotated[Path | None, typer.Option(help="Write everything as JSON.")]
 JunitFile = Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")]
 
 
-@contextlib.contextmanager
-def _plainly() -> Iterator[None]:
-    """Warnings and errors as one message each; exit status 1 after an error, 2 after wrong usage."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            yield
-        except LagfmuError as error:
-            errors.print(
-                f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
-            )
-            misused = isinstance(error, (UsageError, SettingError))
-            raise typer.Exit(WRONG_USAGE if misused else 1) from None
-        except OSError as error:  # of temporary files; for what the user names see its own errors
-            where = error.filename or tempfile.gettempdir()
-            errors.print(
-                f"[bold red]error:[/] {escape(f'{where}: {error.strerror or error}')}: is the disk full? "
-                "The environment variable TMPDIR chooses another folder for temporary files",
-                highlight=False,
-                soft_wrap=True,
-            )
-            raise typer.Exit(1) from None
-        finally:
-            for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
-                errors.print(
-                    f"[yellow]warning:[/] {escape(message)}", highlight=False, soft_wrap=True
-                )
-
-
-def _ours(warning: Any) -> bool:
-    return str(getattr(warning.category, "__module__", "")).startswith("lagfmu")
-
-
 @app.command()
+@takes(*OPTIONS)
 def build(
     model: ModelPath,
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist"),
@@ -191,42 +144,21 @@ def build(
         bool,
         typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
     ] = False,
-    outputs: Outputs = None,
-    fixed: Fixed = None,
-    inputs: Inputs = None,
-    contacts: Contacts = None,
-    frictions: Frictions = None,
-    methods: Methods = None,
-    method: Method = None,
-    formulation: Formulation = None,
-    derivatives: Derivatives = None,
-    reals_only: RealsOnly = None,
-    error_bars: ErrorBars = None,
-    name: Name = None,
+    *,
+    needs: Needs,
     add_output: AddOutput = None,
 ) -> None:
     """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
-    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {
-        "frictions": frictions,
-        "contacts": contacts,
-        "methods": methods,
-        "method": method,
-        "name": name,
-    }
-    needs |= {"formulation": formulation, "derivatives": derivatives, "accuracy": accuracy}
-    needs |= {"reals_only": reals_only, "error_bars": error_bars}
-    narrowing = (outputs, fixed, inputs, contacts, frictions, methods, method, reals_only)
     failed = False
     kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
-    with _plainly():
+    with plainly():
         if platforms and target is Target.python:
             raise LagfmuError(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
         file = _load(model, add_output, arguments)
-        for s in narrowed(_chosen(file, scene), **needs):
+        for s in narrowed(_chosen(file, scene), {**needs, "accuracy": accuracy}):
             choice = ""
             if s.accuracy is not None:
                 chosen = chosen_for(file, s, parse(s.accuracy), kind, console)
@@ -235,7 +167,8 @@ def build(
                 f"building {'and verifying ' if check else ''}{s.name}{_first_time(target, places)}"
             ):
                 prepared = prepare(file.model, s)
-                if name is None and any(v is not None for v in narrowing):
+                less = any(needs[n] is not None for n in NARROWING)
+                if less and needs["name"] is None:
                     _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
                 built = package(
                     prepared,
@@ -290,41 +223,29 @@ def new_command(
     ] = None,
 ) -> None:
     """Write a commented model to start from."""
-    with _plainly():
+    with plainly():
         path = new(file, source)
         console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
         console.print(f"next: lagfmu show {escape(str(path))}", soft_wrap=True, highlight=False)
 
 
 @app.command()
+@takes(*(n for n in OPTIONS if n != "name"))
 def show(
     model: ModelPath,
     scene: Annotated[str | None, typer.Option(help="Which FMU of the file.")] = None,
     arguments: Arguments = None,
-    outputs: Outputs = None,
-    fixed: Fixed = None,
-    inputs: Inputs = None,
-    contacts: Contacts = None,
-    frictions: Frictions = None,
-    methods: Methods = None,
-    method: Method = None,
-    formulation: Formulation = None,
-    derivatives: Derivatives = None,
-    reals_only: RealsOnly = None,
-    error_bars: ErrorBars = None,
+    *,
+    needs: Needs,
     add_output: AddOutput = None,
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
 
     Of a scene that needs less than everything, also what was pruned and what that saved.
     """
-    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    needs |= {"frictions": frictions, "contacts": contacts, "methods": methods, "method": method}
-    needs |= {"formulation": formulation, "derivatives": derivatives}
-    needs |= {"reals_only": reals_only, "error_bars": error_bars}
-    with _plainly():
+    with plainly():
         file = _load(model, add_output, arguments)
-        for s in narrowed(_chosen(file, None if scene is None else [scene]), **needs):
+        for s in narrowed(_chosen(file, None if scene is None else [scene]), needs):
             try:
                 prepared = prepare(file.model, s)
             except CannotStartError as error:
@@ -359,7 +280,7 @@ def verify_command(
 
     Exit codes: 0 all hold, 1 a statement fails, 2 wrong usage, 3 an FMU could not be run.
     """
-    with _plainly():
+    with plainly():
         done = examine(
             fmus,
             _assignments(set_),
@@ -386,7 +307,7 @@ def reference_command(
     inputs: InputFile = None,
 ) -> None:
     """Write reference results of an FMU for other tools: the files of the FMI cross-check."""
-    with _plainly():
+    with plainly():
         signals = None if inputs is None else read_table(inputs)
         folder = out or Path(fmu.stem)
         for path in write_crosscheck(fmu, folder, stop_time, step_size, signals):
@@ -423,12 +344,12 @@ def simulate_command(
     With a figure, a table or a film only multipliers, coordinates and times of events are printed; -v names
     others.
     """
-    with _plainly():
+    with plainly():
         source: Any = target
         if target.suffix == ".py":
             file = _load(target, add_output, arguments)
             chosen = _chosen(file, None if scene is None else [scene])
-            source = prepare(file.model, narrowed(chosen, error_bars=error_bars)[0])
+            source = prepare(file.model, narrowed(chosen, {"error_bars": error_bars})[0])
             name = source.scene.name
             variables = source.table.variables
         elif arguments:
@@ -472,6 +393,7 @@ def simulate_command(
 
 
 @app.command()
+@takes("outputs", "fixed", "inputs")
 def page(
     target: Annotated[
         Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or a native FMU.")
@@ -480,23 +402,24 @@ def page(
         Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
-    outputs: Outputs = None,
-    fixed: Fixed = None,
-    inputs: Inputs = None,
+    arguments: Arguments = None,
+    *,
+    needs: Needs,
     add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
-    needs: dict[str, Any] = {"outputs": outputs, "fixed": fixed, "inputs": inputs}
-    given = {"scene": scene, **needs, "add-output": add_output}
-    with _plainly():
+    given = {"scene": scene, "p": arguments, **needs, "add-output": add_output}
+    with plainly():
         source: Model | Path = target
         chosen = None
         if target.suffix == ".py":
-            file = _load(target, add_output)
+            file = _load(target, add_output, arguments)
             source = file.model
             scenes = _chosen(file, None if scene is None else [scene])
-            chosen = narrowed(scenes[:1], **needs)[0]
-        elif said := [f"--{n}" for n, value in given.items() if value is not None]:
+            chosen = narrowed(scenes[:1], needs)[0]
+        elif said := [
+            f"{'--' if len(n) > 1 else '-'}{n}" for n, value in given.items() if value is not None
+        ]:
             raise LagfmuError(
                 f"{' and '.join(said)}: an FMU is one scene with outputs of its own; leave it out, or "
                 "make the page from the model file"
@@ -546,7 +469,7 @@ def tradeoff(
     Exit codes: 0 closed forms hold at every tolerance, 1 one does not, 2 wrong usage, 3 an FMU could not be
     built or run.
     """
-    with _plainly():
+    with plainly():
         done = compare(
             targets,
             out,
@@ -581,7 +504,7 @@ def stress(
 
     Exit codes: 0 none is wrong, 1 a row is wrong, 2 wrong usage, 3 an FMU could not be built or run.
     """
-    with _plainly():
+    with plainly():
         done = stress_fmus(targets, out, console, target.value, scene or (), quick, limit)
         _finish("stress", [one.suite for one in done], probed_as_json(done), json, junit)
 
@@ -608,86 +531,7 @@ def _load(path: Path, added: list[str] | None, arguments: list[str] | None = Non
     return replace(file, model=with_outputs(file.model, added or []))
 
 
-@app.command()
-def sweep(
-    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=FROM:TO:COUNT[:log]|NAME=V,V,...",
-            help="A parameter, start value or solver setting; several are crossed.",
-        ),
-    ] = None,
-    sample: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="'NAME ~ KIND(...)'",
-            help="uniform(low, high), loguniform(low, high), normal(mean, sd) or truncnormal(mean, sd, "
-            "low, high); with --runs.",
-        ),
-    ] = None,
-    runs: Annotated[int | None, typer.Option(help="How many samples.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
-    sampling: Annotated[str, typer.Option(help="latin-hypercube or sobol.")] = "latin-hypercube",
-    rows: Annotated[
-        Path | None,
-        typer.Option("--from", help="A .csv or .parquet file, a row a run under the names."),
-    ] = None,
-    keep: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME:last|max|min|mean|time-of-max|trajectory",
-            help="What to keep of each run (default: largest multipliers, departures); repeatable.",
-        ),
-    ] = None,
-    stop_time: StopTime = None,
-    step_size: StepSize = None,
-    tolerance: Tolerance = None,
-    inputs: InputFile = None,
-    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", help="runs.parquet, or .nc or .zarr with trajectories."),
-    ] = None,
-    on: Annotated[
-        str | None,
-        typer.Option(metavar="tcp://HOST:PORT", help="A Dask scheduler; else this machine."),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Processes of this machine (default: its cores).")
-    ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on where an interrupted sweep stopped.")
-    ] = False,
-    plot_: Annotated[
-        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
-    ] = None,
-) -> None:
-    """Run an FMU many times: parameters and start values crossed, sampled, or from a file."""
-    from .sweep import run_sweep
-
-    with _plainly():
-        run_sweep(
-            target,
-            console,
-            vary or (),
-            sample or (),
-            runs,
-            seed,
-            sampling,
-            rows,
-            keep or (),
-            stop_time,
-            step_size,
-            tolerance,
-            inputs,
-            scene,
-            out,
-            on,
-            workers,
-            resume,
-            plot_,
-        )
+app.command()(sweep)
 
 
 def _chosen(file: ModelFile, names: list[str] | None) -> list[Scene]:

@@ -1,10 +1,13 @@
-"""Options of the commands that say what a scene needs, and the scene that they make."""
+"""Options that several commands have: of a run, and what a scene needs, with the scene that they make."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
@@ -87,41 +90,76 @@ Name = Annotated[
     typer.Option(help="Another name for the FMU.", rich_help_panel="What the scene needs"),
 ]
 
+Tolerance = Annotated[
+    float | None, typer.Option(help="Relative tolerance: speed against accuracy.")
+]
+StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
+StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
+InputFile = Annotated[
+    Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
+]
 
-def narrowed(
-    scenes: Sequence[Scene],
-    outputs: Names = None,
-    fixed: Names = None,
-    inputs: Names = None,
-    contacts: Names = None,
-    frictions: Names = None,
-    methods: Names = None,
-    method: str | None = None,
-    formulation: str | None = None,
-    derivatives: bool | None = None,
-    reals_only: bool | None = None,
-    error_bars: bool | None = None,
-    name: str | None = None,
-    accuracy: str | None = None,
-) -> list[Scene]:
+
+OPTIONS = {
+    "outputs": Outputs,
+    "fixed": Fixed,
+    "inputs": Inputs,
+    "contacts": Contacts,
+    "frictions": Frictions,
+    "methods": Methods,
+    "method": Method,
+    "formulation": Formulation,
+    "derivatives": Derivatives,
+    "reals_only": RealsOnly,
+    "error_bars": ErrorBars,
+    "name": Name,
+}  # in the order of --help
+LISTS = ("outputs", "fixed", "inputs", "contacts", "frictions", "methods")
+NARROWING = (
+    *LISTS,
+    "method",
+    "reals_only",
+)  # an FMU with one of these shows less than the full one
+Needs = Mapping[str, Any]
+
+
+def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The command has these options of a scene, which reach it together as its argument `needs`."""
+
+    def with_options(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def called(**given: Any) -> None:
+            command(needs={n: given.pop(n) for n in names}, **given)
+
+        hints = get_type_hints(command, include_extras=True) | {n: OPTIONS[n] for n in names}
+        kind = inspect.Parameter.KEYWORD_ONLY
+        own = inspect.signature(command).parameters.values()
+        parameters = []
+        for p in own:
+            options = names if p.name == "needs" else ()
+            parameters += [inspect.Parameter(n, kind, default=None) for n in options]
+            parameters += [] if options else [p.replace(kind=kind)]
+        parameters = [p.replace(annotation=hints[p.name]) for p in parameters]
+        called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        called.__annotations__ = {p.name: p.annotation for p in parameters}
+        return called
+
+    return with_options
+
+
+def narrowed(scenes: Sequence[Scene], needs: Needs) -> list[Scene]:
     """The scenes with what was said on the command line; what was not said stays.
 
     Raises LagfmuError if one name is given to several, and ModelError for a scene that cannot be.
     """
+    name = needs.get("name")
     if name is not None and len(scenes) > 1:
         raise LagfmuError(
             f"--name {name}: the file has {len(scenes)} FMUs, choose one of them with --scene: "
             f"{', '.join(s.name for s in scenes)}"
         )
-    lists = {"outputs": outputs, "fixed": fixed, "inputs": inputs, "contacts": contacts}
-    lists["frictions"] = frictions
-    said: dict[str, Any] = {k: _split(v) for k, v in lists.items() if v is not None}
-    if methods is not None:
-        said["methods"] = _split(methods)
-    single = {"method": method, "formulation": formulation, "derivatives": derivatives}
-    single |= {"reals_only": reals_only, "error_bars": error_bars}
-    single |= {"name": name, "accuracy": accuracy}
-    said |= {k: v for k, v in single.items() if v is not None}
+    said = {k: v for k, v in needs.items() if v is not None}
+    said |= {k: _split(said[k]) for k in LISTS if k in said}
     return [replace(s, **said) for s in scenes]
 
 

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import sys
+import tempfile
 import unicodedata
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from typing import Any
 
+import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, RenderableType
+from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
+
+from ..errors import LagfmuError, SettingError
+from ..verification.pipeline import WRONG_USAGE, UsageError
+
+console = Console()
+errors = Console(stderr=True)
 
 PLAIN = {"≤": "<=", "≥": ">=", "−": "-", "–": "-", "→": "->", "●": "*", "µ": "u", "√": "sqrt"}
 ACCENTS = {"\u0307": "'", "\u0308": "''"}  # combining dots: derivatives
@@ -66,7 +78,10 @@ def new_table(title: str, *columns: str, text: Sequence[str] = ()) -> Table:
 
 
 def _width(cell: RenderableType) -> int:
-    return Text.from_markup(cell).cell_len if isinstance(cell, str) else 0
+    """Of its longest line."""
+    if not isinstance(cell, str):
+        return 0
+    return max((line.cell_len for line in Text.from_markup(cell).split()), default=0)
 
 
 def print_whole(console: Console, drawn: Table) -> None:
@@ -79,7 +94,7 @@ def print_whole(console: Console, drawn: Table) -> None:
         console.print(drawn)
         return
     console.print(drawn.title or "", style="bold", highlight=False)
-    headings = [str(c.header) for c in drawn.columns]
+    headings = [" ".join(str(c.header).split()) for c in drawn.columns]
     for cells in zip(*(c.cells for c in drawn.columns), strict=True):
         parts = [
             f"{heading} {cell}".strip()
@@ -87,3 +102,36 @@ def print_whole(console: Console, drawn: Table) -> None:
             if cell
         ]
         console.print("  " + ", ".join(parts), highlight=False)
+
+
+@contextlib.contextmanager
+def plainly() -> Iterator[None]:
+    """Warnings and errors as one message each; exit status 1 after an error, 2 after wrong usage."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield
+        except LagfmuError as error:
+            errors.print(
+                f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
+            )
+            misused = isinstance(error, (UsageError, SettingError))
+            raise typer.Exit(WRONG_USAGE if misused else 1) from None
+        except OSError as error:  # of temporary files; for what the user names see its own errors
+            where = error.filename or tempfile.gettempdir()
+            errors.print(
+                f"[bold red]error:[/] {escape(f'{where}: {error.strerror or error}')}: is the disk full? "
+                "The environment variable TMPDIR chooses another folder for temporary files",
+                highlight=False,
+                soft_wrap=True,
+            )
+            raise typer.Exit(1) from None
+        finally:
+            for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
+                errors.print(
+                    f"[yellow]warning:[/] {escape(message)}", highlight=False, soft_wrap=True
+                )
+
+
+def _ours(warning: Any) -> bool:
+    return str(getattr(warning.category, "__module__", "")).startswith("lagfmu")

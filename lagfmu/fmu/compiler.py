@@ -33,6 +33,7 @@ FLAGS = (
     "-fvisibility=hidden",
     "-ffp-contract=off",  # the same rounding everywhere
     "-fno-math-errno",
+    "-fomit-frame-pointer",  # zig keeps it, which costs 1 % of bytes and of time
     "-ffunction-sections",
     "-fdata-sections",
     "-fno-unroll-loops",  # most models are small: code that fits into the cache is faster

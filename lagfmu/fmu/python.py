@@ -27,6 +27,7 @@ from .description import model_description
 SHIPPED = (
     "names.py",
     "solver",
+    "runtime/base/thresholds.h",
     "fmu/entry.py",
     "fmu/references.py",
     "fmu/slave.py",

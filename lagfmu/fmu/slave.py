@@ -15,7 +15,7 @@ import json
 import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, TypeVar
 
 from pythonfmu.enums import Fmi2Status
@@ -23,15 +23,16 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from .. import names
 from ..solver import at_bars
-from ..solver.advance import advance
+from ..solver.advance import advance, beginning
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.rates import Past, estimated, half_connected, restored_past
 from ..solver.restored import restored, restored_settings
-from ..solver.state import SMALLEST_TOLERANCE, Settings, State
+from ..solver.state import Settings, State
 from ..solver.system import System
+from ..solver.thresholds import SMALLEST_TOLERANCE
 from .references import end_once, keep, keep_module_of
 
 Call = TypeVar("Call", bound=Callable[..., Any])
@@ -362,27 +363,43 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             if self.state is None:
                 self._initialize()
             assert self.state is not None
-            seen: Values = observe(self.system, self.state, self._values(self.inputs), self.p)
+            state, u = self._seen(self.state), self._values(self.inputs)
+            seen: Values = observe(self.system, state, u, self.p)
             row = list(self.values)
             for k in self.outputs:
                 row[k] = seen[self.names[k]]
             if self.barred:
-                bars, found = self._widened(self.state, seen)
+                bars, found = self._widened(state, seen)
                 self.bars = bars if keep or bars.state is None else self.bars
                 for (k, _), value in zip(self.barred, found, strict=True):
                     row[k] = value
             self.observed = row
         return self.observed
 
+    def _seen(self, state: State) -> State:
+        """The state that is read: where a prescribed motion was set to another place or other rates than it
+        went by, the one with which the next step begins."""
+        u, motions = self._values(self.inputs), {*self.system.prescribed} - {*self.system.estimated}
+        if not self.running or all(u[k : k + 3] == self.expected[k : k + 3] for k in motions):
+            return state
+        return beginning(self.system, state, u, self.p)[1]
+
     def _widened(self, state: State, seen: Values) -> tuple[Any, list[float]]:
         """The error bars with the present differences in them, and their values."""
-        u, now = self._values(self.inputs), (state, seen)
+        u, now, kept = self._values(self.inputs), (state, seen), self.bars
+        companion = None if kept.state is None else self._seen(kept.state)
         bars, found, told = at_bars.widened(
-            self.system, self.coarse, self.bars, self.with_bars, now, u, self.p
+            self.system,
+            self.coarse,
+            replace(kept, state=companion),
+            self.with_bars,
+            now,
+            u,
+            self.p,
         )
         if told:
             self._warn(told)
-        return bars, found
+        return bars if bars.state is None else replace(bars, state=kept.state), found
 
     def _values(self, references: list[int]) -> list[float]:
         return [self.values[k] for k in references]
@@ -415,7 +432,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                 self.log(str(moved), Fmi2Status.ok, "logEvents")
             else:
                 self._warn(str(moved))
-        self.state, self.observed = found.state, None
+        self.state, self.observed, self.expected = found.state, None, u
         if self.barred:
             self.bars = at_bars.begun(found.state, self.with_bars)
             self.coarse = at_bars.paired_settings(self.settings, found.state, found.state.t)[1]
@@ -437,6 +454,14 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def _report_events(self, before: State, after: State) -> None:
         for c, k in enumerate(self.system.contacts):
             name, latest = self.system.rows[k].name, after.departures[c]
+            struck = after.hits[c] - before.hits[c]
+            if struck:
+                told = (
+                    f"contact {name} was struck at t = {after.hit_times[c]!r} s, impulse "
+                    f"{after.impulses[c]!r} (of its lambda times s)"
+                )
+                told += f", the latest of {struck}" if struck > 1 else ""
+                self.log(told, Fmi2Status.ok, "logEvents")
             if latest.count != before.departures[c].count:
                 self.log(
                     f"contact {name} opened at t = {latest.time!r} s", Fmi2Status.ok, "logEvents"
@@ -463,6 +488,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             "experiment": [self.start_time, self.stop_time, self.tolerance],
             "settings": None if settings is None else asdict(settings),
             "state": None if self.state is None else self.state.to_json(),
+            "expected": list(self.expected),
             "past": [list(self.past.points), sorted(self.fresh)],
             "bars": None if None in (self.bars, self.state) else at_bars.to_list(self.bars),
         }
@@ -480,7 +506,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         except (ValueError, TypeError, KeyError) as error:
             raise Refused(f"the saved state is none of this FMU's: {error}") from None
         self.past, fresh = restored_past(self.system, state.get("past"))
-        self.fresh = set(fresh)
+        self.fresh, self.expected = set(fresh), list(map(float, state["expected"]))
         self.values, self.running, experiment, settings, self.state = kept
         self.bars = bars
         self.start_time, self.stop_time, self.tolerance = experiment
@@ -510,12 +536,16 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         start, stop, tolerance = (float(x) for x in state["experiment"])
         if not (math.isfinite(start) and stop > start and 0 <= tolerance < math.inf):
             raise ValueError(f"its experiment is {state['experiment']!r}")
+        expected = list(map(float, state["expected"]))
+        if len(expected) not in (0, len(self.inputs)) or not all(map(math.isfinite, expected)):
+            raise ValueError(f"its inputs are {state['expected']!r}")
         settings, kept = state["settings"], state["state"]
         settings = (
             None if settings is None else restored_settings(settings, tuple(self.numbers.values()))
         )
         kept = None if kept is None else restored(self.system, kept)
-        if not isinstance(running, bool) or (running and None in (settings, kept)):
+        begun = None not in (settings, kept) and len(expected) == len(self.inputs)
+        if not isinstance(running, bool) or (running and not begun):
             raise ValueError(f"its mode is {running!r}")
         return list(values), running, (start, stop, tolerance), settings, kept
 

@@ -21,7 +21,7 @@ GROUPS = {  # by the kind of what a variable is of
     **dict.fromkeys(names.OF_FRICTION, "Friction"),
     names.FORCE: "Generalized forces of constraint",
     names.ENERGY: "Energies",
-    **dict.fromkeys((names.RESIDUAL, names.UNIQUE), "Residuals"),
+    **dict.fromkeys((names.RESIDUAL, names.UNIQUE), "Residuals, zero where a constraint acts"),
     **dict.fromkeys((names.CONTACT, names.DEPARTURE), "Contacts and departures"),
     names.ERROR: "Error bars",
     names.SOLVER: "Solver",

@@ -12,15 +12,17 @@ TEMPLATE = '''"""A bead on a parabola z = k x^2.  Change it into your own system
     lagfmu show {file}                      equations of motion, constraints, degrees of freedom
     lagfmu build {file}                     dist/python/{name}.fmu, verified; --target native for compiled C
     lagfmu simulate {file} --plot out.svg   curves of every lambda and coordinate
+    lagfmu page {file}                      one HTML file in which it moves, with sliders
 """
 
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Conserved, Holonomic, Model, Parameter, Scene, output
+from lagfmu import Arrow, Conserved, Disk, Holonomic, Model, Parameter, Path, Scene, output
 
 x, z = dynamicsymbols("x z")  # coordinates; x.diff() is a velocity
 m, g, k = symbols("m g k", positive=True)  # parameters
+s = symbols("s")  # runs along the wire in the picture
 
 model = Model(
     name="{name}",
@@ -39,7 +41,13 @@ model = Model(
     ],
     # forces={{x: F - c * x.diff()}},  # generalized forces beside the Lagrangian [J/coordinate]
     # inputs=[Input(F, "N")],  # what the importer drives
-    start={{x: 0.5, z: 0.5}},  # coordinates and velocities at the start; what is left out is 0
+    start={{x: 0.5, z: 0.5}},  # coordinates and velocities; what is left out is 0, or follows from them
+    # How it looks [m], to the right and up; others: Line, Rod, Spring, Ground (docs/live.md).
+    picture=[
+        Path((s, k * s**2), s, -0.7, 0.7),
+        Disk((x, z)),
+        Arrow("wire", at=(x, z)),  # the force of this constraint
+    ],
 )
 
 # The FMUs of this file, and what their outputs must equal: `lagfmu build` holds them to it.

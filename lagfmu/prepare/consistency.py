@@ -29,9 +29,9 @@ from ..solver.jumps import levels_at
 from ..solver.magnitudes import Mask
 from ..solver.observe import expand, observe
 from ..solver.precedence import GIVEN
-from ..solver.solution import RANK
 from ..solver.state import Settings
 from ..solver.system import NONHOLONOMIC, Matrix, System, Vector
+from ..solver.thresholds import RANK
 from .diagnosis import cause_of_failure, negative_energy
 from .starts import ranks
 

@@ -12,8 +12,8 @@ import numpy as np
 from ..solver.afar import project_from_afar
 from ..solver.failure import StepFailureError
 from ..solver.instant import Instant
-from ..solver.solution import RANK
 from ..solver.system import Matrix, System, Vector
+from ..solver.thresholds import RANK
 
 NEGATIVE = 1e-12  # a mass below this fraction of its neighbours' is rounding
 INDEFINITE = 1e-8  # an eigenvalue of the scaled mass matrix above -this is rounding

@@ -20,11 +20,7 @@ from .motion import project
 from .state import Settings, State
 from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step, is_due, unjudged_step
 from .system import System, Vector
-
-CHATTER = 200  # contact events in next to no time after which the step is given up
-PATIENCE = 200  # steps after which a communication step is judged by its average step
-STEP_LIMIT = 1e7  # internal steps that a communication step may need
-TINY = 1e-6  # part of the natural time; a step shorter than this makes no headway
+from .thresholds import AT_ONCE, CHATTER, HEADWAY, PATIENCE, STEP_LIMIT
 
 
 def advance(
@@ -38,7 +34,7 @@ def advance(
 ) -> State:
     """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was.
 
-    `after_step`: with error bars (bars.py), what is done to the integrator after a step, and adds to
+    `after_step`: with error bars (bars.py), what is done to the integrator after a step, and makes of
     State.local.
     """
     begun = state.t
@@ -48,20 +44,7 @@ def advance(
             f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
         )
     with np.errstate(all="ignore"):
-        inputs = system.inputs_at(u, 0.0)
-        if system.floors:  # the inputs may have been set
-            levels = levels_at(system, state.t, np.array(state.q), inputs, p)
-            state = replace(state, levels=levels)
-        at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
-        if system.contacts and system.prescribed:
-            state = at_contacts.released(at, state, state.span)
-        elif system.prescribed:  # whose place and rates may be others than it went by
-            q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
-            q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
-            state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
-        if system.frictions:
-            state = at_slides.renewed(at, state)
-            at = replace(at, slides=state.slides)
+        at, state = beginning(system, state, u, p)
         if is_incomplete(state):
             state = complete(at, settings, state, t_end - state.t)
         headway = Headway(settings, begun, t_end, state.rate)
@@ -69,12 +52,35 @@ def advance(
             leg = Leg(system, settings, state, u, p, begun, after_step)
             state = _travel(leg, state, t_end, headway)
             events.append(state.t)
-            if len(events) == CHATTER and events[-1] - events[0] < 1e-9 / state.rate:
+            if len(events) == CHATTER and events[-1] - events[0] < AT_ONCE / state.rate:
                 raise StepFailureError(
                     f"{CHATTER} events in {events[-1] - events[0]:.1g} s at t = {state.t!r} s: contacts "
                     "chatter without end, or a force jumps to and fro"
                 )
     return replace(state, span=t_end - begun)
+
+
+def beginning(
+    system: System, state: State, u: Sequence[float], p: Sequence[float]
+) -> tuple[Instant, State]:
+    """What each step begins with: the inputs may have been set.  Levels of jumps are those of now, contacts
+    whose surface went away open, the others go with it; a prescribed motion may have another place and other
+    rates than it went by.  Raises StepFailureError."""
+    inputs = system.inputs_at(u, 0.0)
+    if system.floors:
+        levels = levels_at(system, state.t, np.array(state.q), inputs, p)
+        state = replace(state, levels=levels)
+    at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
+    if system.contacts and system.prescribed:
+        state = at_contacts.released(at, state, state.span)
+    elif system.prescribed:
+        q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
+        q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
+        state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
+    if system.frictions:
+        state = at_slides.renewed(at, state)
+        at = replace(at, slides=state.slides)
+    return at, state
 
 
 @dataclass
@@ -92,16 +98,16 @@ class Headway:
         """Counts the step from t0 to t.  Raises StepFailureError if t_end is too far off for its kind."""
         most, gone, way = self.settings.maximum_steps, t - self.begun, self.t_end - self.begun
         self.steps += 1
-        self.tiny += (t - t0) * self.rate < TINY
+        self.tiny += (t - t0) * self.rate < HEADWAY
         if 0 < most < self.tiny:
             raise StepFailureError(
                 f"the communication step to t = {self.t_end!r} s makes no headway at t = {t!r} s: more "
                 f"than {most:.0f} internal steps (solver.maximum_steps) were shorter than "
-                f"{TINY / self.rate:.2g} s, {TINY:.0e} of the motion's natural time: is there a force "
+                f"{HEADWAY / self.rate:.2g} s, {HEADWAY:.0e} of the motion's natural time: is there a force "
                 "that jumps to and fro?"
             )
         if self.steps >= PATIENCE and self.steps * way > STEP_LIMIT * gone:
-            needed = self.steps * way / max(gone, TINY * way)
+            needed = self.steps * way / max(gone, HEADWAY * way)
             raise StepFailureError(
                 f"the communication step to t = {self.t_end!r} s would need about {needed:.0e} internal "
                 f"steps, more than {STEP_LIMIT:.0e}: take a shorter one"
@@ -124,9 +130,9 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
         offered = solver.h_abs
         try:
             leg.step(solver)
+            before_it = local
             if leg.after_step is not None:
-                more = leg.after_step(solver, state)
-                local = local[0] + more[0], local[1] + more[1]
+                local = leg.after_step(solver, state, local)
             y1 = leg.project(solver.t, solver.y)
             if not (
                 leg.system.prescribed and t0 == leg.begun
@@ -143,6 +149,10 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
             event, before = at_events.first_event(leg, solver, t0, y0, y1, before, armed)
             if event is not None:
                 headway.check(t0, event[0])
+                if leg.after_step is not None:  # the way to the event counts, not the whole step
+                    leg.local = before_it
+                    leg.reach(t0, y0, event[0])
+                    local = leg.local
                 step = offered
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)

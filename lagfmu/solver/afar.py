@@ -17,11 +17,7 @@ from .magnitudes import extents, motion_speeds
 from .motion import EPS
 from .precedence import GIVEN, OMITTED, Stage, singular_omissions, stages
 from .system import NONHOLONOMIC, Vector
-
-ITERATIONS = 60
-NEAR = 1e-5  # from this on the angles between dependent rows tell how far off the constraints a state is
-SWEEPS = 3  # of the velocities: the second removes what the first left by rounding
-ARRIVED = 1e3 * EPS  # slip, relative to its terms, at which velocities are on the constraints
+from .thresholds import AFAR_ARRIVED, AFAR_ITERATIONS, AFAR_NEAR, AFAR_SWEEPS
 
 
 def project_from_afar(
@@ -75,7 +71,7 @@ def _newton(
     M, _, G, _, _ = at.evaluate(q, v0)
     f = at.residual(q)[fixed]
     allowed = np.zeros(len(fixed))
-    for _ in range(ITERATIONS):
+    for _ in range(AFAR_ITERATIONS):
         allowed = 4 * EPS * (np.abs(G[fixed]) @ np.maximum(np.abs(q), least))
         if (np.abs(f) <= allowed).all():
             return q, np.zeros(len(fixed))
@@ -88,7 +84,7 @@ def _newton(
             off = float(
                 (np.abs(f[own]) / np.where(unit[own] > 0, unit[own], np.inf)).max(initial=0.0)
             )
-            off = off if off < NEAR else 0.0
+            off = off if off < AFAR_NEAR else 0.0
             step = stage.nearest(M, G[fixed][own], -f[own], off)
         except StepFailureError:
             break
@@ -141,10 +137,10 @@ def velocities_from_afar(
     v = v0
     for stage in stages([GIVEN] * system.n if rank is None else rank) if rows else ():
         v, own = v0, stage.rows(system, rows)
-        for _ in range(SWEEPS):
+        for _ in range(AFAR_SWEEPS):
             speeds = motion_speeds(system, M, np.maximum(np.maximum(np.abs(v), np.abs(v0)), least))
             slip = nu - G @ v
-            missed = np.abs(slip) > ARRIVED * (np.abs(G) @ speeds + np.abs(nu))
+            missed = np.abs(slip) > AFAR_ARRIVED * (np.abs(G) @ speeds + np.abs(nu))
             if not missed[rows].any():
                 return v
             if not missed[own].any():

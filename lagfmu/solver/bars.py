@@ -4,10 +4,13 @@ The companion steps the same equations from the same consistent start under the 
 that is COARSER times the delivered one's.  With x of the delivered run and y of the companion, at the
 communication points t_k so far,
 
-    bar = max( max_k s_k |x(t_k) - y(t_k)| ,  rounding of max_k |x(t_k)| ) ,   s_k = min(1, MARGIN / r_k) :
+    bar = max( max_k s_k d_k ,  rounding of max_k |x(t_k)| ) ,   d_k = |x(t_k) - y(t_k)| ,
+    s_k = min(1, MARGIN / r_k) (1 + FEW / N_k) :
 
-the difference is the companion's error, which is r times the delivered one's if local errors were all there
-is: r is the ratio of the sums of h^(p + 1) of both (docs/error_bars.md).
+d is the companion's error, which is r times the delivered one's if local errors were all there is: r is the
+ratio of the sums of h^(p + 1) of both.  N is the companion's sum in its largest part: where a few steps
+decide, their errors may cancel by chance.  Where d is no longer small beside |x| the motions part, and all of
+it is the bar: s is at least min(1, s + d / max |x|)  (docs/error_bars.md).
 
 Events pair by their count: while one of the runs has met an event that the other has not, a difference says
 nothing and the bar is infinite, for which the largest double stands.  A method of fixed steps delivers twice
@@ -24,18 +27,19 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-from ..names import DEPARTURE_TIME, DEPARTURES, SLIP_TIME, SLIPS, motion, read
+from ..names import COUNT_OF, motion, read
 from ..names import name as name_of
 from .advance import advance
 from .failure import StepFailureError
-from .leg import FEWEST_STEPS
 from .observe import Values, observe
 from .restored import restored
-from .state import Settings, State
+from .state import Local, Settings, State
 from .system import System
+from .thresholds import FEWEST_STEPS_RK4
 
 COARSER = 100.0  # the companion's tolerance, in those of the delivered run
-MARGIN = 10.0  # a bar is so many times what the ratio of local errors leaves of a difference
+MARGIN = 5.0  # a bar is so many times what the ratio of local errors leaves of a difference, ...
+FEW = 3.0  # ... and 1 + FEW times as much where a single step decides
 ROUNDING = (
     4.0  # bars are no smaller than this times eps, sqrt(steps) and the largest magnitude so far
 )
@@ -60,7 +64,7 @@ def begun(state: State, names: Sequence[str]) -> Bars:
 def asked_step(settings: Settings, rate: float, span: float) -> float:
     """The fixed step [s] that was asked for: solver.step, or what the motion's natural rate says."""
     known = 0 < rate < math.inf
-    return settings.step or (1 / (FEWEST_STEPS * rate) if known else span / FEWEST_STEPS)
+    return settings.step or (1 / (FEWEST_STEPS_RK4 * rate) if known else span / FEWEST_STEPS_RK4)
 
 
 def paired_settings(settings: Settings, state: State, t_end: float) -> tuple[Settings, Settings]:
@@ -147,7 +151,7 @@ def widened(
         return bars, [INFINITE] * len(names), told
     all_paired = paired(state, companion)
     worst, size, found = list(bars.worst), list(bars.size), []
-    share = 1.0 if coarse.method == "rk4" else min(1.0, MARGIN / _ratio(state, companion))
+    share = 1.0 if coarse.method == "rk4" else _share(state, companion)
     states = motion(system.coordinates)
     natural = dict(zip(states, state.scale, strict=True))
     rounding = ROUNDING * EPS * math.sqrt(1 + state.steps)
@@ -160,7 +164,9 @@ def widened(
         else:
             size[k] = max(size[k], abs(mine[name]), natural.get(name, 0.0))
         if pair:
-            worst[k] = min(max(worst[k], share * abs(mine[name] - others[name])), INFINITE)
+            off = abs(mine[name] - others[name])
+            part = max(share, min(1.0, share + off / size[k])) if size[k] else 1.0
+            worst[k] = min(max(worst[k], part * off), INFINITE)
         bar = max(worst[k], rounding * size[k]) if pair else INFINITE
         found.append(min(bar, INFINITE))
     return replace(bars, worst=tuple(worst), size=tuple(size)), found, ""
@@ -170,33 +176,44 @@ def widened(
 def _count(name: str) -> str:
     """The count of the events whose latest time this is; nothing of another variable."""
     of = read(name)
-    count = {DEPARTURE_TIME: DEPARTURES, SLIP_TIME: SLIPS}.get(of.quantity)
+    count = COUNT_OF.get(of.quantity)
     return "" if count is None else name_of(count, of.constraint)
 
 
-def _ratio(a: State, b: State) -> float:
-    """How much larger the local errors of a companion b are than those of the run a beside it; at least 1."""
-    least = min((y / x for x, y in zip(a.local, b.local, strict=True) if x > 0), default=1.0)
-    return max(least, 1.0) if math.isfinite(least) else 1.0
+def _share(a: State, b: State) -> float:
+    """The part of the difference between a run a and its companion b that is the bar."""
+    pairs = zip(a.local[:2], b.local[:2], strict=True)
+    ratio = min((y / x for x, y in pairs if x > 0), default=math.inf)
+    sums = zip(b.local[:2], b.local[2:], strict=True)
+    steps = min((all_ / most for all_, most in sums if most > 0), default=math.inf)
+    return (min(1.0, MARGIN / ratio) if 0 < ratio < math.inf else 1.0) * (1 + FEW / steps)
 
 
-def after_step(solver: Any, state: State) -> tuple[float, float]:
-    """What a step adds to the sums of local errors of explicit and implicit methods, State.local.
+def after_step(solver: Any, state: State, local: Local) -> Local:
+    """The local errors with that of the step just taken.
 
     The local error of a method of order p grows with h^(p + 1); h in units of the motion's natural time.
     """
-    h = float(solver.t - solver.t_old) * state.rate
-    found = (h**9, 0.0) if hasattr(solver, "estimated_error") else (0.0, h**6)
-    return found if all(map(math.isfinite, found)) else (0.0, 0.0)
+    h, implicit = (
+        float(solver.t - solver.t_old) * state.rate,
+        not hasattr(solver, "estimated_error"),
+    )
+    found = h ** (6 if implicit else 9)
+    if not found <= EPS * INFINITE:
+        return local
+    whole = list(local)
+    whole[implicit] += found
+    whole[2 + implicit] = max(local[2 + implicit], found)
+    return whole[0], whole[1], whole[2], whole[3]
 
 
-def coarsened(solver: Any, state: State) -> tuple[float, float]:
+def coarsened(solver: Any, state: State, local: Local) -> Local:
     """The same for a companion.  A step that the run beside it could take as well, since its end was given
     and not chosen (an input may change there), would not differ: its estimated error stays in it."""
     h = solver.t - solver.t_old
     if hasattr(solver, "estimated_error") and solver.h_abs >= 0.9 * COARSER ** (1 / 8) * h:
         solver.y = solver.y + solver.estimated_error(h)
-    return after_step(solver, state)
+    return after_step(solver, state, local)
 
 
 def to_list(bars: Bars) -> list[Any]:

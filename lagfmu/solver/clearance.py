@@ -20,9 +20,8 @@ from .indicators import ranges
 from .interval import Interval, of
 from .leg import Leg
 from .system import Vector
+from .thresholds import LOOKS_COARSE, LOOKS_FINE
 
-COARSE = 1 / 32  # of a step: as near as is looked where nothing is known of a rate
-FINE = 1 / 64  # of a step: near enough to take the one event that is seen
 CLEAR, BRACKETS, UNKNOWN = "clear", "brackets", "unknown"  # what is known between two looks
 
 
@@ -44,10 +43,10 @@ def between(
             rates = _rates(leg, dense, a, b)
         (low, high), f_a, f_b = rates[k], float(at_a[k]), float(at_b[k])
         if math.isnan(low):
-            if b - a > COARSE * step:
+            if b - a > LOOKS_COARSE * step:
                 return UNKNOWN
         elif r.inside(f_b) < -r.slack:
-            if b - a > FINE * step and low < 0 < high:
+            if b - a > LOOKS_FINE * step and low < 0 < high:
                 return UNKNOWN
         elif (
             r.low > -math.inf and _lowest(f_a - r.low, f_b - r.low, low, high, b - a) < -r.slack

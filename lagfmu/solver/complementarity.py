@@ -12,9 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from .system import Matrix, Vector
-
-ZERO = 1e-12  # of the largest |b| in scaled rows: a w that counts as none
-DEPENDENT = 1e-10  # part of a row of unit norm that must stand out from the set for it to join
+from .thresholds import LCP_DEPENDENT, LCP_ZERO
 
 
 def complementary(A: Matrix, b: Vector) -> tuple[Vector, Vector] | None:
@@ -22,7 +20,7 @@ def complementary(A: Matrix, b: Vector) -> tuple[Vector, Vector] | None:
     d = np.sqrt(np.maximum(A.diagonal(), 0.0))
     d[d == 0] = 1.0
     A, b = A / d / d[:, None], b / d
-    floor = ZERO * np.abs(b).max(initial=0.0)
+    floor = LCP_ZERO * np.abs(b).max(initial=0.0)
     z = np.zeros(len(b))
     held: list[int] = []
     for _ in range(50 * (len(b) + 1)):
@@ -41,8 +39,8 @@ def _join(A: Matrix, b: Vector, z: Vector, held: list[int], j: int) -> bool:
     while True:
         r = np.linalg.solve(A[np.ix_(held, held)], A[held, j]) if held else np.zeros(0)
         stands_out = float(A[j, j] - A[j, held] @ r)
-        full = -float(A[j] @ z + b[j]) / stands_out if stands_out > DEPENDENT else np.inf
-        ways = [z[i] / x if x > DEPENDENT else np.inf for i, x in zip(held, r, strict=True)]
+        full = -float(A[j] @ z + b[j]) / stands_out if stands_out > LCP_DEPENDENT else np.inf
+        ways = [z[i] / x if x > LCP_DEPENDENT else np.inf for i, x in zip(held, r, strict=True)]
         way = min(ways, default=np.inf)
         step = min(way, full)
         if not np.isfinite(step):

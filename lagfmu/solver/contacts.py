@@ -18,9 +18,7 @@ from .failure import StepFailureError
 from .instant import Instant, Motion
 from .motion import motion
 from .system import Vector
-
-MOST = 12  # contacts whose combinations are tried one by one
-PULL = 1e-12  # a multiplier this small, relative to the forces at work, is zero
+from .thresholds import CONTACT_PULL, CONTACTS_MOST
 
 
 def complementary_modes(
@@ -51,12 +49,12 @@ def complementary_modes(
         for c, k in enumerate(system.contacts):
             if modes[c]:
                 excess = -(now.lam[k] / size[k]) if size[k] else 0.0
-                pulls = excess > -PULL if c in touching else excess > PULL
+                pulls = excess > -CONTACT_PULL if c in touching else excess > CONTACT_PULL
                 if pulls and (found is None or excess > worst):
                     worst, found = excess, c
             elif c in touching and c not in leaving:
                 approach = now.gamma[k] - now.G[k] @ now.vdot
-                floor = PULL * (abs(now.gamma[k]) + np.abs(now.G[k]) @ free)
+                floor = CONTACT_PULL * (abs(now.gamma[k]) + np.abs(now.G[k]) @ free)
                 if approach > floor and approach > worst:
                     worst, found = approach, c
         return found
@@ -70,7 +68,7 @@ def complementary_modes(
             return tuple(modes)
         modes[wrong] = not modes[wrong]
     undecided = sorted(touching)  # the active set went in a circle: try all combinations
-    for choice in itertools.product((True, False), repeat=min(len(undecided), MOST)):
+    for choice in itertools.product((True, False), repeat=min(len(undecided), CONTACTS_MOST)):
         trial = list(closed)
         for c, mode in zip(undecided, choice, strict=False):
             trial[c] = mode and c not in leaving

@@ -22,10 +22,7 @@ from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
 from .system import Matrix, System, Vector
-
-ROUNDS = 1000  # of impacts at one instant, after which the rest is taken as one plastic impact
-ROUNDING = 1e-14  # of the terms of a speed: one that is none, so that contacts at rest do not jam
-PULL = 1e-9  # of the largest impulse: a negative one that is rounding
+from .thresholds import IMPACT_PULL, IMPACT_ROUNDING, IMPACT_ROUNDS
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ def impact(
     assert system.restitution is not None
     e = np.zeros(system.m) if plastic else np.array(system.restitution(at.p), dtype=float)
     slip = G @ v - nu
-    slip[np.abs(slip) <= ROUNDING * (np.abs(G) @ np.abs(v) + np.abs(nu))] = 0.0
+    slip[np.abs(slip) <= IMPACT_ROUNDING * (np.abs(G) @ np.abs(v) + np.abs(nu))] = 0.0
     now = Struck(system, at.t, M, G, v, slip, e, tuple(sorted(contacts)))
     found = _bounded(now, _newton(now))
     return found if rub is None else rub(at, q, v, now, found)
@@ -137,7 +134,7 @@ def _solved(now: Struck, base: Sequence[int], z: Vector, w: Vector) -> Impulse:
         contact = np.isin(rows, system.contacts)
         jump = -now.slip[rows] * (1 + np.where(contact, now.e[rows], 0.0))
         found = solve(now.M, np.zeros(system.n), now.G[rows], jump, nearest=True)
-        if (found.lam[contact] >= -PULL * np.abs(found.lam).max(initial=0.0)).all():
+        if (found.lam[contact] >= -IMPACT_PULL * np.abs(found.lam).max(initial=0.0)).all():
             break
     Lambda = np.zeros(system.m)
     Lambda[rows] = found.lam
@@ -186,25 +183,27 @@ def impacts(
     touching: Collection[int],
     slow: Vector,
     rub: Rub | None = None,
-) -> tuple[Vector, frozenset[int]]:
-    """All impacts of an instant: velocities (n) after them, and the contacts that were struck.
+) -> tuple[Vector, dict[int, float]]:
+    """All impacts of an instant: velocities (n) after them, and the impulse on each contact that was struck.
 
     `touching` are those that an impact can reach.  One that separates takes no part; if it is driven back,
     that is the next impact.  `slow` (m): speeds that count as none.
     """
-    struck: set[int] = set()
-    for count in range(ROUNDS):
+    struck: dict[int, float] = {}
+    for count in range(IMPACT_ROUNDS):
         _, _, G, nu, _ = at.evaluate(q, v)
         speed = {c: (G @ v - nu)[k] for c, k in enumerate(at.system.contacts) if c in touching}
         limit = {c: slow[at.system.contacts[c]] for c in speed}
         if not any(s < -limit[c] for c, s in speed.items()):
             break
-        plastic = count == ROUNDS - 1
+        plastic = count == IMPACT_ROUNDS - 1
         entering = [c for c, s in speed.items() if s <= limit[c] or plastic]
         found = impact(at, q, v, entering, plastic, rub)
         v = found.v
-        struck |= {c for c in entering if found.Lambda[at.system.contacts[c]] > 0}
-    return v, frozenset(struck)
+        for c in entering:
+            if (push := float(found.Lambda[at.system.contacts[c]])) > 0:
+                struck[c] = struck.get(c, 0.0) + push
+    return v, struck
 
 
 def check_restitution(system: System, p: Sequence[float]) -> None:

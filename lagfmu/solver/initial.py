@@ -19,13 +19,13 @@ from .afar import project_from_afar, velocities_from_afar
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .jumps import levels_at, settled
-from .magnitudes import TOUCH, complete, motion_speeds, sizes
+from .magnitudes import complete, motion_speeds, sizes
 from .motion import EPS, project
 from .precedence import GIVEN, OMITTED
 from .state import Departure, Settings, State
 from .system import Matrix, System, Vector
+from .thresholds import LARGEST_ANGLE, TOUCH
 
-LARGEST_ANGLE = 1e-3 / EPS  # [rad] beyond which neighbouring numbers are more than 1e-3 rad apart
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
 
 
@@ -149,6 +149,9 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
         span=0.0,
         steps=0,
         departures=(nothing,) * len(system.contacts),
+        hits=(0,) * len(system.contacts),
+        hit_times=(0.0,) * len(system.contacts),
+        impulses=(0.0,) * len(system.contacts),
         slides=at.slides,
         slippings=(nothing,) * len(system.frictions),
         levels=tuple(at.u[len(at.u) - len(system.floors) :]),
@@ -235,7 +238,7 @@ def _velocities(
     M, _, G, nu, _ = at.evaluate(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), natural)
     unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)
-    missed = [k for k in rows if abs(G[k] @ v - nu[k]) > 1e-9 * unit[k]]
+    missed = [k for k in rows if abs(G[k] @ v - nu[k]) > TOUCH * unit[k]]
     if missed:
         names = ", ".join(repr(system.rows[k].name) for k in missed)
         raise StartFailureError(

@@ -19,16 +19,14 @@ from .instant import Instant, Motion
 from .magnitudes import shared
 from .methods import share, stepper
 from .motion import distance, independent, motion, project
-from .state import Settings, State
+from .state import NO_LOCAL, Local, Settings, State
 from .stiffness import Choice
 from .straight import solver_of
 from .system import Matrix, System, Vector
+from .thresholds import FAR, FEWEST_STEPS_RK4, HOPELESS, LEAST_FAR
 
-FAR, LEAST_FAR = 1e3, 1e-6  # how far a projection may move the state: in tolerances, and at least
-HOPELESS = 1.0  # error of one rk4 step, relative to the state, at which it means nothing
 SHIFT = 2.0**-26  # of a size, for a difference quotient: half of a double's digits
-FEWEST_STEPS = 100  # rk4's steps in one natural time of the motion, unless solver.step is set
-AfterStep = Callable[[Any, State], tuple[float, float]]
+AfterStep = Callable[[Any, State, Local], Local]
 
 
 @dataclass
@@ -53,6 +51,7 @@ class Leg:
         self.scale = np.array(self.state.scale)
         self.size = np.array(self.state.size)
         self.cause = ""
+        self.local = NO_LOCAL
         self.auto = self.settings.method == "auto"
         if self.auto:
             self.choose(self.state.choice)
@@ -179,7 +178,7 @@ class Leg:
 
     def stepper(self, t: float, y: Vector, t_bound: float, first_step: float | None) -> Any:
         if self.settings.method == "rk4" and not self.settings.step:
-            first_step = 1 / (FEWEST_STEPS * self.state.rate)
+            first_step = 1 / (FEWEST_STEPS_RK4 * self.state.rate)
         elif self.settings.method == "rk4":
             first_step = self.settings.step
         slope, scale = (self.rate, self.jacobian), shared(self.system, self.scale, y)
@@ -210,10 +209,12 @@ class Leg:
         return StepFailureError(f"the integration stops at t = {float(t)!r} s, {message}{cause}")
 
     def reach(self, t: float, y: Vector, t1: float) -> Vector:
-        """The state at t1, integrated from (t, y) and projected."""
+        """The state at t1, integrated from (t, y) and projected; the way goes on counting in `local`."""
         if t1 <= t:
             return y
         solver = self.stepper(t, y, t1, t1 - t)
         while solver.status == "running":
             self.step(solver)
+            if self.after_step is not None:
+                self.local = self.after_step(solver, self.state, self.local)
         return self.project(t1, solver.y)

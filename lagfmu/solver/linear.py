@@ -17,8 +17,9 @@ from . import dependent
 from .failure import MasslessError, StepFailureError
 from .kkt import kkt
 from .schur import schur
-from .solution import ON, Solution, loose
+from .solution import Solution, loose
 from .system import Matrix, Vector
+from .thresholds import ON_CONSTRAINTS
 
 TAKES_PART = 1e-6  # part of a motion by which a coordinate counts as moving
 
@@ -58,7 +59,7 @@ def _massless(M: Matrix) -> list[int]:
 def solve_nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector, off: float = 0.0) -> Solution:
     """The same by nullspace.py, where that is safe."""
     _check_finite(M, b, G, c)
-    found = dependent.nullspace(M, b, G, c) if len(G) and off <= ON else None
+    found = dependent.nullspace(M, b, G, c) if len(G) and off <= ON_CONSTRAINTS else None
     return solve(M, b, G, c, off=off) if found is None else _finite(found)
 
 

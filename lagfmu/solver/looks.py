@@ -14,13 +14,7 @@ from .clearance import BRACKETS, CLEAR, between
 from .indicators import indicators
 from .leg import Leg
 from .system import Vector
-
-QUARTERS, SMALLEST_LOOK, MOST_LOOKS = (
-    4,
-    2.0**-30,
-    512,
-)  # looks at first; part of a step; looks in all
-DIPS, SHALLOW = 3, 0.1  # parabolas drawn, and how low, of the looks, they must go to be looked into
+from .thresholds import LOOKS_DIPS, LOOKS_FIRST, LOOKS_MOST, LOOKS_SHALLOW, LOOKS_SMALLEST
 
 
 def looks(
@@ -32,7 +26,7 @@ def looks(
     """
     h, dense = float(solver.t - t0), solver.dense_output()
     highest = t0 + _top_of_rebound(leg, t0, y0, before)
-    inner = {t0 + k * h / QUARTERS for k in range(1, QUARTERS)} | {highest}
+    inner = {t0 + k * h / LOOKS_FIRST for k in range(1, LOOKS_FIRST)} | {highest}
     times = [t0, *sorted(t for t in inner if t0 < t < solver.t), float(solver.t)]
     values = [before]
     values += [indicators(leg, t, dense(t)) for t in times[1:-1]]
@@ -44,7 +38,7 @@ def looks(
         found = between(leg, dense, a, b, values[k], values[k + 1], h)
         if found == BRACKETS:
             break
-        more = len(times) < MOST_LOOKS and b - a > SMALLEST_LOOK * h and a < middle < b
+        more = len(times) < LOOKS_MOST and b - a > LOOKS_SMALLEST * h and a < middle < b
         if found == CLEAR or not more:
             k += 1
         else:
@@ -86,11 +80,11 @@ def look_into_dips(
     """
     for i in range(len(times) - 2):
         t, lam = times[i : i + 3], [float(v[contact]) for v in values[i : i + 3]]
-        for _ in range(DIPS):
+        for _ in range(LOOKS_DIPS):
             if min(lam) < 0:
                 break
             lowest, depth = _vertex(t, lam)
-            if not (t[0] < lowest < t[2]) or lowest in t or depth > SHALLOW * max(lam):
+            if not (t[0] < lowest < t[2]) or lowest in t or depth > LOOKS_SHALLOW * max(lam):
                 break
             seen = indicators(leg, lowest, solver.dense_output()(lowest))
             if seen[contact] < 0:

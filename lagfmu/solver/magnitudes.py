@@ -19,7 +19,7 @@ could be small enough to resolve it.  At rest on springs that balance, what is l
 is such rounding, and omega is the natural rate.
 
 Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the only time
-is the importer's: tau is PART of the first communication step.  Were the motion a million times
+is the importer's: tau is MEASURED_PART of the first communication step.  Were the motion a million times
 faster than that step, its size would be taken for at most 1e6 times what it is, which the floor of the
 scale, below 1e-6, still forgives.  `complete` does this, at the start and once more as a step begins.
 """
@@ -37,15 +37,9 @@ from .instant import Instant, Motion
 from .motion import EPS, independent, motion
 from .state import Settings, State
 from .system import Matrix, System, Vector
+from .thresholds import DISPLACED, LOST, MEASURED_PART, SHAKEN, STILL, TOUCH
 
 Mask = NDArray[np.bool_]
-
-TOUCH = 1e-9  # |f| below this, in units of the constraint's own size, counts as touching
-LOST = 1e3 * EPS  # what is left of a place by a projection, or of forces that cancel, is rounding
-PART = 1e-3  # of the first communication step, in which a motion without any scale is measured
-SHIFT = 2.0**-20  # of its size, by which a coordinate is displaced to see what holds it
-ROUNDINGS = 1e9  # times the tolerance: roundings of q that an error of v may reach, 0.01 to 10
-TINY = 1e-100  # scale of what neither moves nor is pushed: anything that moves exceeds it
 
 
 def extents(system: System, p: Sequence[float]) -> Vector:
@@ -126,7 +120,7 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
         own[j] = max(steady, pull / speed if speed > 0 else 0.0)
         natural = max(natural, own[j])
         if own[j] == 0 and span > 0:
-            own[j] = 1 / (PART * span)
+            own[j] = 1 / (MEASURED_PART * span)
         if own[j] > 0:
             size[j] = max(speed / own[j], acceleration / own[j] / own[j])
     back, shaken = _held(at, state, now)
@@ -138,7 +132,7 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
     rate = rate or _rate(system, size, np.abs(v), felt, found) or (1 / span if span > 0 else 0.0)
     floor = max(1e-8, 10 * EPS / settings.tolerance)
     speed_scale = floor * size * np.where(own > 0, own, rate)
-    roundings = min(max(ROUNDINGS * settings.tolerance, 0.01), 10.0)
+    roundings = min(max(SHAKEN * settings.tolerance, 0.01), 10.0)
     speed_scale = np.maximum(speed_scale, roundings / settings.tolerance * shaken)
     scale = np.maximum(state.scale, np.concatenate([floor * size, speed_scale]))
     gap = np.array(state.gap)
@@ -149,7 +143,7 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
         state,
         size=tuple(size.tolist()),
         rate=float(rate),
-        scale=tuple(np.where(scale > 0, scale, TINY).tolist()),
+        scale=tuple(np.where(scale > 0, scale, STILL).tolist()),
         gap=tuple(gap.tolist()),
     )
 
@@ -180,12 +174,12 @@ def _held(at: Instant, state: State, now: Motion) -> tuple[Vector, Vector]:
     back, noise = np.zeros(at.system.n), np.zeros(at.system.n)
     for j in np.flatnonzero(size):
         moved = np.array(state.q)
-        moved[j] += SHIFT * size[j]
+        moved[j] += DISPLACED * size[j]
         try:
             there = motion(at, moved, np.array(state.v), active)
         except StepFailureError:
             return np.zeros(at.system.n), np.zeros(at.system.n)
-        change = np.abs(there.vdot - now.vdot) / SHIFT
+        change = np.abs(there.vdot - now.vdot) / DISPLACED
         back += change
         noise += EPS * change * (abs(state.q[j]) / size[j])
     omega = np.sqrt((back[size > 0] / size[size > 0]).max(initial=0.0))

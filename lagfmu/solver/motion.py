@@ -12,15 +12,18 @@ from . import at_friction
 from .failure import MasslessError, StepFailureError
 from .instant import Instant, Motion
 from .linear import solve, solve_nullspace
-from .solution import RANK, Solution
+from .solution import Solution
 from .straight import solver_of
 from .system import NONHOLONOMIC, Matrix, Vector
+from .thresholds import (
+    PROJECTION_ITERATIONS,
+    PROJECTION_LINEAR,
+    PROJECTION_ROUNDING,
+    PROJECTION_SMALL,
+    RANK,
+)
 
 EPS = float(np.finfo(float).eps)
-ITERATIONS = 10
-SMALL = 1e-12  # residual, relative to the constraint's own size, that rounding may leave
-ROUNDING = 100 * EPS  # and that is left in peace where Newton's method still gains, but slowly
-LINEAR = 0.1  # ratio of successive residuals: Newton's method converges linearly, G loses rank
 
 
 def motion(
@@ -113,19 +116,23 @@ def project(
     values = at.values(q, v)
     _, _, G, nu, _ = at.system.placed(values)
     before = np.inf
-    for count in range(ITERATIONS + 1 if fixed else 0):
+    for count in range(PROJECTION_ITERATIONS + 1 if fixed else 0):
         f = (at.residual(q) - offset)[fixed]
         miss, steepness = np.abs(f), np.abs(G[fixed])
         if (miss <= 2 * EPS * (steepness @ np.abs(q))).all():
             break
         error = (miss / (steepness @ np.maximum(np.abs(q), size))).max()
-        if error < EPS**2 or (error > before / 2 and error < SMALL):
+        if error < EPS**2 or (error > before / 2 and error < PROJECTION_SMALL):
             break  # f vanishes with q, or rounding in f is all that is left
-        if count == ITERATIONS:
-            if error < ROUNDING:
+        if count == PROJECTION_ITERATIONS:
+            if error < PROJECTION_ROUNDING:
                 break  # linear convergence, or terms that are larger than q tells
             worst = [at.system.rows[k].name for k, a in zip(fixed, miss, strict=True) if a > 0]
-            cause = "the configuration is singular, or nearly so" if error > LINEAR * before else ""
+            cause = (
+                "the configuration is singular, or nearly so"
+                if error > PROJECTION_LINEAR * before
+                else ""
+            )
             raise StepFailureError(
                 f"the step to t = {float(at.t)!r} s cannot be projected onto the constraints "
                 f"{', '.join(map(repr, worst))} (missed by {miss.max():.3g}): "

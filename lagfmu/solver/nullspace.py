@@ -10,8 +10,9 @@ import numpy as np
 from scipy.linalg import lapack
 
 from .schur import half_solve, mass_factor
-from .solution import RANK, Solution
+from .solution import Solution
 from .system import Matrix, Vector
+from .thresholds import RANK
 
 
 def nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:

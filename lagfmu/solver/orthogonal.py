@@ -12,10 +12,9 @@ from scipy.linalg import lapack
 
 from .failure import MasslessError, StepFailureError
 from .schur import half_solve, mass_factor
-from .solution import ON, RANK, Solution, loose
+from .solution import Solution, loose
 from .system import Matrix, Vector
-
-CONSISTENT = 1e-7  # a dependent row may miss its right-hand side by this, relative to its terms
+from .thresholds import CONSISTENT, ON_CONSTRAINTS, RANK, VANISHES
 
 
 def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: float) -> Solution:
@@ -43,7 +42,7 @@ def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: f
     x, lam, right = substitute(b, c)
     size = np.abs(c / r).max(initial=0) + np.abs(right).max(initial=0)
     size += np.abs(half_solve(L, (b + G.T @ lam) * s)).max(initial=0)
-    strict = not nearest and off <= ON
+    strict = not nearest and off <= ON_CONSTRAINTS
     if strict and len(null) and np.abs(null @ right).max() > CONSISTENT * size:
         raise StepFailureError(
             "the constraints contradict each other at this state: dependent rows of G ask for "
@@ -57,7 +56,7 @@ def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: f
         dx, dlam, _ = substitute(*rest)
         xw, lamw = xw + dx, lamw + dlam
     x, lam = xw.astype(float), lamw.astype(float)
-    unique = (np.abs(null) < 1e-8).all(axis=0) if len(null) else np.ones(len(c), dtype=bool)
+    unique = (np.abs(null) < VANISHES).all(axis=0) if len(null) else np.ones(len(c), dtype=bool)
     return Solution(x, lam, unique)
 
 
@@ -69,15 +68,17 @@ def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: 
     U, sigma, Vt = np.linalg.svd(K * d * d[:, None])
     keep = sigma > max(RANK, loose(off)) * sigma[0]
     null = Vt[~keep]
-    if not nearest and len(null) and np.abs(null[:, :n]).max() > 1e-8:
+    if not nearest and len(null) and np.abs(null[:, :n]).max() > VANISHES:
         raise MasslessError(
             "the mass matrix is singular on the constraint surface: a coordinate has neither mass "
             "nor a constraint that determines its acceleration",
-            np.flatnonzero(np.abs(null[:, :n]).max(axis=0) > 1e-8).tolist(),
+            np.flatnonzero(np.abs(null[:, :n]).max(axis=0) > VANISHES).tolist(),
         )
     right = np.concatenate([b, c]) * d
-    missed = 0.0 if nearest or off > ON else np.abs(U[:, ~keep].T @ right).max(initial=0)
+    missed = (
+        0.0 if nearest or off > ON_CONSTRAINTS else np.abs(U[:, ~keep].T @ right).max(initial=0)
+    )
     if missed > CONSISTENT * np.abs(right).max():
         raise StepFailureError("the constraints contradict each other at this state")
     z = Vt[keep].T @ ((U[:, keep].T @ right) / sigma[keep]) * d
-    return Solution(z[:n], -z[n:], (np.abs(null[:, n:]) < 1e-8).all(axis=0))
+    return Solution(z[:n], -z[n:], (np.abs(null[:, n:]) < VANISHES).all(axis=0))

@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 from .failure import StepFailureError
 from .instant import Instant
 from .system import Matrix, Vector
-
-SAFE = 1e-9  # 1 + A below this counts as not positive
-OPENED, ROWS = 8, 16  # contacts of which all combinations are looked at, and their rows
+from .thresholds import PAINLEVE_OPENED, PAINLEVE_ROWS, PAINLEVE_SAFE
 
 
 def paradox(at: Instant, frictions: Sequence[int], value: float) -> StepFailureError:
@@ -38,11 +36,11 @@ def check_solvable(at: Instant, sliding: Sequence[int], A: Matrix) -> None:
     for place, i in enumerate(sliding):
         own = A[place, place]
         least = 1 + own if at.system.frictions[i].gated else 1 - abs(own)
-        if not least > SAFE:
+        if not least > PAINLEVE_SAFE:
             raise paradox(at, [i], least)
     if len(sliding) > 1:
         determinant = float(np.linalg.det(np.eye(len(sliding)) + A))
-        if not determinant > SAFE:
+        if not determinant > PAINLEVE_SAFE:
             raise paradox(at, sliding, determinant)
 
 
@@ -62,10 +60,10 @@ def check_opened(
     forces; unit(k): multipliers (m) to a unit acceleration of row k, without friction.
     """
     contacts = [k for k in at.system.contacts if k in rows]
-    if not 2 <= len(contacts) <= OPENED:
+    if not 2 <= len(contacts) <= PAINLEVE_OPENED:
         return
     found = contacts + [k for k in rows if _gates(at, k)]
-    if len(found) > ROWS or not all(unique[k] for k in found):
+    if len(found) > PAINLEVE_ROWS or not all(unique[k] for k in found):
         return  # redundant: there is no K^-1
     without = np.column_stack([unit(k) for k in found])
     whole = np.eye(len(sliding)) + A
@@ -80,7 +78,7 @@ def check_opened(
             ]
             part = np.ix_(which, which)
             value = determinant * float(np.linalg.det(B[part]) / np.linalg.det(K[part]))
-            if not value > SAFE:
+            if not value > PAINLEVE_SAFE:
                 raise paradox(at, sliding, value)
 
 

@@ -21,11 +21,9 @@ from .instant import Instant
 from .linear import solve
 from .magnitudes import Mask
 from .system import Matrix, System, Vector
+from .thresholds import RANK_EASE
 
 OMITTED, GIVEN, SET = 0, 1, 2  # nobody said it; the model's `start` does; the importer did
-EASE = (
-    2.0**-15
-)  # weight of a rank below those that a stage frees: its square is lost in rounding, twice
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ def stages(rank: Sequence[int]) -> Iterator[Stage]:
         if (ranks == highest).any():
             free = ranks <= highest
             below = np.where(ranks == OMITTED, 2 if highest > OMITTED else 0, highest - ranks)
-            yield Stage(highest, free, np.where(free, EASE**below, 1.0))
+            yield Stage(highest, free, np.where(free, RANK_EASE**below, 1.0))
 
 
 def singular_omissions(

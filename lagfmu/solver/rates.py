@@ -17,9 +17,7 @@ from itertools import pairwise
 from typing import Any
 
 from .system import System
-
-ROUNDING = 1e-9
-KEPT = 4  # points of a cubic polynomial
+from .thresholds import RATES_KEPT, RATES_ROUNDING
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ def estimated(
             found.append(before)
             continue
         value = u[k] if was_set[i] else before[0][1]
-        points = ((t, value), *(p for p in before if p[0] < t))[:KEPT]
+        points = ((t, value), *(p for p in before if p[0] < t))[:RATES_KEPT]
         w[k] = value
         if len(points) > 1:
             w[k + 1 : k + 4] = derivatives(points)
@@ -78,10 +76,12 @@ def half_connected(u: Sequence[float], went: Sequence[float], h: float) -> bool:
     x = went[0] - h * (v + h * a / 2)
     way, speed, size = u[0] - x, u[1] - v, abs(x) + abs(u[0])
     miss = abs(way - h * (v + u[1]) / 2 + h * h * (u[2] - a) / 12)
-    if miss > ROUNDING * size and miss > (abs(way) + h * (abs(v) + abs(u[1])) / 2) / 2:
+    if miss > RATES_ROUNDING * size and miss > (abs(way) + h * (abs(v) + abs(u[1])) / 2) / 2:
         return True
     miss = abs(speed - h * (a + u[2]) / 2)
-    return h * miss > ROUNDING * size and miss > (abs(speed) + h * (abs(a) + abs(u[2])) / 2) / 2
+    return (
+        h * miss > RATES_ROUNDING * size and miss > (abs(speed) + h * (abs(a) + abs(u[2])) / 2) / 2
+    )
 
 
 def restored_past(system: System, raw: Any) -> tuple[Past, list[int]]:
@@ -92,7 +92,7 @@ def restored_past(system: System, raw: Any) -> tuple[Past, list[int]]:
         raise ValueError("its inputs have other pasts")
     for motion in motions:
         times = [t for t, _ in motion]
-        if len(motion) > KEPT or not all(math.isfinite(x) for point in motion for x in point):
+        if len(motion) > RATES_KEPT or not all(math.isfinite(x) for point in motion for x in point):
             raise ValueError("the past of its inputs is no list of points")
         if any(a <= b for a, b in pairwise(times)):
             raise ValueError("the past of its inputs does not go back in time")

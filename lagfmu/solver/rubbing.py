@@ -21,10 +21,7 @@ from .impact import Impulse, Struck, base_rows, bounded
 from .instant import Instant
 from .linear import solve
 from .system import Matrix, Vector
-
-SWEEPS = 20000
-CLOSE = 1e-15  # of the largest impulse: what a sweep may still change
-ROUGH = 1e-9  # beyond which the sweeps have not arrived
+from .thresholds import RUBBING_CLOSE, RUBBING_ROUGH, RUBBING_SWEEPS
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,7 @@ def _swept(now: Struck, x: _Rows, coefficients: Law) -> Impulse | None:
     place = {k: i for i, k in enumerate(rows)}
     groups = [[place[k] for k in system.frictions[i].rows] for i in x.frictions]
     z, change = np.zeros(len(rows)), np.inf
-    for _ in range(SWEEPS):
+    for _ in range(RUBBING_SWEEPS):
         before = z.copy()
         for i in range(x.count):
             if x.A[i, i] > 0:
@@ -102,9 +99,9 @@ def _swept(now: Struck, x: _Rows, coefficients: Law) -> Impulse | None:
             if length > radius:
                 z[group] *= radius / length
         change = float(np.abs(z - before).max())
-        if change <= CLOSE * np.abs(z).max():
+        if change <= RUBBING_CLOSE * np.abs(z).max():
             break
-    if not change <= ROUGH * np.abs(z).max():
+    if not change <= RUBBING_ROUGH * np.abs(z).max():
         return None
     base = base_rows(system, set(now.contacts))
     found = solve(now.M, now.G[rows].T @ z, now.G[base], -now.slip[base], nearest=True)

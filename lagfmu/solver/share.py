@@ -14,10 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .system import Matrix, System, Vector
-
-DEPENDENT = 1e-9  # of a row's own norm, left over by the others, that counts as nothing
-WIDE = 1e2  # times the forces at work: how far is looked
-ROUNDS = 60  # bisections, and ellipsoids for each pair of unknowns
+from .thresholds import SHARE_DEPENDENT, SHARE_ROUNDS, SHARE_WIDE
 
 
 def best_share(
@@ -51,11 +48,11 @@ def best_share(
                     slope = slope - Z[:, mine] @ (t / force)
         return least, slope
 
-    wide = WIDE * max(float(np.abs(lam).max()), float(np.abs(load).max(initial=0.0)))
+    wide = SHARE_WIDE * max(float(np.abs(lam).max()), float(np.abs(load).max(initial=0.0)))
     best = _highest(worst, len(Z), wide)
     low, high = 0.0, 1.0
     if worst(0 * best)[0] < 0:
-        for _ in range(ROUNDS):
+        for _ in range(SHARE_ROUNDS):
             middle = (low + high) / 2
             low, high = (middle, high) if worst(middle * best)[0] < 0 else (low, middle)
         low = high
@@ -77,7 +74,7 @@ def null_space(G: Matrix, rows: Sequence[int]) -> Matrix:
                 part = float(b @ rest)
                 rest, of = rest - part * b, of - part * c
         left = float(np.linalg.norm(rest))
-        if left > DEPENDENT * norm:
+        if left > SHARE_DEPENDENT * norm:
             basis.append(rest / left)
             made.append(of / left)
         else:
@@ -96,7 +93,7 @@ def _highest(worst: object, count: int, wide: float) -> Vector:
     best, top = y, worst(y)[0]
     if count == 1:
         low, high = -wide, wide
-        for _ in range(2 * ROUNDS):
+        for _ in range(2 * SHARE_ROUNDS):
             y = np.array([(low + high) / 2])
             value, slope = worst(y)
             if value > top:
@@ -105,7 +102,7 @@ def _highest(worst: object, count: int, wide: float) -> Vector:
         return best
     P = np.eye(count) * wide**2
     n = float(count)
-    for _ in range(ROUNDS * count * count):
+    for _ in range(SHARE_ROUNDS * count * count):
         value, slope = worst(y)
         if value > top:
             best, top = y, value

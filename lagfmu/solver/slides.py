@@ -30,13 +30,15 @@ from .painleve import paradox
 from .ranges import Range, first_of_frictions
 from .state import Departure, Slide, State
 from .system import Matrix, System, Vector
+from .thresholds import (
+    SLIDES_ANGLES,
+    SLIDES_BACK,
+    SLIDES_JUMP,
+    SLIDES_MOST,
+    SLIDES_ROUNDS,
+    SLIDES_SLACK,
+)
 
-MOST = 6  # frictions whose combinations are tried one by one
-SLACK = 1e-12  # of the cone, and of the slip velocities that rounding leaves
-BACK = 1e-9  # of the accelerations at work, against its own direction, that counts as none
-JUMP = 1e3  # times the noise: a slip velocity that no rounding makes
-ANGLES = 48  # directions that are tried on the circle
-ROUNDS = 50
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)  # of the work done by friction within a step
 
 
@@ -57,7 +59,7 @@ class Contacts:
 def noises(system: System, G: Matrix, nu: Vector, speed: Vector) -> Vector:
     """The slip velocity [m/s] of each friction that rounding of velocities of the size `speed` makes."""
     unit = np.abs(G) @ np.abs(speed) + np.abs(nu)
-    return np.array([SLACK * unit[list(f.rows)].sum() for f in system.frictions])
+    return np.array([SLIDES_SLACK * unit[list(f.rows)].sum() for f in system.frictions])
 
 
 def _noises(at: Instant, q: Vector, v: Vector, state: State) -> Vector:
@@ -102,7 +104,7 @@ def settle(
     the edge of their cone, where rounding must not decide.
     """
     stuck = [slide.sticks for slide in at.slides]
-    for _ in range(ROUNDS):
+    for _ in range(SLIDES_ROUNDS):
         at = replace(at, slides=_choose(at, q, v, closed, ended, begins))
         found = contacts.settled(at, closed)
         if found == closed:
@@ -134,7 +136,7 @@ def _choose(
     for i, slide in enumerate(at.slides):
         length = float(np.hypot(s[i, 0], s[i, 1]))
         still = length <= slide.noise
-        still |= (slide.sticks or i in ended) and length <= JUMP * slide.noise
+        still |= (slide.sticks or i in ended) and length <= SLIDES_JUMP * slide.noise
         if on[i] and still:
             resting.append(i)
         else:
@@ -214,7 +216,7 @@ def _pulling(now: _Now, found: Motion, slides: Sequence[Slide]) -> list[int]:
         for i, slide in enumerate(slides)
         if not slide.sticks
         and not frictions[i].gated
-        and found.press.normal[i] < -SLACK * abs(found.lam).max(initial=0.0)
+        and found.press.normal[i] < -SLIDES_SLACK * abs(found.lam).max(initial=0.0)
     ]
 
 
@@ -240,14 +242,14 @@ class _Rest:
             if found is None:
                 break
             slides, now = found
-            over = [i for i in sticking if now.press.reserve[i] < -SLACK]
+            over = [i for i in sticking if now.press.reserve[i] < -SLIDES_SLACK]
             if not over:
                 return slides
             worst = min(over, key=lambda i: now.press.reserve[i])
             against[worst] = self._against(now, worst)
             sticking = [i for i in sticking if i != worst]
         for slides, now in self._all(against):
-            if all(now.press.reserve[i] >= -SLACK for i in self.resting if slides[i].sticks):
+            if all(now.press.reserve[i] >= -SLIDES_SLACK for i in self.resting if slides[i].sticks):
                 return slides
         raise paradox(self.now.at, self.resting, 0.0)
 
@@ -276,7 +278,7 @@ class _Rest:
         towards = dict(guess)
         slipping = [i for i in self.resting if i not in sticking]
         slides = self._with(sticking, towards)
-        for _ in range(ROUNDS):
+        for _ in range(SLIDES_ROUNDS):
             try:
                 slides = list(_signed(self.now, slides))
                 turned = False
@@ -299,7 +301,7 @@ class _Rest:
         self, guess: dict[int, tuple[float, float]]
     ) -> Iterator[tuple[tuple[Slide, ...], Motion]]:
         """Every combination, those with most sticking first."""
-        free = self.resting[:MOST]
+        free = self.resting[:SLIDES_MOST]
         for count in range(len(free) + 1):
             for slipping in itertools.combinations(free, count):
                 sticking = [i for i in self.resting if i not in slipping]
@@ -320,7 +322,7 @@ class _Rest:
         mass = now.M.diagonal()
         forces = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
         free = np.maximum(np.abs(now.vdot), forces / np.where(mass > 0, mass, np.inf))
-        floor = BACK * (np.abs(now.gamma[rows]) + np.abs(now.G[rows]) @ free).sum()
+        floor = SLIDES_BACK * (np.abs(now.gamma[rows]) + np.abs(now.G[rows]) @ free).sum()
         return rate, float(floor)
 
     def _steered(self, slides: list[Slide], i: int) -> tuple[float, float] | None:
@@ -352,8 +354,8 @@ class _Rest:
         c, along, floor = across(0.0)
         if abs(c) <= floor and along >= -floor:
             return at(0.0)
-        step = 2 * np.pi / ANGLES
-        for k in range(ANGLES // 2 + 1):  # nearest first, both ways
+        step = 2 * np.pi / SLIDES_ANGLES
+        for k in range(SLIDES_ANGLES // 2 + 1):  # nearest first, both ways
             for side in (1.0, -1.0):
                 low, high = side * k * step, side * (k + 1) * step
                 f_low, f_high = across(low)[0], across(high)[0]
@@ -424,7 +426,7 @@ def renewed(at: Instant, state: State) -> State:
     slides = [replace(x, noise=float(n)) for x, n in zip(state.slides, noise, strict=True)]
     moved, slippings = [], list(state.slippings)
     for i, (slide, x) in enumerate(zip(slides, s, strict=True)):
-        away = slide.sticks and np.hypot(x[0], x[1]) > JUMP * slide.noise
+        away = slide.sticks and np.hypot(x[0], x[1]) > SLIDES_JUMP * slide.noise
         moved.append(_along(slide, x) if away else slide)
         if away:
             slippings[i] = Departure(slippings[i].count + 1, state.t, state.q, state.v)
@@ -532,5 +534,8 @@ def ranges(leg: Leg) -> list[Range]:
     """The range of each; what begins on the edge has to get inside before it can leave there."""
     found = []
     for slide in leg.state.slides:
-        found += [Range(0.0, slack=SLACK if slide.sticks else slide.noise, rises=True), Range(0.0)]
+        found += [
+            Range(0.0, slack=SLIDES_SLACK if slide.sticks else slide.noise, rises=True),
+            Range(0.0),
+        ]
     return found

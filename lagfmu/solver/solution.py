@@ -8,16 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .system import Vector
-
-RANK = 1e-12  # singular values below this, relative to rows of unit norm, count as zero, ...
-TURNED = 1e2  # ... and below so many times the state's relative distance from the constraints, ...
-LOOSEST = 1e-3  # ... which says nothing of rows at a larger angle
-ON = 1e-13  # a state closer to the constraints than this is on them
+from .thresholds import RANK_LOOSEST, RANK_TURNED
 
 
 def loose(off: float) -> float:
     """The angle by which rows that depend on each other on the constraints differ `off` away from them."""
-    return min(TURNED * off, LOOSEST)
+    return float(min(RANK_TURNED * off, RANK_LOOSEST))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass, field, fields
 from .stiffness import Choice
 
 DEFAULT_TOLERANCE = 1e-8
-SMALLEST_TOLERANCE = 1e-14
 MAXIMUM_STEPS = 5000.0  # that make no headway, in one communication step
 
 
@@ -52,6 +51,10 @@ class Slide:
     noise: float = 0.0
 
 
+Local = tuple[float, float, float, float]
+NO_LOCAL: Local = (0.0, 0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class State:
     """Time, motion, contact modes, step-size memory.
@@ -64,7 +67,9 @@ class State:
     natural rate at the start; choice: what `auto` remembers; levels: those of jumps (jumps.py);
     slides, slippings: one entry a friction, how it stands and its latest start of slipping; dissipated
     [J]: by frictions and impacts so far; strikes: contacts that were struck so far;
-    local: with error bars, the sums of local errors of explicit and implicit methods (bars.py).
+    hits, hit_times [s], impulses [of lambda times s]: one entry a contact, how often, when last, how hard;
+    local: with error bars, of the local errors of explicit and of implicit steps the sums, then the largest
+    of each (bars.py).
     """
 
     t: float
@@ -86,7 +91,10 @@ class State:
     slippings: tuple[Departure, ...] = ()
     dissipated: float = 0.0
     strikes: int = 0
-    local: tuple[float, float] = (0.0, 0.0)
+    hits: tuple[int, ...] = ()
+    hit_times: tuple[float, ...] = ()
+    impulses: tuple[float, ...] = ()
+    local: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     levels: tuple[float, ...] = ()
 
     def to_json(self) -> str:

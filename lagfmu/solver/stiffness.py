@@ -26,20 +26,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .system import Vector
+from .thresholds import (
+    BOUND,
+    SLOWER,
+    STABLE,
+    STIFF_BRIEF,
+    STIFF_EVERY,
+    STIFF_OTHER,
+    STIFF_RETRY,
+    STIFF_ROUNDING,
+    STIFF_ROUNDING_FORCE,
+    STIFF_STEPS,
+)
 
-STABLE = 6.1  # h rho beyond which dop853 is unstable
-SLOWER = 30.0  # rho / sigma, per price of a step, from which on the motion is far slower
-BOUND = 0.1  # h rho below which nothing but the motion, or a bound, limits a step of order 8
-ROUNDING, ROUNDING_FORCE = 1e-14, 1e-12  # relative changes (of accelerations) that say nothing
-EVERY = 3  # steps of dop853 of which one is judged while none was stiff
-STIFF, OTHER = 15, 6  # steps that decide; others in a row after which they are counted anew
-SHORT = 6  # steps of radau5 in a row that do not pay, after which dop853 comes back
 PRICE = 1.5  # cost of a step of radau5 in steps of dop853
 DEARER, MOST = (
     4,
     8,
 )  # factor of the stiff steps asked for after radau5 did not pay; its power at most
-RETRY, LATEST = 128, 20  # steps of radau5 before dop853 is tried again; doublings of them at most
+LATEST = 20  # doublings of the steps of radau5 before dop853 is tried again, at most
 
 
 @dataclass(frozen=True)
@@ -96,9 +101,9 @@ class Slope:
             seen = np.where(change > rounding * np.abs(y1), change, 0.0)
             return float(np.linalg.norm(seen / size))
 
-        dq = norm(self.y0[:n], self.y1[:n], ROUNDING)
-        dv = norm(self.y0[n:], self.y1[n:], ROUNDING)
-        da = norm(self.f0[n:], self.f1[n:], ROUNDING_FORCE)
+        dq = norm(self.y0[:n], self.y1[:n], STIFF_ROUNDING)
+        dv = norm(self.y0[n:], self.y1[n:], STIFF_ROUNDING)
+        da = norm(self.f0[n:], self.f1[n:], STIFF_ROUNDING_FORCE)
         if not (dv > 0 and da > 0):
             return 0.0, 0.0
         return da / dv, math.sqrt(da / dq) if dq > 0 else math.inf
@@ -106,7 +111,7 @@ class Slope:
 
 def is_due(choice: Choice) -> bool:
     """True if the next step of dop853 is to be judged."""
-    return choice.stiff > 0 or choice.unseen + 1 >= EVERY
+    return choice.stiff > 0 or choice.unseen + 1 >= STIFF_EVERY
 
 
 def unjudged_step(choice: Choice) -> Choice:
@@ -123,10 +128,10 @@ def explicit_step(
     slow = sigma > 0 and rho > SLOWER * PRICE * sigma
     if not (h * rho > STABLE or (h * rho > BOUND and slow)):
         other = choice.other + 1
-        return replace(choice, other=other, stiff=0 if other >= OTHER else choice.stiff)
+        return replace(choice, other=other, stiff=0 if other >= STIFF_OTHER else choice.stiff)
     longest = max(h, choice.longest if choice.stiff else 0.0)
     choice = replace(choice, stiff=choice.stiff + 1, other=0, longest=longest)
-    if choice.stiff < STIFF * DEARER**choice.failures:
+    if choice.stiff < STIFF_STEPS * DEARER**choice.failures:
         return choice
     if not choice.product:
         choice = replace(choice, time=t, product=h * rho, ratio=rho / sigma if slow else 0.0)
@@ -142,9 +147,9 @@ def implicit_step(choice: Choice, h: float) -> Choice:
         span=choice.span + h,
         short=choice.short + 1 if h < enough else 0,
     )
-    if choice.short >= SHORT:
+    if choice.short >= STIFF_BRIEF:
         return replace(explicit(choice, choice.span >= enough * choice.taken), retries=0)
-    if choice.taken >= RETRY * 2**choice.retries:
+    if choice.taken >= STIFF_RETRY * 2**choice.retries:
         return replace(explicit(choice, paid=True), retries=min(choice.retries + 1, LATEST))
     return choice
 

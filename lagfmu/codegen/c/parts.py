@@ -15,6 +15,7 @@ AT_CONTACTS = {
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
 }
+BESIDE = ("after_step", "at_trial", "at_event", "inside")  # of companion.c
 COMPANION = ("bars.c", "companion.c")  # behind ERROR_BARS of variables.c
 FRICTION = ("friction.c", "painleve.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
 NO_RUNGS = """
@@ -63,7 +64,7 @@ def parts_source(scene: Scene, system: System) -> str | None:
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
     if scene.error_bars:
-        rows += [f"    .{part} = companion_{part},\n" for part in ("after_step", "inside")]
+        rows += [f"    .{part} = companion_{part},\n" for part in BESIDE]
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""

@@ -38,6 +38,23 @@ def solve_source(name: str, n: int, entries: Sequence[tuple[int, int]], plan: Pl
     return head + unused + "".join(_wrapped(line) for line in lines) + "}\n"
 
 
+def accelerate_source(prefix: str, sizes: Sequence[int]) -> str:
+    """C text of `accelerate` in system.h: the functions `dynamics` and `solve` in one, whose values stay in
+    registers between them.  `sizes` are those of M, F, G, nu and gamma."""
+    names = ("M", "F", "G", "nu", "gamma", "lambda")
+    values = [f"{a}[{max(1, n)}]" for a, n in zip(names, (*sizes, sizes[-1]), strict=True)]
+    head = f"static int {prefix}accelerate("
+    return (
+        "/* vdot at a state with all rows acting; 0 where that is not safe. */\n"
+        f"{head}double t, const double *q, const double *v, const double *u,\n"
+        f"{' ' * len(head)}const double *p, double *vdot) {{\n"
+        f"    double {', '.join(values)};\n"
+        f"    {prefix}dynamics(t, q, v, u, p, M, F, G, nu, gamma);\n"
+        f"    return {prefix}solve(M, F, G, gamma, vdot, lambda);\n"
+        "}\n"
+    )
+
+
 class _Writer:
     """i: 1 / M; h: G M^-1; a: diagonal of S; y, l, p: a row of L D and of L, its pivot; d = 1 / p."""
 

@@ -80,6 +80,10 @@ class Tables:
         if self.formulation != "nullspace":
             solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
             parts.append(f"{solve}\n" if solve else "")
+        quick = solve is not None and not eom.u
+        if quick:
+            sizes = (len(self.mass), eom.n, len(self.entries), eom.m, eom.m)
+            parts.append(csolve.accelerate_source(p, sizes) + "\n")
         own, more = self._outputs(functions)
         reach, ends = self._lookups(functions)
         parts += [own, reach]
@@ -115,6 +119,7 @@ class Tables:
             "separable": int(self._separable()),
             "plan": f"&{p}plan",
             "solve": f"{p}solve" if solve else "NULL",
+            "accelerate": f"{p}accelerate" if quick else "NULL",
             **{
                 name: p + name if name in functions else "NULL"
                 for name in (

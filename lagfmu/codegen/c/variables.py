@@ -11,7 +11,7 @@ from ... import names
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.form import Form
 from ...model.scene import Scene
-from ...solver.bars import COARSER, MARGIN, ROUNDING
+from ...solver.bars import COARSER, FEW, MARGIN, ROUNDING
 from ...solver.system import System
 from .printer import string
 
@@ -40,7 +40,8 @@ const int DEFAULT_METHOD = {method};
 {bars}"""
 NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
 WITH_BARS = f"""const ErrorBars *const ERROR_BARS = &BARS;
-const double BAR_COARSER = {COARSER!r}, BAR_MARGIN = {MARGIN!r}, BAR_ROUNDING = {ROUNDING!r};
+const double BAR_COARSER = {COARSER!r}, BAR_MARGIN = {MARGIN!r}, BAR_FEW = {FEW!r},
+             BAR_ROUNDING = {ROUNDING!r};
 """
 
 

@@ -148,6 +148,7 @@ class Accuracy {
           { ...axis, size: 64, values: power, filter: thirds, ...both },
         ],
         cursor: { drag: { x: false, y: false } },
+        legend: { live: false },
         series: [{ label: "steps" }, ...series],
       },
       data,

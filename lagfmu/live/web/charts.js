@@ -7,7 +7,7 @@ const AT_FIRST = [
   "Coordinates",
   "Energies",
   "Generalized forces of constraint",
-  "Residuals",
+  "Residuals, zero where a constraint acts",
   "Gaps of contacts",
 ];
 const MOST = 12; // curves of one chart
@@ -24,6 +24,13 @@ function chartList() {
   });
   const rank = (c) => (AT_FIRST.indexOf(c.group) + 1 || 99);
   return found.sort((a, b) => rank(a) - rank(b));
+}
+
+/* The range of an axis: a curve that stays where it is lies in the middle. */
+function roomy(low, high) {
+  if (low === null || low < high) return uPlot.rangeNum(low ?? 0, high ?? 1, 0.1, true);
+  const pad = Math.abs(low) / 2 || 1;
+  return [low - pad, high + pad];
 }
 
 class Charts {
@@ -77,7 +84,7 @@ class Charts {
     const options = {
       width: this.width(),
       height: HEIGHT,
-      scales: { x: { time: false } },
+      scales: { x: { time: false }, y: { range: (u, low, high) => roomy(low, high) } },
       axes: [
         { ...axis, values: (u, ticks) => ticks.map((t) => `${shown(t)} s`) },
         { ...axis, size: 64, values: (u, ticks) => ticks.map((y) => shown(y)) },

@@ -78,7 +78,8 @@ function showEvents(events) {
   const items = events.slice(0, MOST_EVENTS).map((event) => {
     const jump = element("button", { type: "button" }, `${shown(event.time, 10)} s`);
     jump.addEventListener("click", () => player.seek(event.time));
-    return element("li", {}, jump, ` ${event.text}`);
+    const after = event.truth ? `, after ${shown(event.since, 10)} s` : "";
+    return element("li", {}, jump, ` ${event.text}${after}`);
   });
   const more = events.length - items.length;
   if (more) items.push(element("li", {}, `and ${more} more, all of them in the CSV file`));
@@ -88,9 +89,12 @@ function showEvents(events) {
 }
 
 function showLog(log) {
-  const said = log.filter((m) => m.status !== "ok");
-  byId("log").replaceChildren(...said.map((m) => element("li", {}, `${m.status}: ${m.message}`)));
-  byId("log-box").hidden = !said.length;
+  const items = log
+    .slice(0, MOST_EVENTS)
+    .map((m) => element("li", {}, m.status === "ok" ? m.message : `${m.status}: ${m.message}`));
+  if (log.length > MOST_EVENTS) items.push(element("li", {}, `and ${log.length - MOST_EVENTS} more`));
+  byId("log").replaceChildren(...items);
+  byId("log-box").hidden = !log.length;
 }
 
 function showTime(t) {
@@ -132,7 +136,7 @@ function tell() {
   }
   const steps = STEPS === undefined ? "" : `, ${trajectory.columns[STEPS].at(-1)} steps`;
   const took = trajectory.milliseconds !== null ? `, ${shown(trajectory.milliseconds, 2)} ms` : "";
-  const events = trajectory.events.slice(0, 3).map((e) => `${e.text} at ${shown(e.time)} s`);
+  const events = trajectory.events.slice(0, 3).map((e) => `${e.text} ${e.truth ? "by" : "at"} ${shown(e.time)} s`);
   const end = `Run to ${shown(trajectory.end)} s${steps}${took}`;
   byId("status").textContent = [end, ...events].join("; ");
 }

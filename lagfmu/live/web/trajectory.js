@@ -64,9 +64,8 @@ class Trajectory {
       } else if (v.type === "Boolean" && !v.name.startsWith("unique.")) {
         for (let i = 1; i < column.length; i++) {
           if (column[i] === column[i - 1]) continue;
-          const [since, time] = [this.time[i - 1], this.time[i]];
-          const text = `${v.name} ${column[i] ? "begins" : "ends"}, after ${shown(since, 10)} s`;
-          found.push({ time, since, text, truth: true });
+          const text = `${v.name} ${column[i] ? "begins" : "ends"}`;
+          found.push({ time: this.time[i], since: this.time[i - 1], text, truth: true });
         }
       }
     });

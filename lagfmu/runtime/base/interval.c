@@ -4,7 +4,7 @@
 #include <math.h>
 
 static const double HALF_PI = 1.57079632679489661923, TWO_PI = 6.28318530717958647693;
-static const double LARGEST_ANGLE = 1e15; /* beyond it neighbouring doubles are no neighbouring angles */
+static const double ENCLOSED_ANGLE = 1e15; /* beyond it neighbouring doubles are no neighbouring angles */
 
 static double least(double a, double b) { return a < b ? a : b; }
 static double most(double a, double b) { return a > b ? a : b; }
@@ -59,7 +59,7 @@ Interval interval_sqrt(Interval a) {
 }
 
 Interval interval_sin(Interval a) {
-    if (!(a.high - a.low < TWO_PI && fabs(a.low) < LARGEST_ANGLE && fabs(a.high) < LARGEST_ANGLE))
+    if (!(a.high - a.low < TWO_PI && fabs(a.low) < ENCLOSED_ANGLE && fabs(a.high) < ENCLOSED_ANGLE))
         return (Interval){-1, 1};
     const double low = sin(a.low), high = sin(a.high);
     const int crest = floor((a.high - HALF_PI) / TWO_PI) >= ceil((a.low - HALF_PI) / TWO_PI);

@@ -63,6 +63,9 @@ struct System {
      * out for a small system; 0 where that is not safe: then linear.h decides.  NULL: not there. */
     int (*solve)(const double *M, const double *b, const double *G, const double *c, double *x,
                  double *lambda);
+    /* Both in one, dynamics and solve, for a system without inputs: vdot (n) at a state. */
+    int (*accelerate)(double t, const double *q, const double *v, const double *u, const double *p,
+                      double *vdot);
 
     void (*dynamics)(double t, const double *q, const double *v, const double *u, const double *p,
                      double *M, double *F, double *G, double *nu, double *gamma);

@@ -119,6 +119,15 @@ static void inputs_changed(Instance *x) {
     if (!*x->bars->lost) solver_inputs_changed(&x->bars->solver);
 }
 
+/* A look at the state with which the next step begins; one that cannot be found is told by that step. */
+static void turn(Instance *x) {
+    Bars *b = x->bars;
+    b->observed = 0;
+    if (*b->lost) return;
+    share(x);
+    *b->lost = solver_follow(&b->solver) != OK;
+}
+
 /* ------------------------------------------------------------------ bars */
 
 /* The time of an event pairs by the count of its own kind. */
@@ -163,14 +172,15 @@ static int compare(Instance *x, const Variable *bar, int paired, double share, d
     }
     if (!is_paired_for(of, &x->solver, &b->solver, paired)) return 0;
     if (instance_value(&b->solver, &b->seen, of, &other) != OK) return 0;
-    *worst = fmin(fmax(*worst, share * fabs(mine - other)), INFINITE);
+    const double off = fabs(mine - other), part = fmax(share, fmin(1, share + off / *size));
+    *worst = fmin(fmax(*worst, part * off), INFINITE);
     return 1;
 }
 
 /* The part of a difference that is the bar: all of it where a fixed step is halved. */
 static double share_of(const Instance *x) {
     if (has_fixed_step(x)) return 1;
-    return fmin(1, BAR_MARGIN / companion_ratio(&x->solver, &x->bars->solver));
+    return companion_share(&x->solver, &x->bars->solver, BAR_MARGIN, BAR_FEW);
 }
 
 static void widen(Instance *x) {
@@ -240,4 +250,4 @@ static Status restored(Instance *x) {
 }
 
 const ErrorBars BARS = {layout,         start, begin_step, follow,  widen,
-                        inputs_changed, get,   save,       restore, restored};
+                        inputs_changed, turn,  get,        save,    restore, restored};

@@ -4,10 +4,12 @@
  * tolerance that is BAR_COARSER times the delivered one's.  With x of the delivered run and y of the
  * companion, at the communication points t_k so far,
  *
- *   bar = max( max_k s_k |x(t_k) - y(t_k)| ,  rounding of max_k |x(t_k)| ) ,   s_k = min(1, BAR_MARGIN / r_k) :
+ *   bar = max( max_k s_k d_k ,  rounding of max_k |x(t_k)| ) ,   d_k = |x(t_k) - y(t_k)| ,
+ *   s_k = min(1, BAR_MARGIN / r_k) (1 + BAR_FEW / N_k) :
  *
- * the difference is the companion's error, which is r times the delivered one's if local errors were all there
- * is: r is the ratio of the sums of h^(p + 1) of both (companion.h; docs/error_bars.md).
+ * d is the companion's error, which is r times the delivered one's if local errors were all there is: r is the
+ * ratio of the sums of h^(p + 1) of both, N the companion's sum in its largest part (companion.h).  Where d is
+ * no longer small beside |x| the motions part, and s is at least min(1, s + d / max |x|) (docs/error_bars.md).
  *
  * All of it is reached by one pointer, NULL in an FMU without error bars. */
 #ifndef LAGFMU_BARS_H
@@ -40,6 +42,8 @@ typedef struct {
     void (*follow)(struct Instance *x, double t_end);
     void (*widen)(struct Instance *x);
     void (*inputs_changed)(struct Instance *x);
+    /* The companion goes with a prescribed motion that was set, as the delivered run does to be read. */
+    void (*turn)(struct Instance *x);
     /* The bar of a variable; the largest double stands for infinity. */
     Status (*get)(struct Instance *x, const Variable *v, double *value);
     void (*save)(const struct Instance *x);
@@ -50,6 +54,6 @@ typedef struct {
 
 extern const ErrorBars BARS;
 extern const ErrorBars *const ERROR_BARS; /* of variables.c: &BARS, or NULL */
-extern const double BAR_COARSER, BAR_MARGIN, BAR_ROUNDING; /* of variables.c: solver/bars.py */
+extern const double BAR_COARSER, BAR_MARGIN, BAR_FEW, BAR_ROUNDING; /* of variables.c: solver/bars.py */
 
 #endif

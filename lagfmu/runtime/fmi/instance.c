@@ -11,8 +11,8 @@
 #include "magnitudes.h"
 #include "outputs.h"
 #include "rates.h"
+#include "thresholds.h"
 
-static const double SMALLEST_TOLERANCE = 1e-14;
 
 /* ------------------------------------------------------------------ memory */
 
@@ -66,12 +66,53 @@ void instance_reset(Instance *x) {
     x->tolerance = 0;
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->solver.on_demand = ERROR_BARS == NULL; /* which are carried from point to point */
-    x->started = x->running = x->warned = x->observed = x->evaluated = 0;
+    x->started = x->running = x->warned = x->observed = x->evaluated = x->followed = 0;
     for (int k = 0; k < VARIABLE_COUNT; k++)
         if (VARIABLES[k].type == TYPE_REAL &&
             (VARIABLES[k].role != ROLE_OUTPUT || VARIABLES[k].place == AT_INPUT))
             instance_set(x, &VARIABLES[k], VARIABLES[k].start);
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
+}
+
+/* ------------------------------------------------------------------ prescribed motions */
+
+static int is_estimated(const System *s, int k) {
+    for (int i = 0; i < s->estimated_count; i++)
+        if (s->estimated[i] == k) return 1;
+    return 0;
+}
+
+/* A prescribed motion was set to another place or other rates than it went by. */
+static int has_turned(const Instance *x) {
+    const System *s = x->solver.system;
+    const double *u = x->solver.drive.value;
+    for (int i = 0; i < s->prescribed_count; i++) {
+        const int k = s->prescribed[i];
+        if (is_estimated(s, k)) continue;
+        for (int order = 0; order <= 2; order++)
+            if (u[k + order] != x->expected[k + order]) return 1;
+    }
+    return 0;
+}
+
+/* The state as the importer left it: what is set next may be the rest of the motion. */
+static void unfollow(Instance *x) {
+    const int phase = x->phase;
+    if (!x->followed) return;
+    instance_restore(x, x->backup);
+    x->phase = phase;
+}
+
+/* What is read of a motion that was set is read at the state with which the next step begins. */
+static Status follow(Instance *x) {
+    if (x->followed || x->exchange || !x->started || !x->running || !has_turned(x)) return OK;
+    instance_save(x, x->backup);
+    x->followed = 1;
+    x->observed = x->evaluated = 0;
+    if (ERROR_BARS != NULL) ERROR_BARS->turn(x);
+    if (solver_follow(&x->solver) == OK) return OK;
+    unfollow(x);
+    return FAILED;
 }
 
 /* ------------------------------------------------------------------ values */
@@ -170,6 +211,7 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
     if (was_set(x, v, value)) return OK;
     if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
     if (solver_arrive(&x->solver) != OK) return FAILED;
+    if (follow(x) != OK) return FAILED;
     if (x->started && ready(&x->solver, v, value)) return OK;
     if (!x->observed && instance_observe(x) != OK) return FAILED;
     return instance_value(&x->solver, &x->seen, v, value);
@@ -189,6 +231,7 @@ static void renew_input(Instance *x, int k) {
 }
 
 static void set_input(Instance *x, int k, double value) {
+    unfollow(x);
     Drive *drive = &x->solver.drive;
     const int same = drive->value[k] == value && drive->first[k] == 0 && drive->second[k] == 0;
     renew_input(x, k);
@@ -199,6 +242,7 @@ static void set_input(Instance *x, int k, double value) {
 }
 
 void instance_set(Instance *x, const Variable *v, double value) {
+    unfollow(x);
     const int n = x->solver.system->n;
     if (v->place == AT_INPUT) {
         set_input(x, v->index, value);
@@ -224,12 +268,6 @@ void instance_set(Instance *x, const Variable *v, double value) {
     }
 }
 
-static int is_estimated(const System *s, int k) {
-    for (int i = 0; i < s->estimated_count; i++)
-        if (s->estimated[i] == k) return 1;
-    return 0;
-}
-
 /* Where a prescribed motion stands in u: 0, 1 or 2 for u, der(u), der(u,2); -1 for other inputs. */
 static int order_in_motion(const System *s, int k) {
     for (int i = 0; i < s->estimated_count; i++)
@@ -240,6 +278,7 @@ static int order_in_motion(const System *s, int k) {
 }
 
 void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value) {
+    unfollow(x);
     Drive *drive = &x->solver.drive;
     const int k = v->index, place = order_in_motion(x->solver.system, k);
     if (place >= 0) { /* its derivatives are inputs themselves */
@@ -319,7 +358,7 @@ Status instance_start(Instance *x) {
 
 Status instance_observe(Instance *x) {
     if (x->observed) return OK;
-    if (instance_start(x) != OK || solver_arrive(&x->solver) != OK) return FAILED;
+    if (instance_start(x) != OK || solver_arrive(&x->solver) != OK || follow(x) != OK) return FAILED;
     if (solver_observe(&x->solver, &x->seen) != OK) return FAILED;
     x->observed = 1;
     x->evaluated = 0;
@@ -406,10 +445,22 @@ static void move_inputs(Instance *x, double t) {
     drive->since = t;
 }
 
+static void report_strike(Instance *x, int c, const char *name) {
+    const Solver *s = &x->solver;
+    char latest[32] = "";
+    if (s->strikes[c] > 1)
+        (void)snprintf(latest, sizeof latest, ", the latest of %d", s->strikes[c]);
+    (void)snprintf(x->note, sizeof x->note,
+                   "contact %s was struck at t = %s s, impulse %s (of its lambda times s)%s", name,
+                   digits(s->struck_at[c]).text, digits(s->impulse[c]).text, latest);
+    x->tell(x->context, NOTE_EVENT, x->note);
+}
+
 static void report_events(Instance *x) {
     const State *now = &x->solver.state;
     for (int c = 0; c < x->solver.system->contacts; c++) {
         const char *name = x->solver.system->rows[x->solver.system->contact[c]].name;
+        if (x->solver.strikes[c] > 0) report_strike(x, c, name);
         if (now->count[c] != x->count[c])
             (void)snprintf(x->note, sizeof x->note, "contact %s opened at t = %s s", name,
                            digits(now->departure_time[c]).text);
@@ -437,6 +488,7 @@ static void note_modes(Instance *x) {
     const size_t size = (size_t)s->contacts * sizeof *x->closed;
     memcpy(x->closed, x->solver.state.closed, size);
     memcpy(x->count, x->solver.state.count, size);
+    memset(x->solver.strikes, 0, size);
     for (int i = 0; i < s->frictions; i++) {
         x->stuck[i] = x->solver.state.slide[i].sticks;
         x->slips[i] = x->solver.state.slip_count[i];
@@ -459,17 +511,22 @@ static void tell_of_method(Instance *x, double product, int implicit) {
 
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
-    const int passed = solver_passed(s, t_end);
-    if (!passed) instance_save(x, x->backup);
+    if (solver_pass(s, t_end)) {
+        x->observed = x->evaluated = 0;
+        return OK;
+    }
+    unfollow(x);
+    instance_save(x, x->backup);
     if (s->system->estimated_count > 0) estimate_rates(x);
     if (s->system->prescribed_count > 0) warn_of_rates(x);
+    memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     if (s->system->contacts + s->system->frictions > 0) note_modes(x);
     if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;
     const int implicit = s->state.now.choice.implicit;
     if (solver_advance(s, t_end) != OK) {
-        if (!passed) instance_restore(x, x->backup);
+        instance_restore(x, x->backup);
         return FAILED;
     }
     if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
@@ -589,7 +646,8 @@ static size_t record_head(void) { return (sizeof(Record) + 15) / 16 * 16; }
 
 size_t instance_record_size(const Instance *x) { return record_head() + x->saved_size; }
 
-void instance_save(const Instance *x, char *record) {
+void instance_save(Instance *x, char *record) {
+    unfollow(x);
     const Solver *s = &x->solver;
     Record head;
     memset(&head, 0, sizeof head);
@@ -607,8 +665,8 @@ void instance_save(const Instance *x, char *record) {
     head.running = x->running;
     head.warned = x->warned;
     if (ERROR_BARS != NULL) ERROR_BARS->save(x);
-    memset(record, 0, record_head());
     memcpy(record, &head, sizeof head);
+    memset(record + sizeof head, 0, record_head() - sizeof head);
     memcpy(record + record_head(), x->saved, x->saved_size);
 }
 
@@ -630,6 +688,6 @@ void instance_restore(Instance *x, const char *record) {
     x->started = head.started;
     x->running = head.running;
     x->warned = head.warned;
-    x->observed = x->evaluated = 0;
+    x->observed = x->evaluated = x->followed = 0;
     if (ERROR_BARS != NULL) ERROR_BARS->restore(x);
 }

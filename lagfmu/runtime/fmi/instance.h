@@ -31,6 +31,7 @@ typedef struct Instance {
     int warned;             /* 1: a jump of a prescribed motion has been told; 2 << i: lookup i outside */
     double *places;         /* (lookup_count) scratch */
     int observed, evaluated;
+    int followed;           /* 1: the state goes with a motion that was set; as it was in `backup` */
     double *q0, *v0;        /* (n) start values as they were set */
     Rank *rank;             /* (2 n) who said them; found anew at each start */
     double *expected;       /* (inputs) values at the end of the latest step */
@@ -86,7 +87,7 @@ Status instance_rates(Instance *x, Direction *d);
 
 /* Saved states: `instance_record_size` bytes that hold no pointer. */
 size_t instance_record_size(const Instance *x);
-void instance_save(const Instance *x, char *record);
+void instance_save(Instance *x, char *record);
 void instance_restore(Instance *x, const char *record);
 
 #endif

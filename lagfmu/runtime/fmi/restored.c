@@ -141,8 +141,14 @@ static Status times(Instance *x, const Solver *s) {
         {"energy dissipated", now->lost, -DBL_MAX, DBL_MAX},
         {"energy dissipated", now->lost_old, -DBL_MAX, DBL_MAX},
         {"energy dissipated", now->lost_ahead, -DBL_MAX, DBL_MAX},
-        {"sum of local errors", now->local[0], 0, DBL_MAX},
-        {"sum of local errors", now->local[1], 0, DBL_MAX},
+        {"sum of local errors", now->local.sum[0], 0, DBL_MAX},
+        {"sum of local errors", now->local.sum[1], 0, DBL_MAX},
+        {"largest local error", now->local.most[0], 0, now->local.sum[0]},
+        {"largest local error", now->local.most[1], 0, now->local.sum[1]},
+        {"sum of local errors", now->local_old.sum[0], 0, DBL_MAX},
+        {"sum of local errors", now->local_old.sum[1], 0, DBL_MAX},
+        {"largest local error", now->local_old.most[0], 0, now->local_old.sum[0]},
+        {"largest local error", now->local_old.most[1], 0, now->local_old.sum[1]},
     };
     if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
     if (numbers(x, list, sizeof list / sizeof *list) != OK) return FAILED;

@@ -11,9 +11,8 @@
 #include <math.h>
 
 #include "lu.h"
+#include "thresholds.h"
 
-static const double ZERO = 1e-12;      /* of the largest |b| in scaled rows: a w that counts as none */
-static const double DEPENDENT = 1e-10; /* of a row of unit norm that must stand out from the set to join */
 
 typedef struct {
     int n, count;       /* rows, and how many of them are held at w = 0 */
@@ -58,11 +57,11 @@ static double respond(Problem *p, int j) {
 static int join(Problem *p, int j) {
     for (;;) {
         const double left = respond(p, j);
-        const double full = left > DEPENDENT ? -gap(p, j) / left : HUGE_VAL;
+        const double full = left > LCP_DEPENDENT ? -gap(p, j) / left : HUGE_VAL;
         double way = HUGE_VAL;
         int leaves = 0;
         for (int a = 0; a < p->count; a++) {
-            if (!(p->r[a] > DEPENDENT) || !(p->z[p->held[a]] / p->r[a] < way)) continue;
+            if (!(p->r[a] > LCP_DEPENDENT) || !(p->z[p->held[a]] / p->r[a] < way)) continue;
             way = p->z[p->held[a]] / p->r[a];
             leaves = a;
         }
@@ -97,7 +96,7 @@ int complementarity_solve(int n, double *A, double *b, double *z, double *w, dou
     scale(&p, d);
     for (int i = 0; i < n; i++) {
         z[i] = 0;
-        floor = fmax(floor, ZERO * fabs(b[i]));
+        floor = fmax(floor, LCP_ZERO * fabs(b[i]));
     }
     for (int round = 0; round < 50 * (n + 1); round++) {
         const int j = worst(&p, w);

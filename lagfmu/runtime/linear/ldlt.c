@@ -27,7 +27,7 @@ static double forest_row(const Elimination *e, double *L, const double *D, const
         int i = e->column[k];
         double a = L[k], l = a * D[i];
         L[k] = l;
-        rest -= a * a * D[i];
+        rest -= a * l;
         size += l * l * row_size[i];
     }
     *pivot = rest;

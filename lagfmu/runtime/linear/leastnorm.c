@@ -14,10 +14,8 @@
 #include "cod.h"
 #include "kkt.h"
 #include "residual.h"
+#include "thresholds.h"
 
-static const double CONSISTENT = 1e-7; /* a dependent row may miss its right-hand side by this */
-static const double ON = 1e-13;        /* a state closer to the constraints than this is on them */
-static const double VANISHES = 1e-8;   /* component of a unit null vector that counts as zero */
 
 /* The scaled KKT matrix of the rows that act, decomposed. */
 typedef struct {
@@ -126,7 +124,7 @@ static void substitute(Linear *l, const double *b, const double *c, double *x, d
 Status least_norm_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     Whole w = whole_view(l);
     double most = right(l, &w, b, c);
-    for (int i = w.cod.rank; i < w.cod.rows && !l->nearest && !(l->off > ON); i++)
+    for (int i = w.cod.rank; i < w.cod.rows && !l->nearest && !(l->off > ON_CONSTRAINTS); i++)
         if (fabs(w.z[i]) > CONSISTENT * most)
             return fail(l->why, "the constraints contradict each other at this state");
     substitute(l, b, c, x, lambda);

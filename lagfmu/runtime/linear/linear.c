@@ -12,20 +12,18 @@
 #include "kkt.h"
 #include "schur.h"
 #include "stiffened.h"
+#include "thresholds.h"
 
-static const double RANK = 1e-12;  /* rows of unit norm that stand out by less are dependent, ... */
-static const double TURNED = 1e2;  /* ... and by less than so many times the distance from the constraints, ... */
-static const double LOOSEST = 1e-3; /* ... which says nothing of rows at a larger angle */
 
 static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
 
 double linear_rank_threshold(const Linear *l) {
-    return fmax(RANK, fmin(TURNED * l->off, LOOSEST));
+    return fmax(RANK, fmin(RANK_TURNED * l->off, RANK_LOOSEST));
 }
 
 /* The square of that: what the condition of the rungs below tells. */
 static double loose(const Linear *l) {
-    const double angle = fmin(TURNED * l->off, LOOSEST);
+    const double angle = fmin(RANK_TURNED * l->off, RANK_LOOSEST);
     return l->dense != NULL && DEPENDENT != NULL ? angle * angle : 0;
 }
 

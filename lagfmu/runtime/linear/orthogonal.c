@@ -8,11 +8,9 @@
 #include <math.h>
 
 #include "residual.h"
+#include "thresholds.h"
 #include "weighted.h"
 
-static const double CONSISTENT = 1e-7; /* a dependent row may miss its right-hand side by this */
-static const double ON = 1e-13;        /* a state closer to the constraints than this is on them */
-static const double VANISHES = 1e-8;   /* component of a unit null vector that counts as zero */
 
 int orthogonal_factor(Linear *l) {
     Weighted w;
@@ -50,7 +48,7 @@ static int consistent(const Linear *l, const double *b, const double *c) {
 }
 
 Status orthogonal_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
-    if (!l->nearest && !(l->off > ON) && !consistent(l, b, c))
+    if (!l->nearest && !(l->off > ON_CONSTRAINTS) && !consistent(l, b, c))
         return fail(l->why,
                     "the constraints contradict each other at this state: dependent rows of G ask "
                     "for different accelerations");

@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "thresholds.h"
 
 static void layout(Mechanism *b, Arena *arena) {
     const System *s = b->system;

@@ -9,7 +9,6 @@
 
 #include "mechanism.h"
 
-#define PAINLEVE_SAFE 1e-9 /* 1 + A below this counts as not positive */
 
 /* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
  * slip velocity where that is zero or was last known; slip velocities up to `noise` [m/s] are rounding. */

@@ -28,11 +28,14 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
     if (b->sliding != NULL) b->sliding->layout(b, arena);
 }
 
-static int all_finite(int count, const double *x) {
-    int all = 1;
-    for (int i = 0; i < count; i++) all &= fabs(x[i]) <= DBL_MAX;
-    return all;
+/* 0, or not a number. */
+static inline double zero(int count, const double *x) {
+    double sum = 0;
+    for (int i = 0; i < count; i++) sum += 0 * x[i];
+    return sum;
 }
+
+static int all_finite(int count, const double *x) { return zero(count, x) == 0; }
 
 static Status not_evaluated(Mechanism *b, Instant at, const char *what) {
     Digits t = digits(at.t);
@@ -43,11 +46,13 @@ static Status not_evaluated(Mechanism *b, Instant at, const char *what) {
 
 static Status check_values(Mechanism *b, Instant at) {
     const System *s = b->system;
+    if (zero(s->masses, b->M) + zero(s->n, b->F) + zero(s->entries, b->G) + zero(s->m, b->nu) +
+            zero(s->m, b->gamma) ==
+        0)
+        return OK;
     if (!(all_finite(s->masses, b->M) & all_finite(s->n, b->F)))
         return not_evaluated(b, at, "a mass or a force is");
-    if (!(all_finite(s->entries, b->G) & all_finite(s->m, b->nu) & all_finite(s->m, b->gamma)))
-        return not_evaluated(b, at, "a constraint or its derivative is");
-    return OK;
+    return not_evaluated(b, at, "a constraint or its derivative is");
 }
 
 static void evaluate(Mechanism *b, Instant at, const double *q, const double *v) {

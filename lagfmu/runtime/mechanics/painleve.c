@@ -10,8 +10,8 @@
 #include <string.h>
 
 #include "digits.h"
+#include "thresholds.h"
 
-enum { OPENED = 8, ROWS = 16 }; /* contacts of which all combinations are looked at, and their rows */
 
 Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value) {
     fail(b->why, "friction ");
@@ -65,7 +65,7 @@ static int find_rows(const Mechanism *b, int *rows, int *contacts) {
     int count = 0;
     for (int c = 0; c < s->contacts; c++) {
         if (!acting[s->contact[c]]) continue;
-        if (count == OPENED) return 0;
+        if (count == PAINLEVE_OPENED) return 0;
         rows[count++] = s->contact[c];
     }
     *contacts = count;
@@ -75,7 +75,7 @@ static int find_rows(const Mechanism *b, int *rows, int *contacts) {
         const int gated = row->while_closed >= 0 ||
                           (row->friction > 0 && s->friction[row->friction - 1].gated);
         if (!acting[k] || !gated) continue;
-        if (count == ROWS) return 0;
+        if (count == PAINLEVE_ROWS) return 0;
         rows[count++] = k;
     }
     for (int r = 0; r < count; r++)
@@ -100,7 +100,7 @@ static int opens(const Mechanism *b, int k, const int *rows, int contacts, unsig
 
 /* The determinant of the rows and columns in `which`. */
 static double minor(const double *X, int count, const int *which) {
-    double part[ROWS * ROWS], none[ROWS] = {0};
+    double part[PAINLEVE_ROWS * PAINLEVE_ROWS], none[PAINLEVE_ROWS] = {0};
     int size = 0;
     for (int i = 0; i < count; i++) size += which[i];
     for (int i = 0, at = 0; i < count; i++)
@@ -134,8 +134,8 @@ static Status respond(Mechanism *b, int sliding, const int *rows, int count, int
 }
 
 Status friction_opened(Mechanism *b, double t, int sliding, double determinant) {
-    double K[ROWS * ROWS], B[ROWS * ROWS];
-    int rows[ROWS], which[ROWS], contacts;
+    double K[PAINLEVE_ROWS * PAINLEVE_ROWS], B[PAINLEVE_ROWS * PAINLEVE_ROWS];
+    int rows[PAINLEVE_ROWS], which[PAINLEVE_ROWS], contacts;
     const int count = find_rows(b, rows, &contacts);
     for (int r = 0; r < count; r++)
         if (respond(b, sliding, rows, count, r, K, B) != OK) return FAILED;

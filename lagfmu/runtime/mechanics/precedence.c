@@ -7,7 +7,8 @@
  * least squares with unequal weights (Golub & Van Loan, Matrix Computations, sect. 12.1.5). */
 #include "precedence.h"
 
-static const double EASE = 0x1p-15;      /* weight of a rank below those that a stage frees, ... */
+#include "thresholds.h"
+
 static const double LITTLE_EASE = 0x1p-5; /* ... and where there is no solution for extreme masses */
 
 int precedence_stage(const System *s, const Rank *rank, int stage) {
@@ -36,7 +37,7 @@ static double weight(Rank rank, int stage, double ease) {
 Status precedence_nearest(Mechanism *b, const Rank *rank, int stage, const int *own,
                           const double *c) {
     const System *s = b->system;
-    const double ease = b->linear.dense != NULL ? EASE : LITTLE_EASE;
+    const double ease = b->linear.dense != NULL ? RANK_EASE : LITTLE_EASE;
     for (int e = 0; e < s->masses; e++) {
         const int i = s->mass_row[e], j = s->mass_column[e];
         const int held = (int)rank[i] > stage || (int)rank[j] > stage;

@@ -18,12 +18,8 @@
 #include <string.h>
 
 #include "digits.h"
+#include "thresholds.h"
 
-enum { ITERATIONS = 10 };
-static const double SMALL = 1e-12;    /* relative residual that rounding may leave */
-static const double ROUNDING = 100 * DBL_EPSILON; /* and that is left in peace where Newton's method still
-                                                    * gains, but slowly */
-static const double LINEAR = 0.1; /* ratio of successive errors: the convergence is linear, G loses rank */
 static const double CONTRACTS = 1e-4; /* reduction of the error for which factors are kept */
 
 /* How far the positions are off: `error` is the largest |f - offset| relative to its own terms. */
@@ -67,7 +63,7 @@ static Status no_arrival(Mechanism *b, Instant at, const Miss *miss, double befo
             comma = ", ";
         }
     why_append(b->why, " (missed by %.3g): %s", miss->largest,
-               miss->error > LINEAR * before ? "the configuration is singular, or nearly so"
+               miss->error > PROJECTION_LINEAR * before ? "the configuration is singular, or nearly so"
                                              : "take smaller steps");
     return FAILED;
 }
@@ -81,9 +77,9 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
         if (measure(b, at, q, offset, size, &miss) == FAILED) return FAILED;
         *moved = count > 0;
         if (miss.rounding || miss.error < DBL_EPSILON * DBL_EPSILON) return OK;
-        if (miss.error > before / 2 && miss.error < SMALL) return OK; /* rounding in f is left */
-        if (count == ITERATIONS && miss.error < ROUNDING) return OK;
-        if (count == ITERATIONS) return no_arrival(b, at, &miss, before);
+        if (miss.error > before / 2 && miss.error < PROJECTION_SMALL) return OK; /* rounding in f is left */
+        if (count == PROJECTION_ITERATIONS && miss.error < PROJECTION_ROUNDING) return OK;
+        if (count == PROJECTION_ITERATIONS) return no_arrival(b, at, &miss, before);
         int stale = count > 0 && !(miss.error <= CONTRACTS * before);
         if (stale && mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
         b->linear.off = b->dependent ? miss.error : 0;

@@ -9,10 +9,8 @@
 #include <string.h>
 
 #include "friction.h"
+#include "thresholds.h"
 
-static const double DEPENDENT_ROW = 1e-9; /* of a row's norm, left over by the others: nothing */
-static const double WIDE = 1e2;           /* times the forces at work: how far is looked */
-enum { ROUNDS = 60 };                     /* bisections, and ellipsoids for each pair of unknowns */
 
 size_t share_doubles(const System *s) {
     const size_t m = (size_t)s->m, n = (size_t)s->n;
@@ -62,7 +60,7 @@ static void find_null_space(Share *x, double *basis, double *made, double *rest)
                 add(m, -part, made + i * m, of);
             }
         const double left = sqrt(dot(n, rest, rest));
-        if (!(left > DEPENDENT_ROW * norm)) {
+        if (!(left > SHARE_DEPENDENT * norm)) {
             x->count += 1;
             continue;
         }
@@ -119,7 +117,7 @@ static void note_best(Share *x, double value, double *top) {
 static void bisect(Share *x, double wide) {
     double low = -wide, high = wide, zero = 0, top = worst(x, 0, &zero);
     x->best[0] = 0;
-    for (int round = 0; round < 2 * ROUNDS; round++) {
+    for (int round = 0; round < 2 * SHARE_ROUNDS; round++) {
         x->y[0] = (low + high) / 2;
         note_best(x, worst(x, 1, x->y), &top);
         if (x->slope[0] > 0)
@@ -137,7 +135,7 @@ static void shrink_ellipsoid(Share *x, double wide) {
     memset(x->best, 0, (size_t)count * sizeof *x->best);
     for (int i = 0; i < count * count; i++) x->P[i] = 0;
     for (int i = 0; i < count; i++) x->P[i * count + i] = wide * wide;
-    for (int round = 0; round < ROUNDS * count * count; round++) {
+    for (int round = 0; round < SHARE_ROUNDS * count * count; round++) {
         note_best(x, worst(x, 1, x->y), &top);
         for (int i = 0; i < count; i++) x->Pg[i] = dot(count, x->P + i * count, x->slope);
         const double size = dot(count, x->slope, x->Pg);
@@ -171,11 +169,11 @@ void share_best(Mechanism *b, double *best) {
     for (int k = 0; k < m; k++) wide = fmax(wide, fabs(b->lambda[k]));
     for (int i = 0; i < s->frictions; i++) wide = fmax(wide, fabs(b->friction->load[i]));
     if (x.count == 1)
-        bisect(&x, WIDE * wide);
+        bisect(&x, SHARE_WIDE * wide);
     else
-        shrink_ellipsoid(&x, WIDE * wide);
+        shrink_ellipsoid(&x, SHARE_WIDE * wide);
     if (worst(&x, 0, x.best) < 0) {
-        for (int round = 0; round < ROUNDS; round++) {
+        for (int round = 0; round < SHARE_ROUNDS; round++) {
             const double middle = (low + high) / 2;
             if (worst(&x, middle, x.best) < 0)
                 low = middle;

@@ -22,19 +22,8 @@
 #include <stdio.h>
 
 #include "digits.h"
+#include "thresholds.h"
 
-static const double STABLE = 6.1; /* h rho beyond which dop853 is unstable */
-static const double SLOWER = 30;  /* rho / sigma, per price of a step, from which on the motion is slow */
-static const double BOUND = 0.1;  /* h rho below which only the motion, or a bound, limits a step */
-/* Changes of coordinates and velocities, and of accelerations, relative to them, that say nothing. */
-static const double ROUNDING = 1e-14, ROUNDING_FORCE = 1e-12;
-enum {
-    EVERY = 3,  /* steps of dop853 of which one is judged while none was stiff */
-    STIFF = 15, /* steps that decide, ... */
-    OTHER = 6,  /* ... and others in a row after which they are counted anew */
-    BRIEF = 6,  /* steps of radau5 in a row that do not pay, after which dop853 comes back */
-    RETRY = 128 /* steps of radau5 before dop853 is tried again; twice as many each time */
-};
 
 /* Cost of a step of radau5 in steps of dop853: as measured for 4 to 64 states; the matrices are dense. */
 static double price(int ny) { return 1 + ny / 8.0 + (double)ny * ny / 170; }
@@ -53,9 +42,9 @@ static Rates rates(int n, const double *size, const double *y0, const double *f0
                    const double *f1) {
     double dq = 0, dv = 0, da = 0;
     for (int j = 0; j < n; j++) {
-        dq += square(y0[j], y1[j], size[j], ROUNDING);
-        dv += square(y0[n + j], y1[n + j], size[j], ROUNDING);
-        da += square(f0[n + j], f1[n + j], size[j], ROUNDING_FORCE);
+        dq += square(y0[j], y1[j], size[j], STIFF_ROUNDING);
+        dv += square(y0[n + j], y1[n + j], size[j], STIFF_ROUNDING);
+        da += square(f0[n + j], f1[n + j], size[j], STIFF_ROUNDING_FORCE);
     }
     if (!(dv > 0 && da > 0)) return (Rates){0, 0};
     return (Rates){sqrt(da / dv), dq > 0 ? sqrt(sqrt(da / dq)) : HUGE_VAL};
@@ -63,7 +52,7 @@ static Rates rates(int n, const double *size, const double *y0, const double *f0
 
 int stiffness_due(Choice *c) {
     c->unseen += 1;
-    if (c->stiff == 0 && c->unseen < EVERY) return 0;
+    if (c->stiff == 0 && c->unseen < STIFF_EVERY) return 0;
     c->unseen = 0;
     return 1;
 }
@@ -78,13 +67,13 @@ void stiffness_explicit_step(Choice *c, const Integrator *i, const double *size)
     const int slow = sigma > 0 && rho > SLOWER * price(i->ny) * sigma;
     if (!(h * rho > STABLE || (h * rho > BOUND && slow))) {
         c->other += 1;
-        if (c->other >= OTHER) c->stiff = 0;
+        if (c->other >= STIFF_OTHER) c->stiff = 0;
         return;
     }
     c->longest = c->stiff > 0 ? fmax(h, c->longest) : h;
     c->stiff += 1;
     c->other = 0;
-    if (c->stiff < STIFF << 2 * c->failures || i->ny > RADAU5_MOST_STATES) return;
+    if (c->stiff < STIFF_STEPS << 2 * c->failures || i->ny > RADAU5_MOST_STATES) return;
     c->turn = 1;
     if (c->product > 0) return;
     c->time = i->t;
@@ -97,11 +86,11 @@ void stiffness_implicit_step(Choice *c, const Integrator *i) {
     c->taken += 1;
     c->span += h;
     c->brief = h < enough ? c->brief + 1 : 0;
-    if (c->brief >= BRIEF) {
+    if (c->brief >= STIFF_BRIEF) {
         c->turn = 1;
         c->retries = 0;
         c->failures = c->span >= enough * c->taken ? 0 : c->failures + 1;
-    } else if (c->taken >= RETRY << c->retries) {
+    } else if (c->taken >= STIFF_RETRY << c->retries) {
         c->turn = 1;
         c->retries += c->retries < STIFFNESS_MOST_RETRIES;
         c->failures = 0;

@@ -14,11 +14,8 @@
 #include "leg.h"
 #include "parts.h"
 #include "magnitudes.h"
+#include "thresholds.h"
 
-enum { CHATTER = 200 }; /* contact events in next to no time after which the step is given up */
-static const double PATIENCE = 200; /* steps after which one is judged by its average step */
-static const double STEP_LIMIT = 1e7; /* internal steps that a communication step may need */
-static const double TINY = 1e-6;      /* part of the natural time; a step shorter than this makes no headway */
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
 static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 
@@ -27,11 +24,9 @@ static const Method *method_of(const Solver *s) {
 }
 
 /* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not
- * at a fixed step, which divides the communication step; not on the way to an obstacle. */
+ * at a fixed step, which divides the communication step; not where a slip may come to rest on the way. */
 static int runs_ahead(const Solver *s) {
     if (s->system->inputs > 0 || method_of(s)->fixed) return 0;
-    for (int c = 0; c < s->system->contacts; c++)
-        if (!s->state.closed[c]) return 0;
     return s->system->frictions == 0 || !PARTS.slides->turns(s);
 }
 
@@ -183,10 +178,16 @@ Status solver_arrive(Solver *s) {
     return put_between(s, s->state.now.t);
 }
 
-int solver_passed(const Solver *s, double t_end) {
-    const Numbers *now = &s->state.now;
-    return now->ahead && now->t_integrator > t_end &&
-           !(now->event_count > 0 && now->event_time <= t_end) && waits(s);
+int solver_pass(Solver *s, double t_end) {
+    Numbers *now = &s->state.now;
+    if (!(now->ahead && now->t_integrator > t_end && t_end > now->t)) return 0;
+    if ((now->event_count > 0 && now->event_time <= t_end) || !waits(s)) return 0;
+    now->tiny = 0;
+    now->step = now->h_next;
+    now->span = t_end - now->t;
+    now->t = t_end;
+    now->between = 1;
+    return 1;
 }
 
 /* What frictions have dissipated at t, within the step just taken. */
@@ -226,6 +227,7 @@ static Status meet(Solver *s) {
     double *y = s->work_advance;
     if (s->system->frictions > 0 && lose(s, t) != OK) return FAILED;
     if (leg_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
+    if (s->alike > 0) PARTS.at_event(s);
     put(s, t, y);
     s->state.now.step = i->t - i->t_old;
     if (s->state.now.choice.implicit) {
@@ -244,13 +246,13 @@ static Status check_headway(Solver *s, double t_end, double begun, int first) {
     const Integrator *i = &s->integrator;
     const double t = now->event_count > 0 ? now->event_time : i->t;
     const double done = now->steps - first, gone = t - begun, most = s->settings.maximum_steps;
-    if ((t - i->t_old) * now->rate < TINY) now->tiny += 1;
+    if ((t - i->t_old) * now->rate < HEADWAY) now->tiny += 1;
     if (most > 0 && now->tiny > most)
         return fail(&s->why,
                     "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
                     "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
                     "motion's natural time: is there a force that jumps to and fro?",
-                    t_end, t, most, TINY / now->rate, TINY);
+                    t_end, t, most, HEADWAY / now->rate, HEADWAY);
     if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone)
         return fail(&s->why,
                     "the communication step to t = %.17g s would need about %.0e internal "
@@ -283,20 +285,21 @@ static Status complete_magnitudes(Solver *s, double span) {
     return magnitudes_complete(s, at, span);
 }
 
-/* The inputs may have been set: levels of jumps are those of now, contacts whose surface went away open,
- * the others go with it; a prescribed motion may have another place and other rates than it went by. */
-static Status follow_inputs(Solver *s) {
+Status solver_follow(Solver *s) {
     const System *system = s->system;
     if (!s->state.now.ahead)
         jumps_settle(s, leg_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
-    if (system->prescribed_count == 0) return OK;
-    if (system->contacts == 0)
-        system_active(system, s->state.closed, s->active);
-    else if (PARTS.switch_released(s, s->state.now.span) != OK)
-        return FAILED;
-    const Instant at = leg_instant(s, s->state.now.t);
-    return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                             s->state.size);
+    if (system->prescribed_count > 0) {
+        if (system->contacts == 0)
+            system_active(system, s->state.closed, s->active);
+        else if (PARTS.switch_released(s, s->state.now.span) != OK)
+            return FAILED;
+        const Instant at = leg_instant(s, s->state.now.t);
+        if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                              s->state.size) != OK)
+            return FAILED;
+    }
+    return system->frictions > 0 ? PARTS.slides->renew(s) : OK;
 }
 
 Status solver_advance(Solver *s, double t_end) {
@@ -310,14 +313,13 @@ Status solver_advance(Solver *s, double t_end) {
                     t_end);
     now->tiny = 0;
     resume(s);
-    if (follow_inputs(s) != OK) return FAILED;
-    if (s->system->frictions > 0 && PARTS.slides->renew(s) != OK) return FAILED;
+    if (solver_follow(s) != OK) return FAILED;
     if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
     while (now->t < t_end) {
         int met;
         if (travel(s, t_end, begun, first, &met) != OK) return FAILED;
         if (!met) continue;
-        if (events == 0 || now->t - since >= 1e-9 / now->rate) {
+        if (events == 0 || now->t - since >= AT_ONCE / now->rate) {
             since = now->t;
             events = 0;
         }

@@ -12,13 +12,10 @@
 
 #include "digits.h"
 #include "magnitudes.h"
+#include "thresholds.h"
 
-enum { ITERATIONS = 60, HALVINGS = 25 };
-enum { SWEEPS = 3 }; /* of the velocities: the second removes what the first left by rounding */
-static const double NEAR = 1e-5; /* from this on the angles between dependent rows tell how far off the
-                                  * constraints a state is */
+enum { HALVINGS = 25 };
 static const double EPS = DBL_EPSILON;
-static const double ARRIVED = 1e3 * DBL_EPSILON; /* slip, relative to its terms, that rounding may leave */
 
 Status afar_refused(Solver *s) {
     Why cause = s->why;
@@ -56,7 +53,7 @@ static double find_off(const System *s, const int *rows, const double *f, const 
     double off = 0;
     for (int k = 0; k < s->m; k++)
         if (rows[k] && allowed[k] > 0) off = fmax(off, 1e3 * EPS * fabs(f[k]) / allowed[k]);
-    return off < NEAR ? off : 0;
+    return off < AFAR_NEAR ? off : 0;
 }
 
 static Status cannot_be_projected(const Start *x, const int *rows, const double *f,
@@ -98,7 +95,7 @@ static Status newton(const Start *x, int stage, double *q, const int *rows) {
         if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return afar_refused(x->s);
         find_allowed(x, q, least, 4, trial, allowed);
         if (arrived(s, rows, f, allowed)) return OK;
-        if (count == ITERATIONS) return cannot_be_projected(x, rows, f, allowed);
+        if (count == AFAR_ITERATIONS) return cannot_be_projected(x, rows, f, allowed);
         find_allowed(x, q, x->s->state.size, 1e3, trial, allowed);
         if (!all && arrived(s, own, f, allowed)) break; /* what is left is not for these coordinates */
         for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
@@ -194,7 +191,7 @@ static int on_velocities(const Start *x, const double *least, const double *v, c
     for (int k = 0; k < s->m; k++) {
         slip[k] = -mechanism_slip(b, k, v);
         const double terms = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);
-        on &= !own[k] || fabs(slip[k]) <= ARRIVED * terms;
+        on &= !own[k] || fabs(slip[k]) <= AFAR_ARRIVED * terms;
     }
     return on;
 }
@@ -208,7 +205,7 @@ Status afar_velocities(const Start *x, const double *q, const double *least, con
     for (int stage = 0; (stage = precedence_stage(s, x->rank_v, stage)) < RANKS; stage++) {
         memcpy(v, x->v0, (size_t)s->n * sizeof *v);
         precedence_rows(s, x->rank_v, stage, rows, own);
-        for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        for (int sweep = 0; sweep < AFAR_SWEEPS; sweep++) {
             if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return FAILED;
             if (on_velocities(x, least, v, rows, speed, slip)) return OK;
             if (on_velocities(x, least, v, own, speed, slip)) break;

@@ -14,9 +14,8 @@
 
 #include "indicators.h"
 #include "leg.h"
+#include "thresholds.h"
 
-static const double COARSE = 1.0 / 32; /* of a step: as near as is looked where nothing is known of a rate */
-static const double FINE = 1.0 / 64;   /* of a step: near enough to take the one event that is seen */
 
 static Interval box(double a, double middle, double b) {
     const double bend = fabs(a - 2 * middle + b);
@@ -85,12 +84,12 @@ Clearance clearance_between(Solver *s, const Looks *looks, int k, double *y) {
         Interval rate = rates[i];
         if (moving && i >= s->system->contacts) rate = interval_unknown();
         if (isnan(rate.low)) {
-            if (h > COARSE * step) return UNKNOWN;
+            if (h > LOOKS_COARSE * step) return UNKNOWN;
             continue;
         }
         const Interval fall = {-rate.high, -rate.low};
         if (!is_inside(s, i, at_b[i])) {
-            if (h > FINE * step && rate.low < 0 && rate.high > 0) return UNKNOWN;
+            if (h > LOOKS_FINE * step && rate.low < 0 && rate.high > 0) return UNKNOWN;
         } else if ((r.low > -HUGE_VAL &&
                     lowest(at_a[i] - r.low, at_b[i] - r.low, rate, h) < -r.slack) ||
                    (r.high < HUGE_VAL &&

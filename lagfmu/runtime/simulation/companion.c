@@ -3,6 +3,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 #include "parts.h"
 #include "step_size.h"
@@ -21,12 +22,34 @@ static int is_alike(const Solver *s, const Integrator *i) {
     return i->method == PARTS.methods[DOP853] && i->h_next > s->alike * (i->t - i->t_old);
 }
 
-void companion_after_step(Solver *s, Integrator *i) {
+/* The local error of the step just taken is counted; its estimate stays in y. */
+static void add(const Solver *s, Integrator *i, LocalErrors *errors) {
     const int implicit = i->method != PARTS.methods[DOP853];
     const double local = power((i->t - i->t_old) * s->state.now.rate, implicit ? 6 : 9);
-    if (local <= DBL_MAX - s->state.now.local[implicit]) s->state.now.local[implicit] += local;
+    if (local <= DBL_MAX - errors->sum[implicit]) {
+        errors->sum[implicit] += local;
+        errors->most[implicit] = fmax(errors->most[implicit], local);
+    }
     if (!is_alike(s, i)) return;
     for (int j = 0; j < i->ny; j++) i->y[j] += PARTS.dop853_error(i, j);
+}
+
+void companion_after_step(Solver *s, Integrator *i) {
+    s->state.now.local_old = s->state.now.local;
+    add(s, i, &s->state.now.local);
+}
+
+void companion_at_trial(Solver *s, Integrator *i) {
+    add(s, i, &s->local_trial);
+}
+
+void companion_at_event(Solver *s) {
+    const LocalErrors *old = &s->state.now.local_old, *more = &s->local_trial;
+    LocalErrors *local = &s->state.now.local;
+    for (int k = 0; k < 2; k++) {
+        local->sum[k] = fmin(old->sum[k] + more->sum[k], DBL_MAX);
+        local->most[k] = fmax(old->most[k], more->most[k]);
+    }
 }
 
 void companion_inside(const Solver *s, const Integrator *i, double t, double *y) {
@@ -34,13 +57,15 @@ void companion_inside(const Solver *s, const Integrator *i, double t, double *y)
     for (int j = 0; j < i->ny; j++) y[j] += PARTS.dop853_inside(i, t, j);
 }
 
-double companion_ratio(const Solver *a, const Solver *b) {
-    double least = HUGE_VAL;
+double companion_share(const Solver *a, const Solver *b, double margin, double few) {
+    const LocalErrors *mine = &a->state.now.local, *others = &b->state.now.local;
+    double ratio = HUGE_VAL, steps = HUGE_VAL;
     for (int k = 0; k < 2; k++) {
-        const double mine = a->state.now.local[k], other = b->state.now.local[k];
-        if (mine > 0) least = fmin(least, other / mine);
+        if (mine->sum[k] > 0) ratio = fmin(ratio, others->sum[k] / mine->sum[k]);
+        if (others->most[k] > 0) steps = fmin(steps, others->sum[k] / others->most[k]);
     }
-    return least >= 1 && least < HUGE_VAL ? least : 1;
+    const double part = ratio < HUGE_VAL ? fmin(1, margin / ratio) : 1;
+    return part * (1 + few / steps);
 }
 
 static int slides_paired(const Slide *a, const Slide *b) {

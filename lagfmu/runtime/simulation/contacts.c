@@ -11,9 +11,8 @@
 #include <string.h>
 
 #include "digits.h"
+#include "thresholds.h"
 
-enum { MOST = 12 };               /* contacts whose combinations are tried one by one */
-static const double PULL = 1e-12; /* a multiplier this small, relative to the forces, is zero */
 enum { NONE = -1 };
 
 /* For each coordinate all forces at work (n), those of constraint included. */
@@ -59,13 +58,13 @@ static Status most_wrong(Solver *s, Instant at, const double *q, const double *v
         if (modes[c]) {
             double size = force_scale(b, k, forces);
             double excess = size != 0 ? -(b->lambda[k] / size) : 0;
-            if (excess > (touching[c] ? -PULL : PULL) && (*found == NONE || excess > worst)) {
+            if (excess > (touching[c] ? -CONTACT_PULL : CONTACT_PULL) && (*found == NONE || excess > worst)) {
                 worst = excess;
                 *found = c;
             }
         } else if (touching[c] && !(leaving != NULL && leaving[c])) {
             double approach = b->gamma[k] - mechanism_row(b, k, b->vdot);
-            double floor = PULL * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
+            double floor = CONTACT_PULL * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
             if (approach > floor && approach > worst) {
                 worst = approach;
                 *found = c;
@@ -103,7 +102,7 @@ static Status try_all(Solver *s, Instant at, const double *q, const double *v, c
     const int contacts = s->system->contacts;
     int undecided = 0;
     for (int c = 0; c < contacts; c++) undecided += touching[c];
-    if (undecided > MOST) undecided = MOST;
+    if (undecided > CONTACTS_MOST) undecided = CONTACTS_MOST;
     for (unsigned choice = 0; choice < 1u << undecided; choice++) {
         int wrong, bit = undecided;
         memcpy(modes, closed, (size_t)contacts * sizeof *modes);

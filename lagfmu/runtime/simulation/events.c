@@ -123,7 +123,7 @@ Status events_find(Solver *s, const double *y1) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
     double *y = s->work_events, *values = y + 3 * i->ny;
-    Looks looks = {0, values + width, values + width + MOST_LOOKS + width};
+    Looks looks = {0, values + width, values + width + LOOKS_MOST + width};
     Sought x = {s, i->t_old, i->y_old, 0, {0, 0, 0, 0}, y, values};
     s->state.now.event_count = 0;
     if (looks_take(s, y1, y, &looks) != OK) return FAILED;

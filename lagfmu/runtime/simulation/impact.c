@@ -15,10 +15,8 @@
 
 #include "digits.h"
 #include "parts.h"
+#include "thresholds.h"
 
-enum { ROUNDS = 1000 }; /* of impacts at one instant, after which the rest is one plastic impact */
-static const double ROUNDING = 1e-14; /* of the terms of a speed: one that is none; rest does not jam */
-static const double PULL = 1e-9; /* of the largest impulse: a negative one that is rounding */
 
 /* What an impact starts from, and its workspace.  Rows are numbered as in the system, contacts by their
  * position among the contacts, `k` of them entering. */
@@ -121,7 +119,7 @@ static Status finish(Struck *x, const Impulse *found) {
         if (solve(x, x->right, found->dv, found->Lambda) != OK) return FAILED;
         for (int j = 0; j < system->m; j++) most = fmax(most, fabs(found->Lambda[j]));
         for (int i = 0; i < x->k; i++) least = fmin(least, found->Lambda[row_of(x, i)]);
-        if (least >= -PULL * most) break;
+        if (least >= -IMPACT_PULL * most) break;
     }
     return OK;
 }
@@ -241,7 +239,7 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
     for (int j = 0; j < m; j++) {
         const double terms = mechanism_row_size(x.b, j, v) + fabs(x.b->nu[j]);
         x.slip[j] = mechanism_slip(x.b, j, v);
-        if (fabs(x.slip[j]) <= ROUNDING * terms) x.slip[j] = 0;
+        if (fabs(x.slip[j]) <= IMPACT_ROUNDING * terms) x.slip[j] = 0;
         x.zero[j] = 0;
     }
     if (strike(&x, at, q, v, entering, plastic, &found, &soft) != OK) return FAILED;
@@ -271,12 +269,18 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
     int *entering = s->iwork_impact + impact_ints(system->m, contacts) - contacts;
     double *Lambda = s->work_impact + impact_doubles(system->n, system->m, contacts) - system->m;
     memset(struck, 0, (size_t)contacts * sizeof *struck);
-    for (int round = 1; round <= ROUNDS; round++) {
+    for (int round = 1; round <= IMPACT_ROUNDS; round++) {
         if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
-        if (!find_entering(s, v, touching, slow, round == ROUNDS, entering)) return OK;
-        if (impact(s, at, q, v, entering, round == ROUNDS, Lambda) != OK) return FAILED;
-        for (int c = 0; c < contacts; c++)
-            struck[c] |= entering[c] && Lambda[system->contact[c]] > 0;
+        if (!find_entering(s, v, touching, slow, round == IMPACT_ROUNDS, entering)) return OK;
+        if (impact(s, at, q, v, entering, round == IMPACT_ROUNDS, Lambda) != OK) return FAILED;
+        for (int c = 0; c < contacts; c++) {
+            const double push = Lambda[system->contact[c]];
+            if (!entering[c] || !(push > 0)) continue;
+            s->impulse[c] = struck[c] ? s->impulse[c] + push : push;
+            s->struck_at[c] = at.t;
+            s->strikes[c] += !struck[c];
+            struck[c] = 1;
+        }
     }
     return OK;
 }

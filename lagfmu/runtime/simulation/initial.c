@@ -13,9 +13,9 @@
 #include "leg.h"
 #include "magnitudes.h"
 #include "parts.h"
+#include "thresholds.h"
 
 static const double EPS = DBL_EPSILON;
-static const double LARGEST_ANGLE = 1e-3 / DBL_EPSILON; /* [rad] neighbouring numbers are 1e-3 apart */
 
 /* An angle whose neighbouring numbers are no neighbouring directions is refused. */
 static Status check_angles(const Start *x) {
@@ -104,7 +104,7 @@ static Status check_velocities(const Start *x, const int *active, double *fastes
     magnitudes_motion_speeds(b, fastest, shared);
     for (int k = 0; k < s->m; k++) {
         double unit = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);
-        if (!active[k] || fabs(mechanism_slip(b, k, v)) <= 1e-9 * unit) continue;
+        if (!active[k] || fabs(mechanism_slip(b, k, v)) <= TOUCH * unit) continue;
         if (!missed) fail(&solver->why, "no velocities satisfy the constraints ");
         why_append(&solver->why, "%s'%s'", missed ? ", " : "", s->rows[k].name);
         missed = 1;

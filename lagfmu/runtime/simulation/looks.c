@@ -11,11 +11,8 @@
 #include "clearance.h"
 #include "indicators.h"
 #include "leg.h"
+#include "thresholds.h"
 
-enum { DIPS = 3 };                            /* parabolas drawn through a dip, ... */
-static const double SHALLOW = 0.1;            /* ... and how low they must go to be looked into */
-enum { QUARTERS = 4 };
-static const double SMALLEST_LOOK = 1.0 / (1 << 30); /* of a step */
 
 /* The time [s] in which an open contact that has just been left parts most, f' / (-f''). */
 static Status top_of_rebound(Solver *s, double t, const double *y, const double *values,
@@ -73,12 +70,12 @@ static Status look_into_dip(Solver *s, Looks *looks, int i, int contact, double 
         t[k] = looks->t[i + k];
         lambda[k] = looks->values[(i + k) * width + contact];
     }
-    for (int round = 0; round < DIPS; round++) {
+    for (int round = 0; round < LOOKS_DIPS; round++) {
         double lowest, depth;
         const double least = fmin(lambda[0], fmin(lambda[1], lambda[2]));
         const double most = fmax(lambda[0], fmax(lambda[1], lambda[2]));
         if (least < 0 || !vertex(t, lambda, &lowest, &depth)) return OK;
-        if (!(t[0] < lowest && lowest < t[2]) || lowest == t[1] || depth > SHALLOW * most)
+        if (!(t[0] < lowest && lowest < t[2]) || lowest == t[1] || depth > LOOKS_SHALLOW * most)
             return OK;
         integrator->method->dense(integrator, lowest, y);
         if (indicators_at(s, lowest, y, seen) != OK) return FAILED;
@@ -102,7 +99,7 @@ static Status look_into_dip(Solver *s, Looks *looks, int i, int contact, double 
 static Status look(Solver *s, Looks *looks, int k, double t, double *y) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
-    double *seen = looks->values + (MOST_LOOKS + width) * width; /* one row of scratch */
+    double *seen = looks->values + (LOOKS_MOST + width) * width; /* one row of scratch */
     i->method->dense(i, t, y);
     if (indicators_at(s, t, y, seen) != OK) return FAILED;
     insert(looks, k + 1, width, t, seen);
@@ -115,7 +112,7 @@ static Status refine(Solver *s, Looks *looks, double *y) {
     for (int k = 0; s->system->bounds != NULL && k + 1 < looks->count;) {
         const double a = looks->t[k], b = looks->t[k + 1], middle = a + (b - a) / 2;
         const Clearance clearance = clearance_between(s, looks, k, y);
-        const int more = looks->count < MOST_LOOKS - 1 && b - a > SMALLEST_LOOK * step &&
+        const int more = looks->count < LOOKS_MOST - 1 && b - a > LOOKS_SMALLEST * step &&
                          middle > a && middle < b;
         if (clearance == BRACKETS) return OK;
         if (clearance == CLEAR || !more)
@@ -146,8 +143,8 @@ Status looks_take(Solver *s, const double *y1, double *y, Looks *looks) {
     looks->t[1] = i->t;
     if (indicators_at(s, i->t, y1, looks->values + width) != OK) return FAILED;
     looks->count = 2;
-    for (int k = 1; k < QUARTERS; k++)
-        if (look(s, looks, looks->count - 2, i->t_old + k * h / QUARTERS, y) != OK) return FAILED;
+    for (int k = 1; k < LOOKS_FIRST; k++)
+        if (look(s, looks, looks->count - 2, i->t_old + k * h / LOOKS_FIRST, y) != OK) return FAILED;
     highest += i->t_old;
     for (int k = 0; k + 1 < looks->count; k++)
         if (looks->t[k] < highest && highest < looks->t[k + 1] &&
@@ -156,7 +153,7 @@ Status looks_take(Solver *s, const double *y1, double *y, Looks *looks) {
     if (refine(s, looks, y) != OK) return FAILED;
     for (int c = 0; c < width; c++) {
         if (!may_dip(s, c)) continue;
-        double *seen = looks->values + (MOST_LOOKS + width) * width; /* one row of scratch */
+        double *seen = looks->values + (LOOKS_MOST + width) * width; /* one row of scratch */
         for (int k = 0, found = 0; k + 2 < looks->count && !found; k++)
             if (look_into_dip(s, looks, k, c, y, seen, &found) != OK) return FAILED;
     }

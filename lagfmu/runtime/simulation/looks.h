@@ -3,8 +3,8 @@
 #define LAGFMU_LOOKS_H
 
 #include "solver.h"
+#include "thresholds.h"
 
-enum { MOST_LOOKS = 512 }; /* and one more for each indicator */
 
 /* Times t[0] < ... < t[count - 1] and the indicators then, a row of values for each look. */
 typedef struct {
@@ -14,7 +14,7 @@ typedef struct {
 
 /* Doubles behind t and values, one row of scratch among them. */
 static inline int looks_doubles(int indicators) {
-    return (MOST_LOOKS + indicators) * (1 + indicators) + indicators;
+    return (LOOKS_MOST + indicators) * (1 + indicators) + indicators;
 }
 
 /* Fills `looks` for the step of s->integrator (dense output prepared), from state.indicator at its start

@@ -20,30 +20,21 @@
  * acceleration is such rounding, and omega is the natural rate.
  *
  * Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the
- * only time is the importer's: tau is PART of the first communication step.  Were the motion a
+ * only time is the importer's: tau is MEASURED_PART of the first communication step.  Were the motion a
  * million times faster than that step, its size would be taken for at most 1e6 times what it is,
  * which the floor of the scale, below 1e-6, still forgives. */
 #include "magnitudes.h"
 
 #include "leg.h"
+#include "thresholds.h"
 
 #include <float.h>
 #include <string.h>
 
-const double TOUCH = 1e-9;
-static const double LOST = 1e3 * DBL_EPSILON; /* what is left of a place by a projection, or of
-                                               * forces that cancel, is rounding */
-static const double PART = 1e-3;  /* of the first step, in which a motion without scale is measured */
-static const double SHIFT = 0x1p-20; /* of its size, by which a coordinate is displaced to see what
-                                      * holds it */
-static const double ROUNDINGS = 1e9; /* times the tolerance: roundings of q that an error of v may
-                                      * reach, 0.01 to 10 */
-static const double TINY = 1e-100; /* scale of what neither moves nor is pushed: anything that moves
-                                    * exceeds it */
 
 static double larger(double a, double b) { return a > b ? a : b; }
 
-static double positive(double x) { return x > 0 ? x : TINY; }
+static double positive(double x) { return x > 0 ? x : STILL; }
 
 void magnitudes_extents(const System *s, const double *p, double *least) {
     for (int j = 0; j < s->n; j++) {
@@ -186,7 +177,7 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
         const double speed = largest_alike(system, j, s->state.v);
         own[j] = larger(steady, speed > 0 ? largest_alike(system, j, felt) / speed : 0);
         natural = larger(natural, own[j]);
-        if (!(own[j] > 0) && span > 0) own[j] = 1 / (PART * span);
+        if (!(own[j] > 0) && span > 0) own[j] = 1 / (MEASURED_PART * span);
     }
     return natural;
 }
@@ -205,11 +196,11 @@ static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
     for (int j = 0; j < n && evaluated; j++) {
         const double q = state->q[j], size = state->size[j];
         if (!(size > 0)) continue;
-        state->q[j] += SHIFT * size;
+        state->q[j] += DISPLACED * size;
         evaluated = mechanism_motion(b, at, state->q, state->v, leg_rows(s)) == OK;
         state->q[j] = q;
         for (int i = 0; i < n; i++) {
-            const double change = fabs(b->vdot[i] - vdot[i]) / SHIFT;
+            const double change = fabs(b->vdot[i] - vdot[i]) / DISPLACED;
             back[i] += change;
             shaken[i] += DBL_EPSILON * change * (fabs(q) / size);
         }
@@ -269,7 +260,7 @@ static Status find_scales(Solver *s, const double *own, const double *shaken) {
     const int n = s->system->n;
     State *state = &s->state;
     const double floor = larger(1e-8, 10 * DBL_EPSILON / s->settings.tolerance);
-    const double roundings = fmin(larger(ROUNDINGS * s->settings.tolerance, 0.01), 10);
+    const double roundings = fmin(larger(SHAKEN * s->settings.tolerance, 0.01), 10);
     for (int j = 0; j < n; j++) {
         const double least = floor * state->size[j];
         const double rate = own[j] > 0 ? own[j] : state->now.rate;

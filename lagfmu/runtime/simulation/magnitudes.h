@@ -4,7 +4,6 @@
 
 #include "solver.h"
 
-extern const double TOUCH; /* |f| below this, relative to its own terms: touching */
 
 /* least (n): for each coordinate the largest parameter of its dimension; 0 for an angle. */
 void magnitudes_extents(const System *s, const double *p, double *least);

@@ -22,6 +22,8 @@ typedef struct {
     double (*dop853_error)(const Integrator *i, int component);
     double (*dop853_inside)(const Integrator *i, double t, int component);
     void (*after_step)(Solver *s, Integrator *i);
+    void (*at_trial)(Solver *s, Integrator *i);
+    void (*at_event)(Solver *s);
     void (*inside)(const Solver *s, const Integrator *i, double t, double *y);
     Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *level,
                           const double *u, const double *p, const Control *control,

@@ -7,17 +7,18 @@
  * to O(h^2). */
 #include "rates.h"
 
+#include "thresholds.h"
+
 #include <math.h>
 
-static const double ROUNDING = 1e-9;
 
 int rates_half_connected(const double *u, const double *went, double h) {
     const double a = went[2], v = went[1] - h * a, x = went[0] - h * (v + h * a / 2);
     const double way = u[0] - x, speed = u[1] - v, size = fabs(x) + fabs(u[0]);
     const double miss = fabs(way - h * (v + u[1]) / 2 + h * h * (u[2] - a) / 12);
     const double miss_rate = fabs(speed - h * (a + u[2]) / 2);
-    if (miss > ROUNDING * size && miss > (fabs(way) + h * (fabs(v) + fabs(u[1])) / 2) / 2) return 1;
-    return h * miss_rate > ROUNDING * size &&
+    if (miss > RATES_ROUNDING * size && miss > (fabs(way) + h * (fabs(v) + fabs(u[1])) / 2) / 2) return 1;
+    return h * miss_rate > RATES_ROUNDING * size &&
            miss_rate > (fabs(speed) + h * (fabs(a) + fabs(u[2])) / 2) / 2;
 }
 

@@ -3,7 +3,8 @@
 #ifndef LAGFMU_RATES_H
 #define LAGFMU_RATES_H
 
-enum { RATES_KEPT = 4 }; /* points of a cubic polynomial */
+#include "thresholds.h"
+
 
 /* The latest communication points of an estimated motion, newest first. */
 typedef struct {

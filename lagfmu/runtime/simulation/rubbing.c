@@ -11,10 +11,8 @@
 #include <string.h>
 
 #include "slides.h"
+#include "thresholds.h"
 
-enum { SWEEPS = 20000 };
-static const double CLOSE = 1e-15; /* of the largest impulse: what a sweep may still change */
-static const double ROUGH = 1e-9;  /* beyond which the sweeps have not arrived */
 
 /* The contacts' rows, then those of the frictions that they press. */
 typedef struct {
@@ -119,7 +117,7 @@ static int sweep(Rub *x, const double *e) {
     const System *s = x->s->system;
     double change = HUGE_VAL, most = 0;
     memset(x->z, 0, (size_t)x->count * sizeof *x->z);
-    for (int round = 0; round < SWEEPS; round++) {
+    for (int round = 0; round < RUBBING_SWEEPS; round++) {
         memcpy(x->before, x->z, (size_t)x->count * sizeof *x->z);
         for (int i = 0; i < x->contacts; i++) {
             const double own = x->A[i * x->count + i];
@@ -135,9 +133,9 @@ static int sweep(Rub *x, const double *e) {
             change = fmax(change, fabs(x->z[i] - x->before[i]));
             most = fmax(most, fabs(x->z[i]));
         }
-        if (change <= CLOSE * most) break;
+        if (change <= RUBBING_CLOSE * most) break;
     }
-    return change <= ROUGH * most;
+    return change <= RUBBING_ROUGH * most;
 }
 
 /* Velocities and all impulses that go with z. */

@@ -13,12 +13,9 @@
 #include "digits.h"
 #include "leg.h"
 #include "parts.h"
+#include "thresholds.h"
 
-enum { MOST = 6 };                /* frictions whose combinations are tried one by one */
-enum { ROUNDS = 50, ANGLES = 48, HALVINGS = 60 };
-static const double SLACK = 1e-12; /* of the cone, and of the slip velocities that rounding leaves */
-static const double BACK = 1e-9;   /* of the accelerations at work, against its own direction: none */
-static const double JUMP = 1e3;    /* times the noise: a slip velocity that no rounding makes */
+enum { HALVINGS = 60 };
 static const double PI = 3.14159265358979323846;
 
 /* Frictions at s = 0, settled together; contacts as in `active`. */
@@ -42,7 +39,7 @@ static void set_noise(Solver *s, const double *speed, Slide *slides) {
         slides[i].noise = 0;
         for (int r = 0; r < s->system->friction[i].rows; r++) {
             const int k = s->system->friction[i].row[r];
-            slides[i].noise += SLACK * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
+            slides[i].noise += SLIDES_SLACK * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
         }
     }
 }
@@ -80,7 +77,7 @@ static Status find_signs(Rest *x) {
     for (int round = 0; round <= s->frictions; round++) {
         int wrong = 0;
         if (motion(x) != OK) return FAILED;
-        const double zero = -SLACK * largest(s->m, b->lambda);
+        const double zero = -SLIDES_SLACK * largest(s->m, b->lambda);
         for (int i = 0; i < s->frictions; i++) {
             if (x->slides[i].sticks || s->friction[i].gated) continue;
             if (!(b->friction->normal[i] < zero)) continue;
@@ -121,7 +118,7 @@ static Status find_rate(Rest *x, int i, double rate[2], double *floor) {
     for (int r = 0; r < s->friction[i].rows; r++) {
         const int k = s->friction[i].row[r];
         rate[r] = mechanism_row(b, k, b->vdot) - b->gamma[k];
-        *floor += BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
+        *floor += SLIDES_BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
     }
     return OK;
 }
@@ -158,11 +155,11 @@ static Status close_in(Rest *x, int i, double low, double high, double f_low, do
 /* A direction of two rows that agrees with its acceleration, the nearest to the present one. */
 static Status turn_on_circle(Rest *x, int i, int *found) {
     const double begin = atan2(x->slides[i].direction[1], x->slides[i].direction[0]);
-    const double step = 2 * PI / ANGLES;
+    const double step = 2 * PI / SLIDES_ANGLES;
     double across, along, floor;
     if (look_along(x, i, begin, &across, &along, &floor) != OK) return FAILED;
     *found = fabs(across) <= floor && along >= -floor;
-    for (int k = 0; k <= ANGLES / 2 && !*found; k++)
+    for (int k = 0; k <= SLIDES_ANGLES / 2 && !*found; k++)
         for (int side = 1; side >= -1 && !*found; side -= 2) {
             const double low = begin + side * k * step, high = begin + side * (k + 1) * step;
             double f_low, f_high, angle;
@@ -208,7 +205,7 @@ static int set_modes(Rest *x) {
  * If found, the latest motion is that of these modes. */
 static int try_modes(Rest *x) {
     const int count = x->s->system->frictions, slipping = set_modes(x);
-    for (int round = 0; round < ROUNDS; round++) {
+    for (int round = 0; round < SLIDES_ROUNDS; round++) {
         int turned = 0;
         if (find_signs(x) != OK) return 0;
         for (int i = 0; i < count; i++) {
@@ -228,7 +225,7 @@ static int furthest_out(const Rest *x) {
     const double *reserve = x->s->stepped.friction->reserve;
     int worst = -1;
     for (int i = 0; i < x->s->system->frictions; i++)
-        if (x->resting[i] && x->sticking[i] && reserve[i] < -SLACK &&
+        if (x->resting[i] && x->sticking[i] && reserve[i] < -SLIDES_SLACK &&
             (worst < 0 || reserve[i] < reserve[worst]))
             worst = i;
     return worst;
@@ -243,9 +240,9 @@ static int bits(unsigned mask) {
 /* Every combination, those with most sticking first, each direction of slip both ways. */
 static int try_all(Rest *x) {
     const int frictions = x->s->system->frictions;
-    int which[MOST], count = 0;
-    double straight[2 * MOST];
-    for (int i = 0; i < frictions && count < MOST; i++)
+    int which[SLIDES_MOST], count = 0;
+    double straight[2 * SLIDES_MOST];
+    for (int i = 0; i < frictions && count < SLIDES_MOST; i++)
         if (x->resting[i]) which[count++] = i;
     for (int i = 0; i < count; i++) memcpy(straight + 2 * i, x->guess + 2 * which[i], 2 * sizeof *straight);
     for (int slipping = 0; slipping <= count; slipping++)
@@ -310,7 +307,7 @@ static Status choose(Rest *x, const int *ended) {
         friction_slip(b, i, s->state.v, slip);
         const double length = hypot(slip[0], slip[1]);
         const int still = length <= slide->noise || ((slide->sticks || (ended != NULL && ended[i])) &&
-                                                     length <= JUMP * slide->noise);
+                                                     length <= SLIDES_JUMP * slide->noise);
         x->resting[i] = b->friction->loaded[i] && still;
         any |= x->resting[i];
         if (!x->resting[i]) slide_along(b, i, s->state.v, slide);
@@ -383,7 +380,7 @@ static Status settle(Rest *x, int *closed, const int *ended, const int *touching
     const size_t bytes = (size_t)s->system->contacts * sizeof *closed;
     int *active = s->active, *before = s->iwork_slides + 4 * s->system->frictions;
     x->active = active;
-    for (int round = 0; round < ROUNDS; round++) {
+    for (int round = 0; round < SLIDES_ROUNDS; round++) {
         system_active(s->system, closed, active);
         if (choose(x, ended) != OK) return FAILED;
         memcpy(before, closed, bytes);
@@ -520,7 +517,7 @@ static Status renew(Solver *s) {
         double slip[2];
         friction_slip(b, i, s->state.v, slip);
         if (!s->state.slide[i].sticks) continue;
-        if (hypot(slip[0], slip[1]) <= JUMP * s->state.slide[i].noise) continue;
+        if (hypot(slip[0], slip[1]) <= SLIDES_JUMP * s->state.slide[i].noise) continue;
         slide_along(b, i, s->state.v, &s->state.slide[i]);
         note_slipping(s, i);
     }
@@ -544,7 +541,7 @@ static void indicators(const Solver *s, double *values) {
 static Range range(const Solver *s, int which) {
     const Slide *slide = &s->state.slide[which / 2];
     if (which % 2 == 1) return (Range){0, HUGE_VAL, 0, 0};
-    return (Range){0, HUGE_VAL, slide->sticks ? SLACK : slide->noise, 1};
+    return (Range){0, HUGE_VAL, slide->sticks ? SLIDES_SLACK : slide->noise, 1};
 }
 
 static int turns(const Solver *s) {

@@ -13,6 +13,7 @@ typedef struct {
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
     double alike;              /* with error bars, else 0: see companion.h */
+    LocalErrors local_trial;   /* of the latest trial of an event's time */
     State state;
     Drive drive;
     double *p;                 /* (parameters) */
@@ -22,6 +23,8 @@ typedef struct {
     double *scale;             /* (2 n) of errors, in the present step */
     double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
+    int *strikes;              /* (contacts) impacts since the caller set them to 0 */
+    double *struck_at, *impulse; /* (contacts) of the latest: time [s], impulse [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
     double *work_initial;      /* (6 n + 3 m) of initial.c, afar.c and magnitudes.c */
@@ -64,12 +67,18 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
  * puts the saved one back (it keeps a copy). */
 Status solver_advance(Solver *s, double t_end);
 
+/* The inputs may have been set: levels of jumps are those of now, contacts whose surface went away open, the
+ * others go with it; a prescribed motion may have another place and other rates than it went by.  What each
+ * step begins with.  FAILED leaves the state in disorder. */
+Status solver_follow(Solver *s);
+
 /* q and v at the communication point, where they are still to be found (on_demand).  FAILED: they cannot
  * be projected onto the constraints. */
 Status solver_arrive(Solver *s);
 
-/* 1: the integrator has been beyond t_end already, and to advance there on demand cannot fail. */
-int solver_passed(const Solver *s, double t_end);
+/* The same where the integrator has been beyond t_end already, and q and v there are found on demand: nothing
+ * is left to do, and nothing can fail.  0: it has not been there, and nothing was done. */
+int solver_pass(Solver *s, double t_end);
 
 /* The inputs were set: what was integrated ahead with the old ones is dropped. */
 void solver_inputs_changed(Solver *s);

@@ -32,6 +32,11 @@ typedef struct {
 /* u at time t.  */
 void drive_at(const System *s, const Drive *drive, double t, double *u);
 
+/* Of error bars: local errors of explicit and of implicit steps, each a number, summed up, and the largest. */
+typedef struct {
+    double sum[2], most[2];
+} LocalErrors;
+
 /* The numbers of a state (copied as a struct) ... */
 typedef struct {
     double t;            /* [s] the communication point */
@@ -51,7 +56,7 @@ typedef struct {
     double lost;         /* [J] that frictions and impacts have dissipated, ... */
     double lost_old, lost_ahead; /* ... and so far where the integrator began its step, and stands */
     int strikes;         /* impacts so far: contacts that were struck */
-    double local[2];     /* of error bars: sums over the steps of explicit and implicit methods, companion.c */
+    LocalErrors local, local_old; /* so far, and without the latest step */
 } Numbers;
 
 /* ... and its arrays, which lie in one block. */

@@ -11,8 +11,8 @@
 #include "indicators.h"
 #include "leg.h"
 #include "parts.h"
+#include "thresholds.h"
 
-static const double SLOW = 1e-9; /* speed of a gap, relative to the motion's own, that counts as none */
 
 /* What is said of each contact while an event is met: flags (contacts). */
 typedef struct {

@@ -171,7 +171,11 @@ def laws(closed_forms: tuple[CarriedForm, ...]) -> tuple[JudgedForm, ...]:
 
 def _judged(c: CarriedForm, instantaneous: bool, law: bool, inputs: set[str]) -> JudgedForm:
     parts = [c.actual] + ([] if c.expected is None else [c.expected])
-    sizes = [magnitude(sp.sympify(e)) for e in parts] + ([] if c.scale is None else [c.scale])
+    scale = [] if c.scale is None else [sp.sympify(c.scale)]
+    # a difference of velocities is not one of the magnitudes that they have at least (Compiled.at)
+    sizes = [magnitude(e) for e in map(sp.sympify, parts)] + [
+        e if law else magnitude(e) for e in scale
+    ]
     return JudgedForm(
         c,
         Compiled(c.actual, c.name),

@@ -1,9 +1,11 @@
-"""Inputs that jump, chatter, are huge or no numbers."""
+"""Inputs that jump, chatter, are huge or no numbers; prescribed motions that swing."""
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
+from ... import names
 from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .facts import Facts
@@ -12,6 +14,8 @@ from .probe import Probe
 
 FAMILY = "inputs"
 SHAPES = ("jumps", "chatters", "a spike")
+SWING = 0.05  # of a motion's start, or of one unit
+SWINGS = 3  # in the default experiment
 
 
 def probes(facts: Facts, quick: bool) -> list[Probe]:
@@ -26,7 +30,27 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
             found.append(
                 Probe(FAMILY, f"{i.name} = {value:g}", partial(_not_finite, i.name, value))
             )
+        if i.name in facts.motions and not names.read(i.name).order:
+            found.append(Probe(FAMILY, f"{i.name} swings", partial(_swings, i.name)))
     return found
+
+
+def _swings(name: str, bench: Bench) -> Finding:
+    """A prescribed motion that begins as described and swings, given with its rates at each point; between
+    points its acceleration is constant, so that it is where the FMU takes it to be."""
+    start = {i.name: i.start for i in bench.facts.inputs}
+    times, orders = (
+        bench.times(bench.facts.stop_time),
+        [names.derivative(name, k) for k in range(3)],
+    )
+    w, h = 2 * math.pi * SWINGS / bench.facts.stop_time, times[1]
+    size = SWING * (abs(start[name]) or 1.0)
+    u, rate, way = start[name], start[names.derivative(name)], {}
+    for t in times:
+        pull = w**2 * size * math.cos(w * t)
+        way[t] = dict(zip(orders, (u, rate, pull), strict=True))
+        u, rate = u + rate * h + pull * h**2 / 2, rate + pull * h
+    return bench.judged(bench.run({}, times, None, way.__getitem__))
 
 
 def _driven(name: str, shape: str, size: float, bench: Bench) -> Finding:

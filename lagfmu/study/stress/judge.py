@@ -125,11 +125,11 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
 
     A coordinate is known to the rounding of the value that it was given at the start, however small the
     one is onto which that was projected; a velocity to that of the motion's natural one, sqrt(|vdot| size),
-    beside which a throw at 8 m/s is none where g = 1e300 m/s^2; the energy to the work of Q over the rounding
-    of the sizes.
+    beside which a throw at 8 m/s is none where g = 1e300 m/s^2, and to what would move the coordinate by its
+    rounding within the run; the energy to the work of Q over the rounding of the sizes.
     """
     found = {}
-    work = 0.0
+    work, span = 0.0, float(run.rows["time"][-1] - run.rows["time"][0])
     for q in facts.coordinates:
         rounding = EPS * abs(run.values.get(q, 0.0))
         found[q] = max(facts.same_unit(q, run.values), rounding)
@@ -137,7 +137,8 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
         fastest = max(float(np.abs(run.rows[names.derivative(p)]).max()) for p in peers)
         size = found[q] or facts.usual(q)
         natural = math.sqrt(size) * math.sqrt(float(np.abs(run.rows[names.derivative(q, 2)]).max()))
-        found[names.derivative(q)] = max(fastest, EPS * natural)
+        creep = EPS * (size / span) if span > 0 else 0.0
+        found[names.derivative(q)] = max(fastest, EPS * natural, creep)
         if names.name(names.FORCE, "", q) in facts.variables:
             work += EPS * size * float(np.abs(run.rows[names.name(names.FORCE, "", q)]).max())
     if names.POTENTIAL in facts.variables:

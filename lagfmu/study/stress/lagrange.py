@@ -3,7 +3,8 @@
     d/dt dL/dv_j - dL/dq_j = Q_nc,j + Q_j                  for each coordinate
     d^2 f/dt^2 = 0   or   d/dt (sum a_j v_j + a_0) = 0     for each constraint, while it acts
     Q_cj = lambda_c a_cj ,   residual_c = f   or   sum a_j v_j + a_0
-    friction: |lambda| <= mu_s |N| while it sticks, lambda = -mu_k |N| s/|s| while it slips, lambda . s <= 0
+    friction: |lambda| <= mu_s |N| while it sticks, lambda = -mu_k |N| s/|s| while it slips, lambda . s <= 0;
+    margin = mu_s |N| - |lambda|, power = lambda . s, 0 while it sticks
     an Output of the model = its expression, of the values that are reported beside it
 
 They hold at each instant, whatever the parameters, the inputs and the tolerance, and together they
@@ -103,6 +104,18 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
     forms.append(
         ClosedForm(
             f"heat of {law.name}", sp.Integer(0), heat, scale=force * speed, rounding=ROUNDING
+        )
+    )
+    margin, power = names.name(names.MARGIN, law.name), names.name(names.POWER, law.name)
+    work = (1 - sticks) * sp.Add(*(x * s for x, s in zip(lam, slip, strict=True)))
+    forms.append(
+        ClosedForm(
+            margin, static * N - force, output(margin), scale=force + static * N, rounding=ROUNDING
+        )
+    )
+    forms.append(
+        ClosedForm(
+            power, work, output(power), scale=(1 - sticks) * force * speed, rounding=ROUNDING
         )
     )
     for x, s in zip(lam, slip, strict=True):

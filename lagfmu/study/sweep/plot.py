@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import SimulationError
+from ...model.units import for_reading
+from .table import INFINITE, happened, numbers, one_by_one, varied
 
+FIGURES = (".svg", ".png", ".pdf")
 FAILED = "#c0392b"
 INK = "#1f5fa8"
 STYLE = {
@@ -27,11 +30,7 @@ def plot(found: Any, path: Path) -> Path:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    names = [
-        str(n)
-        for n, a in found.data_vars.items()
-        if a.dtype.kind == "f" and n != "reached" and "time" not in a.dims
-    ]
+    names = numbers(found)
     if not names:
         raise SimulationError("there is nothing to plot: keep numbers of each run")
     dims = [d for d in found["status"].dims if d != "run"]
@@ -48,13 +47,21 @@ def plot(found: Any, path: Path) -> Path:
     return path
 
 
+def _drawn(found: Any, name: str) -> Any:
+    """The values; nothing where an event did not happen, or a bar is infinite."""
+    values = happened(found, name)
+    return np.where(np.abs(values) < INFINITE, values, np.nan)
+
+
 def _label(found: Any, name: str) -> str:
-    unit = found[name].attrs.get("units", "")
+    unit = for_reading(found[name].attrs.get("units", ""))
     return f"{name} [{unit}]" if unit else name
 
 
 def _grid(found: Any, names: list[str], dims: list[str], Figure: Any) -> Any:
     """A panel a kept quantity: a curve over one axis, a map over two."""
+    from matplotlib.ticker import MaxNLocator
+
     width, height = (7.0, 2.4) if len(dims) == 1 else (6.0, 4.2)
     figure = Figure(figsize=(width, height * len(names)), layout="constrained")
     panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
@@ -62,7 +69,7 @@ def _grid(found: Any, names: list[str], dims: list[str], Figure: Any) -> Any:
     for panel, name in zip(panels, names, strict=True):
         x = found[dims[0]].values
         if len(dims) == 1:
-            panel.plot(x, found[name].values, color=INK, marker="." if len(x) < 60 else None)
+            panel.plot(x, _drawn(found, name), color=INK, marker="." if len(x) < 60 else None)
             if bad.any():
                 panel.plot(x[bad], np.zeros(bad.sum()), "x", color=FAILED, clip_on=False,
                            transform=panel.get_xaxis_transform(), label="refused")  # fmt: skip
@@ -70,8 +77,10 @@ def _grid(found: Any, names: list[str], dims: list[str], Figure: Any) -> Any:
             panel.set_ylabel(_label(found, name))
         else:
             y = found[dims[1]].values
-            drawn = panel.pcolormesh(x, y, found[name].values.T, shading="nearest", cmap="viridis")
-            figure.colorbar(drawn, ax=panel, label=_label(found, name))
+            z = _drawn(found, name).T
+            drawn = panel.pcolormesh(x, y, z, shading="nearest", cmap="viridis")
+            bar = figure.colorbar(drawn, ax=panel, label=_label(found, name))
+            bar.locator = MaxNLocator(integer=bool((z[np.isfinite(z)] % 1 == 0).all()))
             if bad.any():
                 i, j = np.nonzero(bad)
                 panel.plot(x[i], y[j], "x", color=FAILED, label="refused")
@@ -97,18 +106,15 @@ def _logarithmic(values: Any) -> bool:
 
 def _scatter(found: Any, names: list[str], Figure: Any) -> Any:
     """What varied across, what was kept down; histograms of each on the edges."""
-    varied = [
-        n for n, c in found.coords.items() if n not in ("run", "time") and c.dtype.kind == "f"
-    ]
-    stacked = found.stack(all_runs=found["status"].dims) if "run" not in found.dims else found
+    causes, stacked = varied(found), one_by_one(found)
     good = stacked["status"].values == "ok"
-    columns, rows = len(varied) + 1, len(names) + 1
+    columns, rows = len(causes) + 1, len(names) + 1
     figure = Figure(figsize=(2.4 * columns, 2.1 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False)
     bins = min(50, max(8, int(np.sqrt(good.sum()))))
     for i, name in enumerate(names):
-        y = stacked[name].values
-        for j, cause in enumerate(varied):
+        y = _drawn(stacked, name)
+        for j, cause in enumerate(causes):
             panel = panels[i][j]
             panel.plot(stacked[cause].values[good], y[good], ".", ms=2, color=INK, alpha=0.4,
                        rasterized=True)  # fmt: skip
@@ -117,9 +123,9 @@ def _scatter(found: Any, names: list[str], Figure: Any) -> Any:
                            color=FAILED, transform=panel.get_xaxis_transform(), clip_on=False)  # fmt: skip
             if j == 0:
                 panel.set_ylabel(_label(found, name))
-        panels[i][-1].hist(y[good], bins=bins, orientation="horizontal", color=INK)
+        panels[i][-1].hist(y[np.isfinite(y)], bins=bins, orientation="horizontal", color=INK)
         panels[i][-1].sharey(panels[i][0])
-    for j, cause in enumerate(varied):
+    for j, cause in enumerate(causes):
         panels[-1][j].hist(stacked[cause].values[good], bins=bins, color=INK)
         panels[-1][j].set_xlabel(_label(found, cause))
     corner = panels[-1][-1]

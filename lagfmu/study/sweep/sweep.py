@@ -6,9 +6,10 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections import Counter
+import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +27,23 @@ from ...model.file import load
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
-from ...verification.simulate import Trajectory, communication_points, read_description
+from ...verification.simulate import (
+    Trajectory,
+    check_inputs,
+    communication_points,
+    missing,
+    read_description,
+)
 from .design import Design, Values, design
 from .engine import connected, distributed, local
 from .keep import kept as parsed
-from .keep import missing
-from .table import Layout, Parts, dataset, write_parquet
+from .table import Layout, Parts, dataset, write_rows
 
 MOST = 2000  # runs in a chunk
 FEWEST = 100  # chunks, of a large sweep
 MEMORY = 0.1  # of this machine's, for one table: it is held a few times over
-SUFFIXES = (".parquet", ".nc", ".zarr")
+ROWS = (".parquet", ".csv")  # files of a row a run; others hold trajectories too
+SUFFIXES = (*ROWS, ".nc", ".zarr")
 
 Progress = Callable[[int, int, int], None]  # runs done, of how many, of those refused
 
@@ -72,67 +79,79 @@ def sweep(
 
     `keep` are 'NAME:last', ':max', ':min', ':mean', ':time-of-max' (over communication points and departures)
     or ':trajectory'; if empty, the largest multipliers, counts and times of departures and slips.  `out`:
-    .parquet for a row a run, .nc or .zarr for all, trajectories included; finished chunks stand in OUT.parts
-    at once, and `resume` goes on from them.  `on` is a Dask scheduler's address or a
+    .parquet or .csv for a row a run, .nc or .zarr for all, trajectories included; finished chunks stand in
+    OUT.parts at once, and `resume` goes on from them.  `on` is a Dask scheduler's address or a
     `dask.distributed.Client`; without it `workers` processes of this machine do the runs (all cores).
 
     Returns an xarray.Dataset over the crossed quantities, or over `run`; a run that is refused has NaN, its
     `status` and `reason`.  Raises SimulationError with what was expected.
     """
     _require()
-    _check_options(workers, seed, tolerance, resume and out is None)
+    path_out = None if out is None else Path(out)
+    _check_options(workers, seed, tolerance, path_out, resume)
     with _fmu(target, scene) as path:
-        return _sweep(
-            path,
-            _design(vary, sample, runs, seed, sampling, rows),
-            keep,
-            _times(path, stop_time, step_size),
-            tolerance,
-            inputs,
-            None if out is None else Path(out),
-            on,
-            workers,
-            resume,
-            progress,
-            command,
-        )
+        varied = _design(vary, sample, runs, seed, sampling, rows)
+        times = _times(path, stop_time, step_size)
+        study = _study(path, varied, keep, times, tolerance, inputs, command)
+        if study.layout.kept.trajectories and path_out is not None and path_out.suffix in ROWS:
+            raise SettingError(
+                f"trajectories do not fit a {path_out.suffix} file: --out FILE.nc or FILE.zarr"
+            )
+        folder = None if path_out is None else path_out.with_name(f"{path_out.name}.parts")
+        parts = Parts(folder, study.identity, resume)
+        try:
+            _run(study, parts, on, workers, progress)
+            found = _assembled(study, parts, path_out)
+        except BaseException:
+            if parts.temporary:
+                parts.remove()
+            raise
+        parts.remove()
+        return found
 
 
-def _sweep(
+@dataclass(frozen=True)
+class Study:
+    """What is run, of which FMU, in chunks of how many runs, and what stands in the table of results."""
+
+    path: Path
+    plan: Plan
+    layout: Layout
+    chunk: int
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """What a sweep that goes on must share with the one that was interrupted."""
+        facts, drives = self.layout.facts, self.plan.drives
+        driven = "" if drives is None else hashlib.sha256(drives.tobytes()).hexdigest()
+        found = {k: facts[k] for k in ("fmu_sha256", "stop_time", "step_size", "tolerance")}
+        found |= {"design": self.layout.design.digest, "keep": repr(self.layout.kept)}
+        return found | {"inputs": driven, "chunk": str(self.chunk)}
+
+
+def _study(
     path: Path,
     varied: Design,
     keep: Sequence[str],
     times: NDArray[np.float64],
     tolerance: float | None,
     inputs: Trajectory | None,
-    out: Path | None,
-    on: Any,
-    workers: int | None,
-    resume: bool,
-    progress: Progress | None,
     command: str,
-) -> Any:
+) -> Study:
+    """All that can be said before anything is run.  Raises SettingError."""
     description = read_description(path)
-    if description.coSimulation is None:
-        raise SimulationError(
-            f"{str(path)!r} has no co-simulation: a sweep steps FMUs by fmi2DoStep"
-        )
+    _check_fmu(path, description)
     variables = {v.name: v for v in description.modelVariables}
-    kept = parsed(keep, {n: v.type for n, v in variables.items()})
+    outputs = [n for n, v in variables.items() if v.causality == "output"]
+    kept = parsed(keep, {n: v.type for n, v in variables.items()}, outputs)
     drives = _drives(inputs, times, variables)
     _check(varied, variables, drives[0])
-    if out is not None and out.suffix not in SUFFIXES:
-        raise SettingError(f"--out {str(out)!r}: expected a file .parquet, .nc or .zarr")
-    if kept.trajectories and out is not None and out.suffix == ".parquet":
-        raise SettingError("trajectories do not fit a Parquet file: --out FILE.nc or FILE.zarr")
     size = 8 * len(varied) * (len(kept.numbers) + len(kept.trajectories) * len(times))
     if size > memory():
         raise SettingError(
             f"{len(varied)} runs would keep {size / 1e9:.3g} GB, more than the {memory() / 1e9:.3g} GB that "
             "fit here: keep less, or make fewer runs"
         )
-    chunk = min(MOST, max(1, -(-len(varied) // FEWEST)))
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
     plan = Plan(
         vary=varied.names,
         keep=kept.plan,
@@ -145,7 +164,7 @@ def _sweep(
     )
     facts = {
         "fmu": path.name,
-        "fmu_sha256": digest,
+        "fmu_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "lagfmu": version(),
         "fmpy": fmpy.__version__,
         "command": command,
@@ -156,67 +175,75 @@ def _sweep(
     units = {
         n: str(v.unit or getattr(v.declaredType, "unit", "") or "") for n, v in variables.items()
     }
-    layout = Layout(varied, kept, units, facts)
-    driven = "" if drives[1] is None else hashlib.sha256(drives[1].tobytes()).hexdigest()
-    identity = {k: facts[k] for k in ("fmu_sha256", "stop_time", "step_size", "tolerance")}
-    identity |= {"design": varied.digest, "keep": repr(kept), "inputs": driven, "chunk": str(chunk)}
-    parts = Parts(None if out is None else out.with_name(f"{out.name}.parts"), identity, resume)
-    try:
-        failed = _run(path, plan, layout, parts, chunk, on, workers, progress)
-        if out is not None and out.suffix == ".parquet":
-            write_parquet(parts, out)
-        whole = parts.trajectories() if kept.trajectories else None
-        found = dataset(layout, list(parts.tables()), times, whole)
-        found.attrs["refused"] = sum(failed.values())
-        if out is not None and out.suffix != ".parquet":
-            _save(found, out)
-    except BaseException:
-        if parts.temporary:
-            parts.remove()
-        raise
-    parts.remove()
+    chunk = min(MOST, max(1, -(-len(varied) // FEWEST)))
+    return Study(path, plan, Layout(varied, kept, units, facts), chunk)
+
+
+def _check_fmu(path: Path, description: Any) -> None:
+    """FMI 2.0, co-simulation, with a binary for this machine.  Raises SimulationError."""
+    if description.fmiVersion != "2.0":
+        raise SimulationError(
+            f"{str(path)!r} is an FMU of FMI {description.fmiVersion}: a sweep drives FMI 2.0"
+        )
+    if description.coSimulation is None:
+        raise SimulationError(
+            f"{str(path)!r} has no co-simulation: a sweep steps FMUs by fmi2DoStep"
+        )
+    with zipfile.ZipFile(path) as archive:
+        folders = [n.split("/")[1] for n in archive.namelist() if n.startswith("binaries/")]
+    if fmpy.platform not in folders:
+        found = ", ".join(dict.fromkeys(f for f in folders if f)) or "none"
+        raise SimulationError(
+            f"{str(path)!r} has no binary for this machine ({fmpy.platform}), but for {found}: build it with "
+            "--platforms, or run the sweep where it has one"
+        )
+
+
+def _assembled(study: Study, parts: Parts, out: Path | None) -> Any:
+    """The Dataset of all runs, written if it is asked for."""
+    layout = study.layout
+    if out is not None and out.suffix in ROWS:
+        write_rows(parts, out, layout)
+    whole = parts.trajectories() if layout.kept.trajectories else None
+    found = dataset(layout, list(parts.tables()), study.plan.times, whole)
+    found.attrs["refused"] = int((found["status"].values != "ok").sum())
+    if out is not None and out.suffix not in ROWS:
+        _save(found, out)
     return found
 
 
 def _run(
-    path: Path,
-    plan: Plan,
-    layout: Layout,
-    parts: Parts,
-    chunk: int,
-    on: Any,
-    workers: int | None,
-    progress: Progress | None,
-) -> Counter[str]:
-    """What is not yet there; the reasons of the runs that were refused."""
-    total, done = len(layout.design), parts.done
+    study: Study, parts: Parts, on: Any, workers: int | None, progress: Progress | None
+) -> None:
+    """What is not yet there."""
+    layout, chunk = study.layout, study.chunk
+    total, done, refused = len(layout.design), parts.done, 0
     table = layout.design.table
     left = [
         (n, table[n * chunk : (n + 1) * chunk]) for n in range(-(-total // chunk)) if n not in done
     ]
-    finished, failed = total - sum(len(v) for _, v in left), Counter[str]()
-    folder = fmpy.extract(str(path))
-    plugged = plug(path, read_description(path), folder)
+    finished = total - sum(len(v) for _, v in left)
+    folder = fmpy.extract(str(study.path))
+    plugged = plug(study.path, read_description(study.path), folder)
     if progress is not None:
         progress(finished, total, 0)
     client, ours = (None, False) if on is None else connected(on)
     try:
         if client is None:
-            results = local(plugged, plan, left, workers or os.cpu_count() or 1)
+            results = local(plugged, study.plan, left, workers or os.cpu_count() or 1)
         else:
-            results = distributed(client, path, plugged, plan, left)
+            results = distributed(client, study.path, plugged, study.plan, left)
         for number, outcome in results:
             first = number * chunk
             parts.write(number, layout.part(first, outcome), layout.trajectories(outcome))
-            failed.update(outcome.reasons.values())
+            refused += len(outcome.reasons)
             finished += len(outcome.status)
             if progress is not None:
-                progress(finished, total, sum(failed.values()))
+                progress(finished, total, refused)
     finally:
         if client is not None and ours:
             client.close()
         shutil.rmtree(folder, ignore_errors=True)
-    return failed
 
 
 def memory() -> float:
@@ -291,7 +318,9 @@ def _times(path: Path, stop_time: float | None, step_size: float | None) -> NDAr
     return communication_points(stop, step)
 
 
-def _check_options(workers: int | None, seed: int, tolerance: float | None, nowhere: bool) -> None:
+def _check_options(
+    workers: int | None, seed: int, tolerance: float | None, out: Path | None, resume: bool
+) -> None:
     """All problems at once."""
     problems = []
     if workers is not None and workers < 1:
@@ -300,8 +329,10 @@ def _check_options(workers: int | None, seed: int, tolerance: float | None, nowh
         problems.append(f"seed = {seed}, expected a whole number from 0")
     if tolerance is not None and not 0 < tolerance < np.inf:
         problems.append(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
-    if nowhere:
+    if resume and out is None:
         problems.append("resume needs the out of the sweep that was interrupted")
+    if out is not None and out.suffix not in SUFFIXES:
+        problems.append(f"out {str(out)!r}: expected a file {', '.join(SUFFIXES)}")
     if problems:
         raise SettingError("; ".join(problems))
 
@@ -314,6 +345,7 @@ def _check(varied: Design, variables: Mapping[str, Any], driven: Sequence[str]) 
         if v.type in TYPES
         and (v.causality in ("parameter", "input") or v.initial in ("exact", "approx"))
     ]
+    settable.sort(key=lambda n: names.read(n).head == names.SOLVER)  # what is physics stands first
     problems = [missing(n, settable, "cannot be set") for n in varied.names if n not in settable]
     problems += [
         f"{n} varies and comes from the file of inputs" for n in varied.names if n in driven
@@ -332,23 +364,17 @@ def _drives(
     """Inputs, interpolated linearly at the communication points."""
     if inputs is None:
         return (), None
+    check_inputs(inputs, list(variables.values()))
     names = tuple(n for n in inputs.dtype.names or () if n != "time")
-    known = [n for n, v in variables.items() if v.causality == "input"]
-    unknown = [missing(n, known) for n in names if n not in known]
-    if unknown or "time" not in (inputs.dtype.names or ()):
-        raise SettingError("inputs: " + ("; ".join(unknown) or "there is no column 'time'"))
-    if not (np.diff(inputs["time"]) >= 0).all() or not np.isfinite(inputs["time"]).all():
-        raise SettingError("inputs: the times are not sorted, expected rising seconds")
     table = np.column_stack([np.interp(times, inputs["time"], inputs[n]) for n in names])
     return names, table
 
 
 def _events(variables: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """(count, time) of what happens between points and is counted: departures, starts of slipping."""
-    events = ((names.DEPARTURES, names.DEPARTURE_TIME), (names.SLIPS, names.SLIP_TIME))
     pairs = [
         (names.name(count, c), names.name(time, c))
-        for count, time in events
+        for time, count in names.COUNT_OF.items()
         for c in names.constraints(variables, count)
     ]
     return tuple(p for p in pairs if p[1] in variables)

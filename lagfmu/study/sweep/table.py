@@ -9,14 +9,17 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
+from ... import names
 from ...errors import SettingError, SimulationError
 from ...fmu.session import STATUS, Outcome
 from .design import Design
@@ -24,6 +27,8 @@ from .host import CRASHED
 from .keep import Kept
 
 RECORD = "sweep.json"
+INFINITE = sys.float_info.max  # stands for infinity where an FMU's Real must be finite: error bars
+METADATA = "-metadata.json"  # of a CSV file, behind its name: W3C's tabular metadata
 
 
 def status_name(status: int) -> str:
@@ -143,22 +148,82 @@ class Parts:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def write_parquet(parts: Parts, path: Path) -> None:
-    """One file of all runs, written part by part; it replaces what was there when it is whole."""
+def write_rows(parts: Parts, path: Path, layout: Layout) -> None:
+    """One .parquet or .csv file of all runs, written part by part; it replaces what was there when it is
+    whole.  What a CSV file cannot say of itself stands beside it: see `_metadata`."""
+    import pyarrow.csv as csv
     import pyarrow.parquet as pq
 
     unfinished = path.with_name(f".{path.name}.unfinished")
+    write = csv.CSVWriter if path.suffix == ".csv" else pq.ParquetWriter
     writer: Any = None
     try:
         for table in parts.tables():
             if writer is None:
-                writer = pq.ParquetWriter(unfinished, table.schema)
+                writer = write(unfinished, table.schema)
+                if path.suffix == ".csv":
+                    about = json.dumps(_metadata(path.name, table.schema, layout.facts), indent=1)
+                    path.with_name(path.name + METADATA).write_text(about, encoding="utf-8")
             writer.write_table(table)
         writer.close()
         os.replace(unfinished, path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
         raise SimulationError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+
+
+def _metadata(name: str, schema: Any, facts: Mapping[str, str]) -> dict[str, Any]:
+    """Units of the columns and facts of the study, by W3C's "Metadata Vocabulary for Tabular Data"."""
+    columns = []
+    for field in schema:
+        kind = {"string": "string", "int64": "integer"}.get(str(field.type), "number")
+        column = {"name": quote(field.name), "titles": field.name, "datatype": kind}
+        if unit := field.metadata[b"unit"].decode():
+            column["schema:unitText"] = unit
+        columns.append(column)
+    return {
+        "@context": "http://www.w3.org/ns/csvw",
+        "url": name,
+        "null": ["nan"],
+        "schema:creator": f"lagfmu {facts['lagfmu']}",
+        "notes": [dict(facts)],
+        "tableSchema": {"columns": columns, "primaryKey": "run"},
+    }
+
+
+def one_by_one(found: Any) -> Any:
+    """The runs of a Dataset in their order, whatever was crossed."""
+    return found if "run" in found.dims else found.stack(run=found["status"].dims)
+
+
+def varied(found: Any) -> list[str]:
+    """Names of what varied."""
+    others = ("run", "time")
+    return [str(n) for n, c in found.coords.items() if n not in others and c.dtype.kind == "f"]
+
+
+def numbers(found: Any) -> list[str]:
+    """Names of the numbers that were kept of each run."""
+    return [
+        str(n)
+        for n, a in found.data_vars.items()
+        if a.dtype.kind == "f" and n != "reached" and "time" not in a.dims
+    ]
+
+
+def happened(found: Any, column: str) -> np.ndarray[Any, Any]:
+    """The values of a column; of an event that a run has not met NaN, where its FMU has zeros.
+
+    Whether it has is known by its count where that was kept, and of a time also by its being 0.
+    """
+    values = np.array(found[column].values, dtype=float)
+    of = column.rpartition(":")[0]
+    count = f"{names.counted(of)}:last"
+    if count in found:
+        values[found[count].values == 0] = np.nan
+    elif names.read(of).quantity in names.COUNT_OF:
+        values[values == 0] = np.nan
+    return values
 
 
 def dataset(

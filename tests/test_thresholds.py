@@ -1,0 +1,51 @@
+"""What both engines decide by stands once, in runtime/base/thresholds.h."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from runtime import INCLUDES, compiler
+
+import lagfmu
+from lagfmu.solver import thresholds
+
+PACKAGE = Path(lagfmu.__file__).parent
+NAMES = sorted(thresholds._VALUES)
+
+
+def test_python_reads_what_c_compiles(tmp_path: Path) -> None:
+    """Each threshold is the same double in both engines, to the last bit."""
+    rows = "".join(f'    printf("{n} %a\\n", (double){n});\n' for n in NAMES)
+    text = (
+        f'#include "thresholds.h"\n#include <stdio.h>\nint main(void) {{\n{rows}    return 0;\n}}\n'
+    )
+    (tmp_path / "print.c").write_text(text)
+    command = [compiler(), *INCLUDES, "print.c", "-o", "print"]
+    subprocess.run(command, cwd=tmp_path, check=True, timeout=120)
+    printed = subprocess.run(
+        [str(tmp_path / "print")], capture_output=True, text=True, check=True, timeout=20
+    )
+    compiled = dict(line.split() for line in printed.stdout.splitlines())
+    assert {n: float.fromhex(v) for n, v in compiled.items()} == {
+        n: float(thresholds._VALUES[n]) for n in NAMES
+    }
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_both_engines_decide_by_it(name: str) -> None:
+    """A threshold in the header is used by the C runtime and by the python engine."""
+    word = re.compile(rf"\b{name}\b")
+    c = [f for f in PACKAGE.glob("runtime/*/*.[ch]") if f.name != "thresholds.h"]
+    python = [*PACKAGE.glob("solver/*.py"), PACKAGE / "fmu" / "slave.py"]
+    python.remove(PACKAGE / "solver" / "thresholds.py")
+    assert any(word.search(f.read_text()) for f in c), "not in the C runtime"
+    assert any(word.search(f.read_text()) for f in python), "not in the python engine"
+
+
+def test_a_name_that_is_not_there_is_an_import_error() -> None:
+    """A misspelt threshold is no number."""
+    with pytest.raises(AttributeError, match=r"thresholds\.h defines no RNAK"):
+        thresholds.RNAK  # noqa: B018
