@@ -458,6 +458,7 @@ static void report_strike(Instance *x, int c, const char *name) {
 
 static void report_events(Instance *x) {
     const State *now = &x->solver.state;
+    if (x->quiet) return;
     for (int c = 0; c < x->solver.system->contacts; c++) {
         const char *name = x->solver.system->rows[x->solver.system->contact[c]].name;
         if (x->solver.strikes[c] > 0) report_strike(x, c, name);
