@@ -15,37 +15,29 @@ import sys
 import tempfile
 from pathlib import Path
 
+import fmpy
 import numpy as np
 
 ROOT = Path(__file__).parent.parent
-RUN = """
-import sys, warnings
-from pathlib import Path
-import fmpy, numpy as np
-from lagfmu import build_fmu
-from lagfmu.model.file import load
-warnings.simplefilter("ignore")
-out = Path(sys.argv[1])
-for path in sorted(Path("models").glob("*.py")):
-    if sys.argv[2:] and path.stem not in sys.argv[2:]:
-        continue
-    file = load(path)
-    for scene in file.scenes:
-        fmu = build_fmu(file.model, out, scene, target="native", check=False)
-        reals = [v.name for v in fmpy.read_model_description(str(fmu)).modelVariables
-                 if v.type == "Real" and v.causality in ("output", "local")]
-        np.save(out / f"{scene.name}.npy", fmpy.simulate_fmu(str(fmu), output=reals))
-"""
 
 
 def run(checkout: Path, folder: Path, models: list[str]) -> None:
     """Every scene's result as NAME.npy in `folder`."""
-    subprocess.run(
-        [sys.executable, "-c", RUN, str(folder), *models],
-        cwd=checkout,
-        env={**os.environ, "PYTHONPATH": str(checkout)},
-        check=True,
-    )
+    command = [sys.executable, "-m", "lagfmu", "build", "--target", "native", "--no-check"]
+    for path in sorted((checkout / "models").glob("*.py")):
+        if not models or path.stem in models:
+            subprocess.run(
+                [*command, "--out", str(folder), str(path)],
+                cwd=checkout,
+                env={**os.environ, "PYTHONPATH": str(checkout)},
+                stdout=subprocess.DEVNULL,
+                check=True,
+            )
+    for path in (folder / "native").glob("*.fmu"):
+        variables = fmpy.read_model_description(str(path)).modelVariables
+        shown = [v for v in variables if v.type == "Real" and v.causality in ("output", "local")]
+        result = fmpy.simulate_fmu(str(path), output=[v.name for v in shown])
+        np.save(folder / f"{path.stem}.npy", result)
 
 
 def main() -> None:

@@ -2,9 +2,10 @@
 
 Hemisphere, 2 s a run, the start angle varied; the time of the departure and the largest multiplier are kept.
 
-ratios    a run in `lagfmu.sweep`, in `fmpy.simulate_fmu`, in fmpy with a kept instance, and in a C host
-          (native/runs.c), at a communication step of 2 s and at the FMU's own; processor time, all
-          processes, what takes turns within a round; medians
+ratios    a run in `lagfmu.sweep` on one core and on all, in `fmpy.simulate_fmu`, in fmpy with a kept
+          instance, and in a C host (native/runs.c), at a communication step of 2 s and at the FMU's own,
+          which is what fmpy takes by itself; processor time of all processes against the sweep on one
+          core, and wall time against that on all; what takes turns within a round; medians
 million   10^6 runs on all cores: time, and the memory of the client and of its workers along the way
 cluster   a Dask scheduler and workers as a user starts them: the numbers of the local run, the time with one
           and with two workers, and the processor time of the workers and of all the rest
@@ -39,7 +40,10 @@ from lagfmu.prepare.prepare import prepare
 HERE = Path(__file__).parent
 STOP, FIRST, LAST = 2.0, 0.05, 1.0
 WANTED = ["lambda.surface", "departure.surface.time"]
-Costs = dict[str, list[float]]
+Costs = dict[
+    str, list[tuple[float, float]]
+]  # processor time and wall time of a run [us], a round each
+ONE, EVERY = "lagfmu.sweep, one core", "lagfmu.sweep, all cores"
 KEEP = ["lambda.surface:max", "departure.surface.time:last"]
 
 
@@ -61,10 +65,10 @@ def fmu(folder: Path) -> Path:
 # ---------------------------------------------------------------------------- ratios
 
 
-def swept(path: Path, step: float, runs: int) -> np.ndarray:
+def swept(path: Path, step: float, runs: int, workers: int | None = 1) -> np.ndarray:
     """Sums of what is kept."""
     found = lagfmu.sweep(
-        path, {"theta": angles(runs)}, keep=KEEP, stop_time=STOP, step_size=step, workers=1
+        path, {"theta": angles(runs)}, keep=KEEP, stop_time=STOP, step_size=step, workers=workers
     )
     return np.array([float(found[k].sum()) for k in KEEP])
 
@@ -112,23 +116,29 @@ def c_host(path: Path, folder: Path) -> Callable[[float, int], tuple[np.ndarray,
     return run
 
 
+def timed(work: Callable[[], object]) -> np.ndarray:
+    """Processor time and wall time [s]."""
+    begun = np.array([processor(), time.perf_counter()])
+    work()
+    return np.array([processor(), time.perf_counter()]) - begun
+
+
 def costs(path: Path, folder: Path, step: float, runs: tuple[int, int], rounds: int) -> Costs:
-    """Processor time of a run [us] by each way, a value a round."""
-    found: Costs = {"lagfmu.sweep, a further run": [], "C host": [], "fmpy, instance kept": [],
-                    "fmpy.simulate_fmu": []}  # fmt: skip
+    """Of a run, by each way; of a sweep that of a further one."""
+    found: Costs = {
+        k: [] for k in (ONE, EVERY, "C host", "fmpy, instance kept", "fmpy.simulate_fmu")
+    }
     host = c_host(path, folder)
     for _ in range(rounds):
-        begun = processor()
-        swept(path, step, runs[0])
-        middle = processor()
-        swept(path, step, runs[1])
-        more = (processor() - middle) - (middle - begun)
-        found["lagfmu.sweep, a further run"].append(1e6 * more / (runs[1] - runs[0]))
-        found["C host"].append(host(step, runs[1])[1])
+        for name, workers in ((ONE, 1), (EVERY, None)):
+            few, many = (
+                timed(lambda n=n, w=workers: swept(path, step, n, w)) for n in (runs[0], runs[1])
+            )
+            found[name].append(tuple(1e6 * (many - few) / (runs[1] - runs[0])))
+        found["C host"].append((host(step, runs[1])[1],) * 2)
         for name, count in (("fmpy, instance kept", 300), ("fmpy.simulate_fmu", 30)):
-            begun = processor()
-            by_fmpy(path, step, count, "kept" in name)
-            found[name].append(1e6 * (processor() - begun) / count)
+            spent = timed(lambda n=name, c=count: by_fmpy(path, step, c, "kept" in n))
+            found[name].append(tuple(1e6 * spent / count))
     sums = swept(path, step, 500)
     for others in (host(step, 500)[0], by_fmpy(path, step, 500, True)):
         assert np.allclose(others, sums, rtol=1e-9), (others, sums)
@@ -137,13 +147,20 @@ def costs(path: Path, folder: Path, step: float, runs: tuple[int, int], rounds: 
 
 def ratios(path: Path, folder: Path, rounds: int) -> None:
     """A table a communication step."""
-    for step, runs in ((STOP, (2000, 20000)), (0.01, (1000, 6000))):
+    for step, runs in ((STOP, (4000, 40000)), (0.01, (2000, 20000))):
         found = costs(path, folder, step, runs, rounds)
-        print(f"communication step {step:g} s: processor time of a run, and its ratio to a sweep's")
-        own = found["lagfmu.sweep, a further run"]
+        print(
+            f"communication step {step:g} s, {os.cpu_count()} cores; a run in microseconds, and its ratio"
+        )
+        print(f"  {'':24s} {'processor':>10s} {'/one core':>9s} {'wall':>10s} {'/all cores':>10s}")
         for name, each in found.items():
-            ratio = statistics.median(a / b for a, b in zip(each, own, strict=True))
-            print(f"  {name:28s} {statistics.median(each):9.1f} us {ratio:8.2f}", flush=True)
+            cells = []
+            for kind, own in enumerate((ONE, EVERY)):
+                pairs = zip(each, found[own], strict=True)
+                ratio = statistics.median(a[kind] / b[kind] for a, b in pairs)
+                cells.append((statistics.median(a[kind] for a in each), ratio))
+            (busy, one), (wall, every) = cells
+            print(f"  {name:24s} {busy:10.1f} {one:9.2f} {wall:10.1f} {every:10.2f}", flush=True)
 
 
 # ---------------------------------------------------------------------------- million

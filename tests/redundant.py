@@ -175,6 +175,18 @@ def closed_chain(redundant: bool) -> Model:
     return _model("ClosedChain", lagrangian, dict.fromkeys(turns, "rad"), closes, start)
 
 
+def trammel(redundant: bool) -> Model:
+    """A bar whose ends slide along two lines at right angles, and its middle, as follows, on a circle, which
+    and one line alone do not hold the bar where it passes along the other (after 0.82 s)."""
+    x, y, a = dynamicsymbols("x y a")
+    held = [Holonomic("floor", y - 0.75 * R * sin(a)), Holonomic("wall", x - 0.75 * R * cos(a))]
+    if redundant:
+        held.append(Holonomic("circle", x**2 + y**2 - (0.75 * R) ** 2))
+    kinetic = m * (x.diff() ** 2 + y.diff() ** 2) / 2 + m * (1.5 * R) ** 2 * a.diff() ** 2 / 24
+    start = {x: 0.45, y: 0.6, a: 0.9272952180016122}
+    return _model("Trammel", kinetic - m * g * y, {x: "m", y: "m", a: "rad"}, held, start)
+
+
 SYSTEMS: dict[str, Callable[[bool], Model]] = {
     "platform": platform,
     "truss": truss,
@@ -183,4 +195,5 @@ SYSTEMS: dict[str, Callable[[bool], Model]] = {
     "ball": ball,
     "pendulum": pendulum,
     "closed_chain": closed_chain,
+    "trammel": trammel,
 }

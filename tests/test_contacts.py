@@ -5,10 +5,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
+from instance import instance
 from sympy import Rational, cos, pi, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate
+from lagfmu import (
+    Contact,
+    Holonomic,
+    Input,
+    Model,
+    Nonholonomic,
+    Parameter,
+    Scene,
+    build_fmu,
+    simulate,
+)
 from lagfmu.prepare.prepare import prepare
 
 G = 9.81
@@ -569,3 +581,32 @@ def test_a_table_that_drops_away_leaves_the_block_in_free_fall():
     assert result["lambda.top"][flying] == pytest.approx(0.0, abs=1e-12)
     assert np.ptp(result["y"][flying] + G * fallen[flying] ** 2 / 2) < 0.05
     assert result["y"][late] == pytest.approx(-0.2, abs=1e-9)
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_foot_too_far_out_for_a_double_is_refused_by_name(tmp_path, target):
+    """The square of a lever of 1e300 m overflows: nothing says then whether its contact pushes, and the
+    start is refused (a step began with the wrong contacts); a plate of 1 m stands on both alike."""
+    z, lean = dynamicsymbols("z lean")
+    half = symbols("b", positive=True)
+    plate = Model(
+        name="Plate",
+        lagrangian=m * z.diff() ** 2 / 2 + m * a**2 * lean.diff() ** 2 / 2 - m * g * z,
+        coordinates={z: "m", lean: "rad"},
+        constraints=[
+            Contact("left", z - half * sin(lean)),
+            Contact("right", z + half * sin(lean)),
+        ],
+        parameters=[MASS, GRAVITY, Parameter(a, 1.0, "m"), Parameter(half, 1.0, "m")],
+        start={z: 0.0, lean: 0.0},
+    )
+    fmu = build_fmu(plate, tmp_path, target=target, check=False)
+    with instance(fmu) as one:
+        one.start()
+        assert one.get("lambda.left") == pytest.approx(G, rel=1e-14)
+    with instance(fmu) as one:
+        with pytest.raises(FMICallException):
+            one.start({"b": 1e300})
+        told = " ".join(text for _, _, text in one.log)
+    assert "derivative of 1e+300" in told
+    assert "choose larger units" in told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from lagfmu.errors import ModelError, SimulationError
 from lagfmu.fmu.closed_forms import carried
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
-from lagfmu.model.file import load
+from lagfmu.model.file import load as read_file
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress.lagrange import lagrange
 from lagfmu.verification.verify import check_closed_form
@@ -44,6 +45,8 @@ FILES = {
     "SlippingSphere": "rolling_sphere",
 }
 Build = Callable[..., Path]
+
+load = cache(read_file)
 
 
 @pytest.fixture(scope="module")

@@ -112,6 +112,18 @@ def test_a_refused_value_is_told_and_the_curves_stay(opened: Opened) -> None:
     page.until(f"{status}.startsWith('Run to 2 s')")
 
 
+def test_bounces_are_told_with_time_and_impulse(opened: Opened) -> None:
+    """A ball that falls 1 m strikes the floor at 0.4515 s with m sqrt(2 g h) (1 + e) = 7.53 N s: the FMU says
+    so, and the page shows what it says."""
+    page = opened("BouncingBall")
+    page.until("lagfmu.runs")
+    first = page.tab.locator("#log li").all_text_contents()[0]
+    words = first.replace(",", "").split()
+    assert first.startswith("contact floor was struck at t = ")
+    assert float(words[7]) == pytest.approx((2 / 9.81) ** 0.5, rel=1e-8)
+    assert float(words[10]) == pytest.approx((2 * 9.81) ** 0.5 * 1.7, rel=1e-8)
+
+
 def test_a_departure_that_has_not_been_has_no_time(opened: Opened) -> None:
     """Before 1.641 s the particle is on the hemisphere: among all values its departure is none yet."""
     page = opened("Hemisphere")
@@ -183,6 +195,17 @@ def test_a_slider_has_the_bounds_and_the_unit_of_its_variable(opened: Opened) ->
     page.tab.locator("#dials input[type=number][aria-label^='y, as a number']").fill("0.5")
     page.until(f"lagfmu.runs > {before}")
     assert page.tab.evaluate("() => lagfmu.shown().values.y[0]") == 0.5
+
+
+def test_a_start_value_that_is_moved_says_so(opened: Opened) -> None:
+    """A bob that is put at x = 0.6 m hangs on a rod of 1 m: y becomes -0.8 m, whatever its slider says."""
+    page = opened("PendulumCartesian")
+    page.until("lagfmu.runs")
+    told = page.tab.locator(".dial:has(input[data-name='y']) .moved")
+    assert told.inner_text() == ""
+    page.slide("x", 0.6)
+    assert told.inner_text() == "the constraints make it -0.8 m"
+    assert page.tab.locator(".dial:has(input[data-name='x']) .moved").inner_text() == ""
 
 
 def test_another_method_is_another_run(opened: Opened) -> None:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu.cli import app
-from lagfmu.errors import SimulationError
+from lagfmu.errors import LagfmuError, SimulationError
 from lagfmu.fmu.archive import version
 from lagfmu.fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, Session, plug
 from lagfmu.study.sweep import engine
@@ -464,6 +465,115 @@ def test_the_client_never_loads_the_binary(hemisphere):
     if not Path("/proc/self/maps").exists():
         pytest.skip("no /proc on this machine")
     subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
+
+
+OTHER = """
+import math
+from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
+
+class Decay(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.k, self.u, self.x = 1.0, 0.0, 1.0
+        fixed = Fmi2Variability.fixed
+        self.register_variable(Real("k", causality=Fmi2Causality.parameter, variability=fixed))
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("x", causality=Fmi2Causality.output, initial=Fmi2Initial.exact))
+
+    def do_step(self, t, h):
+        self.x = self.x * math.exp(-self.k * h) + self.u * h
+        return self.k > 0
+"""
+
+
+@pytest.fixture(scope="module")
+def decay(tmp_path_factory) -> Path:
+    """An FMU that pythonfmu built, without lagfmu: x' = -k x + u."""
+    from pythonfmu import FmuBuilder
+
+    folder = tmp_path_factory.mktemp("other")
+    (folder / "decay.py").write_text(OTHER)
+    return Path(FmuBuilder.build_FMU(folder / "decay.py", dest=folder))
+
+
+def test_an_fmu_of_another_tool_is_swept_as_well(decay, tmp_path):
+    """x = exp(-k t), kept without being asked for, since there is no multiplier; what it refuses is a row;
+    the input of a table drives it."""
+    found = lagfmu.sweep(decay, {"k": [0.5, -1.0, 2.0]}, stop_time=1.0, step_size=0.1)
+    assert found["x:last"].values[[0, 2]] == pytest.approx(np.exp([-0.5, -2.0]), rel=1e-12)
+    assert found.status.values.tolist() == ["ok", "discard", "ok"]
+    inputs = np.zeros(2, dtype=[("time", float), ("u", float)])
+    inputs["time"], inputs["u"] = [0, 1], 1.0
+    driven = lagfmu.sweep(decay, {"k": [1e-9]}, stop_time=1.0, step_size=0.1, inputs=inputs)
+    assert driven["x:last"].values == pytest.approx(2.0)
+
+
+THREE = b"""<fmiModelDescription fmiVersion="3.0" modelName="Three" instantiationToken="1">
+<CoSimulation modelIdentifier="Three"/><ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+</ModelVariables><ModelStructure/></fmiModelDescription>"""
+
+
+@pytest.mark.parametrize(
+    ("change", "gone", "message"),
+    [
+        (lambda text: THREE, "", "is an FMU of FMI 3.0: a sweep drives FMI 2.0"),
+        (lambda text: text.replace(b"CoSimulation", b"Other"), "", "has no co-simulation"),
+        (lambda text: text, "binaries/", "has no binary for this machine"),
+    ],
+)
+def test_an_fmu_that_cannot_be_swept_is_refused_by_name(decay, tmp_path, change, gone, message):
+    """Another version of FMI, model exchange alone, no binary: said before anything is run."""
+    path = tmp_path / "odd.fmu"
+    with zipfile.ZipFile(decay) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "modelDescription.xml":
+                content = change(content)
+            if not (gone and name.startswith(gone)):
+                new.writestr(name, content)
+    with pytest.raises(LagfmuError, match=message) as told:
+        lagfmu.sweep(path, {"k": [1.0]})
+    assert "odd.fmu" in str(told.value)
+
+
+@pytest.mark.parametrize("command", [["sweep", "--vary", "k=1,2"], ["simulate"], ["verify"]])
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,u\n0,1\n1,2\n", "there is no column 'time', found t, u"),
+        ("time,u\n0,1\n2,1\n1,1\n", "the times are not sorted, expected rising seconds"),
+        ("time,u\n0,1\n1,one\n", "row 2 is '1,one'"),
+        ("time,u,u\n0,1,2\n1,1,2\n", "u stands in two columns"),
+        ("time,v\n0,1\n1,2\n", "'v' is no input, expected one of u"),
+        ("", "is no table"),
+        (None, "cannot be read: No such file"),
+    ],
+)
+def test_a_bad_table_of_inputs_is_told_by_every_command(decay, tmp_path, command, text, message):
+    """As wrong usage, with what was found and what was expected."""
+    table = tmp_path / "in.csv"
+    if text is not None:
+        table.write_text(text)
+    name, *options = command
+    words = [name, str(decay), *options, "--input", str(table), "--stop-time", "1"]
+    if name == "verify":  # an FMU of another tool is held against a reference
+        (tmp_path / "ref.csv").write_text("time,x\n0,1\n")
+        words += ["--reference", str(tmp_path / "ref.csv")]
+    done = CliRunner().invoke(app, words)
+    assert message in " ".join(done.output.split())
+    assert done.exit_code == 2
+
+
+def test_a_folder_of_something_else_is_left_alone(decay, tmp_path):
+    """What lies where the finished chunks would go is no sweep's: nothing is touched."""
+    parts = tmp_path / "runs.parquet.parts"
+    parts.mkdir()
+    (parts / "letter.txt").write_text("dear")
+    for options in ({}, {"resume": True}):
+        with pytest.raises(SimulationError, match="is not the folder of a sweep"):
+            lagfmu.sweep(decay, {"k": [1.0]}, out=tmp_path / "runs.parquet", **options)
+    assert (parts / "letter.txt").read_text() == "dear"
 
 
 @contextlib.contextmanager

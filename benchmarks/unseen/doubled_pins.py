@@ -7,7 +7,7 @@ by a torque. Conserved: the energy but for the torque's work.
 
 from math import atan2
 
-from sympy import cos, sin, symbols
+from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import ClosedForm, Conserved, Holonomic, Input, Model, Parameter, Scene, output
@@ -76,7 +76,8 @@ closed_forms = [
         "each pin carries half",
         output("lambda.leftx"),
         actual=output("lambda.rightx"),
-        scale=rho * g * l2 + output("lambda.leftx"),
+        scale=sum(output(f"lambda.{n}{a}") ** 2 for n in ("crank", "coupler", "left") for a in "xy")
+        ** Rational(1, 2),
     ),
     Conserved(
         "energy but for the torque's work",

@@ -40,7 +40,7 @@ scenes = [Scene("Trammel", stop_time=3.0, step_size=0.01)]
 fall = -3 * g / (2 * l) * cos(theta)  # theta''
 bend = l / 2 * theta.diff() ** 2
 closed_forms = [
-    ClosedForm("der(theta,2)", fall, scale=g / l),
+    ClosedForm("der(theta,2)", fall, scale=g / l + theta.diff() ** 2),
     ClosedForm("Q.x", -m * (l / 2 * sin(theta) * fall + bend * cos(theta)), scale=m * (g + bend)),
     ClosedForm("Q.y", m * (g + l / 2 * cos(theta) * fall - bend * sin(theta)), scale=m * (g + bend)),
     Conserved("energy", output("energy.total"), scale=m * g * l),

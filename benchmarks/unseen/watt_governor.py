@@ -65,5 +65,4 @@ def momentum(of):
 closed_forms = [
     ClosedForm("angular momentum", momentum(initial) + tau * t, actual=momentum(lambda state: state)),
     Conserved("energy but for the torque's work", output("energy.total") - tau * phi),
-    ClosedForm("the balls are opposite", 0, actual=x1 + x2, scale=l),
 ]  # fmt: skip

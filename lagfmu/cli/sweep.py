@@ -26,7 +26,9 @@ from .terminal import console, new_table, plainly, print_whole
 SHOWN = 5  # reasons in the summary
 FEW = 20  # runs that are shown each by itself
 BROAD = 14  # letters of a name in a heading; a longer one is broken at its dots
-QUIET = 5.0  # [s] between two lines of progress where there is no terminal
+QUIET = (
+    5.0  # [s] at least, and a hundredth of the runs, between lines of progress without a terminal
+)
 NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
@@ -154,18 +156,18 @@ def _told(out: Path | None) -> Iterator[Callable[[int, int, int], None]]:
         TextColumn("{task.fields[refused]}"),
     )
     shown = console.is_terminal
-    latest = time.monotonic()
+    latest, told = time.monotonic(), 0
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
         task = progress.add_task("runs", total=None, rate="", refused="")
 
         def tell(done: int, total: int, refused: int) -> None:
-            nonlocal latest
+            nonlocal latest, told
             spent = progress.tasks[0].elapsed or 0.0
             rate = f"{done / spent:.3g}/s" if spent > 0 else ""
             more = f"{refused} refused" if refused else ""
             progress.update(task, completed=done, total=total, rate=rate, refused=more)
-            if not shown and time.monotonic() - latest > QUIET:
-                latest = time.monotonic()
+            if not shown and time.monotonic() - latest > QUIET and done >= told + 0.01 * total:
+                latest, told = time.monotonic(), done
                 console.print(f"{done} of {total} runs {more}".rstrip(), highlight=False)
 
         try:

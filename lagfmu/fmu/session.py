@@ -159,7 +159,8 @@ class Session:
                 modelIdentifier=self.plug.identifier,
                 unzipDirectory=self.plug.folder,
             )
-            self.slave.instantiate(callbacks=callbacks, loggingOn=True)
+            ours = hasattr(self.slave.dll, "lagfmu_batch")  # it gives its reasons unasked
+            self.slave.instantiate(callbacks=callbacks, loggingOn=not ours)
         except Exception as error:
             told = reason() if MESSAGES else str(error)
             raise RefusalError("instantiate", 3, told) from None

@@ -454,6 +454,14 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def _report_events(self, before: State, after: State) -> None:
         for c, k in enumerate(self.system.contacts):
             name, latest = self.system.rows[k].name, after.departures[c]
+            struck = after.hits[c] - before.hits[c]
+            if struck:
+                told = (
+                    f"contact {name} was struck at t = {after.hit_times[c]!r} s, impulse "
+                    f"{after.impulses[c]!r} (of its lambda times s)"
+                )
+                told += f", the latest of {struck}" if struck > 1 else ""
+                self.log(told, Fmi2Status.ok, "logEvents")
             if latest.count != before.departures[c].count:
                 self.log(
                     f"contact {name} opened at t = {latest.time!r} s", Fmi2Status.ok, "logEvents"

@@ -41,7 +41,7 @@ def complementary_modes(
     def change(modes: Sequence[bool]) -> int | None:
         """The contact whose mode contradicts the accelerations most; None if none does."""
         now = motion(at, q, v, system.active(modes))
-        size = _force_scale(now)
+        size = _force_scale(now, at)
         mass = now.M.diagonal()
         forces = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
         free = np.maximum(np.abs(now.vdot), forces / np.where(mass > 0, mass, np.inf))
@@ -96,9 +96,18 @@ def low(
     return found
 
 
-def _force_scale(now: Motion) -> Vector:
-    """For each row the multiplier that would carry all forces alone, those of constraint included."""
+def _force_scale(now: Motion, at: Instant) -> Vector:
+    """For each row the multiplier that would carry all forces alone, those of constraint included.
+
+    Raises StepFailureError where a double does not hold it.
+    """
     G = np.abs(now.G)
     square = np.einsum("ij,ij->i", G, G)
+    for k in at.system.contacts:
+        if not np.isfinite(square[k]):
+            raise StepFailureError(
+                f"contact {at.system.rows[k].name!r} has a derivative of {G[k].max():.3g}, whose square is "
+                "beyond a double: choose larger units"
+            )
     forces = np.abs(now.F) + G.T @ np.abs(now.lam)
     return np.asarray((G @ forces) / np.where(square > 0, square, 1.0))

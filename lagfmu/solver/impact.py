@@ -183,13 +183,13 @@ def impacts(
     touching: Collection[int],
     slow: Vector,
     rub: Rub | None = None,
-) -> tuple[Vector, frozenset[int]]:
-    """All impacts of an instant: velocities (n) after them, and the contacts that were struck.
+) -> tuple[Vector, dict[int, float]]:
+    """All impacts of an instant: velocities (n) after them, and the impulse on each contact that was struck.
 
     `touching` are those that an impact can reach.  One that separates takes no part; if it is driven back,
     that is the next impact.  `slow` (m): speeds that count as none.
     """
-    struck: set[int] = set()
+    struck: dict[int, float] = {}
     for count in range(IMPACT_ROUNDS):
         _, _, G, nu, _ = at.evaluate(q, v)
         speed = {c: (G @ v - nu)[k] for c, k in enumerate(at.system.contacts) if c in touching}
@@ -200,8 +200,10 @@ def impacts(
         entering = [c for c, s in speed.items() if s <= limit[c] or plastic]
         found = impact(at, q, v, entering, plastic, rub)
         v = found.v
-        struck |= {c for c in entering if found.Lambda[at.system.contacts[c]] > 0}
-    return v, frozenset(struck)
+        for c in entering:
+            if (push := float(found.Lambda[at.system.contacts[c]])) > 0:
+                struck[c] = struck.get(c, 0.0) + push
+    return v, struck
 
 
 def check_restitution(system: System, p: Sequence[float]) -> None:

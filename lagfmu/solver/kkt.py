@@ -12,13 +12,18 @@ from .schur import mass_factor
 from .solution import Solution
 from .system import Matrix, Vector
 
+REGULAR = 1e-14  # reciprocal condition above which the matrix is not singular
+
 
 def kkt(M: Matrix, b: Vector, G: Matrix, c: Vector, least: float = 0.0) -> Solution | None:
     """None where the matrix is singular to working precision, or its reciprocal condition below `least`.
 
     Where it is, though it may be the masses alone that are, it is scaled from masses of 1 on: then no unit of
-    mass counts beside the constraints, but masses that differ much cost digits.
+    mass counts beside the constraints, but masses that differ much cost digits.  From masses of 1 on also off
+    the constraints, where `least` asks how nearly rows depend on each other.
     """
+    if least > 0 and mass_factor(M) is not None:
+        return _kkt(M, b, G, c, least, to_masses=True)
     found = _kkt(M, b, G, c, least, to_masses=False)
     if found is None and mass_factor(M) is None:
         found = _kkt(M, b, G, c, least, to_masses=True)
@@ -53,7 +58,7 @@ def _kkt(
     if info != 0:
         return None
     rcond, _ = lapack.dgecon(lu, np.abs(A).sum(axis=0).max())
-    if rcond < max(1e-14, least):
+    if rcond < max(REGULAR, least):
         return None
     right = np.concatenate([b, c]) * d
     z = lapack.dgetrs(lu, pivots, right)[0]

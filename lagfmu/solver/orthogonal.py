@@ -14,7 +14,7 @@ from .failure import MasslessError, StepFailureError
 from .schur import half_solve, mass_factor
 from .solution import Solution, loose
 from .system import Matrix, Vector
-from .thresholds import CONSISTENT, ON_CONSTRAINTS, RANK, VANISHES
+from .thresholds import CONSISTENT, HIDDEN, ON_CONSTRAINTS, RANK, VANISHES
 
 
 def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: float) -> Solution:
@@ -29,6 +29,12 @@ def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: f
     W = W / r
     U, sigma, Vt = np.linalg.svd(W, full_matrices=True)
     rank = int((sigma > max(RANK, loose(off))).sum())
+    part = np.abs(W).max(axis=1, initial=0.0)
+    if rank < len(c) and ((part > 0) & (part < HIDDEN)).any():
+        # light coordinates hide what the others are held by; in the KKT matrix they do not
+        _, _, sizes, _ = _scaled(M, G)
+        if (sizes > max(RANK, loose(off)) * sizes[0]).sum() > len(b) + rank:
+            return _least_norm(M, b, G, c, nearest, off)
     null = Vt[rank:]
 
     def substitute(b: Vector, c: Vector) -> tuple[Vector, Vector, Vector]:
@@ -60,12 +66,18 @@ def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: f
     return Solution(x, lam, unique)
 
 
-def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: float) -> Solution:
-    """Dependent constraints and a massless coordinate together: the KKT matrix's least norm."""
-    n, m = len(b), len(c)
+def _scaled(M: Matrix, G: Matrix) -> tuple[Vector, Matrix, Vector, Matrix]:
+    """1 / sqrt of the largest element of each row of the KKT matrix, and its singular values so scaled."""
+    m = len(G)
     K = np.block([[M, G.T], [G, np.zeros((m, m))]])
     d = 1 / np.sqrt(np.maximum(np.abs(K).max(axis=1), np.finfo(float).tiny))
-    U, sigma, Vt = np.linalg.svd(K * d * d[:, None])
+    return d, *np.linalg.svd(K * d * d[:, None])
+
+
+def _least_norm(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: float) -> Solution:
+    """Dependent constraints and a massless coordinate together: the KKT matrix's least norm."""
+    n = len(b)
+    d, U, sigma, Vt = _scaled(M, G)
     keep = sigma > max(RANK, loose(off)) * sigma[0]
     null = Vt[~keep]
     if not nearest and len(null) and np.abs(null[:, :n]).max() > VANISHES:

@@ -35,6 +35,7 @@ def restored(system: System, text: Any) -> State:
     n, contacts = system.n, len(system.contacts)
     lengths = {"q": n, "v": n, "size": n, "scale": 2 * n, "offset": system.m}
     lengths |= dict.fromkeys(("closed", "armed", "gap", "departures"), contacts)
+    lengths |= dict.fromkeys(("hits", "hit_times", "impulses"), contacts)
     lengths |= {"levels": len(system.floors), "local": 4}
     lengths |= dict.fromkeys(("slides", "slippings"), len(system.frictions))
     for name, length in lengths.items():

@@ -67,6 +67,7 @@ class State:
     natural rate at the start; choice: what `auto` remembers; levels: those of jumps (jumps.py);
     slides, slippings: one entry a friction, how it stands and its latest start of slipping; dissipated
     [J]: by frictions and impacts so far; strikes: contacts that were struck so far;
+    hits, hit_times [s], impulses [of lambda times s]: one entry a contact, how often, when last, how hard;
     local: with error bars, of the local errors of explicit and of implicit steps the sums, then the largest
     of each (bars.py).
     """
@@ -90,6 +91,9 @@ class State:
     slippings: tuple[Departure, ...] = ()
     dissipated: float = 0.0
     strikes: int = 0
+    hits: tuple[int, ...] = ()
+    hit_times: tuple[float, ...] = ()
+    impulses: tuple[float, ...] = ()
     local: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     levels: tuple[float, ...] = ()
 

@@ -78,7 +78,7 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list
     f = at.residual(q)[list(system.contacts)]
     near = {c for c, shut in enumerate(closed) if shut or c in landing or abs(f[c]) <= state.gap[c]}
     slow = _slow(at, q, v, state)
-    struck: Collection[int] = ()
+    struck: dict[int, float] = {}
     if landing:
         v, struck = impacts(at, q, v, near, slow, at_slides.rubbed if system.frictions else None)
     bounced = {*struck, *landing}
@@ -119,6 +119,9 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list
         offset=tuple(offset.tolist()),
         departures=tuple(departures),
         strikes=state.strikes + len(bounced),
+        hits=tuple(k + (c in struck) for c, k in enumerate(state.hits)),
+        hit_times=tuple(t if c in struck else x for c, x in enumerate(state.hit_times)),
+        impulses=tuple(struck.get(c, x) for c, x in enumerate(state.impulses)),
     )
 
 

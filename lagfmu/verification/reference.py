@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SettingError, SimulationError
+from ..errors import SettingError
 from .simulate import Trajectory
 from .verify import Check
 
@@ -66,35 +66,37 @@ def at(result: Trajectory, name: str, times: NDArray[np.float64]) -> NDArray[np.
 
 
 def read_table(path: Path) -> Trajectory:
-    """A CSV file with a column `time` [s].  Raises SimulationError with what is wrong with it."""
+    """A CSV file with a column `time` [s].  Raises SettingError with what is wrong with it."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             head, *rows = [row for row in csv.reader(file, skipinitialspace=True) if row]
     except OSError as error:
-        raise SimulationError(f"{str(path)!r} cannot be read: {error.strerror or error}") from None
+        raise SettingError(f"{str(path)!r} cannot be read: {error.strerror or error}") from None
     except (ValueError, csv.Error):
-        raise SimulationError(
+        raise SettingError(
             f"{str(path)!r} is no table: expected names, and rows of numbers"
         ) from None
     names = [n.strip() for n in head]
-    table = np.zeros(len(rows), dtype=[(n, float) for n in dict.fromkeys(names)])
+    if twice := sorted({n for n in names if names.count(n) > 1}):
+        raise SettingError(f"{str(path)!r}: {', '.join(twice)} stands in two columns")
+    table = np.zeros(len(rows), dtype=[(n, float) for n in names])
     for k, row in enumerate(rows):
         try:
             for name, cell in zip(names, row, strict=True):
                 table[name][k] = float(TRUTH.get(cell.strip(), cell))
         except ValueError:
-            raise SimulationError(
+            raise SettingError(
                 f"{str(path)!r} is no table of numbers: row {k + 1} is {','.join(row)!r}"
             ) from None
     if "time" not in names:
-        raise SimulationError(
+        raise SettingError(
             f"{str(path)!r}: there is no column 'time', found {', '.join(names) or 'nothing'}"
         )
     if not rows:
-        raise SimulationError(f"{str(path)!r} has no rows")
+        raise SettingError(f"{str(path)!r} has no rows")
     bad = [n for n in names if not np.isfinite(table[n]).all()]
     if bad:
-        raise SimulationError(f"{str(path)!r}: {', '.join(bad)} holds what is no finite number")
+        raise SettingError(f"{str(path)!r}: {', '.join(bad)} holds what is no finite number")
     if not (np.diff(table["time"]) >= 0).all():
-        raise SimulationError(f"{str(path)!r}: the times are not sorted, expected rising seconds")
+        raise SettingError(f"{str(path)!r}: the times are not sorted, expected rising seconds")
     return table

@@ -7,7 +7,7 @@ import os
 import re
 import warnings
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,7 @@ def simulate(
     if isinstance(target, Prepared) and error_bars and not target.asked.error_bars:
         target = prepare(target.model, replace(target.asked, error_bars=True))
     if isinstance(target, Prepared):
+        check_inputs(inputs, target.table.variables)
         table = _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
         every = target.table.variables
         units = {v.name: v.unit.name for v in every if v.unit is not None}
@@ -92,9 +93,35 @@ def simulate(
             f"{str(path)!r} was built without error bars: build it with Scene(error_bars=True), or with "
             "lagfmu build --error-bars"
         )
+    check_inputs(inputs, description.modelVariables)
     table = _simulate_fmu(path, stop_time, step_size, tolerance, values, inputs, besides)
     units = {v.name: v.unit for v in description.modelVariables if v.unit}
     return Result(table, units, description.modelName)
+
+
+def missing(name: str, known: Iterable[str], what: str = "is not in the FMU") -> str:
+    """What to say of a name that the FMU does not have."""
+    known = list(known)
+    near = difflib.get_close_matches(name, known, 1)
+    if near:
+        return f"{name!r} {what}; did you mean {near[0]!r}?"
+    return f"{name!r} {what}, expected one of {', '.join(known) or 'none'}"
+
+
+def check_inputs(inputs: Trajectory | None, variables: Sequence[Any]) -> None:
+    """A table of inputs, if there is one, has rising times and columns that are inputs of these variables, a
+    table's or fmpy's.  Raises SettingError."""
+    if inputs is None:
+        return
+    found = inputs.dtype.names or ()
+    known = [v.name for v in variables if v.causality == "input"]
+    problems = [missing(n, known, "is no input") for n in found if n != "time" and n not in known]
+    if "time" not in found:
+        problems.append("there is no column 'time'")
+    elif not (np.isfinite(inputs["time"]).all() and (np.diff(inputs["time"]) >= 0).all()):
+        problems.append("the times are not sorted, expected rising seconds")
+    if problems:
+        raise SettingError(f"inputs: {'; '.join(problems)}")
 
 
 def has_error_bars(variables: Sequence[Any]) -> bool:

@@ -6,8 +6,9 @@ import math
 import os
 import time
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -207,7 +208,7 @@ def closed_forms_in(path: Path) -> list[CarriedForm]:
             if RECORD not in archive.namelist():
                 raise VerificationError(
                     f"{str(path)!r} carries no closed forms ({RECORD} is missing): it was not built "
-                    "by lagfmu, and there is nothing to hold it against"
+                    "by lagfmu, and there is nothing to hold it against: give it a --reference"
                 )
             closed_forms = unpack_closed_forms(_record(archive), str(path))
     except (zipfile.BadZipFile, OSError) as error:
@@ -385,6 +386,15 @@ def evaluate(
                 f"closed form {name!r} uses {text!r}, which is no output or parameter of the FMU"
             )
         columns.append(np.asarray(column, dtype=float))
-    function = sp.lambdify(symbols, expression, modules=["scipy", "numpy"], dummify=True)
+    function = _function(tuple(symbols), expression)
     with np.errstate(all="ignore"):
         return np.broadcast_to(np.asarray(function(*columns), dtype=float), len(rows)).copy()
+
+
+@lru_cache(maxsize=1024)
+def _function(symbols: tuple[Expr, ...], expression: Expr) -> Callable[..., Any]:
+    """The numeric function of an expression, which takes SymPy much longer than the run that it is for."""
+    function: Callable[..., Any] = sp.lambdify(
+        symbols, expression, modules=["scipy", "numpy"], dummify=True
+    )
+    return function

@@ -13,13 +13,13 @@ const picture = FACTS.picture ? new Picture(byId("picture"), FACTS.picture) : nu
 const player = new Player((t) => showTime(t));
 const charts = new Charts(byId("charts"), byId("chart-choices"), (t) => player.seek(t));
 const accuracy = new Accuracy(settings, changed);
-const showDials = buildDials(byId("dials"), settings, changed);
+const dials = buildDials(byId("dials"), settings, changed);
 const measureLater = calmly(() => accuracy.measure(), 250);
 const tellLater = calmly(tell, 400);
 const describeLater = calmly(describe, 300);
 
 function showAll() {
-  showDials();
+  dials.show();
   accuracy.show();
   byId("stop-time").value = settings.stopTime;
   byId("step-size").value = settings.stepSize;
@@ -70,6 +70,7 @@ function show() {
   charts.show(trajectory);
   if (picture) picture.show(trajectory);
   player.setEnd(trajectory.end, settings.stepSize);
+  dials.tell(trajectory);
   showEvents(trajectory.events);
   showLog(trajectory.log);
 }
@@ -89,9 +90,12 @@ function showEvents(events) {
 }
 
 function showLog(log) {
-  const said = log.filter((m) => m.status !== "ok");
-  byId("log").replaceChildren(...said.map((m) => element("li", {}, `${m.status}: ${m.message}`)));
-  byId("log-box").hidden = !said.length;
+  const items = log
+    .slice(0, MOST_EVENTS)
+    .map((m) => element("li", {}, m.status === "ok" ? m.message : `${m.status}: ${m.message}`));
+  if (log.length > MOST_EVENTS) items.push(element("li", {}, `and ${log.length - MOST_EVENTS} more`));
+  byId("log").replaceChildren(...items);
+  byId("log-box").hidden = !log.length;
 }
 
 function showTime(t) {

@@ -20,9 +20,11 @@
 #include "leg.h"
 #include "magnitudes.h"
 #include "parts.h"
+#include "schur.h"
 
 static const double GAIN = 3;     /* of the stabilization, in units of the motion's natural rate */
 static const double SHORT = 1e-2; /* natural time in which a contact closes what drift has opened */
+static const double CLOSE = 10;   /* condition of rows that stand for all, beyond which they are chosen anew */
 static const double LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
 
 void exchange_set_time(Instance *x, double t) {
@@ -209,6 +211,11 @@ static Status find_happened(Instance *x, int *any) {
     return OK;
 }
 
+/* The rows that stand for all others are about to depend on each other. */
+static int are_close(const Linear *l) {
+    return l->rung != RUNG_SCHUR || schur_of(l)->condition > CLOSE;
+}
+
 Status exchange_step_done(Instance *x, int *event) {
     Solver *s = &x->solver;
     double worst;
@@ -216,8 +223,7 @@ Status exchange_step_done(Instance *x, int *event) {
     *event = jumps_stale(s, leg_instant(s, s->state.now.t), s->state.q);
     if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
-    if (s->state.now.dependent && s->stepped.linear.rung != RUNG_SCHUR && choose_rows(x) != OK)
-        return FAILED; /* the rows that stood for all are about to depend on each other */
+    if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
     if (!any && s->system->frictions > 0) {
         double *y = s->work_advance;

@@ -136,6 +136,11 @@ const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return fmi2Version; }
 
+static void listen(Component *c, unsigned categories) {
+    c->logging = categories;
+    c->instance.quiet = !(categories & (1u << EVENTS | 1u << ALL));
+}
+
 static int category_of(const char *name) {
     for (int k = 0; name != NULL && k < CATEGORY_COUNT; k++)
         if (strcmp(name, CATEGORIES[k]) == 0) return k;
@@ -158,7 +163,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, s
         }
         chosen |= 1u << found;
     }
-    c->logging = loggingOn ? chosen : c->logging & ~(chosen | 1u << ALL); /* only those (2.1.5) */
+    listen(c, loggingOn ? chosen : c->logging & ~(chosen | 1u << ALL)); /* only those (2.1.5) */
     return fmi2OK;
 }
 
@@ -226,7 +231,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     instance_layout(&c->instance, &arena);
     c->callbacks = callbacks;
     c->name = name;
-    c->logging = loggingOn ? ~0u : 0u;
+    listen(c, loggingOn ? ~0u : 0u);
     c->instance.tell = told;
     c->instance.context = c;
     c->instance.exchange = fmuType == fmi2ModelExchange;

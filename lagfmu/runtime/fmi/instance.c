@@ -445,10 +445,23 @@ static void move_inputs(Instance *x, double t) {
     drive->since = t;
 }
 
+static void report_strike(Instance *x, int c, const char *name) {
+    const Solver *s = &x->solver;
+    char latest[32] = "";
+    if (s->strikes[c] > 1)
+        (void)snprintf(latest, sizeof latest, ", the latest of %d", s->strikes[c]);
+    (void)snprintf(x->note, sizeof x->note,
+                   "contact %s was struck at t = %s s, impulse %s (of its lambda times s)%s", name,
+                   digits(s->struck_at[c]).text, digits(s->impulse[c]).text, latest);
+    x->tell(x->context, NOTE_EVENT, x->note);
+}
+
 static void report_events(Instance *x) {
     const State *now = &x->solver.state;
+    if (x->quiet) return;
     for (int c = 0; c < x->solver.system->contacts; c++) {
         const char *name = x->solver.system->rows[x->solver.system->contact[c]].name;
+        if (x->solver.strikes[c] > 0) report_strike(x, c, name);
         if (now->count[c] != x->count[c])
             (void)snprintf(x->note, sizeof x->note, "contact %s opened at t = %s s", name,
                            digits(now->departure_time[c]).text);
@@ -476,6 +489,7 @@ static void note_modes(Instance *x) {
     const size_t size = (size_t)s->contacts * sizeof *x->closed;
     memcpy(x->closed, x->solver.state.closed, size);
     memcpy(x->count, x->solver.state.count, size);
+    memset(x->solver.strikes, 0, size);
     for (int i = 0; i < s->frictions; i++) {
         x->stuck[i] = x->solver.state.slide[i].sticks;
         x->slips[i] = x->solver.state.slip_count[i];

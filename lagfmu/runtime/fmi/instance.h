@@ -44,6 +44,7 @@ typedef struct Instance {
     size_t saved_size;
     Tell tell;
     void *context;          /* of tell() */
+    int quiet;              /* 1: nobody listens to NOTE_EVENT, and no text need be made */
     char note[512];
 } Instance;
 

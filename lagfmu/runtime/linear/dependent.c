@@ -25,9 +25,21 @@ static int factor_nullspace(Linear *l) {
     return 1;
 }
 
+/* In the metric of M light coordinates hide what the others are held by; in the KKT matrix they do not. */
 static Status factor(Linear *l) {
+    int doubtful;
     l->rung = RUNG_ORTHOGONAL;
-    if (orthogonal_factor(l)) return OK;
+    if (orthogonal_factor(l, &doubtful)) {
+        if (!doubtful) return OK;
+        const int rank = l->system->n + *l->pivots;
+        for (int k = 0; k < l->system->m; k++) l->unique[k] = 1;
+        l->rung = RUNG_LEAST_NORM;
+        if (least_norm_factor(l) == OK && *l->pivots > rank) return OK;
+        for (int k = 0; k < l->system->m; k++) l->unique[k] = 1;
+        l->rung = RUNG_ORTHOGONAL;
+        (void)orthogonal_factor(l, &doubtful);
+        return OK;
+    }
     l->rung = RUNG_LEAST_NORM;
     return least_norm_factor(l);
 }

@@ -138,8 +138,10 @@ static int factor(Linear *l, double least, int to_masses) {
 }
 
 /* As it is; and where that is singular though it may be the masses alone that are, from masses of 1 on: then
- * no unit of mass counts beside the constraints, but masses that differ much cost digits. */
+ * no unit of mass counts beside the constraints, but masses that differ much cost digits.  From masses of 1 on
+ * also off the constraints, where it is asked how nearly rows depend on each other. */
 int kkt_factor(Linear *l, double least) {
+    if (least > 0 && schur_of(l)->definite) return factor(l, least, 1);
     return factor(l, least, 0) || (!schur_of(l)->definite && factor(l, least, 1));
 }
 

@@ -12,9 +12,10 @@
 #include "weighted.h"
 
 
-int orthogonal_factor(Linear *l) {
+int orthogonal_factor(Linear *l, int *doubtful) {
     Weighted w;
     if (!weighted_factor(l, linear_rank_threshold(l), &w)) return 0;
+    *doubtful = w.cod.rank < w.acting && weighted_hides(&w);
     for (int j = w.cod.rank; j < w.acting; j++) {
         for (int i = 0; i < w.acting; i++) w.w[i] = i == j;
         cod_from_rows(&w.cod, w.w, w.spare);

@@ -13,6 +13,7 @@
 #include <math.h>
 
 #include "schur.h"
+#include "thresholds.h"
 
 size_t weighted_doubles(int n, int m) {
     return cod_doubles(n, m) + (size_t)n + 3 * (size_t)m;
@@ -43,6 +44,7 @@ int weighted_factor(Linear *l, double threshold, Weighted *w) {
     *w = weighted_view(l);
     const Schur *own = schur_of(l);
     int n = l->system->n;
+    for (int i = 0; i < n; i++) w->y[i] = 0;
     for (int j = 0; j < w->acting; j++) {
         int k = w->rows[j];
         double *column = w->cod.A + j * n;
@@ -51,11 +53,18 @@ int weighted_factor(Linear *l, double threshold, Weighted *w) {
         for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++) {
             int i = own->w_column[a];
             column[i] = own->w[a] * sqrt(own->inverse_mass[i]) / w->size[j];
+            w->y[i] = fmax(w->y[i], fabs(column[i]));
         }
     }
     cod_factor(&w->cod, threshold);
     *w->rank = w->cod.rank;
     return 1;
+}
+
+int weighted_hides(const Weighted *w) {
+    for (int i = 0; i < w->cod.rows; i++)
+        if (w->y[i] > 0 && w->y[i] < HIDDEN) return 1;
+    return 0;
 }
 
 void weighted_to(const Linear *l, const Weighted *w, const double *b, double *y) {

@@ -24,6 +24,10 @@ int weighted_ints(int n, int m);
  * definite. */
 int weighted_factor(Linear *l, double threshold, Weighted *w);
 
+/* 1: a coordinate has next to no part in the columns, so heavy is it beside others.  To be asked right after
+ * weighted_factor(). */
+int weighted_hides(const Weighted *w);
+
 /* The decomposition that weighted_factor() left. */
 Weighted weighted_view(const Linear *l);
 

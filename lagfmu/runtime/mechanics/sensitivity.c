@@ -63,7 +63,15 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
         if (!isfinite(w->c[k]))
             return fail(b->why, "the derivative of constraint %s is not finite at t = %.17g s",
                         s->rows[k].name, at.t);
-    return linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda);
+    if (linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda) == OK) return OK;
+    for (int k = 0; k < s->m; k++)
+        if (!b->linear.unique[k])
+            return fail(b->why,
+                        "no accelerations satisfy all constraints beside this state along this direction: "
+                        "'%s' follows from others on the constraints alone, and has derivatives only "
+                        "along them",
+                        s->rows[k].name);
+    return FAILED;
 }
 
 void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,

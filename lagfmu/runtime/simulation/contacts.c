@@ -8,6 +8,7 @@
  * closed, the worst first, until none is left. */
 #include "contacts.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "digits.h"
@@ -23,12 +24,22 @@ static void forces_at_work(const Mechanism *b, double *forces) {
         forces[s->entry_column[e]] += fabs(b->G[e] * b->lambda[s->entry_row[e]]);
 }
 
-/* The multiplier with which row k would carry all forces alone. */
-static double force_scale(const Mechanism *b, int k, const double *forces) {
+/* The multiplier with which row k would carry all forces alone.  FAILED: a double does not hold it. */
+static Status find_force_scale(Solver *solver, int k, const double *forces, double *scale) {
+    const Mechanism *b = &solver->stepped;
     const System *s = b->system;
-    double square = 0;
-    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) square += b->G[e] * b->G[e];
-    return mechanism_row_size(b, k, forces) / (square > 0 ? square : 1);
+    double square = 0, steepest = 0;
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
+        square += b->G[e] * b->G[e];
+        steepest = fmax(steepest, fabs(b->G[e]));
+    }
+    if (!(square < HUGE_VAL))
+        return fail(&solver->why,
+                    "contact '%s' has a derivative of %.3g, whose square is beyond a double: choose larger "
+                    "units",
+                    s->rows[k].name, steepest);
+    *scale = mechanism_row_size(b, k, forces) / (square > 0 ? square : 1);
+    return OK;
 }
 
 /* For each coordinate its acceleration, or the one that the forces at work could give it if they
@@ -56,7 +67,8 @@ static Status most_wrong(Solver *s, Instant at, const double *q, const double *v
     for (int c = 0; c < s->system->contacts; c++) {
         int k = s->system->contact[c];
         if (modes[c]) {
-            double size = force_scale(b, k, forces);
+            double size;
+            if (find_force_scale(s, k, forces, &size) != OK) return FAILED;
             double excess = size != 0 ? -(b->lambda[k] / size) : 0;
             if (excess > (touching[c] ? -CONTACT_PULL : CONTACT_PULL) && (*found == NONE || excess > worst)) {
                 worst = excess;

@@ -273,8 +273,14 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
         if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
         if (!find_entering(s, v, touching, slow, round == IMPACT_ROUNDS, entering)) return OK;
         if (impact(s, at, q, v, entering, round == IMPACT_ROUNDS, Lambda) != OK) return FAILED;
-        for (int c = 0; c < contacts; c++)
-            struck[c] |= entering[c] && Lambda[system->contact[c]] > 0;
+        for (int c = 0; c < contacts; c++) {
+            const double push = Lambda[system->contact[c]];
+            if (!entering[c] || !(push > 0)) continue;
+            s->impulse[c] = struck[c] ? s->impulse[c] + push : push;
+            s->struck_at[c] = at.t;
+            s->strikes[c] += !struck[c];
+            struck[c] = 1;
+        }
     }
     return OK;
 }

@@ -62,6 +62,9 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     }
     s->active = arena_ints(scratch, m);
     s->scale = arena_doubles(scratch, 2 * n);
+    s->strikes = arena_ints(scratch, contacts);
+    s->struck_at = arena_doubles(scratch, contacts);
+    s->impulse = arena_doubles(scratch, contacts);
     s->u = arena_doubles(scratch, system->inputs + system->jumps);
     s->work_jumps = arena_doubles(scratch, system->jumps > 0 ? 2 * system->jumps + n : 0);
     s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);

@@ -23,6 +23,8 @@ typedef struct {
     double *scale;             /* (2 n) of errors, in the present step */
     double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
+    int *strikes;              /* (contacts) impacts since the caller set them to 0 */
+    double *struck_at, *impulse; /* (contacts) of the latest: time [s], impulse [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
     double *work_initial;      /* (6 n + 3 m) of initial.c, afar.c and magnitudes.c */

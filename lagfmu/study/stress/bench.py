@@ -134,9 +134,10 @@ class Bench:
         times: list[float],
         tolerance: float | None = None,
         drive: Drive | None = None,
+        late: bool = False,
     ) -> Run:
-        """A run on the bench's instance."""
-        return play(self.player, values, times, tolerance, drive)
+        """A run on the bench's instance; `late` as in play()."""
+        return play(self.player, values, times, tolerance, drive, late=late)
 
     def checks(self, run: Run, span: float | None = None) -> list[Check]:
         """The invariants; `span` [s] is what counts as the default experiment at these values."""
@@ -205,7 +206,10 @@ class Bench:
         seen = {n: run.rows[n][0] for n in run.rows.dtype.names or ()}
         for k, s in enumerate(self.facts.starts):
             own = float(seen[s.name])
-            size = max(abs(own), self.facts.same_unit(s.name, run.values))
+            peers = [
+                abs(seen[p.name]) for p in self.facts.starts if self.facts.alike(p.name, s.name)
+            ]
+            size = max(*peers, self.facts.same_unit(s.name, run.values))
             given[s.name] = own + SHIFT * (1 - 0.3 * (k % 3)) * size
         other = self.run(given, run.rows["time"].tolist(), min(run.tolerance, REFERENCE))
         growth = np.ones(len(run.rows))

@@ -18,6 +18,7 @@ it may be off by  LEEWAY * rounding * size,  with the size at that instant.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -34,6 +35,7 @@ from ...verification.verify import applies
 from .player import Run
 
 LEEWAY = 10.0
+TINY = 1e-150  # whose square a double holds
 Column = NDArray[np.float64]
 
 
@@ -86,8 +88,19 @@ class Compiled:
                 column = np.maximum(np.abs(column), floors[text])
             columns.append(column)
         with np.errstate(all="ignore"):
-            found = np.asarray(self.function(*columns), dtype=float)
+            found = np.asarray(self._evaluated(columns), dtype=float)
         return np.broadcast_to(found, len(rows)).copy()
+
+    def _evaluated(self, columns: list[Any]) -> Any:
+        """In a wider range of exponents, where there is one and what comes in is near the end of a double's:
+        a product of several factors passes through places at which doubles have no digits left."""
+        far = [
+            c for c in columns if np.any((c != 0) & ~((np.abs(c) > TINY) & (np.abs(c) < 1 / TINY)))
+        ]
+        if far:
+            with contextlib.suppress(TypeError):  # functions that know doubles only
+                return self.function(*(c.astype(np.longdouble) for c in columns))
+        return self.function(*columns)
 
 
 @dataclass(frozen=True)

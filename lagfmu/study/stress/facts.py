@@ -69,6 +69,10 @@ class Facts:
         left = self.dimensions[names.name(names.RESIDUAL, constraint)]
         return lam[2] + left[2] == -3
 
+    def alike(self, one: str, other: str) -> bool:
+        """True if they have the same unit."""
+        return self.dimensions[one] == self.dimensions[other]
+
     def usual(self, coordinate: str) -> float:
         """The largest default start among the coordinates of the same unit, or 1."""
         return (

@@ -37,7 +37,8 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
 
 def _swings(name: str, bench: Bench) -> Finding:
     """A prescribed motion that begins as described and swings, given with its rates at each point; between
-    points its acceleration is constant, so that it is where the FMU takes it to be."""
+    points its acceleration is constant, so that it is where the FMU takes it to be; what is read is the end
+    of a step (a jump of the acceleration is an event of the next one)."""
     start = {i.name: i.start for i in bench.facts.inputs}
     times, orders = (
         bench.times(bench.facts.stop_time),
@@ -50,7 +51,7 @@ def _swings(name: str, bench: Bench) -> Finding:
         pull = w**2 * size * math.cos(w * t)
         way[t] = dict(zip(orders, (u, rate, pull), strict=True))
         u, rate = u + rate * h + pull * h**2 / 2, rate + pull * h
-    return bench.judged(bench.run({}, times, None, way.__getitem__))
+    return bench.judged(bench.run({}, times, None, way.__getitem__, late=True))
 
 
 def _driven(name: str, shape: str, size: float, bench: Bench) -> Finding:

@@ -4,7 +4,7 @@
   shares       Q.q = sum of Q.c.q over the constraints c, to rounding of the summands
   residual     |f| (or |G v - nu|) of what acts is at rounding: at most ROUNDING of its own size,
                the sum over q of |G_q| max(|q| so far, its start, parameters of its unit), with
-               G_q = Q.c.q / lambda.c as the FMU itself reports it
+               G_q = Q.c.q / lambda.c as the FMU itself reports it; of velocities: the largest of the unit
   push         lambda >= 0 while a contact is closed, within 10 tol of the largest |lambda|
   no pull      lambda = 0, exactly, while it is open: f lambda = 0
   outside      f >= 0 while it is open, within the gap of 1e-9 of f's own size in which it touches
@@ -191,13 +191,24 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
             name = names.derivative(q)
             column = rows[name]
         least = max(facts.same_unit(name, run.values), abs(run.values.get(name, 0.0)))
-        if not facts.rates(constraint):  # the square of a rounding of the usual place is nothing
-            least = max(least, EPS**2 / ROUNDING * facts.usual(q))
+        peers = _largest_peer(facts, run, name)
+        if facts.rates(constraint):  # they are found together, beside the fastest of them
+            column = peers
+        else:  # the square of a rounding of the usual place is nothing
+            least = max(least, EPS**2 / ROUNDING * max(facts.usual(q), float(peers[-1])))
         G = np.abs(rows[share] / np.where(acting, lam, 1.0))
         size += np.where(acting, G, G[acting].max()) * np.maximum(
             np.maximum.accumulate(np.abs(column)), least
         )
     return np.where(size > 0, size, 1.0)
+
+
+def _largest_peer(facts: Facts, run: Run, name: str) -> Column:
+    """The largest magnitude so far among the coordinates, or velocities, of the same unit."""
+    moving = [n for n in names.motion(facts.coordinates) if n in facts.dimensions]
+    same = [n for n in moving if facts.dimensions[n] == facts.dimensions[name]]
+    largest = np.maximum.reduce([np.abs(run.rows[n]) for n in same])
+    return np.asarray(np.maximum.accumulate(largest))
 
 
 def acts(facts: Facts, run: Run, constraint: str) -> NDArray[np.bool_]:

@@ -11,7 +11,8 @@ They hold at each instant, whatever the parameters, the inputs and the tolerance
 determine the accelerations, lambda and Q: nothing of the FMU's own derivation, code and linear algebra stands
 in them.  A solution of linear equations that is stable fulfils them to rounding, however badly they
 are conditioned (Higham, Accuracy and Stability of Numerical Algorithms, sect. 7.1), in the metric of
-M: relative to  sqrt(M_jj) S  and  S sum_j |a_j| / sqrt(M_jj) ,  S = sum_k |terms of equation k| / sqrt(M_kk).
+M: relative to  sqrt(M_jj) S  and  S sum_j |a_j| / sqrt(M_jj) ,  S = sum_k |terms of equation k| / sqrt(M_kk),
+where the terms of Q_j are its shares.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from .facts import beside
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
 SLOW = 1e-9  # of its terms: a slip velocity that has no direction yet
+NOTHING = 2.0**-52  # of the forces on others: a force that is none, however light what it acts on
 GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps
 
 
@@ -50,11 +52,15 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
         force = sp.sympify(model.forces.get(q, 0)) + (output(name) if name in variables else 0)
         sides[q] = (L.diff(v).diff(TIME) - L.diff(q), force)
         masses[q] = sp.Abs(in_variables(L.diff(v, 2)))
-    terms = {q: sum(magnitude(in_variables(e)) for e in sides[q]) for q in sides}
+    shares = _shares(model, variables)
+    terms = {q: sum(map(magnitude, map(in_variables, sides[q])), shares[q]) for q in sides}
     forms = []
     for q, (inertia, force) in sides.items():
         others = [
-            sp.sqrt(masses[q] / masses[k]) * terms[k] for k in sides if k != q and masses[k] != 0
+            sp.Max(sp.sqrt(masses[q] / masses[k]), least) * terms[k]
+            for k in sides
+            if k != q and masses[k] != 0
+            for least in (NOTHING if model.coordinates[q] == model.coordinates[k] else 0,)
         ]
         scale = sp.Add(terms[q], *others)
         forms.append(_form(f"Lagrange's equation of {name_of(q)}", inertia, force, scale, None))
@@ -66,6 +72,15 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
         forms += _of_friction(model, law)
     forms += [ClosedForm(o.name, o.expression, rounding=ROUNDING) for o in model.outputs]
     return [form for form in forms if _names(form) <= variables]
+
+
+def _shares(model: Model, variables: frozenset[str]) -> dict[Expr, Expr]:
+    """The magnitudes of what constraints contribute to Q, whose sum may be far smaller."""
+    found = {}
+    for q in model.coordinates:
+        of = [names.name(names.FORCE, c.name, name_of(q)) for c in model.constraints]
+        found[q] = sp.Add(*(sp.Abs(output(n)) for n in of if n in variables))
+    return found
 
 
 def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:

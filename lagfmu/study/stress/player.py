@@ -92,8 +92,10 @@ def play(
     tolerance: float | None = None,
     drive: Drive | None = None,
     stop: float | None = None,
+    late: bool = False,
 ) -> Run:
-    """A run over the communication points `times` (from 0), or as far as the FMU goes."""
+    """A run over the communication points `times` (from 0), or as far as the FMU goes; `late`: inputs are set
+    when all has been read."""
     facts = player.facts
     rows = table(facts, len(times))
     known = {s.name: s.start for s in (*facts.parameters, *facts.inputs, *facts.starts)}
@@ -105,7 +107,7 @@ def play(
         for k, t in enumerate(times):
             if k:
                 player.step(t - player.time)
-            if drive is not None:
+            if drive is not None and not late:
                 given = dict(drive(t))
                 player.give(given)
                 fed = (player.inputs() if len(given) < len(fed) else {}) | given
@@ -114,6 +116,8 @@ def play(
             rows[k]["time"] = t
             for name, value in (player.read() | fed).items():
                 rows[name][k] = value
+            if late and drive is not None:
+                player.give(dict(drive(t)))
             reached = k + 1
     except RefusalError as error:
         refusal = error

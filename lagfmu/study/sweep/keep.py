@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ... import names
 from ...errors import SettingError
 from ...fmu.session import LAST, MAX, MEAN, MIN, TIME_OF_MAX, TYPES
+from ...verification.simulate import missing
 
 REDUCTIONS = {"last": LAST, "max": MAX, "min": MIN, "mean": MEAN, "time-of-max": TIME_OF_MAX}
 TRAJECTORY = "trajectory"
@@ -38,9 +38,10 @@ class Kept:
         return (*found, *((name, LAST) for name in self.trajectories))
 
 
-def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
+def kept(texts: Sequence[str], known: Mapping[str, str], outputs: Sequence[str]) -> Kept:
     """`known` maps the FMU's variables to their FMI types.  Without texts: the largest multipliers, and
-    counts and times of departures and slips.  Raises SettingError with all problems at once."""
+    counts and times of departures and slips; of an FMU that has none of these all `outputs`, at the end.
+    Raises SettingError with all problems at once."""
     if not texts:
         texts = [f"{n}:max" for n in names.those(known, names.MULTIPLIER)]
         events = names.those(
@@ -48,7 +49,11 @@ def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
         )
         texts += [f"{n}:last" for n in events]
         if not texts:
-            texts = [f"{n}:last" for n in known if names.read(n).head == names.ENERGY]
+            texts = [
+                f"{n}:last"
+                for n in outputs
+                if known[n] in TYPES and names.read(n).head != names.SOLVER
+            ]
     numbers, trajectories, problems = [], [], []
     for text in dict.fromkeys(texts):
         name, sign, how = text.rpartition(":")
@@ -66,12 +71,3 @@ def kept(texts: Sequence[str], known: Mapping[str, str]) -> Kept:
     if problems:
         raise SettingError("keep: " + "; ".join(problems))
     return Kept(tuple(numbers), tuple(trajectories))
-
-
-def missing(name: str, known: Iterable[str], what: str = "is not in the FMU") -> str:
-    """What to say of a name that the FMU does not have."""
-    known = list(known)
-    near = difflib.get_close_matches(name, known, 1)
-    if near:
-        return f"{name!r} {what}; did you mean {near[0]!r}?"
-    return f"{name!r} {what}, expected one of {', '.join(known) or 'none'}"

@@ -6,6 +6,7 @@ import hashlib
 import os
 import shutil
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,11 +27,16 @@ from ...model.file import load
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
-from ...verification.simulate import Trajectory, communication_points, read_description
+from ...verification.simulate import (
+    Trajectory,
+    check_inputs,
+    communication_points,
+    missing,
+    read_description,
+)
 from .design import Design, Values, design
 from .engine import connected, distributed, local
 from .keep import kept as parsed
-from .keep import missing
 from .table import Layout, Parts, dataset, write_rows
 
 MOST = 2000  # runs in a chunk
@@ -134,12 +140,10 @@ def _study(
 ) -> Study:
     """All that can be said before anything is run.  Raises SettingError."""
     description = read_description(path)
-    if description.coSimulation is None:
-        raise SimulationError(
-            f"{str(path)!r} has no co-simulation: a sweep steps FMUs by fmi2DoStep"
-        )
+    _check_fmu(path, description)
     variables = {v.name: v for v in description.modelVariables}
-    kept = parsed(keep, {n: v.type for n, v in variables.items()})
+    outputs = [n for n, v in variables.items() if v.causality == "output"]
+    kept = parsed(keep, {n: v.type for n, v in variables.items()}, outputs)
     drives = _drives(inputs, times, variables)
     _check(varied, variables, drives[0])
     size = 8 * len(varied) * (len(kept.numbers) + len(kept.trajectories) * len(times))
@@ -173,6 +177,26 @@ def _study(
     }
     chunk = min(MOST, max(1, -(-len(varied) // FEWEST)))
     return Study(path, plan, Layout(varied, kept, units, facts), chunk)
+
+
+def _check_fmu(path: Path, description: Any) -> None:
+    """FMI 2.0, co-simulation, with a binary for this machine.  Raises SimulationError."""
+    if description.fmiVersion != "2.0":
+        raise SimulationError(
+            f"{str(path)!r} is an FMU of FMI {description.fmiVersion}: a sweep drives FMI 2.0"
+        )
+    if description.coSimulation is None:
+        raise SimulationError(
+            f"{str(path)!r} has no co-simulation: a sweep steps FMUs by fmi2DoStep"
+        )
+    with zipfile.ZipFile(path) as archive:
+        folders = [n.split("/")[1] for n in archive.namelist() if n.startswith("binaries/")]
+    if fmpy.platform not in folders:
+        found = ", ".join(dict.fromkeys(f for f in folders if f)) or "none"
+        raise SimulationError(
+            f"{str(path)!r} has no binary for this machine ({fmpy.platform}), but for {found}: build it with "
+            "--platforms, or run the sweep where it has one"
+        )
 
 
 def _assembled(study: Study, parts: Parts, out: Path | None) -> Any:
@@ -340,13 +364,8 @@ def _drives(
     """Inputs, interpolated linearly at the communication points."""
     if inputs is None:
         return (), None
+    check_inputs(inputs, list(variables.values()))
     names = tuple(n for n in inputs.dtype.names or () if n != "time")
-    known = [n for n, v in variables.items() if v.causality == "input"]
-    unknown = [missing(n, known) for n in names if n not in known]
-    if unknown or "time" not in (inputs.dtype.names or ()):
-        raise SettingError("inputs: " + ("; ".join(unknown) or "there is no column 'time'"))
-    if not (np.diff(inputs["time"]) >= 0).all() or not np.isfinite(inputs["time"]).all():
-        raise SettingError("inputs: the times are not sorted, expected rising seconds")
     table = np.column_stack([np.interp(times, inputs["time"], inputs[n]) for n in names])
     return names, table
 
