@@ -76,7 +76,7 @@ def examine(
     they contradict each other, the mass matrix is singular on the constraint surface, or the kinetic
     energy is negative for some velocities at the start.
     """
-    begun, u, p = _begun(eom, table, system, numbers or {})
+    begun, u, p = begin(eom, table, system, numbers or {})
     generator = random.Random(1)
     ranks, masses = [], []
     for trial in range(TRIALS):
@@ -88,9 +88,9 @@ def examine(
                 q = _nearby(system, begun, q + np.array(shift), v, u, p)
             except StepFailureError:
                 continue
-        levelled = [*u, *levels_at(system, 0.0, q, u, p)]
-        full, q, v = expand(system, 0.0, q, v, levelled, p)
-        M, _, G, _, _ = Instant(full, 0.0, levelled, p).evaluate(q, v)
+        inputs = levelled(system, u, q, p)
+        full, q, v = expand(system, 0.0, q, v, inputs, p)
+        M, _, G, _, _ = Instant(full, 0.0, inputs, p).evaluate(q, v)
         ranks.append(_rank(full, G))
         masses.append(M)
     size = np.abs([M.diagonal() for M in masses]).max(axis=0)
@@ -147,7 +147,12 @@ def _uncured(miss: Vector, G: Matrix, size: Vector, free: Mask) -> Vector:
     return np.where(np.abs(left) > MISSED * (np.abs(G) @ size), left, 0.0)
 
 
-def _begun(
+def levelled(system: System, u: Sequence[float], q: Vector, p: Sequence[float]) -> list[float]:
+    """The inputs, and the levels of what jumps, at the start."""
+    return [*u, *levels_at(system, 0.0, q, u, p)]
+
+
+def begin(
     eom: EquationsOfMotion, table: VariableTable, system: System, numbers: Mapping[Any, Any]
 ) -> tuple[Start, list[float], list[float]]:
     """The start with the values of the table and `numbers`, the inputs and the parameters then."""
@@ -179,7 +184,7 @@ def check_held(
 
     The equations, `table` and `system` are the model's, with all contacts; `kept` may open.
     """
-    closed = _begun(eom, table, system, numbers)[0].state.closed
+    closed = begin(eom, table, system, numbers)[0].state.closed
     names = [system.rows[k].name for k in system.contacts]
     away = [n for n, shut in zip(names, closed, strict=True) if n not in kept and not shut]
     if away:

@@ -21,6 +21,7 @@ from ..model.selection import select
 from ..model.stuck import stuck
 from ..solver.system import System
 from .consistency import Structure, check_embedding, check_held, examine
+from .reduced import check_branch, misses, restarted
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,14 @@ def prepare(
         problems = [*error.problems, *_resting_motions(form.equations)]
         known = Derived(model, scene, form, whole)
         raise CannotStartError(error.name, problems, known) from error
+    missed = misses(form, whole, lowered, numbers, model.start)
+    if missed:
+        every = Form(derived)
+        structure = examine(derived, laid.table(every, scene), lower(every), numbers)
+        again = prepare(restarted(model, form, structure, missed), asked)
+        started = again.form, again.whole, lower(again.form)
+        check_branch(model, misses(*started, numbers, model.start))
+        return again
     return Prepared(
         model=model,
         asked=asked,
