@@ -197,6 +197,17 @@ def test_a_slider_has_the_bounds_and_the_unit_of_its_variable(opened: Opened) ->
     assert page.tab.evaluate("() => lagfmu.shown().values.y[0]") == 0.5
 
 
+def test_a_start_value_that_is_moved_says_so(opened: Opened) -> None:
+    """A bob that is put at x = 0.6 m hangs on a rod of 1 m: y becomes -0.8 m, whatever its slider says."""
+    page = opened("PendulumCartesian")
+    page.until("lagfmu.runs")
+    told = page.tab.locator(".dial:has(input[data-name='y']) .moved")
+    assert told.inner_text() == ""
+    page.slide("x", 0.6)
+    assert told.inner_text() == "the constraints make it -0.8 m"
+    assert page.tab.locator(".dial:has(input[data-name='x']) .moved").inner_text() == ""
+
+
 def test_another_method_is_another_run(opened: Opened) -> None:
     """The menu of methods is the FMU's: radau5 takes other steps, and says so."""
     page = opened("PendulumCartesian")

@@ -490,7 +490,10 @@ class _Builder:
             what = f"start{{}} of slipping of {law.name}"
             variables += self._event(names.SLIPPING, law.name, what)
         if self.eom.frictions:
-            text = "energy that frictions and impacts dissipated so far (Model Exchange: impacts)"
+            text = (
+                "energy that frictions and impacts dissipated so far (Model Exchange: impacts alone; "
+                "the importer integrates power.* beside)"
+            )
             variables.append(self.output(Subject(names.DISSIPATED), text, ENERGY, ()))
         return variables
 

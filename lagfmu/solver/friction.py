@@ -112,9 +112,9 @@ def heading(slide: Slide, s: Vector) -> Vector:
     equations of a leg stay smooth there."""
     e = np.array(slide.direction)
     length = np.hypot(s[0], s[1])
-    if not length > slide.noise or (s[1] == 0 and e[1] == 0):
+    if not length > slide.noise or (s[1] == 0 and e[1] == 0) or s @ e < 0:
         return e
-    return np.asarray(s / length if s @ e >= 0 else -s / length)
+    return np.asarray(s / length)
 
 
 def motion_with_friction(

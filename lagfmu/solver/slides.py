@@ -232,7 +232,14 @@ class _Rest:
 
     def settled(self) -> tuple[Slide, ...]:
         stuck = self._with(self.resting, {})
-        held = self.now.motion(stuck)
+        try:
+            held = self.now.motion(stuck)
+        except StepFailureError:  # what drives the bodies accelerates some of them
+            ahead = {i: self.slides[i].direction for i in self.resting}
+            driven = self._within_cones(ahead)
+            if driven is None:
+                raise
+            return driven
         against = {i: self._against(held, i) for i in self.resting}
         sticking = [i for i in self.resting if i not in self.begins]
         if self.begins:  # beyond its cone it slips against lambda_t, or not at all
@@ -248,10 +255,17 @@ class _Rest:
             worst = min(over, key=lambda i: now.press.reserve[i])
             against[worst] = self._against(now, worst)
             sticking = [i for i in sticking if i != worst]
-        for slides, now in self._all(against):
+        settled = self._within_cones(against)
+        if settled is None:
+            raise paradox(self.now.at, self.resting, 0.0)
+        return settled
+
+    def _within_cones(self, guess: dict[int, tuple[float, float]]) -> tuple[Slide, ...] | None:
+        """The combination with most sticking in which all that stick are within their cones."""
+        for slides, now in self._all(guess):
             if all(now.press.reserve[i] >= -SLIDES_SLACK for i in self.resting if slides[i].sticks):
                 return slides
-        raise paradox(self.now.at, self.resting, 0.0)
+        return None
 
     def _with(
         self, sticking: Collection[int], towards: dict[int, tuple[float, float]]

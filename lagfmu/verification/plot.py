@@ -106,7 +106,7 @@ def panels(
                     result[n],
                     color=COLOURS[colour],
                     linestyle=DASHES[turn % len(DASHES)],
-                    label=n,
+                    label=_label(result, n),
                     linewidth=1.8,
                 )
                 _band(axis, result, n, COLOURS[colour])
@@ -123,6 +123,15 @@ def panels(
             )
         axes[-1, 0].set_xlabel("time [s]")
         yield figure, list(axes[:, 0])
+
+
+def _label(result: Trajectory, name: str) -> str:
+    """A curve's name; below it its largest bar, which as a band may be thinner than the line."""
+    if names.bar(name) not in (result.dtype.names or ()):
+        return name
+    bar = result[names.bar(name)]
+    known = bar[bar < np.finfo(float).max]
+    return f"{name}\n± {known.max():.1g}" if len(known) else name
 
 
 def _band(axis: Any, result: Trajectory, name: str, colour: str) -> None:

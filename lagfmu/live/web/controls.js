@@ -59,7 +59,8 @@ class Dial {
     const name = element("label", { for: id }, element("code", {}, variable.name));
     if (hint) name.append(" ", element("small", {}, hint));
     const unit = element("span", { class: "unit" }, variable.unit);
-    this.row = element("div", { class: "dial" }, name, this.slider, this.number, unit);
+    this.moved = element("small", { class: "moved" });
+    this.row = element("div", { class: "dial" }, name, this.slider, this.number, unit, this.moved);
     this.slider.addEventListener("input", () => this.take(this.slider.valueAsNumber, changed));
     this.number.addEventListener("input", () => this.take(this.number.valueAsNumber, changed));
     this.show();
@@ -72,6 +73,16 @@ class Dial {
     changed();
   }
 
+  /* A start value that misses the constraints was moved: the run begins with another. */
+  tell(trajectory) {
+    if (this.variable.role !== "start") return;
+    const given = this.settings.get(this.variable);
+    const used = trajectory.at(this.variable.name, [0, 0]);
+    const same = used === undefined || Math.abs(used - given) <= 1e-9 * Math.max(1e-3, Math.abs(used));
+    const text = same ? "" : `the constraints make it ${withUnit(used, this.variable.unit, 6)}`;
+    if (this.moved.textContent !== text) this.moved.textContent = text;
+  }
+
   show(typing = false) {
     const value = this.settings.get(this.variable);
     this.slider.value = value;
@@ -81,7 +92,8 @@ class Dial {
   }
 }
 
-/* All dials, in one fieldset a role; returns a function that shows the settings anew. */
+/* All dials, in one fieldset a role; returns functions that show the settings anew, and what became of the
+ * start values. */
 function buildDials(box, settings, changed) {
   const dials = [];
   for (const [role, title, open] of TITLES) {
@@ -93,5 +105,8 @@ function buildDials(box, settings, changed) {
       element("details", { open }, element("summary", {}, title), ...made.map((d) => d.row))
     );
   }
-  return () => dials.forEach((d) => d.show());
+  return {
+    show: () => dials.forEach((d) => d.show()),
+    tell: (trajectory) => dials.forEach((d) => d.tell(trajectory)),
+  };
 }

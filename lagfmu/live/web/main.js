@@ -13,13 +13,13 @@ const picture = FACTS.picture ? new Picture(byId("picture"), FACTS.picture) : nu
 const player = new Player((t) => showTime(t));
 const charts = new Charts(byId("charts"), byId("chart-choices"), (t) => player.seek(t));
 const accuracy = new Accuracy(settings, changed);
-const showDials = buildDials(byId("dials"), settings, changed);
+const dials = buildDials(byId("dials"), settings, changed);
 const measureLater = calmly(() => accuracy.measure(), 250);
 const tellLater = calmly(tell, 400);
 const describeLater = calmly(describe, 300);
 
 function showAll() {
-  showDials();
+  dials.show();
   accuracy.show();
   byId("stop-time").value = settings.stopTime;
   byId("step-size").value = settings.stepSize;
@@ -70,6 +70,7 @@ function show() {
   charts.show(trajectory);
   if (picture) picture.show(trajectory);
   player.setEnd(trajectory.end, settings.stepSize);
+  dials.tell(trajectory);
   showEvents(trajectory.events);
   showLog(trajectory.log);
 }

@@ -60,14 +60,17 @@ double friction_normal(const Mechanism *b, int i, const double *lambda) {
     return sum;
 }
 
+/* Mostly of one row. */
+static double length_of(const double x[2]) { return x[1] == 0 ? fabs(x[0]) : hypot(x[0], x[1]); }
+
 void friction_heading(const Slide *slide, const double s[2], double e[2]) {
-    const double length = hypot(s[0], s[1]);
+    const double length = length_of(s);
     e[0] = slide->direction[0];
     e[1] = slide->direction[1];
     if (!(length > slide->noise) || (s[1] == 0 && e[1] == 0)) return;
-    const double sense = s[0] * e[0] + s[1] * e[1] >= 0 ? 1 : -1;
-    e[0] = sense * s[0] / length;
-    e[1] = sense * s[1] / length;
+    if (s[0] * e[0] + s[1] * e[1] < 0) return;
+    e[0] = s[0] / length;
+    e[1] = s[1] / length;
 }
 
 /* f->loaded for contacts and constraints that act as in `active`. */
@@ -166,7 +169,7 @@ static double tangential(const Mechanism *b, int i, const double *lambda, double
     const Friction *law = &b->system->friction[i];
     force[1] = 0;
     for (int r = 0; r < law->rows; r++) force[r] = lambda[law->row[r]];
-    return hypot(force[0], force[1]);
+    return length_of(force);
 }
 
 /* Are the multipliers that a friction which sticks depends on the only ones? */
@@ -207,7 +210,7 @@ static Status motion(Mechanism *b, Instant at, const double *q, const double *v,
     const System *s = b->system;
     struct Frictions *f = b->friction;
     int sliding = 0, sticking = 0;
-    if (mechanism_evaluate(b, at, q, v) != OK || find_law(b, at, q, v) != OK) return FAILED;
+    if (find_law(b, at, q, v) != OK) return FAILED;
     if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
     if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) != OK) return FAILED;
     for (int i = 0; i < s->frictions; i++) {
@@ -220,6 +223,7 @@ static Status motion(Mechanism *b, Instant at, const double *q, const double *v,
         f->sliding[sliding++] = i;
     }
     if (sliding > 0 && slide(b, at.t, sliding) != OK) return FAILED;
+    if (b->stage) return OK;
     if (sticking) hold(b);
     for (int i = 0; i < s->frictions; i++) tangential(b, i, b->lambda, f->tangential + 2 * i);
     return OK;

@@ -11,7 +11,7 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
                       const Sliding *sliding) {
     b->system = s;
     b->why = why;
-    b->dependent = 0;
+    b->dependent = b->stage = 0;
     b->M = arena_doubles(arena, s->masses);
     b->F = arena_doubles(arena, s->n);
     b->G = arena_doubles(arena, s->entries);
@@ -77,11 +77,13 @@ Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f) 
 
 Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                         const int *active) {
-    if (b->sliding != NULL) return b->sliding->motion(b, at, q, v, active);
     evaluate(b, at, q, v);
-    if (linear_factor(&b->linear, b->M, b->G, active) == OK &&
-        linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) == OK)
+    if (b->sliding != NULL) {
+        if (b->sliding->motion(b, at, q, v, active) == OK) return OK;
+    } else if (linear_factor(&b->linear, b->M, b->G, active) == OK &&
+               linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) == OK) {
         return OK; /* linear.h: what it solves is finite */
+    }
     (void)check_values(b, at); /* the cause, if it is the equations */
     return FAILED;
 }

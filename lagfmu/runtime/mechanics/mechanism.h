@@ -37,6 +37,7 @@ struct Mechanism {
     double *dq, *trial;             /* (n) scratch of project() */
     int *fixed;                     /* (m) scratch of project(): position constraints that act */
     int dependent;                  /* 1: rows that act depend on each other, on the constraints */
+    int stage;                      /* 1: of motion(), the accelerations alone are asked for */
     Why *why;
     const Sliding *sliding;     /* NULL without frictions */
     struct Frictions *friction; /* what `sliding` works with */

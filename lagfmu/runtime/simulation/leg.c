@@ -40,10 +40,12 @@ static Status rate(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
     const Instant at = leg_instant(s, t);
+    s->stepped.stage = 1;
     const Status status = s->system->frictions > 0
                               ? mechanism_motion_near(&s->stepped, at, y, y + n, s->active,
                                                       s->state.offset, s->state.size)
                               : mechanism_motion(&s->stepped, at, y, y + n, leg_rows(s));
+    s->stepped.stage = 0;
     if (status != OK) return FAILED;
     for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
         dydt[j] = y[n + j];

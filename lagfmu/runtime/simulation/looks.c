@@ -123,9 +123,18 @@ static Status refine(Solver *s, Looks *looks, double *y) {
     return OK;
 }
 
+/* May indicator c dip below zero between two looks? */
+static int may_dip(const Solver *s, int c) {
+    const System *system = s->system;
+    const int of_friction = c - indicators_first_of_frictions(system);
+    if (c < system->contacts) return s->state.closed[c];
+    if (of_friction < 0) return 0;
+    return of_friction % 2 == 0 || !system->friction[of_friction / 2].gated; /* else it is 1 */
+}
+
 Status looks_take(Solver *s, const double *y1, double *y, Looks *looks) {
     const Integrator *i = &s->integrator;
-    const int contacts = s->system->contacts, width = indicators_count(s->system);
+    const int width = indicators_count(s->system);
     const double h = i->t - i->t_old;
     double highest;
     memcpy(looks->values, s->state.indicator, (size_t)width * sizeof *looks->values);
@@ -143,7 +152,7 @@ Status looks_take(Solver *s, const double *y1, double *y, Looks *looks) {
             return FAILED;
     if (refine(s, looks, y) != OK) return FAILED;
     for (int c = 0; c < width; c++) {
-        if (c < contacts ? !s->state.closed[c] : c < indicators_first_of_frictions(s->system)) continue;
+        if (!may_dip(s, c)) continue;
         double *seen = looks->values + (LOOKS_MOST + width) * width; /* one row of scratch */
         for (int k = 0, found = 0; k + 2 < looks->count && !found; k++)
             if (look_into_dip(s, looks, k, c, y, seen, &found) != OK) return FAILED;

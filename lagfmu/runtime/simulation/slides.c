@@ -270,12 +270,23 @@ static Status no_modes(Rest *x) {
     return friction_paradox(&x->s->stepped, x->at.t, which, count, 0);
 }
 
+static Status stick(Rest *x) {
+    for (int i = 0; i < x->s->system->frictions; i++)
+        if (x->resting[i]) x->slides[i].sticks = 1;
+    return motion(x);
+}
+
+/* Not all can stick, since what drives the bodies accelerates some of them. */
+static Status settle_driven(Rest *x) {
+    for (int i = 0; i < x->s->system->frictions; i++)
+        memcpy(x->guess + 2 * i, x->slides[i].direction, sizeof x->slides[i].direction);
+    return try_all(x) ? OK : stick(x);
+}
+
 static Status settle_resting(Rest *x) {
     const int count = x->s->system->frictions;
     int begins = 0;
-    for (int i = 0; i < count; i++)
-        if (x->resting[i]) x->slides[i].sticks = 1;
-    if (motion(x) != OK) return FAILED;
+    if (stick(x) != OK) return settle_driven(x);
     for (int i = 0; i < count; i++) {
         if (x->resting[i]) aim(x, i);
         x->sticking[i] = x->resting[i] && !x->begins[i];

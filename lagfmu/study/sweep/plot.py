@@ -12,7 +12,7 @@ from ...model.units import for_reading
 from .table import INFINITE, happened, numbers, one_by_one, varied
 
 FIGURES = (".svg", ".png", ".pdf")
-FAILED = "#c0392b"
+FAILED, NOTHING = "#c0392b", "#e8e8e8"
 INK = "#1f5fa8"
 STYLE = {
     "svg.hashsalt": "lagfmu",
@@ -60,6 +60,7 @@ def _label(found: Any, name: str) -> str:
 
 def _grid(found: Any, names: list[str], dims: list[str], Figure: Any) -> Any:
     """A panel a kept quantity: a curve over one axis, a map over two."""
+    from matplotlib.patches import Patch
     from matplotlib.ticker import MaxNLocator
 
     width, height = (7.0, 2.4) if len(dims) == 1 else (6.0, 4.2)
@@ -80,11 +81,15 @@ def _grid(found: Any, names: list[str], dims: list[str], Figure: Any) -> Any:
             z = _drawn(found, name).T
             drawn = panel.pcolormesh(x, y, z, shading="nearest", cmap="viridis")
             bar = figure.colorbar(drawn, ax=panel, label=_label(found, name))
-            bar.locator = MaxNLocator(integer=bool((z[np.isfinite(z)] % 1 == 0).all()))
+            if (z[np.isfinite(z)] % 1 == 0).all():
+                bar.locator = MaxNLocator(integer=True)
+            panel.set_facecolor(NOTHING)
+            signs = [Patch(color=NOTHING, label="never")] if (np.isnan(z) & ~bad.T).any() else []
             if bad.any():
                 i, j = np.nonzero(bad)
-                panel.plot(x[i], y[j], "x", color=FAILED, label="refused")
-                panel.legend(frameon=True)
+                signs += panel.plot(x[i], y[j], "x", color=FAILED, label="refused")
+            if signs:
+                panel.legend(handles=signs, frameon=True)
             panel.set_ylabel(_label(found, dims[1]))
             panel.grid(visible=False)
         for axis, values in (("x", x), *((("y", found[dims[1]].values),) if len(dims) > 1 else ())):
@@ -111,6 +116,9 @@ def _scatter(found: Any, names: list[str], Figure: Any) -> Any:
     columns, rows = len(causes) + 1, len(names) + 1
     figure = Figure(figsize=(2.4 * columns, 2.1 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False)
+    for column in panels.T[:-1]:
+        for panel in column[1:]:
+            panel.sharex(column[0])
     bins = min(50, max(8, int(np.sqrt(good.sum()))))
     for i, name in enumerate(names):
         y = _drawn(stacked, name)
