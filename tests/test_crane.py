@@ -60,8 +60,8 @@ def test_the_rope_keeps_its_length_where_nothing_pulls(target, native_fmu, pytho
     fmu = native_fmu if target == "native" else python_fmu
     with instance(fmu("Crane")) as one:
         one.start({"g": 1e-300})
-        for _ in range(12):
-            one.step(10.0)
+        for _ in range(4):
+            one.step(94.0)
             l = one.get("l")  # noqa: E741 - the literature's letter
             d, y = one.get("x") - one.get("s"), one.get("y")
             assert abs(d * d + y * y - l * l) < 1e-13 * (one.get("x") ** 2 + y * y + 1)
