@@ -1,11 +1,12 @@
 """What does the native target cost?  Against SUNDIALS in C, the python target and SciPy, and by itself.
 
-    python benchmarks/native.py [--out DIR] [--rounds N] [pendulum|four-bar|python|rhs|growth|call ...]
+    python benchmarks/native.py [--out DIR] [--rounds N] [pendulum|four-bar|python|rhs|bare|growth|call ...]
 
 pendulum, four-bar: error of lambda against cost at tolerances 1e-3 ... 1e-13, every program on the same
     generated model.c; cost at an error of 1e-6 and 1e-9, and the ratio to the better peer.
 python: the same two models by the python target and by SciPy on the index-1 equations.
-rhs: one right-hand side in ns.  growth: chains of 8 ... 512 links.  call: doStep and getReal.
+rhs: one right-hand side in ns.  bare: a run over the right-hand sides that it evaluates.
+growth: chains of 8 ... 512 links.  call: doStep and getReal.
 
 Needs gcc and SUNDIALS (Debian: libsundials-dev).  Programs run interleaved, N rounds; medians, of
 processor time, so that other load on the machine is not counted.  Errors are the largest over 100 samples
@@ -35,6 +36,7 @@ from programs import (
     algebra,
     compiled,
     core,
+    evaluations,
     launch,
     native,
     native_fmu,
@@ -153,7 +155,7 @@ def in_python(name: str, out: Path, rounds: int, ours: dict[str, Curve]) -> None
     for label, curve in curves.items():
         print(f"| {label} | " + cells(curve.at(e) for e in TARGETS))
     mine = next(iter(ours.values()))
-    for what in ("python FMU", "lagfmu.verification.simulate", "solve_ivp"):
+    for what in ("python FMU", "lagfmu.simulate", "solve_ivp"):
         group = [c for label, c in curves.items() if label.startswith(what)]
         ratios = [least(c.at(e) for c in group) / mine.at(e) for e in TARGETS]
         print(f"| best {what} / {mine.label} | " + cells(ratios))
@@ -162,8 +164,8 @@ def in_python(name: str, out: Path, rounds: int, ours: dict[str, Curve]) -> None
 def right_hand_side(out: Path) -> None:
     """ns of evaluating, factoring and solving."""
     print("\n## One right-hand side, ns\n")
-    print("| model | algebra | evaluate | factor | solve | all | all / evaluate |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    print("| model | algebra | evaluate | factor | solve | all | in a row | all / evaluate |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     models = {
         "pendulum": problem_of("pendulum", out).prepared.equations,
         "four-bar": problem_of("four-bar", out).prepared.equations,
@@ -175,7 +177,32 @@ def right_hand_side(out: Path) -> None:
         for linear in ALGEBRAS:
             sources = [*native("rhs.c"), *model, *algebra(linear, out)]
             row = numbers([compiled(folder / f"rhs_{linear}", sources), 1.0])
-            print(f"| {name} | {linear} | " + cells([*row, row[-1] / row[0]]))
+            print(f"| {name} | {linear} | " + cells([*row, row[3] / row[0]]))
+
+
+def bare(out: Path, rounds: int) -> None:
+    """A run over the right-hand sides that it evaluates, one after the other as its stages need them."""
+    print("\n## A run over its bare right-hand sides, tolerance 1e-6\n")
+    print(
+        "| model | lambda read every | evaluations a s | ns each in a row | us a s | ratio |"
+        "\n| --- | --- | --- | --- | --- | --- |"
+    )
+    for name in ("pendulum", "four-bar"):
+        problem = problem_of(name, out)
+        fmu, alone = native_fmu(problem), core(problem.folder, problem.model)
+        sources = [*native("rhs.c"), *problem.model, *algebra("runtime", out)]
+        program = compiled(problem.folder / "rhs_runtime", sources)
+        for h in (STOP, 0.1):
+            pairs = []
+            for _ in range(rounds):
+                counted = evaluations([alone, "dop853", 1e-6, STOP, h, BUDGET, h])
+                run = launch(fmu.command(1e-6, h, problem.multipliers, "dop853", step=h), problem.m)
+                if run is None:
+                    raise SystemExit("a run failed")
+                pairs.append((run[1], numbers([program, 1.0])[4]))
+            ns, each = (statistics.median(column) for column in zip(*pairs, strict=True))
+            row = [counted / STOP, each, 1e-3 * ns / STOP, ns / (counted * each)]
+            print(f"| {name} | {h:g} s | " + cells(row))
 
 
 def growth(out: Path, rounds: int) -> None:
@@ -248,7 +275,7 @@ def calls(out: Path, rounds: int) -> None:
 
 def main() -> None:
     """Answer what is asked."""
-    every = ("pendulum", "four-bar", "python", "rhs", "growth", "call")
+    every = ("pendulum", "four-bar", "python", "rhs", "bare", "growth", "call")
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("questions", nargs="*", help=f"of {', '.join(every)}; default: all")
     parser.add_argument("--out", type=Path, help="folder for what is built (default: temporary)")
@@ -266,6 +293,8 @@ def main() -> None:
                     in_python(name, out, asked.rounds, ours)
         if "rhs" in questions:
             right_hand_side(out)
+        if "bare" in questions:
+            bare(out, asked.rounds)
         if "growth" in questions:
             growth(out, asked.rounds)
         if "call" in questions:

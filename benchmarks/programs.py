@@ -230,6 +230,13 @@ def launch(command: Sequence[Any], m: int) -> tuple[int, float, NDArray[Any]] | 
     return int(first.split()[0]), float(first.split()[2]), lam
 
 
+def evaluations(command: Sequence[Any]) -> int:
+    """Of the equations, as a program counts them."""
+    words = [str(c) for c in command]
+    done = subprocess.run(words, capture_output=True, text=True, check=True, timeout=600)
+    return int(done.stdout.split()[1])
+
+
 def numbers(command: Sequence[Any]) -> list[float]:
     """The numbers on the line that a program prints."""
     words = [str(c) for c in command]

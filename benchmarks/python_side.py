@@ -22,7 +22,7 @@ def curves(problem: Problem, tolerances: list[float], rounds: int) -> dict[str, 
     """Every peer in Python, interleaved."""
     runs: dict[str, Callable[[float], Answer]] = {
         "python FMU by fmpy": fmu_run(problem),
-        "lagfmu.verification.simulate": lambda tolerance: in_process(problem, tolerance),
+        "lagfmu.simulate": lambda tolerance: in_process(problem, tolerance),
     }
     for method in METHODS:
         runs[f"solve_ivp {method}"] = lambda tol, k=method: index_one(problem, k, tol)

@@ -2,7 +2,8 @@
  *
  *   core METHOD TOLERANCE STOP STEP BUDGET COMMUNICATION
  *
- * advances by COMMUNICATION seconds at a time and observes lambda every STEP. */
+ * advances by COMMUNICATION seconds at a time and observes lambda every STEP.  EVALUATIONS are counted in a
+ * run of its own. */
 #include <math.h>
 #include <stdlib.h>
 #include <stdio.h>
@@ -15,8 +16,24 @@
 typedef struct {
     Solver solver;
     Observed seen;
+    Rank *rank;
     double communication;
 } Core;
+
+static long evaluations;
+
+static void count_dynamics(double t, const double *q, const double *v, const double *u,
+                           const double *p, double *M, double *F, double *G, double *nu,
+                           double *gamma) {
+    evaluations++;
+    MODEL_SYSTEM->dynamics(t, q, v, u, p, M, F, G, nu, gamma);
+}
+
+static int count_accelerate(double t, const double *q, const double *v, const double *u,
+                            const double *p, double *vdot) {
+    evaluations++;
+    return MODEL_SYSTEM->accelerate(t, q, v, u, p, vdot);
+}
 
 static int run(void *context, const Task *task, double *lambda, Cost *cost) {
     Core *core = context;
@@ -25,7 +42,7 @@ static int run(void *context, const Task *task, double *lambda, Cost *cost) {
     const int each = (int)lround(task->step / core->communication);
     const int points = task->samples * each;
     s->stop_time = task->stop;
-    if (solver_start(s, 0, PROBLEM_Q, PROBLEM_V, NULL, NULL) != OK)
+    if (solver_start(s, 0, PROBLEM_Q, PROBLEM_V, core->rank, NULL, NULL) != OK)
         return 1;
     const double begun = now_ns();
     for (int i = 1; i <= points; i++) {
@@ -40,7 +57,7 @@ static int run(void *context, const Task *task, double *lambda, Cost *cost) {
     }
     cost->ns = now_ns() - begun;
     cost->steps = s->state.now.steps;
-    cost->evaluations = 0;
+    cost->evaluations = evaluations;
     return 0;
 }
 
@@ -67,12 +84,29 @@ int main(int argc, char *argv[]) {
         if (strcmp(argv[1], METHOD_NAMES[k]) == 0)
             core.solver.settings.method = (MethodName)k;
     }
+    core.rank = calloc(2 * (size_t)MODEL_SYSTEM->n, sizeof *core.rank);
+    if (core.rank == NULL)
+        return 1;
+    for (int j = 0; j < 2 * MODEL_SYSTEM->n; j++)
+        core.rank[j] = GIVEN;
     core.solver.settings.tolerance = task.tolerance;
     memcpy(core.solver.p, PROBLEM_P, (size_t)MODEL_SYSTEM->parameters * sizeof(double));
-    const int status = measure(&task, run, &core, MODEL_SYSTEM->m);
+    System counting = *MODEL_SYSTEM;
+    counting.dynamics = count_dynamics;
+    if (counting.accelerate != NULL)
+        counting.accelerate = count_accelerate;
+    Cost cost = {0};
+    double *lambda = calloc((size_t)(task.samples * MODEL_SYSTEM->m), sizeof(double));
+    core.solver.system = core.solver.stepped.system = &counting;
+    int status = lambda == NULL || run(&core, &task, lambda, &cost) != 0;
+    core.solver.system = core.solver.stepped.system = MODEL_SYSTEM;
+    free(lambda);
+    if (status == 0)
+        status = measure(&task, run, &core, MODEL_SYSTEM->m);
     if (status != 0)
         fprintf(stderr, "%s\n", core.solver.why.text);
     free(saved);
     free(scratch);
+    free(core.rank);
     return status;
 }

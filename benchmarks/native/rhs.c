@@ -1,5 +1,6 @@
 /* rhs.c -- what one right-hand side costs:  rhs BUDGET  prints the median ns of evaluating M, F, G,
- * nu, gamma; of factoring; of solving; and of all three, at the start of the problem. */
+ * nu, gamma; of factoring; of solving; of all three, at the start of the problem; and of a motion whose state
+ * needs the one before, as the stages of a step do: the processor cannot work on several at once. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -7,11 +8,21 @@
 #include "problem.h"
 #include "stopwatch.h"
 
-enum { BATCHES = 201, PARTS = 4 };
+enum { BATCHES = 201, PARTS = 5 };
 
 static int ascending(const void *a, const void *b) {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
+}
+
+/* One motion at a state to which the latest accelerations have added nothing. */
+static int follow(Equations *e, double *q, double *vdot, double *lambda) {
+    const System *s = e->s;
+    for (int j = 0; j < s->n; j++)
+        q[j] = PROBLEM_Q[j] + 0 * vdot[j];
+    if (s->accelerate != NULL)
+        return !s->accelerate(0, q, PROBLEM_V, NULL, PROBLEM_P, vdot);
+    return equations_motion(e, 0, q, PROBLEM_V, vdot, lambda);
 }
 
 int main(int argc, char *argv[]) {
@@ -19,10 +30,10 @@ int main(int argc, char *argv[]) {
     Equations e;
     double ns[PARTS][BATCHES];
     int bad = argc != 2 || equations_create(&e, s, PROBLEM_P) != 0;
-    double *vdot = calloc((size_t)(s->n + s->m), sizeof(double));
+    double *vdot = calloc((size_t)(2 * s->n + s->m), sizeof(double));
     if (bad || vdot == NULL)
         return 1;
-    double *lambda = vdot + s->n, begun = now_ns();
+    double *q = vdot + s->n, *lambda = q + s->n, begun = now_ns();
     long calls = 0;
     while (now_ns() - begun < 2e6) { /* how many calls fill 2 ms: also warms the caches */
         bad |= equations_motion(&e, 0, PROBLEM_Q, PROBLEM_V, vdot, lambda);
@@ -40,8 +51,10 @@ int main(int argc, char *argv[]) {
                     bad |= equations_factor(&e);
                 else if (part == 2)
                     bad |= equations_solve(&e, e.F, e.gamma, vdot, lambda);
-                else
+                else if (part == 3)
                     bad |= equations_motion(&e, 0, PROBLEM_Q, PROBLEM_V, vdot, lambda);
+                else
+                    bad |= follow(&e, q, vdot, lambda);
             }
             ns[part][i] = (now_ns() - begun) / (double)batch;
         }

@@ -17,11 +17,13 @@ def pack(contents: Mapping[str, bytes]) -> bytes:
     """A zip archive whose bytes depend on the contents only: fixed times, modes and order."""
     buffer = io.BytesIO()
     order = sorted(contents, key=lambda name: (name != "modelDescription.xml", name))
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+    with zipfile.ZipFile(buffer, "w") as archive:
         for name in order:
             info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
             info.create_system = 3
             info.external_attr = 0o644 << 16
             info.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(info, contents[name])
+            archive.writestr(
+                info, contents[name], compresslevel=9
+            )  # that of `archive` is not taken
     return buffer.getvalue()
