@@ -197,6 +197,28 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped(hemisphere, tmp_path):
     assert len(facts["fmu_sha256"]) == 64
 
 
+def test_ctrl_c_says_where_the_rest_is_and_how_to_go_on(hemisphere, tmp_path):
+    """What a user does: an interrupt in the middle of a long sweep, then the same command with --resume."""
+    import pyarrow.parquet as pq
+
+    out = tmp_path / "runs.parquet"
+    command = [sys.executable, "-m", "lagfmu", "sweep", str(hemisphere), "--vary", "theta=0.05:1:1000",
+               "--keep", KEEP[0], "--out", str(out)]  # fmt: skip
+    client = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    parts = out.with_name("runs.parquet.parts")
+    while client.poll() is None and len(list(parts.glob("part_*"))) < 3:
+        time.sleep(0.02)
+    client.send_signal(signal.SIGINT)
+    said = " ".join(client.communicate(timeout=60)[0].split())
+    assert client.returncode == 1
+    assert "interrupted: what is finished is in" in said
+    assert "go on with the same command and --resume" in said
+    done = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert pq.read_table(out)["run"].to_pylist() == list(range(1000))
+    assert not parts.exists()
+
+
 def test_what_was_refused_before_an_interruption_counts(hemisphere, tmp_path):
     """The first run has no radius; the client stops after it and goes on."""
     values, out = {"a": [-1.0, *np.linspace(0.5, 1, 9)]}, tmp_path / "runs.nc"

@@ -36,6 +36,7 @@ static void layout(Instance *x, Arena *saved, Arena *scratch) {
     const int count = b->end - b->first;
     solver_layout(&b->solver, saved, scratch, MODEL_SYSTEM);
     b->solver.p = x->solver.p;
+    b->solver.on_demand = 1;
     b->solver.alike = companion_alike(BAR_COARSER);
     x->solver.alike = HUGE_VAL;
     observed_layout(&b->seen, scratch, MODEL_SYSTEM);
@@ -112,6 +113,7 @@ static void follow(Instance *x, double t_end) {
     b->observed = 0;
     if (*b->lost) return;
     share(x);
+    if (solver_pass(&b->solver, t_end)) return;
     if (solver_advance(&b->solver, t_end) != OK) lose(x, b->solver.why.text);
 }
 
@@ -145,7 +147,7 @@ static Status look(Instance *x) {
     if (instance_observe(x) != OK) return FAILED;
     if (*b->lost || b->observed) return OK;
     share(x);
-    if (solver_observe(&b->solver, &b->seen) == OK)
+    if (solver_arrive(&b->solver) == OK && solver_observe(&b->solver, &b->seen) == OK)
         b->observed = 1;
     else
         lose(x, b->solver.why.text);
@@ -197,10 +199,9 @@ static void widen(Instance *x) {
     }
 }
 
-/* The magnitudes at the start; of fixed steps, n to t_end for the companion and 2 n for the delivered run. */
+/* Of fixed steps, n to t_end for the companion and 2 n for the delivered run. */
 static void begin_step(Instance *x, double t_end) {
     const double span = t_end - x->solver.state.now.t;
-    if (x->solver.state.now.t == x->start_time) widen(x);
     if (!has_fixed_step(x) || !(span > 0) || !isfinite(span)) return;
     const double steps = fmax(ceil(span / asked_step(x, span) * (1 - 1e-12)), 1);
     x->bars->solver.settings.step = span / steps;
@@ -249,5 +250,5 @@ static Status restored(Instance *x) {
     return restored_solver(x, &b->solver);
 }
 
-const ErrorBars BARS = {layout,         start, begin_step, follow,  widen,
-                        inputs_changed, turn,  get,        save,    restore, restored};
+const ErrorBars BARS = {layout,         start, widen, begin_step, follow,
+                        inputs_changed, turn,  get,   save,       restore, restored};

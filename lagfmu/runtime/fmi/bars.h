@@ -37,10 +37,12 @@ typedef struct {
     void (*layout)(struct Instance *x, Arena *saved, Arena *scratch);
     /* The companion stands where the delivered run starts. */
     void (*start)(struct Instance *x);
-    /* Before and after the delivered run goes to t_end [s]; then, when it can be observed there. */
+    /* The present differences count from here on: before the next step, when the inputs are set and most often
+     * all has been read. */
+    void (*widen)(struct Instance *x);
+    /* Before and after the delivered run goes to t_end [s]. */
     void (*begin_step)(struct Instance *x, double t_end);
     void (*follow)(struct Instance *x, double t_end);
-    void (*widen)(struct Instance *x);
     void (*inputs_changed)(struct Instance *x);
     /* The companion goes with a prescribed motion that was set, as the delivered run does to be read. */
     void (*turn)(struct Instance *x);

@@ -65,7 +65,7 @@ void instance_reset(Instance *x) {
     x->stop_time = HUGE_VAL;
     x->tolerance = 0;
     x->given.method = (MethodName)DEFAULT_METHOD;
-    x->solver.on_demand = ERROR_BARS == NULL; /* which are carried from point to point */
+    x->solver.on_demand = 1;
     x->started = x->running = x->warned = x->observed = x->evaluated = x->followed = 0;
     for (int k = 0; k < VARIABLE_COUNT; k++)
         if (VARIABLES[k].type == TYPE_REAL &&
@@ -512,8 +512,10 @@ static void tell_of_method(Instance *x, double product, int implicit) {
 
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
+    if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
     if (solver_pass(s, t_end)) {
         x->observed = x->evaluated = 0;
+        if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
         return OK;
     }
     unfollow(x);
@@ -535,7 +537,6 @@ Status instance_step(Instance *x, double t_end) {
     if (s->system->lookup_count > 0) warn_of_tables(x);
     if (s->system->contacts + s->system->frictions > 0) report_events(x);
     tell_of_method(x, product, implicit);
-    if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
     return OK;
 }
 

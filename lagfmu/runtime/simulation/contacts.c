@@ -67,7 +67,7 @@ static Status most_wrong(Solver *s, Instant at, const double *q, const double *v
     for (int c = 0; c < s->system->contacts; c++) {
         int k = s->system->contact[c];
         if (modes[c]) {
-            double size;
+            double size = 0;
             if (find_force_scale(s, k, forces, &size) != OK) return FAILED;
             double excess = size != 0 ? -(b->lambda[k] / size) : 0;
             if (excess > (touching[c] ? -CONTACT_PULL : CONTACT_PULL) && (*found == NONE || excess > worst)) {
