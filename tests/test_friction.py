@@ -245,6 +245,25 @@ def test_the_log_tells_when_a_friction_slips_and_that_it_sticks(
         assert told == [slipped, "friction grip sticks"]
 
 
+@pytest.mark.parametrize("target", ["native", "python"])
+@pytest.mark.parametrize(
+    ("step", "tolerance", "values"),
+    [
+        (0.02689, 1.1e-7, {"g": 21.797, "k": 38.355, "m": 1.0607, "mu_s": 0.948, "x": -0.0536}),
+        (0.11111, 5.5e-10, {"g": 17.66, "k": 131.62, "m": 0.54214, "mu_s": 1.215, "x": -0.0456}),
+    ],
+)
+def test_what_rests_from_the_start_on_goes_on_resting(
+    rubbing: Build, target: str, step: float, tolerance: float, values: dict[str, float]
+) -> None:
+    """A spring too weak for the friction: weight and floor balance to rounding; no place is singular."""
+    run = {"stop_time": 20 * step, "step_size": step, "tolerance": tolerance}
+    found = simulate(rubbing("FrictionOscillator", target), start_values=values, **run)
+    assert found["sticks.grip"].all()
+    assert (found["x"] == values["x"]).all()
+    assert np.abs(found["z"]).max() < 1e-15
+
+
 # ------------------------------------------------------------------ what is refused
 
 x, y, z, u = dynamicsymbols("x y z u")

@@ -7,6 +7,8 @@ from dataclasses import replace
 import fmpy
 import numpy as np
 import pytest
+from instance import instance
+from runs import simulate_fmu
 from sympy import Abs, cos, log, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -127,6 +129,33 @@ def test_an_output_alone_is_what_it_is_among_all(native_fmu, tmp_path):
     np.testing.assert_allclose(alone["tension"], whole["tension"], rtol=0, atol=0)
     found = {q.name: q.group for q in quantities(description)}
     assert found["tension"] == found["bob.height"] == OWN
+
+
+def test_an_output_of_ones_own_is_read_as_any_other(native_fmu):
+    """In model exchange; with a derivative, which for the tension -2 L lambda is -2 L times that of lambda,
+    and for the height is that of y; in a figure under its name and unit."""
+    path = str(native_fmu("PendulumCartesian"))
+    run = {"stop_time": 1.0, "output_interval": 0.1, "relative_tolerance": 1e-9}
+    names = ["tension", "bob.height"]
+    near, far = (
+        simulate_fmu(path, fmi_type=kind, output=names, **run)
+        for kind in ("CoSimulation", "ModelExchange")
+    )
+    for name in names:
+        np.testing.assert_allclose(far[name], near[name], rtol=0, atol=1e-5)
+    with instance(path) as one:
+        one.start({})
+        at = {n: v.valueReference for n, v in one.variables.items()}
+        of = [at["tension"], at["lambda.rod"], at["bob.height"]]
+        for known, slope in (("x", 0.0), ("y", 1.0)):
+            tension, multiplied, height = one.fmu.getDirectionalDerivative(of, [at[known]], [1.0])
+            assert multiplied != 0
+            length = one.get("L")
+            assert tension == pytest.approx(-2 * length * multiplied, rel=1e-12)
+            assert height == slope
+    (axis,) = simulate(path, 0.5).plot("tension").axes
+    assert axis.get_ylabel() == "[N]"
+    assert [line.get_label() for line in axis.lines] == ["tension"]
 
 
 def test_what_needs_no_lambda_needs_no_solution_for_it():

@@ -362,3 +362,14 @@ def test_probes_cover_the_ranges(bench):
     for p in "mga":
         assert sum(n.startswith(f"parameters: {p} = ") for n in names) >= 8
     assert len(names) == len(set(names))
+
+
+def test_rates_that_an_fmu_estimates_are_read_by_the_judge(tmp_path):
+    """A cam whose angle alone is given, a contact with a table, friction: nothing is wrong, and the laws that
+    need the angle's rates are held against those that the FMU reports."""
+    model = Path(__file__).parent.parent / "benchmarks" / "unseen" / "cam.py"
+    arguments = ["stress", str(model), "--target", "native", "--quick", "--out", str(tmp_path)]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    data = json.loads((tmp_path / "native" / "Cam.json").read_text())
+    assert data["verdicts"][WRONG] == 0
+    assert data["verdicts"][RIGHT] > 10

@@ -137,7 +137,7 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
             if not (
                 leg.system.prescribed and t0 == leg.begun
             ):  # it may have jumped when it was set
-                leg.check_projection(solver.t, solver.y, y1)
+                leg.check_projection(t0, solver.t, solver.y, y1)
         except StepFailureError:
             if not choice.implicit:
                 raise

@@ -45,6 +45,8 @@ static const double STILL = 1e-100; /* scale of what neither moves nor is pushed
 static const double FEWEST_STEPS_RK4 = 100; /* in one natural time of the motion, unless solver.step is set */
 static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may move the state: times the
                                                   * tolerance, and at least, relative to the state */
+static const double BALANCED = 1e3 * DBL_EPSILON; /* of what the forces alone would make of a step: what they
+                                                   * leave of it where others hold the state still */
 static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the state: it means nothing */
 enum { CHATTER = 200 };             /* events in next to no time after which the step is given up, ... */
 static const double AT_ONCE = 1e-9; /* ... natural times that are next to none */

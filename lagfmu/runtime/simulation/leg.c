@@ -159,6 +159,19 @@ Status leg_project(Solver *s, double t, double *y) {
                              s->state.offset, s->state.size);
 }
 
+/* Is that much of a step rounding of the forces, which others balance? */
+static int is_balanced(const Solver *s, int j, double moved) {
+    const System *system = s->system;
+    const int n = system->n;
+    const double h = s->integrator.t - s->integrator.t_old;
+    for (int e = 0; e < system->masses; e++) {
+        if (system->mass_row[e] != j % n || system->mass_column[e] != j % n) continue;
+        const double mass = s->stepped.M[e], force = fabs(s->stepped.F[j % n]);
+        return mass > 0 && moved <= BALANCED * force / mass * h * (j < n ? h : 1);
+    }
+    return 0;
+}
+
 Status leg_check_projection(Solver *s, double t, const double *y, const double *projected) {
     const int n = s->system->n;
     const double far = fmax(FAR * s->settings.tolerance, LEAST_FAR);
@@ -167,7 +180,8 @@ Status leg_check_projection(Solver *s, double t, const double *y, const double *
         return OK; /* a prescribed motion may have jumped when it was set */
     for (int j = 0; j < 2 * n; j++) {
         const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
-        if (!(fabs(projected[j] - y[j]) <= far * fmax(fabs(y[j]), size)))
+        const double moved = fabs(projected[j] - y[j]);
+        if (!(moved <= far * fmax(fabs(y[j]), size)) && !is_balanced(s, j, moved))
             return fail(&s->why,
                         "the integration stops at t = %.17g s, the projection onto the constraints "
                         "moves %s by %.3g: the configuration is singular, or nearly so",

@@ -56,6 +56,9 @@ class Facts:
     step_size: float
     tolerance: float
     motions: frozenset[str] = frozenset()  # inputs that are prescribed motions and their rates
+    estimated: tuple[
+        str, ...
+    ] = ()  # rates of inputs that the FMU estimates: read, not set; 0 at first
     tabulated: bool = False  # numbers with units that no parameter scales
 
     def share(self, constraint: str, coordinate: str) -> str | None:
@@ -121,6 +124,9 @@ def facts_of(path: Path) -> Facts:
         v.name for v in reals if names.derivative(v.name, 2) in variables and v.causality != "input"
     )
     moving = {*coordinates, *(names.derivative(c) for c in coordinates)}
+    inputs = [v.name for v in reals if v.causality == "input"]
+    rates = [names.derivative(name, k) for name in inputs for k in (1, 2)]
+    estimated = tuple(n for n in rates if n in variables and n not in inputs)
     return Facts(
         path=path,
         name=file_stem(description),
@@ -130,7 +136,8 @@ def facts_of(path: Path) -> Facts:
         outputs=tuple(
             v
             for v in description.modelVariables
-            if v.causality == "output" and v.type in ("Real", "Integer", "Boolean")
+            if (v.causality == "output" and v.type in ("Real", "Integer", "Boolean"))
+            or (v.causality == "local" and v.name in estimated)
         ),
         parameters=tuple(
             _settable(v)
@@ -139,7 +146,8 @@ def facts_of(path: Path) -> Facts:
         ),
         starts=tuple(_settable(v) for v in reals if v.name in moving and v.start is not None),
         inputs=tuple(_settable(v) for v in reals if v.causality == "input"),
-        motions=_motions([v.name for v in reals if v.causality == "input"]),
+        motions=_motions([*inputs, *estimated]),
+        estimated=estimated,
         coordinates=coordinates,
         constraints=tuple(names.constraints((v.name for v in reals), names.MULTIPLIER)),
         contacts=tuple(names.constraints(variables, names.CONTACT)),

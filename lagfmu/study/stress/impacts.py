@@ -66,9 +66,10 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
 
 
 def _known(facts: Facts) -> Values:
-    return {"time": 0.0} | {
-        s.name: s.start for s in (*facts.parameters, *facts.inputs, *facts.starts)
-    }
+    described = (*facts.parameters, *facts.inputs, *facts.starts)
+    return (
+        {"time": 0.0} | dict.fromkeys(facts.estimated, 0.0) | {s.name: s.start for s in described}
+    )
 
 
 def _state(geometry: Geometry, q: Vector, v: Vector) -> Values:

@@ -30,7 +30,8 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
             found.append(
                 Probe(FAMILY, f"{i.name} = {value:g}", partial(_not_finite, i.name, value))
             )
-        if i.name in facts.motions and not names.read(i.name).order:
+        given = names.derivative(i.name) not in facts.estimated
+        if i.name in facts.motions and not names.read(i.name).order and given:
             found.append(Probe(FAMILY, f"{i.name} swings", partial(_swings, i.name)))
     return found
 

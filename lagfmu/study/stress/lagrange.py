@@ -195,5 +195,6 @@ def _form(
 
 def _names(form: ClosedForm) -> set[str]:
     actual = output(form.name) if form.actual is None else form.actual
-    used = in_variables(actual).free_symbols | in_variables(form.expected).free_symbols
+    parts = [actual, form.expected, *(e for e in (form.scale, form.when) if e is not None)]
+    used = set().union(*(in_variables(sp.sympify(e)).free_symbols for e in parts))
     return {str(s) for s in used} - {"time"}
