@@ -118,7 +118,7 @@ def layered(fmu: Path, found: Verification | None) -> dict[str, bytes]:
     description = read_description(fmu)
     name = description.modelName
     table, stop, step = reference_run(fmu)
-    stride = max(1, -(-(len(table) - 1) // POINTS))
+    stride = max(1, -(-(len(table) - 1) // (POINTS - 1)))
     while True:
         wide = min(stride * step, stop)
         chosen = at_points(fmu, stop, wide)
@@ -168,8 +168,8 @@ def layered(fmu: Path, found: Verification | None) -> dict[str, bytes]:
 def at_points(fmu: Path, stop: float, step: float) -> Trajectory:
     """The reference run with communication points that far apart [s]."""
     count = len(communication_points(stop, step))
-    if count > POINTS + 1:
-        raise SimulationError(f"{count} points, expected at most {POINTS + 1}")
+    if count > POINTS:
+        raise SimulationError(f"{count} points, expected at most {POINTS}")
     return simulate(fmu, stop, step, TOLERANCE)
 
 
