@@ -18,6 +18,8 @@ import fmpy
 import numpy as np
 from scipy.special import ellipj, ellipk
 
+from lagfmu.methods import NUMBERS
+
 RUNS = 5
 STOP, STEP = 10.0, 0.1
 TOLERANCES = [10.0**-k for k in range(3, 14)]
@@ -49,7 +51,7 @@ def main() -> None:
                 stop_time=STOP,
                 output_interval=STEP,
                 relative_tolerance=tol,
-                start_values={"solver.method": method},
+                start_values={"solver.method": NUMBERS[method]},
                 output=["lambda.rod", "solver.steps"],
                 validate=False,
             )

@@ -7,7 +7,20 @@ from functools import cache
 import pytest
 from instance import instance
 from runs import simulate_fmu
-from sympy import Abs, Heaviside, Max, Mod, Piecewise, cos, floor, pi, sign, symbols
+from sympy import (
+    Abs,
+    Heaviside,
+    Max,
+    Mod,
+    Piecewise,
+    cos,
+    exp,
+    floor,
+    pi,
+    sign,
+    sqrt,
+    symbols,
+)
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu
@@ -257,3 +270,29 @@ def test_the_equations_are_shown_as_they_were_written():
     """The page says sign(x), not what stands for it in the code."""
     [force] = prepare(cart("Signs", F * sign(x))).equations.F
     assert str(force) == "F*sign(x)"
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_pulse_shorter_than_a_step_needs_a_word(tmp_path, target):
+    """A smooth pulse of w = 1e-4 s gives a cart at rest F w sqrt(pi)/m, with solver.maximum_step = w as
+    docs/events.md says; one that begins and ends by jumps arrives in full by itself."""
+    w = symbols("w", positive=True)
+    smooth = F * exp(-(((t - T / 3) / w) ** 2))
+    square = F * (Heaviside(t - T / 3) - Heaviside(t - T / 3 - w))
+    for force, step, expected in ((smooth, 1e-4, sqrt(pi)), (square, 0.0, 1)):
+        model = Model(
+            name="Pulse",
+            lagrangian=m * v**2 / 2,
+            coordinates={x: "m"},
+            forces={x: force},
+            parameters=[
+                *(Parameter(m, 1.0, "kg"), Parameter(F, 2.0, "N"), Parameter(T, 1.0, "s")),
+                Parameter(w, 1e-4, "s"),
+            ],
+            start={x: 0.0},
+        )
+        fmu = build_fmu(model, tmp_path, target=target, check=False)
+        with instance(fmu) as one:
+            one.start({"solver.maximum_step": step})
+            one.step(1.0)
+            assert one.get("der(x)") == pytest.approx(2.0 * 1e-4 * float(expected), rel=1e-6)

@@ -239,6 +239,20 @@ def test_the_command_writes_table_files_and_figure(tmp_path):
     assert (out / "python" / "Link.svg").read_text().count("<svg") == 1
 
 
+def test_an_output_of_ones_own_is_measured_too(tmp_path):
+    """The pull of the link is -lambda: it has the same error."""
+    model, out = tmp_path / "link.py", tmp_path / "out"
+    text = SMALL.replace("WRONG", "-1").replace(
+        "constraints=", "outputs=[Output('pull', -multiplier('link'), 'N')], constraints="
+    )
+    model.write_text("from lagfmu import Output, multiplier\n" + text)
+    words = ["tradeoff", model, "--scene", "Link", "--out", out, "--repeats", 1]
+    words += ["--target", "python", "--tolerance", 1e-4, "--method", "rk4", "--step-size", 0.05]
+    lagfmu(*words)
+    for row in csv.DictReader((out / "python" / "Link.csv").read_text().splitlines()):
+        assert row["error(pull)"] == row["error(lambda.link)"]
+
+
 def test_a_pipeline_reads_what_was_measured(tmp_path):
     """A case a setting, which fails where a closed form does not hold at its tolerance: a link that is said
     to pull twice as hard as it does: exit code 1.  3 for a missing file, 2 for a method that is none."""

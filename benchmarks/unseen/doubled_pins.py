@@ -7,10 +7,10 @@ by a torque. Conserved: the energy but for the torque's work.
 
 from math import atan2
 
-from sympy import Rational, cos, sin, symbols
+from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Holonomic, Input, Model, Parameter, Scene, output
+from lagfmu import Conserved, Holonomic, Input, Model, Parameter, Scene, output
 
 x1, y1, a1, x2, y2, a2, x3, y3, a3, tau = dynamicsymbols("x1 y1 a1 x2 y2 a2 x3 y3 a3 tau")
 rho, g = symbols("rho g", positive=True)
@@ -72,13 +72,6 @@ model = Model(
 scenes = [Scene("DoubledPins", stop_time=2.0, step_size=0.01)]
 
 closed_forms = [
-    ClosedForm(
-        "each pin carries half",
-        output("lambda.leftx"),
-        actual=output("lambda.rightx"),
-        scale=sum(output(f"lambda.{n}{a}") ** 2 for n in ("crank", "coupler", "left") for a in "xy")
-        ** Rational(1, 2),
-    ),
     Conserved(
         "energy but for the torque's work",
         output("energy.total") - tau * a1,

@@ -190,17 +190,17 @@ def _print(found: Any) -> None:
     refused = int((status != "ok").sum())
     title = f"{Path(found.attrs['fmu']).stem}: {len(status)} runs, {refused} refused"
     names = numbers(found)
+    console.print(escape(title), highlight=False)
     if len(status) > FEW or not names:
-        console.print(escape(title), highlight=False)
         for name in names:
             text = _range(runs, name, refused)
             console.print(f"  {escape(name)}: {escape(text)}", highlight=False, soft_wrap=True)
     else:
-        _print_runs(runs, names, title, refused > 0)
+        _print_runs(runs, names, refused > 0)
     _print_reasons([str(r) for r in runs["reason"].values if r])
 
 
-def _print_runs(runs: Any, names: Sequence[str], title: str, refused: bool) -> None:
+def _print_runs(runs: Any, names: Sequence[str], refused: bool) -> None:
     """What varied and what was kept, a row a run; `refused`: with the status of each."""
     from ..study.sweep.table import happened, varied
 
@@ -209,7 +209,7 @@ def _print_runs(runs: Any, names: Sequence[str], title: str, refused: bool) -> N
     for name in names:
         of, _, how = name.rpartition(":")
         headings.append(f"{_broken(of)}\n{how} {escape(_unit(runs, name, True))}".rstrip())
-    drawn = new_table(escape(title), *headings, *(["status"] if refused else []))
+    drawn = new_table("", *headings, *(["status"] if refused else []))
     columns = [runs[n].values for n in causes] + [happened(runs, n) for n in names]
     status = runs["status"].values
     for k in range(len(status)):

@@ -118,6 +118,8 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
         if acceleration <= LOST * pull:
             acceleration = pull  # at rest: what is left is rounding of forces that cancel
         own[j] = max(steady, pull / speed if speed > 0 else 0.0)
+        if own[j] > 0:  # one that is hardly pushed moves no farther than the others do
+            own[j] = max(own[j], _slowest(system, known, np.abs(v)))
         natural = max(natural, own[j])
         if own[j] == 0 and span > 0:
             own[j] = 1 / (MEASURED_PART * span)
@@ -184,6 +186,15 @@ def _held(at: Instant, state: State, now: Motion) -> tuple[Vector, Vector]:
         noise += EPS * change * (abs(state.q[j]) / size[j])
     omega = np.sqrt((back[size > 0] / size[size > 0]).max(initial=0.0))
     return back, noise / omega if omega > 0 else noise
+
+
+def _slowest(system: System, size: Vector, speed: Vector) -> float:
+    """The least rate at which a coordinate that has a size moves through it; 0 if none does."""
+    rates = [
+        _rate(system, size, speed, np.zeros(system.n), np.arange(system.n) == j)
+        for j in np.flatnonzero(size > 0)
+    ]
+    return min((r for r in rates if r > 0), default=0.0)
 
 
 def _rate(system: System, size: Vector, speed: Vector, pull: Vector, counted: Mask) -> float:

@@ -14,7 +14,7 @@ from .failure import MasslessError, StepFailureError
 from .schur import half_solve, mass_factor
 from .solution import Solution, loose
 from .system import Matrix, Vector
-from .thresholds import CONSISTENT, HIDDEN, ON_CONSTRAINTS, RANK, VANISHES
+from .thresholds import CONSISTENT, HIDDEN, HIDES, ON_CONSTRAINTS, RANK, VANISHES
 
 
 def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: float) -> Solution:
@@ -29,11 +29,11 @@ def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: f
     W = W / r
     U, sigma, Vt = np.linalg.svd(W, full_matrices=True)
     rank = int((sigma > max(RANK, loose(off))).sum())
-    part = np.abs(W).max(axis=1, initial=0.0)
-    if rank < len(c) and ((part > 0) & (part < HIDDEN)).any():
+    parts = np.abs(G) > HIDES * np.abs(G).max(axis=1, initial=0.0)[:, None]
+    if rank < len(c) and (parts & (np.abs(W.T) < HIDDEN)).any():
         # light coordinates hide what the others are held by; in the KKT matrix they do not
         _, _, sizes, _ = _scaled(M, G)
-        if (sizes > max(RANK, loose(off)) * sizes[0]).sum() > len(b) + rank:
+        if (sizes > max(RANK, loose(off)) * sizes[0]).sum() >= len(b) + rank:
             return _least_norm(M, b, G, c, nearest, off)
     null = Vt[rank:]
 

@@ -14,8 +14,9 @@ static const double RANK_LOOSEST = 1e-3;  /* ... which says nothing of rows at a
 static const double ON_CONSTRAINTS = 1e-13; /* a state that is closer is on them; relative to its size */
 static const double CONSISTENT = 1e-7;    /* a dependent row may miss its right-hand side by this, relative */
 static const double VANISHES = 1e-8;      /* component of a unit null vector that counts as zero */
-static const double HIDDEN = 1e-9;        /* largest part that a heavy coordinate has in rows of unit norm, below
-                                           * which they may seem to be dependent and are not */
+static const double HIDDEN = 1e-7;        /* part that a heavy coordinate keeps in a row of unit norm, ... */
+static const double HIDES = 1e-3;         /* ... of which it has at least this part without the masses: then rows
+                                           * may seem to be dependent and are not */
 static const double LCP_ZERO = 1e-12;     /* of the largest |b| in scaled rows: a w that counts as none */
 static const double LCP_DEPENDENT = 1e-10; /* of a row of unit norm that must stand out to join the set */
 

@@ -34,7 +34,7 @@ static Status factor(Linear *l) {
         const int rank = l->system->n + *l->pivots;
         for (int k = 0; k < l->system->m; k++) l->unique[k] = 1;
         l->rung = RUNG_LEAST_NORM;
-        if (least_norm_factor(l) == OK && *l->pivots > rank) return OK;
+        if (least_norm_factor(l) == OK && *l->pivots >= rank) return OK;
         for (int k = 0; k < l->system->m; k++) l->unique[k] = 1;
         l->rung = RUNG_ORTHOGONAL;
         (void)orthogonal_factor(l, &doubtful);

@@ -15,7 +15,7 @@
 int orthogonal_factor(Linear *l, int *doubtful) {
     Weighted w;
     if (!weighted_factor(l, linear_rank_threshold(l), &w)) return 0;
-    *doubtful = w.cod.rank < w.acting && weighted_hides(&w);
+    *doubtful = w.cod.rank < w.acting && w.hides;
     for (int j = w.cod.rank; j < w.acting; j++) {
         for (int i = 0; i < w.acting; i++) w.w[i] = i == j;
         cod_from_rows(&w.cod, w.w, w.spare);

@@ -44,27 +44,23 @@ int weighted_factor(Linear *l, double threshold, Weighted *w) {
     *w = weighted_view(l);
     const Schur *own = schur_of(l);
     int n = l->system->n;
-    for (int i = 0; i < n; i++) w->y[i] = 0;
+    w->hides = 0;
     for (int j = 0; j < w->acting; j++) {
         int k = w->rows[j];
         double *column = w->cod.A + j * n;
         for (int i = 0; i < n; i++) column[i] = 0;
         w->size[j] = own->diagonal[k] > 0 ? sqrt(own->diagonal[k]) : 1;
+        double most = 0;
+        for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++) most = fmax(most, fabs(own->w[a]));
         for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++) {
             int i = own->w_column[a];
             column[i] = own->w[a] * sqrt(own->inverse_mass[i]) / w->size[j];
-            w->y[i] = fmax(w->y[i], fabs(column[i]));
+            w->hides |= fabs(own->w[a]) > HIDES * most && fabs(column[i]) < HIDDEN;
         }
     }
     cod_factor(&w->cod, threshold);
     *w->rank = w->cod.rank;
     return 1;
-}
-
-int weighted_hides(const Weighted *w) {
-    for (int i = 0; i < w->cod.rows; i++)
-        if (w->y[i] > 0 && w->y[i] < HIDDEN) return 1;
-    return 0;
 }
 
 void weighted_to(const Linear *l, const Weighted *w, const double *b, double *y) {

@@ -14,6 +14,8 @@ typedef struct {
     int *rank;             /* of W */
     int *rows;             /* (acting) which rows act */
     int acting;
+    int hides;             /* 1: in a row a light coordinate leaves next to nothing of others that take part in it;
+                            * known right after weighted_factor() alone */
 } Weighted;
 
 /* Doubles and ints that it needs in Linear.dense and Linear.pivots. */
@@ -23,10 +25,6 @@ int weighted_ints(int n, int m);
 /* Columns that stand out by at most `threshold` count as dependent.  0 if M is not safely positive
  * definite. */
 int weighted_factor(Linear *l, double threshold, Weighted *w);
-
-/* 1: a coordinate has next to no part in the columns, so heavy is it beside others.  To be asked right after
- * weighted_factor(). */
-int weighted_hides(const Weighted *w);
 
 /* The decomposition that weighted_factor() left. */
 Weighted weighted_view(const Linear *l);

@@ -162,8 +162,19 @@ void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *s
     }
 }
 
-/* own (n): the rate by which a coordinate takes its size from the motion; 0 for those that have one.
- * The largest rate that the motion itself gives is returned. */
+/* The least rate at which a coordinate that has a size moves through it; 0 if none does. */
+static double slowest_rate(const Solver *s) {
+    double slowest = 0;
+    for (int j = 0; j < s->system->n; j++) {
+        const double rate = rate_of(s, j, 0);
+        if (rate > 0 && !(slowest > 0 && slowest <= rate)) slowest = rate;
+    }
+    return slowest;
+}
+
+/* own (n): the rate by which a coordinate takes its size from the motion; 0 for those that have one.  One that
+ * is hardly pushed moves no farther than the others do.  The largest rate that the motion itself gives is
+ * returned. */
 static double find_own(Solver *s, double span, const double *felt, double *own) {
     const System *system = s->system;
     double *least = s->work_initial, steady = 0, natural = 0;
@@ -176,6 +187,7 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
         if (s->state.size[j] > 0) continue;
         const double speed = largest_alike(system, j, s->state.v);
         own[j] = larger(steady, speed > 0 ? largest_alike(system, j, felt) / speed : 0);
+        if (own[j] > 0) own[j] = larger(own[j], slowest_rate(s));
         natural = larger(natural, own[j]);
         if (!(own[j] > 0) && span > 0) own[j] = 1 / (MEASURED_PART * span);
     }
