@@ -259,7 +259,7 @@ def test_one_integrator_and_no_event_code_are_linked(tmp_path: Path, native_fmu:
     path = write(prepared, tmp_path, target="native")
     gone = {"rk4.c", "radau5.c", "rattle.c", "events.c", "contacts.c", "switch.c"}
     assert not gone & sources(path)
-    assert {"dop853.c", "parts.c"} <= sources(path)
+    assert {"dop853.c", "optional.c"} <= sources(path)
     full = native_fmu("PendulumCartesian")
     assert gone & sources(full) == gone - {"events.c", "contacts.c", "switch.c"}
     size = {p: zipfile.ZipFile(p).getinfo(_binary(p)).file_size for p in (path, full)}
@@ -278,7 +278,7 @@ def test_one_integrator_and_no_event_code_travel(tmp_path: Path, python_fmu: Any
     file, scene = scene_of("PendulumCartesian")
     events = {
         "events.py",
-        "looks.py",
+        "samples.py",
         "switch.py",
         "contacts.py",
         "impact.py",
@@ -288,7 +288,7 @@ def test_one_integrator_and_no_event_code_travel(tmp_path: Path, python_fmu: Any
     }
     full, contacts = (solver(python_fmu(name)) for name in ("PendulumCartesian", "Hemisphere"))
     assert contacts.keys() - full.keys() <= events
-    assert "from .events" not in full["at_contacts.py"]
+    assert "from .events" not in full["optional_contacts.py"]
     for method in ("dop853", "rk4", "radau5"):
         asked = replace(scene, outputs=["lambda.rod"], method=method, step=1e-3)
         path = write(prepare(file.model, asked), tmp_path / method, target="python")

@@ -16,7 +16,7 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Contact, Holonomic, Model, Parameter, Scene, build_fmu
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.solver import advance as advancing
-from lagfmu.solver import leg
+from lagfmu.solver import flow
 from lagfmu.solver.initial import start
 from lagfmu.solver.state import Settings, State
 from lagfmu.solver.stiffness import DEARER, Choice, Slope, explicit, explicit_step
@@ -369,7 +369,7 @@ def test_where_radau5_fails_dop853_goes_on(prepared, monkeypatch):
     begun = start(system, Settings(), 0.0, [0.0, 0.4, 0.6], [10.0, 0.0, 0.0], [0.0], p).state
     right = advancing.advance(system, Settings("dop853"), begun, [0.0], p, 0.02)
 
-    real = leg.stepper
+    real = flow.stepper
 
     def failing(settings, *arguments):
         made = real(settings, *arguments)
@@ -377,7 +377,7 @@ def test_where_radau5_fails_dop853_goes_on(prepared, monkeypatch):
             made.step = lambda: (_ for _ in ()).throw(ValueError("singular"))
         return made
 
-    monkeypatch.setattr(leg, "stepper", failing)
+    monkeypatch.setattr(flow, "stepper", failing)
     ended = advancing.advance(system, Settings("auto"), begun, [0.0], p, 0.02)
     assert ended.choice.failures > 0
     assert State.from_json(ended.to_json()) == ended

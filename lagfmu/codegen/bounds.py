@@ -16,8 +16,8 @@ from sympy.core.relational import Relational
 from ..mechanics.differential import Differential
 from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.jumps import Jumps
+from ..model.elements import Expr
 from ..model.model import Constraint, Contact
-from ..model.parts import Expr
 
 FUNCTIONS = {
     **{f: f.__name__ for f in (sp.sin, sp.cos, sp.tan, sp.exp, sp.log, sp.atan, sp.asin, sp.acos)},

@@ -15,8 +15,8 @@ from .. import names
 from ..errors import ModelError, TableError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
+from ..model.elements import Expr
 from ..model.goal import parse
-from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.spline import Spline, splines_in
 from .formula import functions_of, read_formula, text_of

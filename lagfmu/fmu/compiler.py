@@ -47,7 +47,7 @@ HOT = {  # where the time of a step and of a communication point goes; all else 
     *("model.c", "mechanism.c", "project.c", "friction.c"),
     *("linear.c", "schur.c", "ldlt.c", "kkt.c", "lu.c"),
     *("dop853.c", "rk4.c", "radau5.c", "rattle.c", "step_size.c", "stiffness.c"),
-    *("leg.c", "advance.c", "observe.c", "outputs.c", "indicators.c", "looks.c"),
+    *("flow.c", "advance.c", "observe.c", "outputs.c", "indicators.c", "samples.c"),
     *("system.c", "integrator.c"),
     "lagfmu.c",  # the runtime in one file
 }

@@ -20,7 +20,7 @@ from typing import Any
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
-from ..model.parts import Expr
+from ..model.elements import Expr
 from ..model.spline import HIGHEST as HIGHEST_DERIVATIVE
 from ..model.spline import Spline
 

@@ -8,7 +8,7 @@ from importlib.resources import files
 
 from ..codegen.c.amalgam import amalgamate, with_one_header
 from ..codegen.c.equations import model_source
-from ..codegen.c.parts import files_left_out, needs_tangents, parts_source
+from ..codegen.c.optional import files_left_out, needs_tangents, optional_source
 from ..codegen.c.tables import entanglements
 from ..codegen.c.variables import variables_source
 from ..errors import BuildError
@@ -86,9 +86,9 @@ def sources_of(prepared: Prepared) -> Sources:
         "model.c": model_source(form, needs_tangents(scene, system)).encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
     }
-    parts = parts_source(scene, system)
+    parts = optional_source(scene, system)
     if parts is not None:
-        generated["parts.c"] = parts.encode()
+        generated["optional.c"] = parts.encode()
     gone |= generated.keys()
     runtime = {file: text for file, text in everything.items() if file not in gone}
     shipped = amalgamate(runtime, version())

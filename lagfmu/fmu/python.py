@@ -14,7 +14,7 @@ from typing import Any
 
 from pythonfmu.builder import FmuBuilder
 
-from ..codegen.py.parts import files_left_out, files_of_its_own
+from ..codegen.py.optional import files_left_out, files_of_its_own
 from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
 from ..methods import IN_PYTHON, NUMBERS

@@ -22,7 +22,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from .. import names
-from ..solver import at_bars
+from ..solver import optional_bars
 from ..solver.advance import advance, beginning
 from ..solver.failure import StepFailureError
 from ..solver.initial import start
@@ -162,11 +162,13 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                     self.observed = None
                     self._outputs(keep=True)
                     bars = self.bars
-                settings, self.coarse = at_bars.paired_settings(settings, before, end)
-            after_step = at_bars.after_step if self.barred else None
+                settings, self.coarse = optional_bars.paired_settings(settings, before, end)
+            after_step = optional_bars.after_step if self.barred else None
             self.state = advance(self.system, settings, before, u, self.p, end, after_step)
             if self.barred:
-                self.bars, told = at_bars.followed(self.system, self.coarse, bars, u, self.p, end)
+                self.bars, told = optional_bars.followed(
+                    self.system, self.coarse, bars, u, self.p, end
+                )
             self.expected = self.system.inputs_at(u, self.state.t - before.t)
             for k, value in zip(self.inputs, self.expected, strict=True):
                 self.values[k] = value
@@ -388,7 +390,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         """The error bars with the present differences in them, and their values."""
         u, now, kept = self._values(self.inputs), (state, seen), self.bars
         companion = None if kept.state is None else self._seen(kept.state)
-        bars, found, told = at_bars.widened(
+        bars, found, told = optional_bars.widened(
             self.system,
             self.coarse,
             replace(kept, state=companion),
@@ -434,9 +436,11 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                 self._warn(str(moved))
         self.state, self.observed, self.expected = found.state, None, u
         if self.barred:
-            self.bars = at_bars.begun(found.state, self.with_bars)
-            self.coarse = at_bars.paired_settings(self.settings, found.state, found.state.t)[1]
-            told = at_bars.halved(self.settings, found.state)
+            self.bars = optional_bars.begun(found.state, self.with_bars)
+            self.coarse = optional_bars.paired_settings(self.settings, found.state, found.state.t)[
+                1
+            ]
+            told = optional_bars.halved(self.settings, found.state)
             if told and self.settings.step:
                 self._warn(told)
             elif told:
@@ -490,7 +494,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             "state": None if self.state is None else self.state.to_json(),
             "expected": list(self.expected),
             "past": [list(self.past.points), sorted(self.fresh)],
-            "bars": None if None in (self.bars, self.state) else at_bars.to_list(self.bars),
+            "bars": None if None in (self.bars, self.state) else optional_bars.to_list(self.bars),
         }
 
     @guarded
@@ -513,7 +517,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         if settings is not None:
             self.settings = settings
         if self.bars is not None and self.state is not None:
-            self.coarse = at_bars.paired_settings(self.settings, self.state, self.state.t)[1]
+            self.coarse = optional_bars.paired_settings(self.settings, self.state, self.state.t)[1]
         self.p = self._values(self.parameters)
         self.observed = None
 
@@ -523,7 +527,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             if raw is not None:
                 raise ValueError("it has error bars")
             return None
-        return at_bars.restored_bars(self.system, raw, len(self.barred), state)
+        return optional_bars.restored_bars(self.system, raw, len(self.barred), state)
 
     def _checked_state(self, state: dict[str, Any]) -> tuple[Any, ...]:
         """Everything that was read is what this FMU can have saved.  Raises ValueError."""

@@ -17,8 +17,8 @@ from ..mechanics.coupling import coupled
 from ..mechanics.equations import symbols_of
 from ..mechanics.form import Form
 from ..methods import FIXED_STEP, described
+from ..model.elements import Expr
 from ..model.model import Contact, Nonholonomic, name_of
-from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.units import (
     ENERGY,

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import sympy as sp
 
 from ..errors import DerivationError
-from ..model.parts import Expr
+from ..model.elements import Expr
 
 CONSTANT_PIECES = (
     sp.sign,

@@ -22,8 +22,8 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
 from ..model.display import Displayed
+from ..model.elements import Expr
 from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
-from ..model.parts import Expr
 from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit

@@ -8,8 +8,8 @@ from dataclasses import replace
 import sympy as sp
 
 from ..errors import ModelError
+from ..model.elements import Expr
 from ..model.model import Contact, Model, Parameter, name_of
-from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.selection import select
 from .equations import TIME, EquationsOfMotion

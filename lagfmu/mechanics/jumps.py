@@ -22,7 +22,7 @@ from sympy.core.relational import Relational
 from sympy.printing.precedence import precedence
 
 from ..errors import ModelError
-from ..model.parts import Expr
+from ..model.elements import Expr
 from .equations import TIME, EquationsOfMotion
 from .form import Form
 

@@ -17,8 +17,8 @@ import sympy as sp
 
 from .. import names
 from ..errors import ModelError
+from ..model.elements import Expr
 from ..model.model import Constraint, Contact, Holonomic, Output
-from ..model.parts import Expr
 from ..model.scene import Scene
 from ..model.selection import select
 from ..names import derivative

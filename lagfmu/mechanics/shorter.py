@@ -18,7 +18,7 @@ from sympy.core.random import rng
 from sympy.functions.elementary.trigonometric import TrigonometricFunction
 from sympy.simplify.fu import TR8
 
-from ..model.parts import Expr
+from ..model.elements import Expr
 
 OPERATIONS = 100  # of what SymPy's heuristics are asked for
 SIMPLE = 40  # of what all of them are

@@ -14,10 +14,10 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
 from ..names import read
+from .elements import Contact, Expr, ModelFields, Nonholonomic, name_of
 from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
-from .parts import Contact, Expr, ModelFields, Nonholonomic, name_of
 from .picture import check_picture
 from .reactions import reaction_units, reactions_in
 from .shapes import unusable_surfaces

@@ -13,8 +13,8 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from .. import names
+from .elements import Expr
 from .model import name_of
-from .parts import Expr
 
 TIME = dynamicsymbols._t
 

@@ -16,8 +16,8 @@ from sympy.physics.mechanics import LagrangesMethod, Lagrangian, System
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
+from .elements import Expr
 from .model import Constraint, Holonomic, Input, Model, Nonholonomic, Parameter, name_of
-from .parts import Expr
 
 
 def from_lagranges_method(

@@ -20,8 +20,8 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
 from ..names import derivative
+from .elements import Expr, Input, Output, name_of
 from .model import Model
-from .parts import Expr, Input, Output, name_of
 from .reactions import force_of_constraint, multiplier
 
 TEXT = re.compile(r"\s*([^=\s]+)\s*=(.*)\[([^\[\]]*)\]\s*\Z", re.S)

@@ -14,7 +14,7 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
-from .parts import NAME, Contact, Expr, Friction, ModelFields, Nonholonomic, name_of
+from .elements import NAME, Contact, Expr, Friction, ModelFields, Nonholonomic, name_of
 from .reactions import is_reaction, multiplier, reactions_in
 from .units import ONE, Unit, check_dimension, parse_unit, plain
 

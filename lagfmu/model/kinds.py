@@ -14,8 +14,7 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..names import RESERVED
-from .frictions import check_kinds
-from .parts import (
+from .elements import (
     NAME,
     Contact,
     Embedding,
@@ -29,6 +28,7 @@ from .parts import (
     Parameter,
     name_of,
 )
+from .frictions import check_kinds
 from .shapes import of_several_components, unusable
 from .units import plain
 

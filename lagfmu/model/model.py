@@ -14,9 +14,7 @@ from functools import cached_property
 from ..errors import ModelError
 from .check import declared_units, problems_of, splines_of
 from .display import Displayed
-from .frictions import split
-from .kinds import check_containers
-from .parts import (
+from .elements import (
     NAME,
     Constraint,
     Contact,
@@ -31,6 +29,8 @@ from .parts import (
     Parameter,
     name_of,
 )
+from .frictions import split
+from .kinds import check_containers
 from .reactions import reaction_units
 from .spline import Spline
 from .units import Unit

@@ -10,7 +10,7 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
 from ..names import MULTIPLIER, RESERVED, read
-from .parts import NAME, Contact, Expr, ModelFields, Nonholonomic, name_of
+from .elements import NAME, Contact, Expr, ModelFields, Nonholonomic, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
 from .units import Unit, check_dimension, parse_unit, plain
 

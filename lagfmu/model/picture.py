@@ -14,7 +14,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
-from .parts import Expr, ModelFields, name_of
+from .elements import Expr, ModelFields, name_of
 
 Point = tuple[Expr, ...]
 

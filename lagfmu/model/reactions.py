@@ -17,7 +17,7 @@ from sympy.core.function import AppliedUndef
 
 from ..errors import UnitError
 from ..names import FORCE, MULTIPLIER, REACTIONS, name, read
-from .parts import Expr, ModelFields, Nonholonomic, name_of
+from .elements import Expr, ModelFields, Nonholonomic, name_of
 from .units import ONE, Unit, dimension_of, generalized_force_unit, multiplier_unit
 
 

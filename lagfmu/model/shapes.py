@@ -11,7 +11,7 @@ from sympy.physics.vector import dynamicsymbols
 from sympy.physics.vector.dyadic import Dyadic
 from sympy.physics.vector.vector import Vector
 
-from .parts import Contact, Expr, Holonomic, ModelFields
+from .elements import Contact, Expr, Holonomic, ModelFields
 from .units import plain
 
 KINKED = (sp.Abs, sp.sign, sp.Heaviside, sp.Max, sp.Min, sp.floor, sp.ceiling, sp.Mod)

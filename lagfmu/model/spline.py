@@ -25,7 +25,7 @@ from scipy.interpolate import CubicSpline
 
 from ..errors import LagfmuWarning, TableError, UnitError
 from ..solver.cubic import Cubic
-from .parts import NAME, Expr
+from .elements import NAME, Expr
 from .units import parse_unit
 
 FEWEST = {"natural": 2, "clamped": 2, "not-a-knot": 4, "periodic": 3}

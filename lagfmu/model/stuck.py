@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import sympy as sp
 
-from .parts import Contact, Expr, ModelFields, Nonholonomic
+from .elements import Contact, Expr, ModelFields, Nonholonomic
 from .reactions import multiplier
 from .selection import select
 

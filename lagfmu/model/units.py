@@ -25,7 +25,7 @@ from sympy.functions.elementary.trigonometric import (
 from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
-from .parts import Expr
+from .elements import Expr
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")

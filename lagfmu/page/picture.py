@@ -18,8 +18,8 @@ import sympy as sp
 from ..errors import BuildError, ModelError
 from ..mechanics.equations import TIME
 from ..model.closed_form import in_variables
+from ..model.elements import Expr
 from ..model.model import Model, Nonholonomic
-from ..model.parts import Expr
 from ..model.picture import Arrow, Disk, Ground, Line, Path, Point, Rod, Shape, Spring, points_of
 from ..model.reactions import multiplier
 from ..model.spline import SplineBase

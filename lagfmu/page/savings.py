@@ -9,10 +9,10 @@ import sympy as sp
 
 from ..codegen.c.elimination import plan
 from ..codegen.c.equations import model_source
-from ..codegen.c.parts import needs_tangents
+from ..codegen.c.optional import needs_tangents
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.fold import idle as idle_parameters
-from ..model.parts import Expr
+from ..model.elements import Expr
 from ..model.units import Unit
 from ..prepare.prepare import Prepared, prepare
 

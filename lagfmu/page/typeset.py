@@ -25,8 +25,8 @@ from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.formulations.nullspace import lambda_free, largest_group
+from ..model.elements import Expr
 from ..model.model import Contact, Nonholonomic
-from ..model.parts import Expr
 from ..model.reactions import multiplier
 from ..model.units import SUPERSCRIPT
 from ..names import derivative, read
@@ -36,7 +36,7 @@ MOST = 24  # equations of a kind that are printed
 LONGEST = 500  # operations beyond which an expression is not printed
 MINORS = 3  # constraints in one group beyond which lambda is not eliminated in symbols
 GREEK = {*greeks, *(name.capitalize() for name in greeks), "lambda", "Lambda"}
-PARTS = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
+OPTIONAL = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
 SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 DOTS = ("", "\u0307", "\u0308", "\u20db")
 
@@ -101,7 +101,7 @@ def name_text(name: str, dots: int = 0) -> str:
 
 def _parts(name: str) -> tuple[str, tuple[str, ...]]:
     """theta0 -> theta, (0,); mu_s -> mu, (s,); a name of another form is one word."""
-    match = PARTS.match(name)
+    match = OPTIONAL.match(name)
     if match is None:
         return name, ()
     base, digits, rest = match.groups()

@@ -1,4 +1,4 @@
-"""From one communication point to the next: leg after leg, each up to an event."""
+"""From one communication point to the next: flow after flow, each up to an event."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from . import at_contacts, at_events, at_slides
+from . import optional_contacts, optional_events, optional_slides
 from .failure import StepFailureError
+from .flow import AfterStep, Flow
 from .indicators import indicators, is_watched
 from .instant import Instant
 from .jumps import levels_at, passed
-from .leg import AfterStep, Leg
 from .magnitudes import complete, is_incomplete
 from .motion import project
 from .state import Settings, State
@@ -49,8 +49,8 @@ def advance(
             state = complete(at, settings, state, t_end - state.t)
         headway = Headway(settings, begun, t_end, state.rate)
         while state.t < t_end:
-            leg = Leg(system, settings, state, u, p, begun, after_step)
-            state = _travel(leg, state, t_end, headway)
+            flow = Flow(system, settings, state, u, p, begun, after_step)
+            state = _travel(flow, state, t_end, headway)
             events.append(state.t)
             if len(events) == CHATTER and events[-1] - events[0] < AT_ONCE / state.rate:
                 raise StepFailureError(
@@ -72,13 +72,13 @@ def beginning(
         state = replace(state, levels=levels)
     at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
     if system.contacts and system.prescribed:
-        state = at_contacts.released(at, state, state.span)
+        state = optional_contacts.released(at, state, state.span)
     elif system.prescribed:
         q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
         q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
         state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
     if system.frictions:
-        state = at_slides.renewed(at, state)
+        state = optional_slides.renewed(at, state)
         at = replace(at, slides=state.slides)
     return at, state
 
@@ -114,64 +114,64 @@ class Headway:
             )
 
 
-def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
+def _travel(flow: Flow, state: State, t_end: float, headway: Headway) -> State:
     """Integrate until t_end or the first event, whichever comes first; at an event, switch modes."""
     y = np.array(state.q + state.v)
-    f0 = leg.accept(state.t, y)
+    f0 = flow.accept(state.t, y)
     if not np.isfinite(f0).all():
-        raise StepFailureError(leg.cause)
-    solver = leg.stepper(state.t, y, t_end, state.step or None)
+        raise StepFailureError(flow.cause)
+    solver = flow.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
     steps, choice, local = state.steps, state.choice, state.local
-    watch, lost = is_watched(leg.system), state.dissipated
-    before = indicators(leg, state.t, y) if watch else np.zeros(0)
+    watch, lost = is_watched(flow.system), state.dissipated
+    before = indicators(flow, state.t, y) if watch else np.zeros(0)
     while True:
         t0, y0 = solver.t, solver.y
         offered = solver.h_abs
         try:
-            leg.step(solver)
+            flow.step(solver)
             before_it = local
-            if leg.after_step is not None:
-                local = leg.after_step(solver, state, local)
-            y1 = leg.project(solver.t, solver.y)
+            if flow.after_step is not None:
+                local = flow.after_step(solver, state, local)
+            y1 = flow.project(solver.t, solver.y)
             if not (
-                leg.system.prescribed and t0 == leg.begun
+                flow.system.prescribed and t0 == flow.begun
             ):  # it may have jumped when it was set
-                leg.check_projection(t0, solver.t, solver.y, y1)
+                flow.check_projection(t0, solver.t, solver.y, y1)
         except StepFailureError:
             if not choice.implicit:
                 raise
             choice = explicit(choice, paid=False)
-            solver = _take_over(leg, choice, t0, y0, t_end)
+            solver = _take_over(flow, choice, t0, y0, t_end)
             continue
         steps += 1
         if watch:
-            event, before = at_events.first_event(leg, solver, t0, y0, y1, before, armed)
+            event, before = optional_events.first_event(flow, solver, t0, y0, y1, before, armed)
             if event is not None:
                 headway.check(t0, event[0])
-                if leg.after_step is not None:  # the way to the event counts, not the whole step
-                    leg.local = before_it
-                    leg.reach(t0, y0, event[0])
-                    local = leg.local
+                if flow.after_step is not None:  # the way to the event counts, not the whole step
+                    flow.local = before_it
+                    flow.reach(t0, y0, event[0])
+                    local = flow.local
                 step = offered
                 if choice.implicit:
                     choice, step = explicit(choice, paid=True), min(offered, choice.longest)
                 here = replace(
                     state, step=step, steps=steps, armed=tuple(armed), choice=choice, local=local
                 )
-                if leg.system.frictions:
-                    lost += at_slides.dissipated(leg, solver.dense_output(), t0, event[0])
-                    here = replace(here, slides=leg.state.slides, dissipated=lost)
-                return _meet(leg, here, t0, y0, *event)
-        if leg.system.frictions:
-            lost += at_slides.dissipated(leg, solver.dense_output(), t0, solver.t)
-            leg.state = replace(leg.state, slides=at_slides.turned(leg, solver.t, y1))
+                if flow.system.frictions:
+                    lost += optional_slides.dissipated(flow, solver.dense_output(), t0, event[0])
+                    here = replace(here, slides=flow.state.slides, dissipated=lost)
+                return _meet(flow, here, t0, y0, *event)
+        if flow.system.frictions:
+            lost += optional_slides.dissipated(flow, solver.dense_output(), t0, solver.t)
+            flow.state = replace(flow.state, slides=optional_slides.turned(flow, solver.t, y1))
         if choice.implicit:
             choice = implicit_step(choice, float(solver.t - t0))
         if solver.t == t_end:
-            n = leg.system.n
+            n = flow.system.n
             step = float(max(solver.h_abs, offered))  # the last step may have been cut short
-            if leg.settings.method == "radau5" and leg.auto and not choice.implicit:
+            if flow.settings.method == "radau5" and flow.auto and not choice.implicit:
                 step = choice.longest
             return replace(
                 state,
@@ -182,46 +182,46 @@ def _travel(leg: Leg, state: State, t_end: float, headway: Headway) -> State:
                 step=step,
                 steps=steps,
                 choice=choice,
-                slides=leg.state.slides,
+                slides=flow.state.slides,
                 dissipated=lost,
                 local=local,
             )
-        solver.y, solver.f = y1, leg.accept(solver.t, y1)
-        if leg.auto and leg.settings.method == "dop853":
-            choice = _judged(leg, choice, solver, t0, y0)
-        if leg.auto and choice.implicit != (leg.settings.method == "radau5"):
-            solver = _take_over(leg, choice, solver.t, y1, t_end)
+        solver.y, solver.f = y1, flow.accept(solver.t, y1)
+        if flow.auto and flow.settings.method == "dop853":
+            choice = _judged(flow, choice, solver, t0, y0)
+        if flow.auto and choice.implicit != (flow.settings.method == "radau5"):
+            solver = _take_over(flow, choice, solver.t, y1, t_end)
         headway.check(t0, float(solver.t))
 
 
-def _meet(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: dict[int, int]) -> State:
+def _meet(flow: Flow, state: State, t0: float, y0: Vector, t: float, left: dict[int, int]) -> State:
     """The state right after the event at t at which these indicators left their ranges."""
-    n, contacts = leg.system.n, len(leg.system.contacts)
-    jumps = range(contacts, contacts + len(leg.system.floors))
+    n, contacts = flow.system.n, len(flow.system.contacts)
+    jumps = range(contacts, contacts + len(flow.system.floors))
     ways = {k - contacts: way for k, way in left.items() if k in jumps}
     if ways:
-        y0, t0 = leg.reach(t0, y0, t), t
-        levels = passed(leg.system, state.levels, ways)
+        y0, t0 = flow.reach(t0, y0, t), t
+        levels = passed(flow.system, state.levels, ways)
         state = replace(
             state, t=t, q=tuple(y0[:n].tolist()), v=tuple(y0[n:].tolist()), levels=levels
         )
-        leg = replace(leg, state=state)
-    if not (contacts or leg.system.frictions):
+        flow = replace(flow, state=state)
+    if not (contacts or flow.system.frictions):
         return state
-    return at_contacts.switched(leg, state, t0, y0, t, [k for k in left if k not in jumps])
+    return optional_contacts.switched(flow, state, t0, y0, t, [k for k in left if k not in jumps])
 
 
-def _judged(leg: Leg, choice: Choice, solver: Any, t0: float, y0: Vector) -> Choice:
+def _judged(flow: Flow, choice: Choice, solver: Any, t0: float, y0: Vector) -> Choice:
     """The choice after the step that dop853 has just taken."""
     if not is_due(choice):
         return unjudged_step(choice)
     stage, rate = solver.last_stage(y0)
     stages = Slope(stage, rate, solver.y, solver.f)
     step = Slope(y0, solver.K[0], solver.y, solver.f)
-    return explicit_step(choice, float(solver.t), float(solver.t - t0), stages, step, leg.size)
+    return explicit_step(choice, float(solver.t), float(solver.t - t0), stages, step, flow.size)
 
 
-def _take_over(leg: Leg, choice: Choice, t: float, y: Vector, t_end: float) -> Any:
+def _take_over(flow: Flow, choice: Choice, t: float, y: Vector, t_end: float) -> Any:
     """The other method of `auto`, at (t, y); it begins with the steps that dop853 took last."""
-    leg.choose(choice)
-    return leg.stepper(t, y, t_end, choice.longest)
+    flow.choose(choice)
+    return flow.stepper(t, y, t_end, choice.longest)

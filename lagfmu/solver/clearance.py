@@ -1,7 +1,7 @@
-"""Can an indicator have left its range between two looks?
+"""Can an indicator have left its range between two samples?
 
 Its rate f' = G v - nu is evaluated in interval arithmetic (interval.py) for the boxes of t, q, v and u
-between the looks: with l <= f' <= h,
+between the samples: with l <= f' <= h,
 
     f(t) >= max(f_a + l (t - a), f_b - h (b - t)) ,
 
@@ -16,37 +16,37 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from .flow import Flow
 from .indicators import ranges
 from .interval import Interval, of
-from .leg import Leg
 from .system import Vector
-from .thresholds import LOOKS_COARSE, LOOKS_FINE
+from .thresholds import SAMPLES_COARSE, SAMPLES_FINE
 
-CLEAR, BRACKETS, UNKNOWN = "clear", "brackets", "unknown"  # what is known between two looks
+CLEAR, BRACKETS, UNKNOWN = "clear", "brackets", "unknown"  # what is known between two samples
 
 
 def between(
-    leg: Leg, dense: Any, a: float, b: float, at_a: Vector, at_b: Vector, step: float
+    flow: Flow, dense: Any, a: float, b: float, at_a: Vector, at_b: Vector, step: float
 ) -> str:
     """CLEAR: nothing leaves its range; BRACKETS: something has left it at b, and once; else UNKNOWN."""
-    found, rates, bounded = CLEAR, None, len(leg.system.contacts) + len(leg.system.floors)
-    limits = ranges(leg)
+    found, rates, bounded = CLEAR, None, len(flow.system.contacts) + len(flow.system.floors)
+    limits = ranges(flow)
     for r, f_a, f_b in zip(limits, at_a.tolist(), at_b.tolist(), strict=True):
         if r.inside(f_a) >= -r.slack > r.inside(f_b):
             found = BRACKETS
     for k, r in enumerate(limits[:bounded]):
-        if k < len(leg.state.closed) and leg.state.closed[k]:
+        if k < len(flow.state.closed) and flow.state.closed[k]:
             continue
         if r.inside(float(at_a[k])) < -r.slack:
             continue
         if rates is None:
-            rates = _rates(leg, dense, a, b)
+            rates = _rates(flow, dense, a, b)
         (low, high), f_a, f_b = rates[k], float(at_a[k]), float(at_b[k])
         if math.isnan(low):
-            if b - a > LOOKS_COARSE * step:
+            if b - a > SAMPLES_COARSE * step:
                 return UNKNOWN
         elif r.inside(f_b) < -r.slack:
-            if b - a > LOOKS_FINE * step and low < 0 < high:
+            if b - a > SAMPLES_FINE * step and low < 0 < high:
                 return UNKNOWN
         elif (
             r.low > -math.inf and _lowest(f_a - r.low, f_b - r.low, low, high, b - a) < -r.slack
@@ -78,12 +78,12 @@ def _boxes(values: Sequence[Sequence[float]]) -> list[Interval]:
     return [_box(*three) for three in zip(*values, strict=True)]
 
 
-def _rates(leg: Leg, dense: Any, a: float, b: float) -> list[Interval]:
-    system, times = leg.system, (a, a + (b - a) / 2, b)
+def _rates(flow: Flow, dense: Any, a: float, b: float) -> list[Interval]:
+    system, times = flow.system, (a, a + (b - a) / 2, b)
     assert system.bounds is not None
     boxes = _boxes([dense(t).tolist() for t in times])
-    inputs = _boxes([system.inputs_at(leg.u, t - leg.begun) for t in times])
-    levels = [of(level) for level in leg.state.levels]
+    inputs = _boxes([system.inputs_at(flow.u, t - flow.begun) for t in times])
+    levels = [of(level) for level in flow.state.levels]
     q, v = boxes[: system.n], boxes[system.n :]
-    found: list[Interval] = system.bounds((a, b), q, v, [*inputs, *levels], leg.p)
+    found: list[Interval] = system.bounds((a, b), q, v, [*inputs, *levels], flow.p)
     return found

@@ -12,11 +12,11 @@ from typing import Any
 
 from scipy.optimize import brentq
 
+from .flow import Flow
 from .indicators import indicators, ranges
-from .leg import Leg
-from .looks import look_into_dips, looks
 from .motion import EPS
 from .ranges import Range, first_of_frictions
+from .samples import look_into_dips, samples
 from .system import Vector
 
 Event = tuple[
@@ -25,7 +25,7 @@ Event = tuple[
 
 
 def first_event(
-    leg: Leg,
+    flow: Flow,
     solver: Any,
     t0: float,
     y0: Vector,
@@ -34,27 +34,27 @@ def first_event(
     armed: list[bool],
 ) -> tuple[Event | None, Vector]:
     """The earliest event within the step just taken, if there is one, and the indicators at its end."""
-    times, values = looks(leg, solver, t0, y0, y1, before)
-    for c, closed in enumerate(leg.state.closed):
+    times, values = samples(flow, solver, t0, y0, y1, before)
+    for c, closed in enumerate(flow.state.closed):
         if closed:
-            look_into_dips(leg, solver, times, values, c)
-    for i in range(2 * len(leg.state.slides)):
-        look_into_dips(leg, solver, times, values, first_of_frictions(leg.system) + i)
+            look_into_dips(flow, solver, times, values, c)
+    for i in range(2 * len(flow.state.slides)):
+        look_into_dips(flow, solver, times, values, first_of_frictions(flow.system) + i)
     found: list[tuple[float, int, int]] = []
-    for k, r in enumerate(ranges(leg)):
-        risen = leg.state.closed[k] or armed[k] if k < len(armed) else not r.rises
+    for k, r in enumerate(ranges(flow)):
+        risen = flow.state.closed[k] or armed[k] if k < len(armed) else not r.rises
         for i in range(1, len(times)):
             risen = risen or r.inside(values[i - 1][k]) > r.slack
             if r.inside(values[i][k]) < -r.slack:
                 limit = r if risen else r.widened()
                 inside = max((j for j in range(i) if limit.inside(values[j][k]) > 0), default=0)
-                t = _locate(leg, t0, y0, times[inside], times[i], k, limit)
+                t = _locate(flow, t0, y0, times[inside], times[i], k, limit)
                 if t is not None:
                     found.append((t, k, r.way(values[i][k])))
                     break
     if not found:
-        gap = leg.state.gap
-        for c, closed in enumerate(leg.state.closed):
+        gap = flow.state.gap
+        for c, closed in enumerate(flow.state.closed):
             armed[c] = bool(armed[c] or (not closed and any(v[c] > gap[c] for v in values)))
         return None, values[-1]
     earliest = min(t for t, _, _ in found)
@@ -70,13 +70,13 @@ def _past(height: Callable[[float], float], root: float, b: float) -> float:
 
 
 def _locate(
-    leg: Leg, t0: float, y0: Vector, lo: float, hi: float, indicator: int, limit: Range
+    flow: Flow, t0: float, y0: Vector, lo: float, hi: float, indicator: int, limit: Range
 ) -> float | None:
     """The time in [lo, hi] at which the indicator leaves the range, to rounding."""
 
     def height(elapsed: float) -> float:
         t = t0 + elapsed
-        return limit.inside(indicators(leg, t, leg.reach(t0, y0, t))[indicator])
+        return limit.inside(indicators(flow, t, flow.reach(t0, y0, t))[indicator])
 
     for a in dict.fromkeys((lo - t0, 0.0)):
         b = hi - t0
@@ -84,5 +84,5 @@ def _locate(
             return None  # it only grazed: within the tolerance there is no event
         if height(a) > 0:
             root = float(brentq(height, a, b, xtol=EPS * b, rtol=4 * EPS, maxiter=200))
-            return t0 + (root if indicator < len(leg.state.closed) else _past(height, root, b))
+            return t0 + (root if indicator < len(flow.state.closed) else _past(height, root, b))
     return float(t0)

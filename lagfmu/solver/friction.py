@@ -109,7 +109,7 @@ def slip_velocity(system: System, G: Matrix, v: Vector, nu: Vector) -> Matrix:
 
 def heading(slide: Slide, s: Vector) -> Vector:
     """The unit vector of the slip velocity s; on beyond a stop it goes on as before, so that the
-    equations of a leg stay smooth there."""
+    equations of a flow stay smooth there."""
     e = np.array(slide.direction)
     length = np.hypot(s[0], s[1])
     if not length > slide.noise or (s[1] == 0 and e[1] == 0) or s @ e < 0:

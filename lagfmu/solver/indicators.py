@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import at_slides
+from . import optional_slides
+from .flow import Flow
 from .instant import Motion
 from .jumps import limits, surfaces
-from .leg import Leg
 from .ranges import Range
 from .system import System, Vector
 
@@ -28,40 +28,40 @@ def is_watched(system: System) -> bool:
     return bool(system.contacts or system.floors or system.frictions)
 
 
-def indicators(leg: Leg, t: float, y: Vector) -> Vector:
+def indicators(flow: Flow, t: float, y: Vector) -> Vector:
     """All values at (t, y), in the present modes."""
-    q, v = leg.split(y)
-    now = leg.near(t, q, v) if leg.system.frictions else None
-    parts = [_of_contacts(leg, t, y, now)] if leg.system.contacts else []
-    if leg.system.floors:
-        at = leg.at(t)
-        parts.append(surfaces(leg.system, t, q, at.u, at.p))
+    q, v = flow.split(y)
+    now = flow.near(t, q, v) if flow.system.frictions else None
+    parts = [_of_contacts(flow, t, y, now)] if flow.system.contacts else []
+    if flow.system.floors:
+        at = flow.at(t)
+        parts.append(surfaces(flow.system, t, q, at.u, at.p))
     if now is not None:
-        parts.append(np.array(at_slides.indicators(leg, now)))
+        parts.append(np.array(optional_slides.indicators(flow, now)))
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def ranges(leg: Leg) -> list[Range]:
+def ranges(flow: Flow) -> list[Range]:
     """The range of each, in the present modes."""
-    state = leg.state
+    state = flow.state
     contacts = [
         Range(0.0, slack=0.0 if shut else gap)
         for shut, gap in zip(state.closed, state.gap, strict=True)
     ]
     jumps = [
         Range(*limits(level, floor))
-        for level, floor in zip(state.levels, leg.system.floors, strict=True)
+        for level, floor in zip(state.levels, flow.system.floors, strict=True)
     ]
-    frictions = at_slides.ranges(leg) if leg.system.frictions else []
+    frictions = optional_slides.ranges(flow) if flow.system.frictions else []
     return contacts + jumps + frictions
 
 
-def _of_contacts(leg: Leg, t: float, y: Vector, now: Motion | None = None) -> Vector:
-    q, v = leg.split(y)
-    at = leg.at(t)
-    contacts = list(leg.system.contacts)
+def _of_contacts(flow: Flow, t: float, y: Vector, now: Motion | None = None) -> Vector:
+    q, v = flow.split(y)
+    at = flow.at(t)
+    contacts = list(flow.system.contacts)
     values = at.residual(q)[contacts]
-    if any(leg.state.closed):
-        lam = (now or leg.near(t, q, v)).lam[contacts]
-        values = np.where(leg.state.closed, lam, values)
+    if any(flow.state.closed):
+        lam = (now or flow.near(t, q, v)).lam[contacts]
+        values = np.where(flow.state.closed, lam, values)
     return values

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..names import motion
-from . import at_contacts, at_slides
+from . import optional_contacts, optional_slides
 from .afar import project_from_afar, velocities_from_afar
 from .failure import StartFailureError, StepFailureError
 from .instant import Instant
@@ -83,7 +83,7 @@ def start(
             levels = levels_at(system, t, np.array(q0, float), inputs, p)
             at = Instant(system, t, [*inputs, *levels], p)
             if system.contacts:
-                at_contacts.check_restitution(system, p)
+                optional_contacts.check_restitution(system, p)
             ranks = [GIVEN] * (2 * system.n) if rank is None else list(rank)
             return _start(at, settings, np.array(q0, float), np.array(v0, float), ranks)
     except StartFailureError:
@@ -118,18 +118,18 @@ def _start(at: Instant, settings: Settings, q0: Vector, v0: Vector, rank: list[i
     touching: list[int] = []
     if system.contacts:
         touching = [c for c, shut in enumerate(closed) if shut]
-        modes = at_contacts.complementary_modes(at, q, v, closed, touching)
+        modes = optional_contacts.complementary_modes(at, q, v, closed, touching)
     offset = none
     if system.frictions:
 
         def contacts_at(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
             if not system.contacts:
                 return ()
-            return at_contacts.complementary_modes(at, q, v, shut, touching)
+            return optional_contacts.complementary_modes(at, q, v, shut, touching)
 
-        at = replace(at, slides=at_slides.begun(at, q, v, size))
-        contacts = at_slides.Contacts(contacts_at, contacts_at, touching)
-        at, modes = at_slides.settle(at, q, v, modes, contacts)
+        at = replace(at, slides=optional_slides.begun(at, q, v, size))
+        contacts = optional_slides.Contacts(contacts_at, contacts_at, touching)
+        at, modes = optional_slides.settle(at, q, v, modes, contacts)
         limited = [row.friction is not None for row in system.rows]
         offset = np.where(limited, at.residual(q), 0.0)
     q, v = project(at, q, v, system.active(modes), offset, size, dependent=True)
@@ -231,7 +231,7 @@ def _velocities(
         v = velocities_from_afar(at, here, v0, rows, rank, natural)
         q, v = project(at, here, v, rows, none, size, dependent=True)
         parting = [c for c, touches in enumerate(closed) if touches and not shut[c]]
-        low = at_contacts.low(at, q, v, shut, parting, gap) if parting else []
+        low = optional_contacts.low(at, q, v, shut, parting, gap) if parting else []
         if not low:
             break
         shut = [s or c in low for c, s in enumerate(shut)]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from . import at_friction
+from . import optional_friction
 from .failure import MasslessError, StepFailureError
 from .instant import Instant, Motion
 from .linear import solve, solve_nullspace
@@ -36,7 +36,7 @@ def motion(
     """Accelerations (n) and multipliers (m; 0 for rows that do not act) at a state, `off` the constraints."""
 
     if at.slides:
-        return at_friction.motion_with_friction(at, q, v, active, _method(at, off))
+        return optional_friction.motion_with_friction(at, q, v, active, _method(at, off))
     values, rows = at.values(q, v), list(active)
     M, F, G, nu, gamma = at.system.placed(values)
     lam, unique = np.zeros(at.system.m), np.ones(at.system.m, dtype=bool)
@@ -109,7 +109,7 @@ def project(
     """
     rows = list(active)
     if at.slides:
-        rows = sorted({*rows, *at_friction.sticking(at, rows)})
+        rows = sorted({*rows, *optional_friction.sticking(at, rows)})
     if not rows:
         return q, v
     fixed = [k for k in rows if at.system.rows[k].kind != NONHOLONOMIC]

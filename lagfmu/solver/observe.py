@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import names
 from ..names import derivative
-from . import at_slides
+from . import optional_slides
 from .failure import StepFailureError, plain
 from .instant import Instant
 from .motion import motion
@@ -84,7 +84,7 @@ def _solved(
     at = Instant(full, state.t, u, p, state.slides)
     now = motion(at, q, v, active)
     if system.frictions:
-        values |= at_slides.observed(system, state, now)
+        values |= optional_slides.observed(system, state, now)
     for name, a in zip(full.coordinates, now.vdot.tolist(), strict=True):
         values[derivative(name, 2)] = a
     f, lam, unique = at.residual(q), now.lam.tolist(), now.unique.tolist()

@@ -22,9 +22,9 @@ import numpy as np
 
 from .. import names
 from .failure import StepFailureError
+from .flow import Flow
 from .friction import heading, loaded, slip_velocity
 from .instant import Instant, Motion
-from .leg import Leg
 from .motion import motion
 from .painleve import paradox
 from .ranges import Range, first_of_frictions
@@ -388,21 +388,21 @@ class _Rest:
         return None
 
 
-def is_slipping(leg: Leg) -> bool:
+def is_slipping(flow: Flow) -> bool:
     """True if some friction does work."""
-    on = loaded(leg.system, leg.rows)
-    return any(presses and not s.sticks for presses, s in zip(on, leg.state.slides, strict=True))
+    on = loaded(flow.system, flow.rows)
+    return any(presses and not s.sticks for presses, s in zip(on, flow.state.slides, strict=True))
 
 
-def dissipated(leg: Leg, dense: Any, t0: float, t1: float) -> float:
+def dissipated(flow: Flow, dense: Any, t0: float, t1: float) -> float:
     """- int sum lambda_t . s dt [J] over a part of a step (Gauss's rule of order 10)."""
-    if not t1 > t0 or not is_slipping(leg):
+    if not t1 > t0 or not is_slipping(flow):
         return 0.0
     work = 0.0
     for node, weight in zip(NODES, WEIGHTS, strict=True):
         t = t0 + (t1 - t0) * (1 + node) / 2
-        q, v = leg.split(dense(t))
-        work += weight * float(power(leg.near(t, q, v)).sum())
+        q, v = flow.split(dense(t))
+        work += weight * float(power(flow.near(t, q, v)).sum())
     return -work * (t1 - t0) / 2
 
 
@@ -412,14 +412,16 @@ def power(now: Motion) -> Vector:
     return np.asarray((press.tangential * press.slip).sum(axis=1))
 
 
-def turned(leg: Leg, t: float, y: Vector) -> tuple[Slide, ...]:
+def turned(flow: Flow, t: float, y: Vector) -> tuple[Slide, ...]:
     """The slides with the directions that two rows have at the end of a step."""
-    slides = leg.state.slides
-    if all(s.sticks or len(f.rows) == 1 for s, f in zip(slides, leg.system.frictions, strict=True)):
+    slides = flow.state.slides
+    if all(
+        s.sticks or len(f.rows) == 1 for s, f in zip(slides, flow.system.frictions, strict=True)
+    ):
         return slides
-    q, v = leg.split(y)
-    _, _, G, nu, _ = leg.at(t).evaluate(q, v)
-    s = slip_velocity(leg.system, G, v, nu)
+    q, v = flow.split(y)
+    _, _, G, nu, _ = flow.at(t).evaluate(q, v)
+    s = slip_velocity(flow.system, G, v, nu)
     found = []
     for i, slide in enumerate(slides):
         e = heading(slide, s[i])
@@ -526,12 +528,12 @@ def observed(system: System, state: State, now: Motion) -> dict[str, float | int
     return values
 
 
-def indicators(leg: Leg, now: Motion) -> list[float]:
+def indicators(flow: Flow, now: Motion) -> list[float]:
     """Two a friction: the reserve of the cone while it sticks, the slip velocity along its direction
     while it slips; and the normal force while it slips on what is no contact."""
     press = now.press
     values = []
-    for i, (f, slide) in enumerate(zip(leg.system.frictions, leg.state.slides, strict=True)):
+    for i, (f, slide) in enumerate(zip(flow.system.frictions, flow.state.slides, strict=True)):
         if not press.loaded[i]:
             values += [1.0, 1.0]
         elif slide.sticks:
@@ -544,10 +546,10 @@ def indicators(leg: Leg, now: Motion) -> list[float]:
     return values
 
 
-def ranges(leg: Leg) -> list[Range]:
+def ranges(flow: Flow) -> list[Range]:
     """The range of each; what begins on the edge has to get inside before it can leave there."""
     found = []
-    for slide in leg.state.slides:
+    for slide in flow.state.slides:
         found += [
             Range(0.0, slack=SLIDES_SLACK if slide.sticks else slide.noise, rises=True),
             Range(0.0),

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import at_slides
+from . import optional_slides
 from .contacts import complementary_modes, low
+from .flow import Flow
 from .impact import impacts
 from .instant import Instant
-from .leg import Leg
 from .motion import motion, project
 from .state import Departure, State
 from .system import Vector
@@ -64,13 +64,13 @@ def _has_parted(
     )
 
 
-def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list[int]) -> State:
+def switched(flow: Flow, state: State, t0: float, y0: Vector, t: float, left: list[int]) -> State:
     """The state right after the event at t: contacts opened or struck, modes settled together.
 
     `left`: the indicators that leave their ranges, of which the first are the contacts'.
     """
-    system, at = leg.system, leg.at(t)
-    q, v = leg.split(leg.reach(t0, y0, t))
+    system, at = flow.system, flow.at(t)
+    q, v = flow.split(flow.reach(t0, y0, t))
     contacts, arriving = [c for c in left if c < len(system.contacts)], v
     leaving = {c for c in contacts if state.closed[c]}
     landing = set(contacts) - leaving
@@ -80,7 +80,9 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list
     slow = _slow(at, q, v, state)
     struck: dict[int, float] = {}
     if landing:
-        v, struck = impacts(at, q, v, near, slow, at_slides.rubbed if system.frictions else None)
+        v, struck = impacts(
+            at, q, v, near, slow, optional_slides.rubbed if system.frictions else None
+        )
     bounced = {*struck, *landing}
     leaving -= {*struck}
     modes = _settled(at, q, v, state, closed, near, leaving, bounced)
@@ -95,15 +97,15 @@ def switched(leg: Leg, state: State, t0: float, y0: Vector, t: float, left: list
         def complementary(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
             return complementary_modes(at, q, v, shut, touching, leaving)
 
-        found = at_slides.Contacts(settled, complementary, touching, leaving)
+        found = optional_slides.Contacts(settled, complementary, touching, leaving)
         here = replace(state, t=t, closed=modes, offset=tuple(offset.tolist()))
-        at, here = at_slides.switched_slides(at, q, v, arriving, here, left, found)
+        at, here = optional_slides.switched_slides(at, q, v, arriving, here, left, found)
         state, modes, offset = (
             replace(here, closed=state.closed),
             here.closed,
             np.array(here.offset),
         )
-    q, v = project(at, q, v, system.active(modes), offset, leg.size)
+    q, v = project(at, q, v, system.active(modes), offset, flow.size)
     departures = list(state.departures)
     for c, (old, new) in enumerate(zip(state.closed, modes, strict=True)):
         if old and not new:

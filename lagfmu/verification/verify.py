@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
-from ..model.parts import Expr
+from ..model.elements import Expr
 from .simulate import Trajectory, read_description, simulate, steps_of
 
 RECORD = "resources/lagfmu.json"

@@ -19,8 +19,8 @@ from ...mechanics.equations import TIME, EquationsOfMotion, FrictionLaw
 from ...mechanics.form import Form
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
+from ...model.elements import Expr
 from ...model.model import Contact
-from ...model.parts import Expr
 from .. import bounds
 from .function import FILL, Result, function
 from .printer import HELPERS, identifiers, table_name, table_text

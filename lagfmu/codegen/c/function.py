@@ -15,7 +15,7 @@ from textwrap import wrap
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .printer import POWER, Printer
 from .subexpressions import Names, common_subexpressions
 

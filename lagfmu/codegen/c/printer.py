@@ -15,7 +15,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean, BooleanFunction
 
 from ...errors import DerivationError
-from ...model.parts import Expr
+from ...model.elements import Expr
 from ..identifier import identifier
 
 Text = tuple[str, int]  # of an expression, and how tightly its outermost operator binds

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .printer import POWER, TAKEN
 
 

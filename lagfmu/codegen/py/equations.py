@@ -12,8 +12,8 @@ import sympy as sp
 from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.form import Form
 from ...mechanics.jumps import NONE, Jumps, levelled
+from ...model.elements import Expr
 from ...model.model import Contact, Nonholonomic
-from ...model.parts import Expr
 from ...solver.cubic import Cubic
 from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
 from .. import bounds

@@ -15,7 +15,7 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from ...errors import DerivationError
-from ...model.parts import Expr
+from ...model.elements import Expr
 from ..identifier import identifier
 
 ARGUMENTS = (

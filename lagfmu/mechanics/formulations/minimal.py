@@ -17,8 +17,8 @@ from typing import Any
 import sympy as sp
 
 from ...errors import DerivationError
+from ...model.elements import Expr
 from ...model.model import Constraint, Holonomic
-from ...model.parts import Expr
 from .. import shorter
 from ..equations import TIME, EquationsOfMotion
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ...errors import DerivationError
-from ...model.parts import Expr
+from ...model.elements import Expr
 from ..equations import TIME, EquationsOfMotion
 
 MOST, OPERATIONS = 6, 400  # coordinates and constraints together; operations of M, G, F and gamma

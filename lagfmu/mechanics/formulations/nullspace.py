@@ -17,7 +17,7 @@ from typing import Any
 import sympy as sp
 from sympy.polys.polyerrors import PolynomialError
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .. import shorter
 from ..equations import EquationsOfMotion
 

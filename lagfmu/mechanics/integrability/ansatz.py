@@ -16,7 +16,7 @@ from sympy import Add, Mul, S
 from sympy.polys.domains import QQ
 from sympy.polys.matrices import DomainMatrix
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .fractions import admit_gcd
 from .tower import Tower
 

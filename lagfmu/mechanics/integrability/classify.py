@@ -27,7 +27,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
 from ...model.display import Displayed
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .coefficients import Chart, pfaffian
 from .echelon import rref
 from .frobenius import curvature, derived_flag, exact, obstruction

@@ -12,7 +12,7 @@ from sympy import Dummy, Eq, S, expand, simplify, sympify
 from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
-from ...model.parts import Expr
+from ...model.elements import Expr
 
 
 def pfaffian(form: Expr, coordinates: Sequence[Expr]) -> tuple[list[Expr], Expr]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from sympy import Dummy
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .echelon import rref
 from .inverse import invert
 from .pfaffians import Pfaffians

@@ -13,7 +13,7 @@ from typing import Any
 
 from sympy import log
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .form import OneForm
 from .frobenius import pairs
 from .potential import potential

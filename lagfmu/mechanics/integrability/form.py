@@ -12,7 +12,7 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .fractions import admit_gcd
 from .frobenius import pairs
 from .tower import Tower

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from sympy import Dummy, S, log
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .form import OneForm
 from .potential import potential, tidy
 from .tower import Tower

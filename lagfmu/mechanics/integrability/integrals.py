@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .ansatz import combine, monomials, relations
 from .elimination import restricted
 from .frobenius import along

@@ -20,7 +20,7 @@ from sympy import (
     together,
 )
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 
 
 def invert(f: Expr, value: Expr, x: Expr) -> Expr | None:

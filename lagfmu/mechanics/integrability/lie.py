@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 from sympy import S
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .ansatz import combine, monomials, relations
 from .form import OneForm
 from .frobenius import pairs

@@ -33,7 +33,7 @@ from sympy import (
     together,
 )
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .echelon import rref
 from .pfaffians import Pfaffians
 from .quadrature import quadrature

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from sympy import Dummy, S
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .form import OneForm
 from .frobenius import pairs
 from .inverse import invert

@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Sequence
 from contextlib import suppress
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .echelon import rref
 from .form import OneForm
 from .frobenius import along

@@ -11,7 +11,7 @@ from typing import Any
 
 from sympy import Add, Mul, Pow, S, exp, expand, factor_terms, ilcm, log
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .quadrature import quadrature
 from .tower import Tower
 from .undecided import FAILURES

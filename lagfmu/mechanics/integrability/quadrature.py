@@ -40,7 +40,7 @@ from sympy.core.function import AppliedUndef
 from sympy.integrals.manualintegrate import manualintegrate
 from sympy.simplify.fu import TR8
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .undecided import late, spend
 
 _LONG = 600  # operations of an integrand beyond which no integration is tried

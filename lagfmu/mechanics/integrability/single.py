@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from sympy import exp, expand
 
-from ...model.parts import Expr
+from ...model.elements import Expr
 from .factors import bernoulli, combination, separable
 from .form import OneForm
 from .homogeneous import homogeneous

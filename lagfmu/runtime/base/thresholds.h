@@ -67,11 +67,11 @@ enum {
 };
 
 /* ---- events ---- */
-enum { LOOKS_FIRST = 4, LOOKS_MOST = 512, LOOKS_DIPS = 3 }; /* in a step; parabolas drawn through a dip */
-static const double LOOKS_SMALLEST = 0x1p-30; /* of a step */
-static const double LOOKS_SHALLOW = 0.1;      /* of the looks, how low a dip must go to be looked into */
-static const double LOOKS_COARSE = 0x1p-5; /* of a step: as near as is looked where no rate is known */
-static const double LOOKS_FINE = 0x1p-6;   /* of a step: near enough to take the one event that is seen */
+enum { SAMPLES_FIRST = 4, SAMPLES_MOST = 512, SAMPLES_DIPS = 3 }; /* in a step; parabolas drawn through a dip */
+static const double SAMPLES_SMALLEST = 0x1p-30; /* of a step */
+static const double SAMPLES_SHALLOW = 0.1;      /* of the samples, how low a dip must go to be looked into */
+static const double SAMPLES_COARSE = 0x1p-5; /* of a step: as near as is looked where no rate is known */
+static const double SAMPLES_FINE = 0x1p-6;   /* of a step: near enough to take the one event that is seen */
 enum { RATES_KEPT = 4 };                   /* points of a cubic polynomial through an estimated input */
 static const double RATES_ROUNDING = 1e-9; /* of a communication step */
 

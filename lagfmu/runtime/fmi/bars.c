@@ -13,8 +13,8 @@
 #include "companion.h"
 #include "digits.h"
 #include "instance.h"
-#include "leg.h"
-#include "parts.h"
+#include "flow.h"
+#include "optional.h"
 #include "restored.h"
 
 static const double INFINITE = DBL_MAX;
@@ -49,7 +49,7 @@ static void layout(Instance *x, Arena *saved, Arena *scratch) {
 /* ------------------------------------------------------------------ settings */
 
 static int has_fixed_step(const Instance *x) {
-    return PARTS.methods[x->solver.settings.method]->fixed;
+    return OPTIONAL.methods[x->solver.settings.method]->fixed;
 }
 
 /* What the companion shares with the delivered run, but for the tolerance. */
@@ -68,7 +68,7 @@ static double asked_step(const Instance *x, double span) {
     const Solver *s = &x->solver;
     const int known = s->state.now.rate > 0 && isfinite(s->state.now.rate);
     if (x->given.step > 0) return x->given.step;
-    return known ? leg_natural_step(s) : span / leg_fewest_steps(s);
+    return known ? flow_natural_step(s) : span / flow_fewest_steps(s);
 }
 
 static void tell_halved(Instance *x) {

@@ -17,9 +17,9 @@
 
 #include "indicators.h"
 #include "jumps.h"
-#include "leg.h"
+#include "flow.h"
 #include "magnitudes.h"
-#include "parts.h"
+#include "optional.h"
 #include "schur.h"
 
 static const double GAIN = 3;     /* of the stabilization, in units of the motion's natural rate */
@@ -70,9 +70,9 @@ static Status evaluate(Instance *x) {
     Solver *s = &x->solver;
     if (x->evaluated) return OK;
     if (instance_start(x) != OK) return FAILED;
-    leg_begin(s);
-    if (mechanism_motion(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
-                         leg_rows(s)) != OK)
+    flow_begin(s);
+    if (mechanism_motion(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
+                         flow_rows(s)) != OK)
         return FAILED;
     x->evaluated = 1;
     return OK;
@@ -83,9 +83,9 @@ static Status find_multipliers(Instance *x) {
     Solver *s = &x->solver;
     if (!s->state.now.dependent) return evaluate(x);
     if (instance_start(x) != OK) return FAILED;
-    leg_begin(s);
+    flow_begin(s);
     x->evaluated = 0;
-    return mechanism_motion_near(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+    return mechanism_motion_near(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
                                  s->active, s->state.offset, s->state.size);
 }
 
@@ -93,12 +93,12 @@ static Status find_multipliers(Instance *x) {
 static Status choose_rows(Instance *x) {
     Solver *s = &x->solver;
     if (s->system->m < 2) return OK;
-    leg_begin(s);
+    flow_begin(s);
     x->evaluated = 0;
-    if (mechanism_motion_near(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+    if (mechanism_motion_near(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
                               s->active, s->state.offset, s->state.size) != OK)
         return FAILED;
-    leg_choose_rows(s);
+    flow_choose_rows(s);
     return OK;
 }
 
@@ -109,7 +109,7 @@ static Status stabilize(Instance *x, double *derivatives) {
     const double alpha = GAIN * s->state.now.rate;
     double *c = s->sensitivity.c, *a = s->sensitivity.dvdot;
     if (s->system->m == 0) return OK;
-    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int k = 0; k < s->system->m; k++)
         c[k] = -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
@@ -136,7 +136,7 @@ Status exchange_indicators(Instance *x, double *indicators) {
     const System *system = s->system;
     if (indicators_count(system) == 0) return OK;
     if (find_multipliers(x) != OK) return FAILED;
-    const Instant at = leg_instant(s, s->state.now.t);
+    const Instant at = flow_instant(s, s->state.now.t);
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     if (system->jumps > 0)
         system->surfaces(at.t, s->state.q, at.u, at.p, indicators + system->contacts);
@@ -146,7 +146,7 @@ Status exchange_indicators(Instance *x, double *indicators) {
                 range_inside(jumps_range(s, k), indicators[system->contacts + k]);
     if (system->frictions > 0) {
         const int first = indicators_first_of_frictions(system);
-        PARTS.slides->indicators(s, indicators + first);
+        OPTIONAL.slides->indicators(s, indicators + first);
         for (int i = 0; i < 2 * system->frictions; i++)
             indicators[first + i] += indicators_range(s, first + i).slack;
     }
@@ -165,7 +165,7 @@ static Status drift(Instance *x, double *worst) {
     *worst = 0;
     if (evaluate(x) != OK) return FAILED;
     const int *active = b->sliding != NULL ? b->sliding->acting(b, s->active) : s->active;
-    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int k = 0; k < system->m; k++) {
         double size = 0, speed = 0;
@@ -189,7 +189,7 @@ static Status find_happened(Instance *x, int *any) {
     Mechanism *b = &s->stepped;
     *any = 0;
     if (find_multipliers(x) != OK) return FAILED;
-    if (mechanism_residual(b, leg_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
@@ -203,7 +203,7 @@ static Status find_happened(Instance *x, int *any) {
     }
     if (s->system->frictions == 0) return OK;
     const int first = indicators_first_of_frictions(s->system);
-    PARTS.slides->indicators(s, s->work_slides);
+    OPTIONAL.slides->indicators(s, s->work_slides);
     for (int i = 0; i < 2 * s->system->frictions; i++) {
         x->happened[first + i] = s->work_slides[i] < -indicators_range(s, first + i).slack;
         *any |= x->happened[first + i];
@@ -220,7 +220,7 @@ Status exchange_step_done(Instance *x, int *event) {
     Solver *s = &x->solver;
     double worst;
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
-    *event = jumps_stale(s, leg_instant(s, s->state.now.t), s->state.q);
+    *event = jumps_stale(s, flow_instant(s, s->state.now.t), s->state.q);
     if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
     if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
@@ -229,7 +229,7 @@ Status exchange_step_done(Instance *x, int *event) {
         double *y = s->work_advance;
         memcpy(y, s->state.q, (size_t)s->system->n * sizeof *y);
         memcpy(y + s->system->n, s->state.v, (size_t)s->system->n * sizeof *y);
-        if (PARTS.slides->turn(s, s->state.now.t, y) != OK) return FAILED;
+        if (OPTIONAL.slides->turn(s, s->state.now.t, y) != OK) return FAILED;
     }
     *event = *event || any || worst > LIMIT;
     return OK;
@@ -238,7 +238,7 @@ Status exchange_step_done(Instance *x, int *event) {
 /* The levels of forces that jump; `changed`: 1 if one is not what it was. */
 static Status settle_jumps(Instance *x, int *changed) {
     Solver *s = &x->solver;
-    const Instant at = leg_instant(s, s->state.now.t);
+    const Instant at = flow_instant(s, s->state.now.t);
     int again = 0;
     jumps_settle(s, at, s->state.q, s->state.v, NULL, changed);
     if (s->system->jumps == 0) return OK;
@@ -256,22 +256,22 @@ Status exchange_event(Instance *x, int *moved) {
     double worst;
     *moved = 0;
     if (instance_start(x) != OK) return FAILED;
-    if (s->system->contacts > 0 && PARTS.switch_released(s, SHORT / s->state.now.rate) != OK) return FAILED;
+    if (s->system->contacts > 0 && OPTIONAL.switch_released(s, SHORT / s->state.now.rate) != OK) return FAILED;
     x->observed = x->evaluated = 0;
     if (settle_jumps(x, &jumped) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
     if (any || (jumped && s->system->contacts + s->system->frictions > 0)) {
         *moved = 1;
         x->evaluated = 0;
-        if (PARTS.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
-        if (PARTS.switch_modes(s, x->happened) != OK) return FAILED;
+        if (OPTIONAL.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
+        if (OPTIONAL.switch_modes(s, x->happened) != OK) return FAILED;
         return choose_rows(x);
     }
     if (drift(x, &worst) != OK) return FAILED;
     if (!(worst > LIMIT)) return OK;
     *moved = 1;
     x->evaluated = 0;
-    if (mechanism_project(&s->stepped, leg_instant(s, s->state.now.t), s->state.q, s->state.v,
+    if (mechanism_project(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
                           s->active, s->state.offset, s->state.size) != OK)
         return FAILED;
     return choose_rows(x);

@@ -23,7 +23,7 @@
 #include "exchange.h"
 #include "indicators.h"
 #include "instance.h"
-#include "parts.h"
+#include "optional.h"
 #include "restored.h"
 
 enum {
@@ -438,7 +438,7 @@ fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], s
 }
 
 static int is_offered(int method) {
-    return method > 0 && method < METHOD_COUNT && PARTS.methods[method] != NULL;
+    return method > 0 && method < METHOD_COUNT && OPTIONAL.methods[method] != NULL;
 }
 
 static fmi2Status valid_method(Component *c, const Variable *v, int method) {

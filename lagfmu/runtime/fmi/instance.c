@@ -7,12 +7,11 @@
 
 #include "digits.h"
 #include "indicators.h"
-#include "leg.h"
+#include "flow.h"
 #include "magnitudes.h"
 #include "outputs.h"
 #include "rates.h"
 #include "thresholds.h"
-
 
 /* ------------------------------------------------------------------ memory */
 
@@ -347,7 +346,7 @@ Status instance_start(Instance *x) {
     if (solver_start(s, x->start_time, x->q0, x->v0, x->rank, tell_moved, x) != OK) return FAILED;
     /* model exchange has no communication step: 1 s stands in for it */
     if (x->exchange && magnitudes_incomplete(s) &&
-        magnitudes_complete(s, leg_instant(s, x->start_time), 1) != OK)
+        magnitudes_complete(s, flow_instant(s, x->start_time), 1) != OK)
         return FAILED;
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     x->started = 1;
@@ -415,7 +414,7 @@ static void warn_of_rates(Instance *x) {
 static void warn_of_tables(Instance *x) {
     Solver *s = &x->solver;
     const System *system = s->system;
-    const Instant at = leg_instant(s, s->state.now.t);
+    const Instant at = flow_instant(s, s->state.now.t);
     system->lookups(at.t, s->state.q, s->state.v, at.u, at.p, x->places);
     for (int i = 0; i < system->lookup_count && i < 30; i++) {
         const double first = system->lookup_first[i], last = system->lookup_last[i];
@@ -548,8 +547,8 @@ Status instance_differentiate(Instance *x, Direction d) {
     if (s->system->tangent == NULL)
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
-    const Instant at = leg_instant(s, s->state.now.t);
-    leg_begin(s);
+    const Instant at = flow_instant(s, s->state.now.t);
+    flow_begin(s);
     if (mechanism_motion_near(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
                               s->state.size) != OK)
         return FAILED;

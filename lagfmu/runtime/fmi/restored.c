@@ -13,7 +13,7 @@
 
 #include "digits.h"
 #include "indicators.h"
-#include "parts.h"
+#include "optional.h"
 
 enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased */
 
@@ -65,7 +65,7 @@ static Status ints(Instance *x, const Ints *list, size_t count) {
 
 /* The methods that this FMU holds; before the start none may be chosen yet. */
 static int offered(MethodName method) {
-    return (int)method > 0 && (int)method < METHOD_COUNT && PARTS.methods[method] != NULL;
+    return (int)method > 0 && (int)method < METHOD_COUNT && OPTIONAL.methods[method] != NULL;
 }
 
 static Status settings(Instance *x) {
@@ -108,7 +108,7 @@ static Status choice(Instance *x, const Solver *s) {
         {"rho / sigma", c->ratio, 0, HUGE_VAL},
     };
     if ((c->implicit || c->turn) &&
-        (s->settings.method != AUTO || PARTS.methods[RADAU5] == NULL))
+        (s->settings.method != AUTO || OPTIONAL.methods[RADAU5] == NULL))
         return restored_none(x, "stiffness mode", c->implicit);
     if (ints(x, list, sizeof list / sizeof *list) != OK) return FAILED;
     return numbers(x, sizes, sizeof sizes / sizeof *sizes);
@@ -184,7 +184,7 @@ static Status arrays(Instance *x, const Solver *s) {
     const int watched = indicators_count(system);
     const Integrator *i = &s->integrator;
     const Method *now =
-        x->started ? PARTS.methods[a->now.choice.implicit ? RADAU5 : s->settings.method] : NULL;
+        x->started ? OPTIONAL.methods[a->now.choice.implicit ? RADAU5 : s->settings.method] : NULL;
     const Doubles list[] = {
         {"coordinates", a->q, n, -DBL_MAX},
         {"velocities", a->v, n, -DBL_MAX},

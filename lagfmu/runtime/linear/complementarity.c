@@ -13,7 +13,6 @@
 #include "lu.h"
 #include "thresholds.h"
 
-
 typedef struct {
     int n, count;       /* rows, and how many of them are held at w = 0 */
     int *held, *pivots; /* (n) */

@@ -19,7 +19,7 @@ typedef struct {
     int (*basis)(Linear *l, int *basis);
 } Dependent;
 
-/* NULL in an FMU without constraints: its parts.c says so, and dependent.c is not there. */
+/* NULL in an FMU without constraints: its optional.c says so, and dependent.c is not there. */
 extern const Dependent *const DEPENDENT;
 
 #endif

@@ -16,7 +16,6 @@
 #include "residual.h"
 #include "thresholds.h"
 
-
 /* The scaled KKT matrix of the rows that act, decomposed. */
 typedef struct {
     Cod cod;

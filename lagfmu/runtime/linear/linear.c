@@ -14,7 +14,6 @@
 #include "stiffened.h"
 #include "thresholds.h"
 
-
 static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
 
 double linear_rank_threshold(const Linear *l) {

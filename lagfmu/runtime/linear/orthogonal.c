@@ -11,7 +11,6 @@
 #include "thresholds.h"
 #include "weighted.h"
 
-
 int orthogonal_factor(Linear *l, int *doubtful) {
     Weighted w;
     if (!weighted_factor(l, linear_rank_threshold(l), &w)) return 0;

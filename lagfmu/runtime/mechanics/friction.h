@@ -9,7 +9,6 @@
 
 #include "mechanism.h"
 
-
 /* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
  * slip velocity where that is zero or was last known; slip velocities up to `noise` [m/s] are rounding. */
 typedef struct {
@@ -40,7 +39,7 @@ struct Frictions {
     double *share;       /* of share.c */
 };
 
-/* What a Mechanism with frictions does besides (parts.h); NULL in an FMU without. */
+/* What a Mechanism with frictions does besides (optional.h); NULL in an FMU without. */
 extern const Sliding SLIDING;
 
 /* G_t v - nu_t of friction i at the state that was evaluated last. */
@@ -50,7 +49,7 @@ void friction_slip(const Mechanism *b, int i, const double *v, double s[2]);
 double friction_normal(const Mechanism *b, int i, const double *lambda);
 
 /* The unit vector of the slip velocity s; beyond a stop it goes on as before, so that the equations of a
- * leg stay smooth there. */
+ * flow stay smooth there. */
 void friction_heading(const Slide *slide, const double s[2], double e[2]);
 
 /* painleve.c -- the refusal of a sliding problem that has no acceleration, or several. */

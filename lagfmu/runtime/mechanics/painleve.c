@@ -12,7 +12,6 @@
 #include "digits.h"
 #include "thresholds.h"
 
-
 Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value) {
     fail(b->why, "friction ");
     for (int i = 0; i < count; i++)

@@ -11,7 +11,6 @@
 #include "friction.h"
 #include "thresholds.h"
 
-
 size_t share_doubles(const System *s) {
     const size_t m = (size_t)s->m, n = (size_t)s->n;
     return m * n + 2 * m * m + 3 * m + n + m * m + 5 * m; /* basis, made, Z, there, y, best, P, ... */

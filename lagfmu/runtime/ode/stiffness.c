@@ -24,7 +24,6 @@
 #include "digits.h"
 #include "thresholds.h"
 
-
 /* Cost of a step of radau5 in steps of dop853: as measured for 4 to 64 states; the matrices are dense. */
 static double price(int ny) { return 1 + ny / 8.0 + (double)ny * ny / 170; }
 

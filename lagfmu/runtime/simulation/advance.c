@@ -1,6 +1,6 @@
 /* advance.c -- from one communication point to the next.
  *
- * Steps are taken and projected within a leg (leg.c); events are found (events.c) and met (switch.c).
+ * Steps are taken and projected within a flow (flow.c); events are found (events.c) and met (switch.c).
  * In a scene without inputs the integrator may stand ahead of the communication point: the state there
  * is read from dense output and projected, on demand if the caller has it so: what nobody looks at costs
  * nothing.  It never passes the stop time, an event that lies ahead is
@@ -11,8 +11,8 @@
 
 #include "indicators.h"
 #include "jumps.h"
-#include "leg.h"
-#include "parts.h"
+#include "flow.h"
+#include "optional.h"
 #include "magnitudes.h"
 #include "thresholds.h"
 
@@ -20,14 +20,14 @@ static const double AHEAD = 2;        /* natural times of the motion that a step
 static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 
 static const Method *method_of(const Solver *s) {
-    return PARTS.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method];
+    return OPTIONAL.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method];
 }
 
 /* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not
  * at a fixed step, which divides the communication step; not where a slip may come to rest on the way. */
 static int runs_ahead(const Solver *s) {
     if (s->system->inputs > 0 || method_of(s)->fixed) return 0;
-    return s->system->frictions == 0 || !PARTS.slides->turns(s);
+    return s->system->frictions == 0 || !OPTIONAL.slides->turns(s);
 }
 
 static void restart(Solver *s, double t, const double *y, double h) {
@@ -78,9 +78,9 @@ static Status slide_on(Solver *s, const double *y1) {
     double lost;
     now->lost_old = now->lost_ahead;
     if (now->event_count > 0) return OK; /* the work is done as far as the event: meet() */
-    if (PARTS.slides->work(s, i->t_old, i->t, &lost) != OK) return FAILED;
+    if (OPTIONAL.slides->work(s, i->t_old, i->t, &lost) != OK) return FAILED;
     now->lost_ahead += lost;
-    return PARTS.slides->turn(s, i->t, y1);
+    return OPTIONAL.slides->turn(s, i->t, y1);
 }
 
 /* One step, projected and searched for events; `bound`: not to be passed. */
@@ -88,13 +88,13 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     Integrator *i = &s->integrator;
     const int watch = indicators_count(s->system) > 0;
     double *y1 = s->work_advance;
-    if (leg_step(s, i, bound, longest) != OK) return FAILED;
-    if (s->alike > 0) PARTS.after_step(s, i);
-    if ((watch || i->t > t_end) && leg_prepare_dense(s, i) != OK) return FAILED;
+    if (flow_step(s, i, bound, longest) != OK) return FAILED;
+    if (s->alike > 0) OPTIONAL.after_step(s, i);
+    if ((watch || i->t > t_end) && flow_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
-    if (leg_project(s, i->t, y1) != OK) return FAILED;
-    if (leg_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
-    if (watch && PARTS.events_find(s, y1) != OK) return FAILED;
+    if (flow_project(s, i->t, y1) != OK) return FAILED;
+    if (flow_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
+    if (watch && OPTIONAL.events_find(s, y1) != OK) return FAILED;
     if (s->system->frictions > 0 && slide_on(s, y1) != OK) return FAILED;
     integrator_move(i, y1);
     s->state.now.steps += 1;
@@ -128,7 +128,7 @@ static Status try_step(Solver *s, double t_end) {
 static void choose(Solver *s) {
     Integrator *i = &s->integrator;
     Choice *choice = &s->state.now.choice;
-    if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && leg_rate(s, i) == OK)
+    if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && flow_rate(s, i) == OK)
         stiffness_explicit_step(choice, i, s->state.size);
     if (!stiffness_turn(choice)) return;
     double *y = s->work_advance;
@@ -160,8 +160,8 @@ static Status put_between(Solver *s, double t) {
     const Integrator *i = &s->integrator;
     double *y = s->work_advance;
     i->method->dense(i, t, y);
-    if (s->alike > 0) PARTS.inside(s, i, t, y);
-    if (leg_project(s, t, y) != OK) return FAILED;
+    if (s->alike > 0) OPTIONAL.inside(s, i, t, y);
+    if (flow_project(s, t, y) != OK) return FAILED;
     put(s, t, y);
     return OK;
 }
@@ -174,7 +174,7 @@ static int waits(const Solver *s) {
 Status solver_arrive(Solver *s) {
     if (!s->state.now.between) return OK;
     resume(s);
-    leg_begin(s);
+    flow_begin(s);
     return put_between(s, s->state.now.t);
 }
 
@@ -197,7 +197,7 @@ static Status lose(Solver *s, double t) {
     double lost;
     now->lost = now->lost_ahead;
     if (i->t == t && now->event_count == 0) return OK;
-    if (PARTS.slides->work(s, i->t_old, t, &lost) != OK) return FAILED;
+    if (OPTIONAL.slides->work(s, i->t_old, t, &lost) != OK) return FAILED;
     now->lost = now->lost_old + lost;
     return OK;
 }
@@ -226,8 +226,8 @@ static Status meet(Solver *s) {
     const double t = s->state.now.event_time;
     double *y = s->work_advance;
     if (s->system->frictions > 0 && lose(s, t) != OK) return FAILED;
-    if (leg_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
-    if (s->alike > 0) PARTS.at_event(s);
+    if (flow_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
+    if (s->alike > 0) OPTIONAL.at_event(s);
     put(s, t, y);
     s->state.now.step = i->t - i->t_old;
     if (s->state.now.choice.implicit) {
@@ -237,7 +237,7 @@ static Status meet(Solver *s) {
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
     jumps_pass(s, s->state.left + s->system->contacts);
-    return s->system->contacts + s->system->frictions == 0 ? OK : PARTS.switch_modes(s, s->state.left);
+    return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.switch_modes(s, s->state.left);
 }
 
 /* FAILED if the step just taken shows that t_end is too far off for steps of its kind. */
@@ -264,7 +264,7 @@ static Status check_headway(Solver *s, double t_end, double begun, int first) {
 /* To t_end, or to the first event before it. */
 static Status travel(Solver *s, double t_end, double begun, int first, int *met) {
     Numbers *now = &s->state.now;
-    leg_begin(s);
+    flow_begin(s);
     *met = 0;
     if (!now->ahead && set_out(s) != OK) return FAILED;
     for (;;) {
@@ -279,8 +279,8 @@ static Status travel(Solver *s, double t_end, double begun, int first, int *met)
 }
 
 static Status complete_magnitudes(Solver *s, double span) {
-    leg_begin(s);
-    const Instant at = leg_instant(s, s->state.now.t);
+    flow_begin(s);
+    const Instant at = flow_instant(s, s->state.now.t);
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     return magnitudes_complete(s, at, span);
 }
@@ -288,18 +288,18 @@ static Status complete_magnitudes(Solver *s, double span) {
 Status solver_follow(Solver *s) {
     const System *system = s->system;
     if (!s->state.now.ahead)
-        jumps_settle(s, leg_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
+        jumps_settle(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (system->prescribed_count > 0) {
         if (system->contacts == 0)
             system_active(system, s->state.closed, s->active);
-        else if (PARTS.switch_released(s, s->state.now.span) != OK)
+        else if (OPTIONAL.switch_released(s, s->state.now.span) != OK)
             return FAILED;
-        const Instant at = leg_instant(s, s->state.now.t);
+        const Instant at = flow_instant(s, s->state.now.t);
         if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
                               s->state.size) != OK)
             return FAILED;
     }
-    return system->frictions > 0 ? PARTS.slides->renew(s) : OK;
+    return system->frictions > 0 ? OPTIONAL.slides->renew(s) : OK;
 }
 
 Status solver_advance(Solver *s, double t_end) {

@@ -1,7 +1,7 @@
-/* clearance.c -- can an indicator have left its range between two looks?
+/* clearance.c -- can an indicator have left its range between two samples?
  *
  * Its rate f' = G v - nu is evaluated in interval arithmetic (interval.h) for the boxes of t, q, v and u
- * between the looks: with l <= f' <= h,
+ * between the samples: with l <= f' <= h,
  *
  *   f(t) >= max(f_a + l (t - a), f_b - h (b - t)) ,
  *
@@ -13,9 +13,8 @@
 #include <math.h>
 
 #include "indicators.h"
-#include "leg.h"
+#include "flow.h"
 #include "thresholds.h"
-
 
 static Interval box(double a, double middle, double b) {
     const double bend = fabs(a - 2 * middle + b);
@@ -67,10 +66,10 @@ static int is_inside(const Solver *s, int i, double value) {
     return !(range_inside(r, value) < -r.slack);
 }
 
-Clearance clearance_between(Solver *s, const Looks *looks, int k, double *y) {
+Clearance clearance_between(Solver *s, const Samples *samples, int k, double *y) {
     const int width = indicators_count(s->system);
-    const double *at_a = looks->values + k * width, *at_b = at_a + width;
-    const double a = looks->t[k], b = looks->t[k + 1], h = b - a;
+    const double *at_a = samples->values + k * width, *at_b = at_a + width;
+    const double a = samples->t[k], b = samples->t[k + 1], h = b - a;
     const double step = s->integrator.t - s->integrator.t_old;
     const int moving = inputs_move(s);
     const Interval *rates = NULL;
@@ -84,12 +83,12 @@ Clearance clearance_between(Solver *s, const Looks *looks, int k, double *y) {
         Interval rate = rates[i];
         if (moving && i >= s->system->contacts) rate = interval_unknown();
         if (isnan(rate.low)) {
-            if (h > LOOKS_COARSE * step) return UNKNOWN;
+            if (h > SAMPLES_COARSE * step) return UNKNOWN;
             continue;
         }
         const Interval fall = {-rate.high, -rate.low};
         if (!is_inside(s, i, at_b[i])) {
-            if (h > LOOKS_FINE * step && rate.low < 0 && rate.high > 0) return UNKNOWN;
+            if (h > SAMPLES_FINE * step && rate.low < 0 && rate.high > 0) return UNKNOWN;
         } else if ((r.low > -HUGE_VAL &&
                     lowest(at_a[i] - r.low, at_b[i] - r.low, rate, h) < -r.slack) ||
                    (r.high < HUGE_VAL &&

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "parts.h"
+#include "optional.h"
 #include "step_size.h"
 
 static double power(double x, int n) {
@@ -19,19 +19,19 @@ double companion_alike(double coarser) {
 }
 
 static int is_alike(const Solver *s, const Integrator *i) {
-    return i->method == PARTS.methods[DOP853] && i->h_next > s->alike * (i->t - i->t_old);
+    return i->method == OPTIONAL.methods[DOP853] && i->h_next > s->alike * (i->t - i->t_old);
 }
 
 /* The local error of the step just taken is counted; its estimate stays in y. */
 static void add(const Solver *s, Integrator *i, LocalErrors *errors) {
-    const int implicit = i->method != PARTS.methods[DOP853];
+    const int implicit = i->method != OPTIONAL.methods[DOP853];
     const double local = power((i->t - i->t_old) * s->state.now.rate, implicit ? 6 : 9);
     if (local <= DBL_MAX - errors->sum[implicit]) {
         errors->sum[implicit] += local;
         errors->most[implicit] = fmax(errors->most[implicit], local);
     }
     if (!is_alike(s, i)) return;
-    for (int j = 0; j < i->ny; j++) i->y[j] += PARTS.dop853_error(i, j);
+    for (int j = 0; j < i->ny; j++) i->y[j] += OPTIONAL.dop853_error(i, j);
 }
 
 void companion_after_step(Solver *s, Integrator *i) {
@@ -54,7 +54,7 @@ void companion_at_event(Solver *s) {
 
 void companion_inside(const Solver *s, const Integrator *i, double t, double *y) {
     if (!is_alike(s, i)) return;
-    for (int j = 0; j < i->ny; j++) y[j] += PARTS.dop853_inside(i, t, j);
+    for (int j = 0; j < i->ny; j++) y[j] += OPTIONAL.dop853_inside(i, t, j);
 }
 
 double companion_share(const Solver *a, const Solver *b, double margin, double few) {

@@ -10,8 +10,8 @@
 #include <string.h>
 
 #include "indicators.h"
-#include "leg.h"
-#include "looks.h"
+#include "flow.h"
+#include "samples.h"
 #include "root.h"
 
 /* The indicator whose time is sought, and the range that it leaves then. */
@@ -27,7 +27,7 @@ typedef struct {
 static Status height(void *context, double elapsed, double *value) {
     const Sought *x = context;
     const double t = x->t0 + elapsed;
-    if (leg_reach(x->s, x->t0, x->y0, t, x->y) != OK) return FAILED;
+    if (flow_reach(x->s, x->t0, x->y0, t, x->y) != OK) return FAILED;
     if (indicators_at(x->s, t, x->y, x->values) != OK) return FAILED;
     *value = range_inside(x->range, x->values[x->indicator]);
     return OK;
@@ -72,15 +72,15 @@ static int is_armed(const Solver *s, int i) {
     return !indicators_range(s, i).rises;
 }
 
-/* The first time among the looks at which indicator i leaves its range, if it does. */
-static Status first_of(Solver *s, Sought *x, const Looks *looks, int i, double *time, int *found,
+/* The first time among the samples at which indicator i leaves its range, if it does. */
+static Status first_of(Solver *s, Sought *x, const Samples *samples, int i, double *time, int *found,
                        int *way) {
     const int width = indicators_count(s->system);
     const Range range = indicators_range(s, i);
-    const double *value = looks->values + i;
+    const double *value = samples->values + i;
     int armed = is_armed(s, i);
     *found = 0;
-    for (int k = 1; k < looks->count && !*found; k++) {
+    for (int k = 1; k < samples->count && !*found; k++) {
         if (range_inside(range, value[(k - 1) * width]) > range.slack) armed = 1;
         if (!(range_inside(range, value[k * width]) < -range.slack)) continue;
         *way = value[k * width] > range.high ? 1 : -1;
@@ -92,7 +92,7 @@ static Status first_of(Solver *s, Sought *x, const Looks *looks, int i, double *
         }
         int inside = k - 1;
         while (inside > 0 && !(range_inside(x->range, value[inside * width]) > 0)) inside--;
-        if (locate(x, looks->t[inside], looks->t[k], time, found) != OK) return FAILED;
+        if (locate(x, samples->t[inside], samples->t[k], time, found) != OK) return FAILED;
     }
     return OK;
 }
@@ -110,12 +110,12 @@ static void note(State *x, int width, int i, double time, int way) {
 }
 
 /* Contacts that have risen above their gap are armed. */
-static void arm(Solver *s, const Looks *looks) {
+static void arm(Solver *s, const Samples *samples) {
     const int width = indicators_count(s->system);
     for (int c = 0; c < s->system->contacts; c++) {
         if (s->state.closed[c]) continue;
-        for (int k = 0; k < looks->count; k++)
-            if (looks->values[k * width + c] > s->state.gap[c]) s->state.armed[c] = 1;
+        for (int k = 0; k < samples->count; k++)
+            if (samples->values[k * width + c] > s->state.gap[c]) s->state.armed[c] = 1;
     }
 }
 
@@ -123,19 +123,19 @@ Status events_find(Solver *s, const double *y1) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
     double *y = s->work_events, *values = y + 3 * i->ny;
-    Looks looks = {0, values + width, values + width + LOOKS_MOST + width};
+    Samples samples = {0, values + width, values + width + SAMPLES_MOST + width};
     Sought x = {s, i->t_old, i->y_old, 0, {0, 0, 0, 0}, y, values};
     s->state.now.event_count = 0;
-    if (looks_take(s, y1, y, &looks) != OK) return FAILED;
+    if (samples_take(s, y1, y, &samples) != OK) return FAILED;
     for (int k = 0; k < width; k++) {
         double time;
         int found, way;
-        if (first_of(s, &x, &looks, k, &time, &found, &way) != OK) return FAILED;
+        if (first_of(s, &x, &samples, k, &time, &found, &way) != OK) return FAILED;
         if (found) note(&s->state, width, k, time, way);
     }
     if (s->state.now.event_count > 0) return OK;
-    arm(s, &looks);
-    memcpy(s->state.indicator, looks.values + (looks.count - 1) * width,
-           (size_t)width * sizeof *looks.values);
+    arm(s, &samples);
+    memcpy(s->state.indicator, samples.values + (samples.count - 1) * width,
+           (size_t)width * sizeof *samples.values);
     return OK;
 }

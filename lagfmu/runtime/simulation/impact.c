@@ -14,9 +14,8 @@
 #include <string.h>
 
 #include "digits.h"
-#include "parts.h"
+#include "optional.h"
 #include "thresholds.h"
-
 
 /* What an impact starts from, and its workspace.  Rows are numbered as in the system, contacts by their
  * position among the contacts, `k` of them entering. */
@@ -204,7 +203,7 @@ static Status strike(Struck *x, Instant at, const double *q, const double *v, co
     int done = 0;
     if (x->s->system->frictions > 0) {
         set_restitution(x, is_plastic);
-        if (PARTS.slides->rub(x->s, at, q, v, entering, x->slip, x->e, *plastic, *found, &done) != OK)
+        if (OPTIONAL.slides->rub(x->s, at, q, v, entering, x->slip, x->e, *plastic, *found, &done) != OK)
             return FAILED;
     }
     if (done) {

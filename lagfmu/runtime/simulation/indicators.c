@@ -9,8 +9,8 @@
 #include <math.h>
 
 #include "jumps.h"
-#include "leg.h"
-#include "parts.h"
+#include "flow.h"
+#include "optional.h"
 
 int indicators_count(const System *s) { return s->contacts + s->jumps + 2 * s->frictions; }
 
@@ -18,7 +18,7 @@ int indicators_first_of_frictions(const System *s) { return s->contacts + s->jum
 
 static Status of_contacts(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
-    const Instant at = leg_instant(s, t);
+    const Instant at = flow_instant(s, t);
     Mechanism *b = &s->stepped;
     int any = system->frictions > 0;
     for (int c = 0; c < system->contacts; c++) any |= s->state.closed[c];
@@ -30,7 +30,7 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
     for (int c = 0; c < system->contacts; c++)
         if (s->state.closed[c]) values[c] = b->lambda[system->contact[c]];
     if (system->frictions > 0)
-        PARTS.slides->indicators(s, values + indicators_first_of_frictions(system));
+        OPTIONAL.slides->indicators(s, values + indicators_first_of_frictions(system));
     return OK;
 }
 
@@ -38,7 +38,7 @@ Status indicators_at(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
     if (system->contacts + system->frictions > 0 && of_contacts(s, t, y, values) != OK) return FAILED;
     if (system->jumps == 0) return OK;
-    const Instant at = leg_instant(s, t);
+    const Instant at = flow_instant(s, t);
     system->surfaces(t, y, at.u, at.p, values + system->contacts);
     return OK;
 }
@@ -46,7 +46,7 @@ Status indicators_at(Solver *s, double t, const double *y, double *values) {
 Range indicators_range(const Solver *s, int indicator) {
     const System *system = s->system;
     const int of_friction = indicator - indicators_first_of_frictions(system);
-    if (of_friction >= 0) return PARTS.slides->range(s, of_friction);
+    if (of_friction >= 0) return OPTIONAL.slides->range(s, of_friction);
     if (indicator >= system->contacts) return jumps_range(s, indicator - system->contacts);
     return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator], 0};
 }

@@ -10,9 +10,9 @@
 #include "afar.h"
 #include "digits.h"
 #include "jumps.h"
-#include "leg.h"
+#include "flow.h"
 #include "magnitudes.h"
-#include "parts.h"
+#include "optional.h"
 #include "thresholds.h"
 
 static const double EPS = DBL_EPSILON;
@@ -182,11 +182,11 @@ static Status find_modes(const Start *x) {
     Mechanism *b = &x->s->stepped;
     int *touching = x->s->iwork_initial + s->m;
     memcpy(touching, state->closed, (size_t)s->contacts * sizeof *touching);
-    if (s->contacts > 0 && PARTS.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
+    if (s->contacts > 0 && OPTIONAL.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
                                                 touching, NULL) == FAILED)
         return afar_refused(x->s);
     if (s->frictions > 0 &&
-        PARTS.slides->begin(x->s, x->at, state->closed, touching) == FAILED)
+        OPTIONAL.slides->begin(x->s, x->at, state->closed, touching) == FAILED)
         return afar_refused(x->s);
     system_active(s, state->closed, x->s->active);
     if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,
@@ -194,7 +194,7 @@ static Status find_modes(const Start *x) {
         return afar_refused(x->s);
     if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
         return afar_refused(x->s);
-    leg_choose_rows(x->s);
+    flow_choose_rows(x->s);
     return OK;
 }
 
@@ -250,8 +250,8 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
                     Moved moved, void *context) {
     if (check_finite(s, q0, v0) == FAILED) return FAILED;
     clear(s, t);
-    jumps_settle(s, leg_instant(s, t), q0, v0, NULL, NULL);
-    if (s->system->contacts > 0 && PARTS.impact_check(s) != OK) return FAILED;
+    jumps_settle(s, flow_instant(s, t), q0, v0, NULL, NULL);
+    if (s->system->contacts > 0 && OPTIONAL.impact_check(s) != OK) return FAILED;
     const Start x = {s, {t, s->u, s->p}, q0, v0, rank, rank + s->system->n};
     s->stepped.dependent = 1; /* it is not known yet */
     magnitudes_sizes(s, q0);

@@ -25,12 +25,11 @@
  * which the floor of the scale, below 1e-6, still forgives. */
 #include "magnitudes.h"
 
-#include "leg.h"
+#include "flow.h"
 #include "thresholds.h"
 
 #include <float.h>
 #include <string.h>
-
 
 static double larger(double a, double b) { return a > b ? a : b; }
 
@@ -209,7 +208,7 @@ static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
         const double q = state->q[j], size = state->size[j];
         if (!(size > 0)) continue;
         state->q[j] += DISPLACED * size;
-        evaluated = mechanism_motion(b, at, state->q, state->v, leg_rows(s)) == OK;
+        evaluated = mechanism_motion(b, at, state->q, state->v, flow_rows(s)) == OK;
         state->q[j] = q;
         for (int i = 0; i < n; i++) {
             const double change = fabs(b->vdot[i] - vdot[i]) / DISPLACED;

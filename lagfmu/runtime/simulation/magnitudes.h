@@ -4,7 +4,6 @@
 
 #include "solver.h"
 
-
 /* least (n): for each coordinate the largest parameter of its dimension; 0 for an angle. */
 void magnitudes_extents(const System *s, const double *p, double *least);
 

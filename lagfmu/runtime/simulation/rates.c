@@ -11,7 +11,6 @@
 
 #include <math.h>
 
-
 int rates_half_connected(const double *u, const double *went, double h) {
     const double a = went[2], v = went[1] - h * a, x = went[0] - h * (v + h * a / 2);
     const double way = u[0] - x, speed = u[1] - v, size = fabs(x) + fabs(u[0]);

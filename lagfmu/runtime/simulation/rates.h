@@ -5,7 +5,6 @@
 
 #include "thresholds.h"
 
-
 /* The latest communication points of an estimated motion, newest first. */
 typedef struct {
     int count; /* up to RATES_KEPT */

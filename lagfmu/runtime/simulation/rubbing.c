@@ -13,7 +13,6 @@
 #include "slides.h"
 #include "thresholds.h"
 
-
 /* The contacts' rows, then those of the frictions that they press. */
 typedef struct {
     Solver *s;

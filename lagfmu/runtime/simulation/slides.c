@@ -11,8 +11,8 @@
 #include <string.h>
 
 #include "digits.h"
-#include "leg.h"
-#include "parts.h"
+#include "flow.h"
+#include "optional.h"
 #include "thresholds.h"
 
 enum { HALVINGS = 60 };
@@ -332,7 +332,7 @@ static int fits(Rest *x, int *trial, const int *touching, const int *leaving) {
     const size_t bytes = (size_t)s->system->contacts * sizeof *trial;
     int *settled = trial + s->system->contacts;
     memcpy(settled, trial, bytes);
-    return PARTS.contacts_modes(s, x->at, s->state.q, s->state.v, settled, touching, leaving) == OK &&
+    return OPTIONAL.contacts_modes(s, x->at, s->state.q, s->state.v, settled, touching, leaving) == OK &&
            memcmp(settled, trial, bytes) == 0;
 }
 
@@ -396,7 +396,7 @@ static Status settle(Rest *x, int *closed, const int *ended, const int *touching
         if (choose(x, ended) != OK) return FAILED;
         memcpy(before, closed, bytes);
         if (s->system->contacts == 0) return OK;
-        if (PARTS.contacts_modes(s, x->at, s->state.q, s->state.v, closed, touching, leaving) != OK)
+        if (OPTIONAL.contacts_modes(s, x->at, s->state.q, s->state.v, closed, touching, leaving) != OK)
             return FAILED;
         if (memcmp(before, closed, bytes) == 0) return check_rest(x, closed, touching, leaving);
     }
@@ -521,7 +521,7 @@ static Status renew(Solver *s) {
     int any = 0;
     for (int i = 0; i < s->system->frictions; i++) any |= s->state.slide[i].sticks;
     if (!any || s->system->inputs == 0) return OK;
-    const Instant at = leg_instant(s, s->state.now.t);
+    const Instant at = flow_instant(s, s->state.now.t);
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     renew_noise(s, s->state.slide); /* at the start nothing may have been at work */
     for (int i = 0; i < s->system->frictions; i++) {
@@ -565,7 +565,7 @@ static Status turn(Solver *s, double t, const double *y) {
     Mechanism *b = &s->stepped;
     if (!turns(s)) return OK;
     const double *v = y + s->system->n;
-    if (mechanism_evaluate(b, leg_instant(s, t), y, v) != OK) return FAILED;
+    if (mechanism_evaluate(b, flow_instant(s, t), y, v) != OK) return FAILED;
     for (int i = 0; i < s->system->frictions; i++) {
         double slip[2], e[2];
         if (s->state.slide[i].sticks) continue;
@@ -584,7 +584,7 @@ static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.56888
 
 /* The motion at a state that may lie off the constraints. */
 static Status move_near(Solver *s, double t, const double *y) {
-    return mechanism_motion_near(&s->stepped, leg_instant(s, t), y, y + s->system->n, s->active,
+    return mechanism_motion_near(&s->stepped, flow_instant(s, t), y, y + s->system->n, s->active,
                                  s->state.offset, s->state.size);
 }
 

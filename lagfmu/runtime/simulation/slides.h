@@ -4,7 +4,7 @@
  * slips in the direction in which it begins to move under the force of that very slip: s/|s| = s'/|s'| with
  * s' = G_t vdot - gamma_t of the equations of sliding (Pfeiffer & Glocker 1996, chs. 5 and 6).
  *
- * All of it is reached by one pointer (parts.h), NULL in an FMU without frictions. */
+ * All of it is reached by one pointer (optional.h), NULL in an FMU without frictions. */
 #ifndef LAGFMU_SLIDES_H
 #define LAGFMU_SLIDES_H
 

@@ -4,8 +4,8 @@
 #include "impact.h"
 #include "clearance.h"
 #include "indicators.h"
-#include "looks.h"
-#include "parts.h"
+#include "samples.h"
+#include "optional.h"
 
 static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
     const int n = s->n, contacts = s->contacts, indicators = indicators_count(s);
@@ -32,7 +32,7 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->slip_q = arena_doubles(saved, s->frictions * n);
     x->slip_v = arena_doubles(saved, s->frictions * n);
     x->indicator = arena_doubles(saved, indicators);
-    integrator_layout(i, saved, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
+    integrator_layout(i, saved, scratch, 2 * n, OPTIONAL.methods, METHOD_COUNT);
     x->y = i->y;
     x->f = i->f;
     x->y_old = i->y_old;
@@ -50,9 +50,9 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.first = arena_doubles(saved, system->inputs);
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
-    integrator_layout(&s->probe, scratch, scratch, 2 * n, PARTS.methods, METHOD_COUNT);
+    integrator_layout(&s->probe, scratch, scratch, 2 * n, OPTIONAL.methods, METHOD_COUNT);
     mechanism_layout(&s->stepped, scratch, system, &s->why,
-                     PARTS.slides != NULL ? PARTS.slides->sliding : NULL);
+                     OPTIONAL.slides != NULL ? OPTIONAL.slides->sliding : NULL);
     if (s->stepped.friction != NULL) s->stepped.friction->slide = s->state.slide;
     sensitivity_layout(&s->sensitivity, scratch, system);
     s->active_full = NULL;
@@ -73,11 +73,11 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
     s->work_advance = arena_doubles(scratch, 4 * n);
     s->work_events =
-        arena_doubles(scratch, indicators == 0 ? 0 : 6 * n + indicators + looks_doubles(indicators));
+        arena_doubles(scratch, indicators == 0 ? 0 : 6 * n + indicators + samples_doubles(indicators));
     s->work_clearance = arena_doubles(scratch, clearance_doubles(system));
     const int frictions = system->frictions, some = frictions > 0;
-    s->work_rub = arena_take(scratch, some ? PARTS.slides->doubles(system) : 0, sizeof(double));
-    s->iwork_rub = arena_take(scratch, some ? PARTS.slides->ints(system) : 0, sizeof(int));
+    s->work_rub = arena_take(scratch, some ? OPTIONAL.slides->doubles(system) : 0, sizeof(double));
+    s->iwork_rub = arena_take(scratch, some ? OPTIONAL.slides->ints(system) : 0, sizeof(int));
     s->trial_slides = arena_take(scratch, (size_t)frictions, sizeof *s->trial_slides);
     s->work_slides = arena_doubles(scratch, some * (2 * frictions + 5 * n));
     s->iwork_slides = arena_ints(scratch, some * (4 * frictions + 2 * contacts));

@@ -33,7 +33,7 @@ typedef struct {
     int *iwork_contacts;       /* (m + 2 contacts) */
     double *work_jumps;        /* (2 jumps + n) of jumps.c */
     double *work_advance;      /* (4 n) of advance.c */
-    double *work_events;       /* (6 n + indicators and all looks) of events.c */
+    double *work_events;       /* (6 n + indicators and all samples) of events.c */
     double *work_clearance;    /* of clearance.c */
     double *work_rub;          /* of rubbing.c */
     int *iwork_rub;

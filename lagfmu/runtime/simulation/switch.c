@@ -9,10 +9,9 @@
 #include "contacts.h"
 #include "impact.h"
 #include "indicators.h"
-#include "leg.h"
-#include "parts.h"
+#include "flow.h"
+#include "optional.h"
 #include "thresholds.h"
-
 
 /* What is said of each contact while an event is met: flags (contacts). */
 typedef struct {
@@ -126,7 +125,7 @@ static void note_departure(Solver *s, int c) {
 Status switch_modes(Solver *s, const int *happened) {
     const System *system = s->system;
     const int contacts = system->contacts;
-    const Instant at = leg_instant(s, s->state.now.t);
+    const Instant at = flow_instant(s, s->state.now.t);
     const int rubs = system->frictions > 0;
     double *arriving = rubs ? s->work_slides + 2 * system->frictions + 4 * system->n : NULL;
     if (rubs) memcpy(arriving, s->state.v, (size_t)system->n * sizeof *arriving);
@@ -135,7 +134,7 @@ Status switch_modes(Solver *s, const int *happened) {
                flags + 4 * contacts};
     if (find_near(s, at, happened, &x) != OK || strike(s, at, happened, &x) != OK) return FAILED;
     if (settle(s, at, &x) != OK || set_levels(s, at, x.closed) != OK) return FAILED;
-    if (rubs && PARTS.slides->change(s, at, happened + indicators_first_of_frictions(system), arriving,
+    if (rubs && OPTIONAL.slides->change(s, at, happened + indicators_first_of_frictions(system), arriving,
                                      x.closed, x.touching, x.leaving) != OK)
         return FAILED;
     system_active(system, x.closed, s->active);
@@ -178,7 +177,7 @@ static Status has_parted(Solver *s, Instant at, int c, double span, int *parted)
 Status switch_released(Solver *s, double span) {
     const System *system = s->system;
     if (system->prescribed_count == 0) return OK;
-    const Instant at = leg_instant(s, s->state.now.t);
+    const Instant at = flow_instant(s, s->state.now.t);
     for (int c = 0; c < system->contacts; c++) {
         int parted;
         if (!s->state.closed[c]) continue;

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ... import names
 from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm
-from ...model.parts import Expr
+from ...model.elements import Expr
 from ...verification.verify import applies
 from .player import Run
 

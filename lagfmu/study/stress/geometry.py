@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ... import names
 from ...fmu.closed_forms import pack_closed_forms, unpack_closed_forms
 from ...model.closed_form import TIME, ClosedForm
+from ...model.elements import Expr
 from ...model.model import Contact, Model, Nonholonomic, name_of
-from ...model.parts import Expr
 from ...model.reactions import reactions_in
 from ...names import read
 from ...prepare.prepare import Prepared

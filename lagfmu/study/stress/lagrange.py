@@ -25,8 +25,8 @@ import sympy as sp
 from ... import names
 from ...fmu.closed_forms import pack_closed_forms
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
+from ...model.elements import Expr
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
-from ...model.parts import Expr
 from ...prepare.prepare import Prepared
 from .closed_forms import magnitude
 from .facts import beside

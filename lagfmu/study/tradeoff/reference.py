@@ -26,7 +26,7 @@ from ... import names
 from ...errors import SimulationError
 from ...fmu.closed_forms import CarriedForm
 from ...model.closed_form import output
-from ...model.parts import Expr
+from ...model.elements import Expr
 from ...verification.simulate import Trajectory
 from ...verification.verify import applies, evaluate
 from .importer import Importer

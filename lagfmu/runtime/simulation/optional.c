@@ -1,7 +1,7 @@
-/* parts.c -- everything: the FMU of a scene that asks for all outputs and methods. */
-#include "parts.h"
+/* optional.c -- everything: the FMU of a scene that asks for all outputs and methods. */
+#include "optional.h"
 
-const Parts PARTS = {
+const Optional OPTIONAL = {
     .methods = {[AUTO] = &dop853,
                 [DOP853] = &dop853,
                 [RK4] = &rk4,

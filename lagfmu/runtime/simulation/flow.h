@@ -1,48 +1,48 @@
-/* leg.h -- a stretch of time over which the contact modes do not change.
+/* flow.h -- the flow between two events: a stretch of time over which the contact modes do not change.
  *
  *   y = [q; v] ,  q' = v ,  v' = vdot   with   M vdot = F + G^T lambda ,  G vdot = gamma
  *
  * is integrated for the rows that act, and projected onto f = offset and G v = nu. */
-#ifndef LAGFMU_LEG_H
-#define LAGFMU_LEG_H
+#ifndef LAGFMU_FLOW_H
+#define LAGFMU_FLOW_H
 
 #include "solver.h"
 
 /* The rows that act in the present modes. */
-void leg_begin(Solver *s);
+void flow_begin(Solver *s);
 
 /* The fixed step [s] that the motion's natural rate says where solver.step does not, and how many of them
  * there are in a natural time. */
-double leg_natural_step(const Solver *s);
-double leg_fewest_steps(const Solver *s);
+double flow_natural_step(const Solver *s);
+double flow_fewest_steps(const Solver *s);
 
 /* Where `stepped` was solved for all rows that act, on the constraints: which of them depend on others is
  * remembered; factors are lost. */
-void leg_choose_rows(Solver *s);
+void flow_choose_rows(Solver *s);
 
 /* (m) The rows for states off the constraints: those that act, as many of them as are independent. */
-const int *leg_rows(const Solver *s);
+const int *flow_rows(const Solver *s);
 
 /* Time t with the inputs then, and the levels of jumps behind them (kept in s->u). */
-Instant leg_instant(Solver *s, double t);
+Instant flow_instant(Solver *s, double t);
 
 /* One accepted step towards t_bound, none longer than `longest` [s]. */
-Status leg_step(Solver *s, Integrator *i, double t_bound, double longest);
+Status flow_step(Solver *s, Integrator *i, double t_bound, double longest);
 
 /* The rate of change at the integrator's state. */
-Status leg_rate(Solver *s, Integrator *i);
+Status flow_rate(Solver *s, Integrator *i);
 
 /* Completes the dense output of the step just taken. */
-Status leg_prepare_dense(Solver *s, Integrator *i);
+Status flow_prepare_dense(Solver *s, Integrator *i);
 
 /* y (2 n) moved onto the constraints. */
-Status leg_project(Solver *s, double t, double *y);
+Status flow_project(Solver *s, double t, double *y);
 
 /* FAILED if the projection after an adaptive step moved the state by far more than the step's error
  * can be: next to a singular configuration the constraints lead to another branch. */
-Status leg_check_projection(Solver *s, double t, const double *y, const double *projected);
+Status flow_check_projection(Solver *s, double t, const double *y, const double *projected);
 
 /* y at t1, integrated from (t0, y0) and projected. */
-Status leg_reach(Solver *s, double t0, const double *y0, double t1, double *y);
+Status flow_reach(Solver *s, double t0, const double *y0, double t1, double *y);
 
 #endif

@@ -1,9 +1,9 @@
-/* parts.h -- the parts of the runtime that not every FMU needs.
+/* optional.h -- the parts of the runtime that not every FMU needs.
  *
- * parts.c names all of them.  An FMU for a scene that needs less carries a parts.c of its own: what is
+ * optional.c names all of them.  An FMU for a scene that needs less carries an optional.c of its own: what is
  * not named there is reached by nothing, and the linker leaves it out. */
-#ifndef LAGFMU_PARTS_H
-#define LAGFMU_PARTS_H
+#ifndef LAGFMU_OPTIONAL_H
+#define LAGFMU_OPTIONAL_H
 
 #include "companion.h"
 #include "contacts.h"
@@ -39,8 +39,8 @@ typedef struct {
     Status (*switch_released)(Solver *s, double span);
     /* What constraints that hold by friction need; NULL where there are none. */
     const Slides *slides;
-} Parts;
+} Optional;
 
-extern const Parts PARTS;
+extern const Optional OPTIONAL;
 
 #endif

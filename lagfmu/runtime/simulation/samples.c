@@ -1,18 +1,17 @@
-/* looks.c -- where in a step an event may pass unseen, more is looked at.
+/* samples.c -- where in a step an event may pass unseen, more is looked at.
  *
- * First at the quarters of the step, and where a rebound is highest; then in the middle between two looks
+ * First at the quarters of the step, and where a rebound is highest; then in the middle between two samples
  * as long as f of an open contact, or h of a force that jumps, can have left its range and come back
- * (clearance.c); and where a multiplier may dip below zero between two looks. */
-#include "looks.h"
+ * (clearance.c); and where a multiplier may dip below zero between two samples. */
+#include "samples.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "clearance.h"
 #include "indicators.h"
-#include "leg.h"
+#include "flow.h"
 #include "thresholds.h"
-
 
 /* The time [s] in which an open contact that has just been left parts most, f' / (-f''). */
 static Status top_of_rebound(Solver *s, double t, const double *y, const double *values,
@@ -24,7 +23,7 @@ static Status top_of_rebound(Solver *s, double t, const double *y, const double 
     for (int c = 0; c < system->contacts; c++)
         left |= !s->state.closed[c] && values[c] <= s->state.gap[c];
     if (!left) return OK;
-    if (mechanism_motion_near(b, leg_instant(s, t), y, y + system->n, s->active, s->state.offset,
+    if (mechanism_motion_near(b, flow_instant(s, t), y, y + system->n, s->active, s->state.offset,
                               s->state.size) != OK)
         return FAILED;
     for (int c = 0; c < system->contacts; c++) {
@@ -48,39 +47,39 @@ static int vertex(const double *t, const double *y, double *lowest, double *dept
     return bend > 0;
 }
 
-static void insert(Looks *looks, int k, int width, double t, const double *values) {
-    const size_t row = (size_t)width, after = (size_t)(looks->count - k);
-    double *place = looks->values + (size_t)k * row;
-    memmove(looks->t + k + 1, looks->t + k, after * sizeof *looks->t);
+static void insert(Samples *samples, int k, int width, double t, const double *values) {
+    const size_t row = (size_t)width, after = (size_t)(samples->count - k);
+    double *place = samples->values + (size_t)k * row;
+    memmove(samples->t + k + 1, samples->t + k, after * sizeof *samples->t);
     memmove(place + row, place, after * row * sizeof *place);
-    looks->t[k] = t;
+    samples->t[k] = t;
     memcpy(place, values, row * sizeof *place);
-    looks->count += 1;
+    samples->count += 1;
 }
 
 /* One more look, put in its place, if the multiplier of a closed contact passes below zero and back
- * between two looks.  The lowest point is that of a parabola through three neighbours, drawn again with
+ * between two samples.  The lowest point is that of a parabola through three neighbours, drawn again with
  * it as one of them. */
-static Status look_into_dip(Solver *s, Looks *looks, int i, int contact, double *y, double *seen,
+static Status look_into_dip(Solver *s, Samples *samples, int i, int contact, double *y, double *seen,
                             int *found) {
     const Integrator *integrator = &s->integrator;
     const int width = indicators_count(s->system);
     double t[3], lambda[3];
     for (int k = 0; k < 3; k++) {
-        t[k] = looks->t[i + k];
-        lambda[k] = looks->values[(i + k) * width + contact];
+        t[k] = samples->t[i + k];
+        lambda[k] = samples->values[(i + k) * width + contact];
     }
-    for (int round = 0; round < LOOKS_DIPS; round++) {
+    for (int round = 0; round < SAMPLES_DIPS; round++) {
         double lowest, depth;
         const double least = fmin(lambda[0], fmin(lambda[1], lambda[2]));
         const double most = fmax(lambda[0], fmax(lambda[1], lambda[2]));
         if (least < 0 || !vertex(t, lambda, &lowest, &depth)) return OK;
-        if (!(t[0] < lowest && lowest < t[2]) || lowest == t[1] || depth > LOOKS_SHALLOW * most)
+        if (!(t[0] < lowest && lowest < t[2]) || lowest == t[1] || depth > SAMPLES_SHALLOW * most)
             return OK;
         integrator->method->dense(integrator, lowest, y);
         if (indicators_at(s, lowest, y, seen) != OK) return FAILED;
         if (seen[contact] < 0) {
-            insert(looks, i + (lowest > looks->t[i + 1] ? 2 : 1), width, lowest, seen);
+            insert(samples, i + (lowest > samples->t[i + 1] ? 2 : 1), width, lowest, seen);
             *found = 1;
             return OK;
         }
@@ -96,34 +95,34 @@ static Status look_into_dip(Solver *s, Looks *looks, int i, int contact, double 
 }
 
 /* One more look at time t, put in its place behind look k. */
-static Status look(Solver *s, Looks *looks, int k, double t, double *y) {
+static Status look(Solver *s, Samples *samples, int k, double t, double *y) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
-    double *seen = looks->values + (LOOKS_MOST + width) * width; /* one row of scratch */
+    double *seen = samples->values + (SAMPLES_MOST + width) * width; /* one row of scratch */
     i->method->dense(i, t, y);
     if (indicators_at(s, t, y, seen) != OK) return FAILED;
-    insert(looks, k + 1, width, t, seen);
+    insert(samples, k + 1, width, t, seen);
     return OK;
 }
 
-/* Looks between looks until nothing can have passed unseen up to the first event. */
-static Status refine(Solver *s, Looks *looks, double *y) {
+/* Samples between samples until nothing can have passed unseen up to the first event. */
+static Status refine(Solver *s, Samples *samples, double *y) {
     const double step = s->integrator.t - s->integrator.t_old;
-    for (int k = 0; s->system->bounds != NULL && k + 1 < looks->count;) {
-        const double a = looks->t[k], b = looks->t[k + 1], middle = a + (b - a) / 2;
-        const Clearance clearance = clearance_between(s, looks, k, y);
-        const int more = looks->count < LOOKS_MOST - 1 && b - a > LOOKS_SMALLEST * step &&
+    for (int k = 0; s->system->bounds != NULL && k + 1 < samples->count;) {
+        const double a = samples->t[k], b = samples->t[k + 1], middle = a + (b - a) / 2;
+        const Clearance clearance = clearance_between(s, samples, k, y);
+        const int more = samples->count < SAMPLES_MOST - 1 && b - a > SAMPLES_SMALLEST * step &&
                          middle > a && middle < b;
         if (clearance == BRACKETS) return OK;
         if (clearance == CLEAR || !more)
             k += 1;
-        else if (look(s, looks, k, middle, y) != OK)
+        else if (look(s, samples, k, middle, y) != OK)
             return FAILED;
     }
     return OK;
 }
 
-/* May indicator c dip below zero between two looks? */
+/* May indicator c dip below zero between two samples? */
 static int may_dip(const Solver *s, int c) {
     const System *system = s->system;
     const int of_friction = c - indicators_first_of_frictions(system);
@@ -132,30 +131,30 @@ static int may_dip(const Solver *s, int c) {
     return of_friction % 2 == 0 || !system->friction[of_friction / 2].gated; /* else it is 1 */
 }
 
-Status looks_take(Solver *s, const double *y1, double *y, Looks *looks) {
+Status samples_take(Solver *s, const double *y1, double *y, Samples *samples) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
     const double h = i->t - i->t_old;
     double highest;
-    memcpy(looks->values, s->state.indicator, (size_t)width * sizeof *looks->values);
-    looks->t[0] = i->t_old;
-    if (top_of_rebound(s, i->t_old, i->y_old, looks->values, &highest) != OK) return FAILED;
-    looks->t[1] = i->t;
-    if (indicators_at(s, i->t, y1, looks->values + width) != OK) return FAILED;
-    looks->count = 2;
-    for (int k = 1; k < LOOKS_FIRST; k++)
-        if (look(s, looks, looks->count - 2, i->t_old + k * h / LOOKS_FIRST, y) != OK) return FAILED;
+    memcpy(samples->values, s->state.indicator, (size_t)width * sizeof *samples->values);
+    samples->t[0] = i->t_old;
+    if (top_of_rebound(s, i->t_old, i->y_old, samples->values, &highest) != OK) return FAILED;
+    samples->t[1] = i->t;
+    if (indicators_at(s, i->t, y1, samples->values + width) != OK) return FAILED;
+    samples->count = 2;
+    for (int k = 1; k < SAMPLES_FIRST; k++)
+        if (look(s, samples, samples->count - 2, i->t_old + k * h / SAMPLES_FIRST, y) != OK) return FAILED;
     highest += i->t_old;
-    for (int k = 0; k + 1 < looks->count; k++)
-        if (looks->t[k] < highest && highest < looks->t[k + 1] &&
-            look(s, looks, k, highest, y) != OK)
+    for (int k = 0; k + 1 < samples->count; k++)
+        if (samples->t[k] < highest && highest < samples->t[k + 1] &&
+            look(s, samples, k, highest, y) != OK)
             return FAILED;
-    if (refine(s, looks, y) != OK) return FAILED;
+    if (refine(s, samples, y) != OK) return FAILED;
     for (int c = 0; c < width; c++) {
         if (!may_dip(s, c)) continue;
-        double *seen = looks->values + (LOOKS_MOST + width) * width; /* one row of scratch */
-        for (int k = 0, found = 0; k + 2 < looks->count && !found; k++)
-            if (look_into_dip(s, looks, k, c, y, seen, &found) != OK) return FAILED;
+        double *seen = samples->values + (SAMPLES_MOST + width) * width; /* one row of scratch */
+        for (int k = 0, found = 0; k + 2 < samples->count && !found; k++)
+            if (look_into_dip(s, samples, k, c, y, seen, &found) != OK) return FAILED;
     }
     return OK;
 }

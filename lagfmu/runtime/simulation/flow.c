@@ -1,13 +1,13 @@
-/* leg.c -- the index-1 equations of motion as an ordinary differential equation, and its projection
+/* flow.c -- the index-1 equations of motion as an ordinary differential equation, and its projection
  * (Hairer & Wanner II, sect. VII.2: index reduction with projection). */
-#include "leg.h"
+#include "flow.h"
 
 #include "magnitudes.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "parts.h"
+#include "optional.h"
 #include "sensitivity.h"
 #include "step_size.h"
 #include "thresholds.h"
@@ -15,21 +15,21 @@
 static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
 static const double SAFETY = 0.25; /* of the tolerance: errors of many steps add up */
 
-void leg_begin(Solver *s) {
+void flow_begin(Solver *s) {
     system_active(s->system, s->state.closed, s->active);
     s->stepped.dependent = s->state.now.dependent;
 }
 
-void leg_choose_rows(Solver *s) {
+void flow_choose_rows(Solver *s) {
     s->state.now.dependent = linear_basis(&s->stepped.linear, s->state.basis);
     s->stepped.dependent = s->state.now.dependent;
 }
 
-const int *leg_rows(const Solver *s) {
+const int *flow_rows(const Solver *s) {
     return s->state.now.dependent ? s->state.basis : s->active;
 }
 
-Instant leg_instant(Solver *s, double t) {
+Instant flow_instant(Solver *s, double t) {
     const System *system = s->system;
     if (system->inputs > 0) drive_at(system, &s->drive, t, s->u);
     for (int k = 0; k < system->jumps; k++) s->u[system->inputs + k] = s->state.level[k];
@@ -39,12 +39,12 @@ Instant leg_instant(Solver *s, double t) {
 static Status rate(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
-    const Instant at = leg_instant(s, t);
+    const Instant at = flow_instant(s, t);
     s->stepped.stage = 1;
     const Status status = s->system->frictions > 0
                               ? mechanism_motion_near(&s->stepped, at, y, y + n, s->active,
                                                       s->state.offset, s->state.size)
-                              : mechanism_motion(&s->stepped, at, y, y + n, leg_rows(s));
+                              : mechanism_motion(&s->stepped, at, y, y + n, flow_rows(s));
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
     for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
@@ -64,7 +64,7 @@ static Status plain_rate(void *context, double t, const double *y, double *dydt)
 }
 
 static int is_plain(const Solver *s) {
-    const int *rows = leg_rows(s);
+    const int *rows = flow_rows(s);
     if (s->system->accelerate == NULL || s->system->frictions > 0) return 0;
     for (int k = 0; k < s->system->m; k++)
         if (!rows[k]) return 0;
@@ -73,29 +73,29 @@ static int is_plain(const Solver *s) {
 
 static Status jacobian(void *context, double t, const double *y, double *J, double *dfdt) {
     Solver *s = context;
-    if (s->system->frictions > 0) return PARTS.slides->jacobian(s, t, y, J, dfdt);
-    return sensitivity_jacobian(&s->sensitivity, &s->stepped, leg_instant(s, t), leg_rows(s), y, J,
+    if (s->system->frictions > 0) return OPTIONAL.slides->jacobian(s, t, y, J, dfdt);
+    return sensitivity_jacobian(&s->sensitivity, &s->stepped, flow_instant(s, t), flow_rows(s), y, J,
                                 dfdt);
 }
 
 /* The equations at the times of a step from t on. */
 static Ode equations(Solver *s, double t) {
     const int plain = is_plain(s);
-    if (plain) (void)leg_instant(s, t); /* levels of jumps, which stay */
+    if (plain) (void)flow_instant(s, t); /* levels of jumps, which stay */
     return (Ode){s, plain ? plain_rate : rate, jacobian, &s->why};
 }
 
-double leg_fewest_steps(const Solver *s) {
+double flow_fewest_steps(const Solver *s) {
     return s->settings.method == RATTLE ? FEWEST_STEPS_RATTLE : FEWEST_STEPS_RK4;
 }
 
-double leg_natural_step(const Solver *s) {
-    return 1 / (leg_fewest_steps(s) * s->state.now.rate);
+double flow_natural_step(const Solver *s) {
+    return 1 / (flow_fewest_steps(s) * s->state.now.rate);
 }
 
 static Control control(const Solver *s, const Integrator *i, double longest) {
     const Settings *set = &s->settings;
-    const double fixed = set->step > 0 ? set->step : leg_natural_step(s);
+    const double fixed = set->step > 0 ? set->step : flow_natural_step(s);
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
     if (!s->integrator.method->fixed) magnitudes_shared(s, i->y, s->scale);
     return (Control){SAFETY * set->tolerance, s->scale, longest < HUGE_VAL ? longest : 0,
@@ -107,7 +107,7 @@ static Status check_fixed_step(Solver *s, const Integrator *i) {
     const int n = s->system->n;
     for (int j = 0; j < 2 * n; j++) {
         const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
-        if (!(fabs(PARTS.rk4_error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
+        if (!(fabs(OPTIONAL.rk4_error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
             return fail(&s->why,
                         "the integration stops at t = %.17g s, rk4's step of %.3g s is far too "
                         "large: reduce solver.step",
@@ -122,20 +122,20 @@ static Status accept(Solver *s, Integrator *i) {
     const int n = s->system->n;
     if (i != &s->integrator || !i->fresh || s->system->m < 2) return OK;
     const double *y = i->y;
-    if (mechanism_motion(&s->stepped, leg_instant(s, i->t), y, y + n, s->active) != OK)
+    if (mechanism_motion(&s->stepped, flow_instant(s, i->t), y, y + n, s->active) != OK)
         return FAILED;
-    leg_choose_rows(s);
+    flow_choose_rows(s);
     memcpy(i->f, y + n, (size_t)n * sizeof *y);
     memcpy(i->f + n, s->stepped.vdot, (size_t)n * sizeof *y);
     i->fresh = 0;
     return OK;
 }
 
-Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
+Status flow_step(Solver *s, Integrator *i, double t_bound, double longest) {
     const Control c = control(s, i, longest);
     if (s->settings.method == RATTLE) {
-        const Instant at = leg_instant(s, i->t);
-        return PARTS.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,
+        const Instant at = flow_instant(s, i->t);
+        return OPTIONAL.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,
                                  t_bound);
     }
     if (accept(s, i) != OK) return FAILED;
@@ -144,18 +144,18 @@ Status leg_step(Solver *s, Integrator *i, double t_bound, double longest) {
     return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;
 }
 
-Status leg_rate(Solver *s, Integrator *i) {
+Status flow_rate(Solver *s, Integrator *i) {
     const Ode ode = equations(s, i->t);
     return step_size_rate(i, &ode);
 }
 
-Status leg_prepare_dense(Solver *s, Integrator *i) {
+Status flow_prepare_dense(Solver *s, Integrator *i) {
     const Ode ode = equations(s, i->t);
     return i->method->prepare_dense == NULL ? OK : i->method->prepare_dense(i, &ode);
 }
 
-Status leg_project(Solver *s, double t, double *y) {
-    return mechanism_project(&s->stepped, leg_instant(s, t), y, y + s->system->n, s->active,
+Status flow_project(Solver *s, double t, double *y) {
+    return mechanism_project(&s->stepped, flow_instant(s, t), y, y + s->system->n, s->active,
                              s->state.offset, s->state.size);
 }
 
@@ -172,7 +172,7 @@ static int is_balanced(const Solver *s, int j, double moved) {
     return 0;
 }
 
-Status leg_check_projection(Solver *s, double t, const double *y, const double *projected) {
+Status flow_check_projection(Solver *s, double t, const double *y, const double *projected) {
     const int n = s->system->n;
     const double far = fmax(FAR * s->settings.tolerance, LEAST_FAR);
     if (s->integrator.method->fixed) return OK;
@@ -190,16 +190,16 @@ Status leg_check_projection(Solver *s, double t, const double *y, const double *
     return OK;
 }
 
-Status leg_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
+Status flow_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
     Integrator *i = &s->probe;
     memcpy(y, y0, 2 * (size_t)s->system->n * sizeof *y);
     memset(&s->local_trial, 0, sizeof s->local_trial);
     if (!(t1 > t0)) return OK;
     integrator_start(i, s->integrator.method, t0, y0, t1 - t0);
     while (i->t < t1) {
-        if (leg_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
-        if (s->alike > 0) PARTS.at_trial(s, i);
+        if (flow_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
+        if (s->alike > 0) OPTIONAL.at_trial(s, i);
     }
     memcpy(y, i->y, 2 * (size_t)s->system->n * sizeof *y);
-    return leg_project(s, t1, y);
+    return flow_project(s, t1, y);
 }

@@ -1,4 +1,4 @@
-"""A stretch of time in which the contact modes do not change: the index-1 equations
+"""The flow between two events, a stretch of time in which the contact modes do not change: the equations
 
     q' = v ,   v' = vdot(t, q, v)   with   M vdot = F + G^T lambda ,  G vdot = gamma
 
@@ -30,7 +30,7 @@ AfterStep = Callable[[Any, State, Local], Local]
 
 
 @dataclass
-class Leg:
+class Flow:
     """From one event to the next; `begun` [s]: the communication step began, from which inputs run on;
     `after_step`: see advance()."""
 

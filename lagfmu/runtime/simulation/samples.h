@@ -1,0 +1,23 @@
+/* samples.h -- the times within a step at which the indicators are looked at. */
+#ifndef LAGFMU_SAMPLES_H
+#define LAGFMU_SAMPLES_H
+
+#include "solver.h"
+#include "thresholds.h"
+
+/* Times t[0] < ... < t[count - 1] and the indicators then, a row of values for each look. */
+typedef struct {
+    int count;
+    double *t, *values;
+} Samples;
+
+/* Doubles behind t and values, one row of scratch among them. */
+static inline int samples_doubles(int indicators) {
+    return (SAMPLES_MOST + indicators) * (1 + indicators) + indicators;
+}
+
+/* Fills `samples` for the step of s->integrator (dense output prepared), from state.indicator at its start
+ * to the projected y1 at its end.  y (6 n): scratch. */
+Status samples_take(Solver *s, const double *y1, double *y, Samples *samples);
+
+#endif
