@@ -25,7 +25,11 @@ from lagfmu.cli.app import app
 from lagfmu.cli.stress import stress
 from lagfmu.fmu.closed_forms import CarriedForm
 from lagfmu.fmu.session import RefusalError
+from lagfmu.fmu.write import write
+from lagfmu.model.file import load
 from lagfmu.model.model import name_of
+from lagfmu.prepare.consistency import RedundantConstraintWarning
+from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress import worker
 from lagfmu.study.stress.bench import Bench, Finding
 from lagfmu.study.stress.closed_forms import judged as judged_forms
@@ -364,10 +368,32 @@ def test_probes_cover_the_ranges(bench):
     assert len(names) == len(set(names))
 
 
+UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
+
+
+def test_what_balances_is_no_difference_of_runs(tmp_path):
+    """A table stands on four legs, whose pushes of 37 N turn it nowhere: their moments balance to 1e-15 N m,
+    the rounding of shares of 25 N m. Runs at two tolerances round otherwise and agree; a moment of 1e-6 N m
+    is one."""
+    file = load(UNSEEN / "table.py")
+    with pytest.warns(RedundantConstraintWarning):
+        prepared = prepare(file.model, file.scenes[0])
+    with Bench(write(prepared, tmp_path, (), target="native"), quick=True) as one:
+        times = np.linspace(0.9, 1.2, 7).tolist()
+        run, other = (one.run({}, [0.0, *times], tolerance) for tolerance in (None, 1e-13))
+        standing = replace(run, rows=run.rows[1:])
+        against = replace(other, rows=other.rows[1:])
+        for sign in (-1.0, 1.0):  # of the rounding, at its largest
+            against.rows["Q.b"] = sign * 7e-15
+            assert max(c.max() for c in one.differences(standing, against).values()) < 1e-12
+        against.rows["Q.b"] += 1e-6
+        assert one.differences(standing, against)["Q.b"].max() > 1e-9
+
+
 def test_rates_that_an_fmu_estimates_are_read_by_the_judge(tmp_path):
     """A cam whose angle alone is given, a contact with a table, friction: nothing is wrong, and the laws that
     need the angle's rates are held against those that the FMU reports."""
-    model = Path(__file__).parent.parent / "benchmarks" / "unseen" / "cam.py"
+    model = UNSEEN / "cam.py"
     arguments = ["stress", str(model), "--target", "native", "--quick", "--out", str(tmp_path)]
     assert CliRunner().invoke(app, arguments).exit_code == 0
     data = json.loads((tmp_path / "native" / "Cam.json").read_text())

@@ -225,6 +225,7 @@ class Bench:
     ) -> dict[str, NDArray[np.float64]]:
         """Of coordinates, velocities, lambda and Q, relative to the largest magnitude of their unit.
 
+        A Q is as large as the constraints' shares in it: what is left where they balance is rounding.
         Where contacts differ beside an event only their own delay is seen: one such point is left out.
         """
         facts, found = self.facts, {}
@@ -242,14 +243,24 @@ class Bench:
         forces = [names.name(names.FORCE, "", q) for q in facts.coordinates]
         groups += [[n for n in forces if n in facts.variables]]
         for group in groups:
-            largest = {x: float(np.abs(a[x]).max(initial=0.0)) for x in group}
+            largest = {x: self._largest(run.rows[:n], x) for x in group}
             for x in group:
                 peers = [largest[y] for y in group if facts.dimensions[y] == facts.dimensions[x]]
-                usual = float(np.abs(self.ordinary.rows[x]).max())
+                usual = self._largest(self.ordinary.rows, x)
                 scale = max(*peers, usual, facts.same_unit(x, run.values)) or 1.0
                 error = np.where(alike, np.abs(a[x] - b[x]), 0.0)
                 found[x] = np.where(error > self._rounding(x), error, 0.0) / scale
         return found
+
+    def _largest(self, rows: NDArray[np.void], name: str) -> float:
+        """The largest magnitude of a column, or of the shares whose sum it is."""
+        of = names.read(name)
+        shares = (
+            [self.facts.share(c, of.coordinate) for c in self.facts.constraints]
+            if of.quantity == names.FORCE
+            else []
+        )
+        return max(float(np.abs(rows[x]).max(initial=0.0)) for x in (name, *filter(None, shares)))
 
     def _rounding(self, name: str) -> float:
         """A difference that is none: of a motion that is none (a rod that falls flat does not turn)."""
