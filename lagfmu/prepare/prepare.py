@@ -21,7 +21,7 @@ from ..model.selection import select
 from ..model.stuck import stuck
 from ..solver.system import System
 from .consistency import Structure, check_embedding, check_held, examine
-from .reduced import check_branch, misses, restarted
+from .reduced import check_branch, misses, restarted, told_apart
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def prepare(
         known = Derived(model, scene, form, whole)
         raise CannotStartError(error.name, problems, known) from error
     missed = misses(form, whole, lowered, numbers, model.start)
-    if missed:
+    if missed and not told_apart(form, missed):
         every = Form(derived)
         structure = examine(derived, laid.table(every, scene), lower(every), numbers)
         again = prepare(restarted(model, form, structure, missed), asked)

@@ -50,27 +50,33 @@ def misses(
     return found
 
 
+def told_apart(form: Form, missed: Mapping[str, Any]) -> bool:
+    """Warns, and is True, where the independent coordinates are an Embedding's, with a start of its own."""
+    reduction, eom = form.reduction, form.equations
+    assert reduction is not None
+    coordinates = {str(eom.symbols[q]) for q in eom.model.coordinates}
+    if {str(s) for s in reduction.s} <= coordinates:
+        return False
+    begins = ", ".join(f"{n} = {given!r} there is {has!r}" for n, (given, has) in missed.items())
+    warnings.warn(
+        f"the start of the embedding is another than `start` says: {begins}; the minimal formulation begins "
+        "with that of the embedding",
+        StartMovedWarning,
+        stacklevel=4,
+    )
+    return True
+
+
 def restarted(model: Model, form: Form, structure: Structure, missed: Mapping[str, Any]) -> Model:
     """The model whose `start` names the independent coordinates alone, from where the constraints put it.
 
-    `structure`: that of the full form.  Warns of it.  Raises ModelError where `start` misses the constraints,
-    and where the independent coordinates are an Embedding's own, which has a start of its own.
+    `structure`: that of the full form.  Warns of it.  Raises ModelError where `start` misses the constraints.
     """
     reduction, eom = form.reduction, form.equations
     assert reduction is not None
     own = {str(s): q for q, s in eom.symbols.items()}
     stepped = [str(s) for s in (*reduction.s, *reduction.sdot)]
     told = ", ".join(f"{n} = {given!r}" for n, (given, _) in missed.items())
-    coordinates = {str(eom.symbols[q]) for q in model.coordinates}
-    if not {str(s) for s in reduction.s} <= coordinates:
-        begins = ", ".join(f"{n} = {has!r}" for n, (_, has) in missed.items())
-        raise ModelError(
-            model.name,
-            [
-                f"start gives {told}, but the start of the embedding gives {begins}: write "
-                f"Embedding(start=...) for {', '.join(map(str, reduction.s))} to agree with it"
-            ],
-        )
     begun = structure.start
     check_given(model.name, begun.moved, structure.missed)
     names = motion([str(eom.symbols[q]) for q in model.coordinates])
