@@ -617,6 +617,35 @@ def test_an_indefinite_mass_matrix_is_made_definite_by_the_constraint_that_holds
     np.testing.assert_allclose(found.lam, [0.5])
 
 
+@pytest.mark.parametrize("inertia", [1.0, 2.0**-60])
+@pytest.mark.parametrize("spin", [1.3, 3.1, 5.7, 11.9])
+def test_a_needle_that_spins_has_the_force_of_its_small_inertia(library, spin, inertia):
+    """In Euler parameters p a body that turns steadily about an axis has p'' = -w^2 p / 4 and
+    lambda = -A w^2, A its inertia about that axis: to rounding, though about the others it has 2^20 times as
+    much, and whatever the unit of mass."""
+    thin, p = 2.0**-20 * inertia, np.full(4, 0.5)  # all sums of the mass matrix are exact
+    E = np.array([[-0.5, 0.5, 0.5, -0.5], [-0.5, -0.5, 0.5, 0.5], [-0.5, 0.5, -0.5, 0.5]])
+    M, G = 4 * E.T @ np.diag([thin, inertia, inertia]) @ E, 2 * p[None, :]
+    bench = Bench(library, 4, 1, *patterns(M, G))
+    bench.factor(M, G)
+    found = bench.solve(2 * thin * spin**2 * p, np.array([-(spin**2) / 2]))
+    np.testing.assert_allclose(found.x, -(spin**2) / 4 * p, rtol=1e-13)
+    np.testing.assert_allclose(found.lam, [-thin * spin**2], rtol=1e-13)
+
+
+def test_where_a_torque_acts_a_length_that_pulls_at_nothing_is_no_reason_for_another_rung(library):
+    """A ball of 1 kg m^2 that a torque of 5 N m sets spinning: the lambda of its Euler parameters' length is
+    nothing beside the torque, and need not be told to its own digits."""
+    p, torque = np.full(4, 0.5), np.array([5.0, -5.0, 0.0, 0.0])
+    M, G, spin = 4 * (np.eye(4) - np.outer(p, p)), 2 * p[None, :], 1.3
+    bench = Bench(library, 4, 1, *patterns(M, G))
+    bench.factor(M, G)
+    found = bench.solve(torque, np.array([-(spin**2) / 2]))
+    assert bench.rung == SCHUR
+    np.testing.assert_allclose(found.x, -(spin**2) / 4 * p + torque / 4, atol=1e-14)
+    np.testing.assert_allclose(found.lam, [0.0], atol=1e-14)
+
+
 NUMBERS = st.sampled_from([-2.0, -1.0, 0.5, 1.0, 3.0])
 
 

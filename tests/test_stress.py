@@ -35,7 +35,7 @@ from lagfmu.study.stress.bench import Bench, Finding
 from lagfmu.study.stress.closed_forms import judged as judged_forms
 from lagfmu.study.stress.closed_forms import magnitude
 from lagfmu.study.stress.judge import Check, first_landing
-from lagfmu.study.stress.lagrange import lay_beside
+from lagfmu.study.stress.lagrange import lagrange, lay_beside
 from lagfmu.study.stress.probe import (
     CONSISTENT,
     REFUSED,
@@ -341,6 +341,18 @@ def test_a_scale_of_a_difference_is_none_of_its_magnitudes(bench):
     rows = np.ones(len(run.rows))
     error, allowed, _ = form.judge(run, rows, rows == 1, {"theta": 2.0, "r": 1.0})
     assert 0 < error < 1e-3 * allowed
+
+
+def test_a_force_is_known_to_what_the_smallest_lambda_makes_of_it(prepared):
+    """A constraint whose derivative is 2e300 acts with 1e-23 N or not at all: no double lies between the two
+    lambda, so that Lagrange's equation cannot hold to less."""
+    one = prepared("PendulumCartesian")
+    forms = lagrange(one.model, frozenset(v.name for v in one.table.variables))
+    (law,) = [form for form in forms if form.name == "Lagrange's equation of x"]
+    values = {s: {"x": 1e300, "m": 1.0}.get(s.name, 0.0) for s in law.scale.free_symbols}
+    assert float(law.scale.subs(values)) == pytest.approx(
+        2e300 * np.finfo(float).smallest_subnormal
+    )
 
 
 def test_a_closed_form_is_not_judged_by_what_underflows_on_its_way(bench):

@@ -117,6 +117,23 @@ def test_what_is_wrong_is_found(bench, probe, monkeypatch):
     assert rows(bench)[probe].verdict == WRONG
 
 
+def test_an_error_of_the_importers_integrator_is_none_of_the_fmus(bench, monkeypatch):
+    """What an integrator misses grows with its tolerance (a rotor that turns over, by 7e-4 at 1e-9 and by
+    3e-6 at 1e-11); what is missed at every tolerance, as above, is the FMU's."""
+    simulate = fmpy.simulate_fmu
+
+    def by_tolerance(*arguments: Any, **named: Any) -> Any:
+        found = simulate(*arguments, **named)
+        found["s"] *= 1 + 1e5 * named["relative_tolerance"]
+        return found
+
+    monkeypatch.setattr(fmpy, "simulate_fmu", by_tolerance)
+    (probe,) = exchange.probes(bench.facts, bench.quick)
+    row = verdict(probe, attempt(probe, bench), 0.0)
+    assert row.verdict == RIGHT
+    assert "the importer's integrator at 1e-11" in row.detail
+
+
 def test_a_multiplier_that_is_called_unique_and_is_not_is_found(bench, monkeypatch):
     """unique.rod is told the other way round at one point."""
     wrong = bench.ordinary.rows.copy()

@@ -157,6 +157,8 @@ static Status solve_dense(Linear *l, const double *b, const double *c, double *x
 }
 
 Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
+    const double *forces = b;
+    const int asked = lambda != NULL && b != NULL;
     if (lambda == NULL) lambda = schur_of(l)->lambda;
     if (l->rung == RUNG_WRITTEN_OUT) {
         if (l->system->solve(l->M, b != NULL ? b : l->zero, l->G, c, x, lambda)) return OK;
@@ -169,6 +171,10 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
     } else if (!schur_solve(l, b, c, x, lambda)) {
         if (check_right(l, b, c) != OK || climb(l) != OK) return FAILED;
         status = solve_dense(l, b, c, x, lambda);
+    } else if (l->stiffened && asked && l->dense != NULL && !stiffened_tells(l, forces, c, lambda)) {
+        stiffened_undo(l);
+        if (climb(l) != OK) return FAILED;
+        status = solve_dense(l, forces, c, x, lambda);
     }
     if (status == OK && !(all_finite(x, l->system->n) && all_finite(lambda, l->system->m)))
         status = check_right(l, b, c) != OK

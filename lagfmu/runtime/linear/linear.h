@@ -30,6 +30,7 @@ typedef struct {
     double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
     int *pivots;
     int stiffened;        /* 1: M holds more than masses (stiffened.h) */
+    const double *bare;   /* then: M as it was given */
     double *masses, *forces, *sigma; /* (masses), (n), (m) of stiffened.c */
     int *holds;           /* (m) */
     double off;           /* how far off the constraints the state is, relative to their size; 0: on them */

@@ -6,8 +6,15 @@
  * Greif, SIAM J. Sci. Comput. 24 (2003) 2076).  Rows s are those whose coordinates M couples each with each,
  * such as the unit length of Euler parameters, whose M is singular along p: then nothing is added to the
  * pattern of M, and the sparse elimination stays as it is.  sigma_k = sum_j M_jj / sum_j G_kj^2 makes both
- * parts alike. */
+ * parts alike.  lambda is then the difference of sigma c and what that moves: a needle that spins about its
+ * own axis has far smaller forces than its other inertia times its acceleration, and lost their digits. */
 #include "stiffened.h"
+
+#include <math.h>
+
+#include "schur.h"
+
+static const double BURIED = 100; /* sigma c beside the forces, from which on these have lost two digits */
 
 /* Where M_ij stands among its values, i >= j; -1: nowhere.  They are sorted by (row, column). */
 static int place(const System *s, int i, int j) {
@@ -70,6 +77,7 @@ int stiffened_masses(Linear *l) {
                 l->masses[place(s, s->entry_column[a], s->entry_column[e])] +=
                     l->sigma[k] * l->G[a] * l->G[e];
     }
+    l->bare = l->M;
     l->M = l->masses;
     l->stiffened = 1;
     return 1;
@@ -83,4 +91,37 @@ const double *stiffened_forces(const Linear *l, const double *b, const double *c
             for (int a = s->row_start[k]; a < s->row_start[k + 1]; a++)
                 l->forces[s->entry_column[a]] += l->sigma[k] * l->G[a] * c[k];
     return l->forces;
+}
+
+/* The largest force on a coordinate of row k, from outside or of a constraint. */
+static double pushed(const Linear *l, int k, const double *b, const double *lambda) {
+    const System *s = l->system;
+    double largest = 0;
+    for (int a = s->row_start[k]; a < s->row_start[k + 1]; a++) {
+        const int j = s->entry_column[a];
+        largest = fmax(largest, fabs(b[j]));
+        for (int e = 0; e < s->entries; e++)
+            if (s->entry_column[e] == j && l->active[s->entry_row[e]])
+                largest = fmax(largest, fabs(l->G[e] * lambda[s->entry_row[e]]));
+    }
+    return largest;
+}
+
+int stiffened_tells(const Linear *l, const double *b, const double *c, const double *lambda) {
+    const System *s = l->system;
+    for (int k = 0; k < s->m; k++) {
+        const double held = l->sigma[k] * fabs(c[k]) / BURIED;
+        double lever = 0;
+        if (held <= fabs(lambda[k])) continue;
+        for (int a = s->row_start[k]; a < s->row_start[k + 1]; a++)
+            lever = fmax(lever, fabs(l->G[a]));
+        if (held * lever > pushed(l, k, b, lambda)) return 0;
+    }
+    return 1;
+}
+
+void stiffened_undo(Linear *l) {
+    l->M = l->bare;
+    l->stiffened = 0;
+    schur_of(l)->definite = 0;
 }

@@ -19,7 +19,7 @@ it may be off by  LEEWAY * rounding * size,  with the size at that instant.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,15 +59,26 @@ def magnitude(e: Expr) -> Expr:
     return sp.Abs(e)
 
 
+def function(symbols: Sequence[Expr], expressions: Any) -> Callable[..., Any]:
+    """Of numbers in place of the symbols, as sp.lambdify makes one, which goes through all once for each
+    symbol whose name Python does not allow: here once for all of them."""
+    plain = [sp.Symbol(f"x{k}") for k in range(len(symbols))]
+    named = dict(zip(symbols, plain, strict=True))
+    several = isinstance(expressions, list)
+    renamed = [sp.sympify(e).xreplace(named) for e in (expressions if several else [expressions])]
+    made: Callable[..., Any] = sp.lambdify(
+        plain, renamed if several else renamed[0], modules=["scipy", "numpy"]
+    )
+    return made
+
+
 class Compiled:
     """An expression in the FMU's variables, as a function of a run."""
 
     def __init__(self, expression: Expr, name: str) -> None:
         self.name = name
         self.symbols = sorted(sp.sympify(expression).free_symbols, key=str)
-        self.function = sp.lambdify(
-            self.symbols, expression, modules=["scipy", "numpy"], dummify=True
-        )
+        self.function = function(self.symbols, expression)
 
     def at(
         self, chosen: NDArray[np.bool_], run: Run, floors: Mapping[str, float] | None = None

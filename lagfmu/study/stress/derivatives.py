@@ -24,7 +24,7 @@ from ... import names
 from ...fmu.session import RefusalError
 from ...verification.verify import applies
 from .bench import Bench, Finding
-from .closed_forms import JudgedForm, magnitude
+from .closed_forms import JudgedForm, function, magnitude
 from .facts import Facts
 from .judge import Check
 from .player import table
@@ -63,8 +63,9 @@ def _law(form: JudgedForm, variables: set[str]) -> _Law | None:
     slopes = [] if R.has(*KINKED) else [R.diff(s) for s in by]
     if not slopes or any(e.has(sp.Derivative, sp.Subs) for e in slopes):
         return None
-    function = sp.lambdify(symbols, [*slopes, size], modules=["scipy", "numpy"], dummify=True)
-    return _Law(form, tuple(map(str, by)), tuple(map(str, symbols)), function)
+    return _Law(
+        form, tuple(map(str, by)), tuple(map(str, symbols)), function(symbols, [*slopes, size])
+    )
 
 
 def _along_each(bench: Bench) -> Finding:

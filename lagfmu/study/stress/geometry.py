@@ -19,6 +19,7 @@ from ...model.model import Contact, Model, Nonholonomic, name_of
 from ...model.reactions import reactions_in
 from ...names import read
 from ...prepare.prepare import Prepared
+from .closed_forms import function
 
 Column = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -54,9 +55,7 @@ class Geometry:
         self.forms = forms
         self.symbols = sorted({s for e in forms.values() for s in e.free_symbols}, key=str)
         self.needs = [str(s) for s in self.symbols]
-        self.function = sp.lambdify(
-            self.symbols, list(forms.values()), modules=["scipy", "numpy"], dummify=True
-        )
+        self.function = function(self.symbols, list(forms.values()))
 
     def at(self, values: Mapping[str, float]) -> Collision:
         """`values` holds coordinates, velocities, parameters, inputs and time."""

@@ -17,6 +17,7 @@ where the terms of Q_j are its shares.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,7 +26,7 @@ import sympy as sp
 from ... import names
 from ...fmu.closed_forms import pack_closed_forms
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
-from ...model.elements import Expr
+from ...model.elements import Constraint, Expr
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
 from .closed_forms import magnitude
@@ -35,6 +36,7 @@ ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
 SLOW = 1e-9  # of its terms: a slip velocity that has no direction yet
 NOTHING = 2.0**-52  # of the forces on others: a force that is none, however light what it acts on
+LEAST = sp.Float(math.ulp(0.0))  # of a lambda: what is smaller is 0 to a double
 GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps
 
 
@@ -75,11 +77,13 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
 
 
 def _shares(model: Model, variables: frozenset[str]) -> dict[Expr, Expr]:
-    """The magnitudes of what constraints contribute to Q, whose sum may be far smaller."""
+    """The magnitudes of what constraints contribute to Q, whose sum may be far smaller; at least of what the
+    smallest lambda does that a double holds: on a lever of 1e300 m it is known no better."""
     found = {}
     for q in model.coordinates:
         of = [names.name(names.FORCE, c.name, name_of(q)) for c in model.constraints]
-        found[q] = sp.Add(*(sp.Abs(output(n)) for n in of if n in variables))
+        least = [LEAST * sp.Abs(in_variables(_along(c, q))) for c in model.constraints]
+        found[q] = sp.Add(*(sp.Abs(output(n)) for n in of if n in variables), *least)
     return found
 
 
@@ -154,7 +158,7 @@ def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
         f, lam = sp.sympify(c.expression), output(names.name(names.MULTIPLIER, c.name))
         contact = c.name if isinstance(c, Contact) else c.while_closed
         for q in model.coordinates:
-            a = f.diff(q.diff(TIME)) if isinstance(c, Nonholonomic) else f.diff(q)
+            a = _along(c, q)
             share = names.name(names.FORCE, c.name, name_of(q))
             if share in variables:
                 found.append(ClosedForm(share, lam * a, output(share), rounding=ROUNDING))
@@ -166,6 +170,12 @@ def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
             f = f.diff(TIME)  # what is reported is the missed velocity
         found.append(ClosedForm(residual, f, output(residual), rounding=rounding))
     return found
+
+
+def _along(constraint: Constraint, q: Expr) -> Expr:
+    """a_cq, of which lambda makes the constraint's share in Q.q."""
+    f = sp.sympify(constraint.expression)
+    return f.diff(q.diff(TIME)) if isinstance(constraint, Nonholonomic) else f.diff(q)
 
 
 def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[ClosedForm]:

@@ -24,7 +24,10 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
     sizes = (1e-9, 1.0, 1e3) if quick else (1e-9, 1e-6, 1e-3, 1e-1, 1.0, 10.0, 1e2, 1e3, 1e4, 1e6)
     for size in sizes:
         name = f"{size:g} natural times"
-        found.append(Probe("communication step", name, partial(_steps, size), size > 1))
+        far = size > 1 or (
+            size == 1 and bool(facts.motions)
+        )  # to where a motion that goes on leads
+        found.append(Probe("communication step", name, partial(_steps, size), far))
     for count in (1, 7) if quick else (1, 7, 333, 3000):
         name = f"{count} in the default experiment"
         found.append(Probe("communication step", name, partial(_pieces, count), False))
