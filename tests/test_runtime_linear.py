@@ -717,7 +717,7 @@ def long_chain(links, angles, masses=None):
 
 
 class Sparse:
-    """Samples like a matrix where Bench reads it: values at the pattern."""
+    """Looks like a matrix where Bench reads it: values at the pattern."""
 
     def __init__(self, pattern, values):
         self.values = dict(zip(pattern, values, strict=True))

@@ -8,7 +8,7 @@
 #include "problem.h"
 #include "stopwatch.h"
 
-enum { BATCHES = 201, OPTIONAL = 5 };
+enum { BATCHES = 201, PARTS = 5 };
 
 static int ascending(const void *a, const void *b) {
     const double x = *(const double *)a, y = *(const double *)b;
@@ -28,7 +28,7 @@ static int follow(Equations *e, double *q, double *vdot, double *lambda) {
 int main(int argc, char *argv[]) {
     const System *s = MODEL_SYSTEM;
     Equations e;
-    double ns[OPTIONAL][BATCHES];
+    double ns[PARTS][BATCHES];
     int bad = argc != 2 || equations_create(&e, s, PROBLEM_P) != 0;
     double *vdot = calloc((size_t)(2 * s->n + s->m), sizeof(double));
     if (bad || vdot == NULL)
@@ -39,10 +39,10 @@ int main(int argc, char *argv[]) {
         bad |= equations_motion(&e, 0, PROBLEM_Q, PROBLEM_V, vdot, lambda);
         calls++;
     }
-    const double share = 500 * atof(argv[1]) / (double)(BATCHES * OPTIONAL); /* in units of 2 ms */
+    const double share = 500 * atof(argv[1]) / (double)(BATCHES * PARTS); /* in units of 2 ms */
     const long batch = 1 + (long)((double)calls * share);
     for (int i = 0; i < BATCHES; i++) {
-        for (int part = 0; part < OPTIONAL; part++) {
+        for (int part = 0; part < PARTS; part++) {
             begun = now_ns();
             for (long k = 0; k < batch; k++) {
                 if (part == 0)
@@ -59,9 +59,9 @@ int main(int argc, char *argv[]) {
             ns[part][i] = (now_ns() - begun) / (double)batch;
         }
     }
-    for (int part = 0; part < OPTIONAL; part++) {
+    for (int part = 0; part < PARTS; part++) {
         qsort(ns[part], BATCHES, sizeof(double), ascending);
-        printf("%.6g%c", ns[part][BATCHES / 2], part + 1 < OPTIONAL ? ' ' : '\n');
+        printf("%.6g%c", ns[part][BATCHES / 2], part + 1 < PARTS ? ' ' : '\n');
     }
     equations_destroy(&e);
     free(vdot);

@@ -36,7 +36,7 @@ MOST = 24  # equations of a kind that are printed
 LONGEST = 500  # operations beyond which an expression is not printed
 MINORS = 3  # constraints in one group beyond which lambda is not eliminated in symbols
 GREEK = {*greeks, *(name.capitalize() for name in greeks), "lambda", "Lambda"}
-OPTIONAL = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
+PARTS = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
 SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 DOTS = ("", "\u0307", "\u0308", "\u20db")
 
@@ -101,7 +101,7 @@ def name_text(name: str, dots: int = 0) -> str:
 
 def _parts(name: str) -> tuple[str, tuple[str, ...]]:
     """theta0 -> theta, (0,); mu_s -> mu, (s,); a name of another form is one word."""
-    match = OPTIONAL.match(name)
+    match = PARTS.match(name)
     if match is None:
         return name, ()
     base, digits, rest = match.groups()

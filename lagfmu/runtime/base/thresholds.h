@@ -1,7 +1,7 @@
 /* thresholds.h -- what both engines decide by: each value stands once.
  *
  * The python engine reads this file (lagfmu/solver/thresholds.py).  A threshold that only one of them has
- * stands where it is used.  `relative` says to what; EPS is the distance from 1 to the next double. */
+ * stands where it is used. */
 #ifndef LAGFMU_THRESHOLDS_H
 #define LAGFMU_THRESHOLDS_H
 

@@ -4,7 +4,7 @@
 
 #include "instance.h"
 
-/* Samples at everything that instance_restore() has just put into the instance.  FAILED: it is no state
+/* Looks at everything that instance_restore() has just put into the instance.  FAILED: it is no state
  * of this FMU, the cause is in x->solver.why; nothing of it must be used. */
 Status instance_restored(Instance *x);
 

@@ -4,7 +4,7 @@
 
 #include "solver.h"
 
-/* Samples through the step of s->integrator (dense output prepared, y not yet projected), which ends at
+/* Looks through the step of s->integrator (dense output prepared, y not yet projected), which ends at
  * the projected y1.  If an indicator leaves its range, state.now.event_time and
  * state.left say when and which; event_count is 0 otherwise, and the contacts that have risen above
  * their gap are armed.  state.indicator moves on to the end of the step. */

@@ -5,7 +5,7 @@
 #include "solver.h"
 #include "thresholds.h"
 
-/* Times t[0] < ... < t[count - 1] and the indicators then, a row of values for each look. */
+/* Times t[0] < ... < t[count - 1] and the indicators then, a row of values for each sample. */
 typedef struct {
     int count;
     double *t, *values;

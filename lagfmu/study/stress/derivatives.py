@@ -32,7 +32,7 @@ from .probe import Probe
 
 FAMILY = "derivatives"
 WITHIN = 1e-11
-OPTIONAL = (1e-3, 0.13, 0.41, 0.77)  # of the default experiment
+PARTS = (1e-3, 0.13, 0.41, 0.77)  # of the default experiment
 KINKED = (sp.Abs, sp.Max, sp.Min, sp.sign, sp.Heaviside, sp.floor, sp.Piecewise)
 
 
@@ -77,7 +77,7 @@ def _along_each(bench: Bench) -> Finding:
     known = {p.name: p.start for p in facts.parameters}
     checks: list[Check] = []
     player.begin({}, None)
-    for part in OPTIONAL:
+    for part in PARTS:
         player.step(part * facts.stop_time - player.time)
         rows = table(facts, 1)
         values = player.read() | player.inputs() | {"time": player.time}

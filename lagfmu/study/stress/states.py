@@ -17,7 +17,7 @@ from .player import Player, clear, play, table
 from .probe import Probe
 
 FAMILY = "states"
-OPTIONAL = 7
+PARTS = 7
 
 
 def probes(facts: Facts, quick: bool) -> list[Probe]:
@@ -74,8 +74,8 @@ def _window(bench: Bench, middle: float) -> Finding:
         one.step(h)
         checks.append(_differ(beyond, one.read(), "same bits after that:"))
         one.restore(state, begin)
-        for _ in range(OPTIONAL):
-            one.step(h / OPTIONAL)
+        for _ in range(PARTS):
+            one.step(h / PARTS)
         checks += _near(bench, right, one.read(), begin + h)
         data = one.call("serializeFMUstate", state)
         two.begin({}, None)

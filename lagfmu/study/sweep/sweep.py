@@ -37,7 +37,7 @@ from ...verification.simulate import (
 from .design import Design, Values, design
 from .engine import connected, distributed, local
 from .keep import kept as parsed
-from .table import Layout, Optional, dataset, write_rows
+from .table import Layout, Parts, dataset, write_rows
 
 MOST = 2000  # runs in a chunk
 FEWEST = 100  # chunks, of a large sweep
@@ -98,7 +98,7 @@ def sweep(
                 f"trajectories do not fit a {path_out.suffix} file: --out FILE.nc or FILE.zarr"
             )
         folder = None if path_out is None else path_out.with_name(f"{path_out.name}.parts")
-        parts = Optional(folder, study.identity, resume)
+        parts = Parts(folder, study.identity, resume)
         try:
             _run(study, parts, on, workers, progress)
             found = _assembled(study, parts, path_out)
@@ -199,7 +199,7 @@ def _check_fmu(path: Path, description: Any) -> None:
         )
 
 
-def _assembled(study: Study, parts: Optional, out: Path | None) -> Any:
+def _assembled(study: Study, parts: Parts, out: Path | None) -> Any:
     """The Dataset of all runs, written if it is asked for."""
     layout = study.layout
     if out is not None and out.suffix in ROWS:
@@ -213,7 +213,7 @@ def _assembled(study: Study, parts: Optional, out: Path | None) -> Any:
 
 
 def _run(
-    study: Study, parts: Optional, on: Any, workers: int | None, progress: Progress | None
+    study: Study, parts: Parts, on: Any, workers: int | None, progress: Progress | None
 ) -> None:
     """What is not yet there."""
     layout, chunk = study.layout, study.chunk

@@ -79,7 +79,7 @@ class Layout:
         return outcome.trajectory[:, :, len(self.kept.numbers) :]
 
 
-class Optional:
+class Parts:
     """The finished chunks of a sweep, each a file: what a client that stops leaves behind."""
 
     def __init__(self, folder: Path | None, identity: Mapping[str, Any], resume: bool) -> None:
@@ -148,7 +148,7 @@ class Optional:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def write_rows(parts: Optional, path: Path, layout: Layout) -> None:
+def write_rows(parts: Parts, path: Path, layout: Layout) -> None:
     """One .parquet or .csv file of all runs, written part by part; it replaces what was there when it is
     whole.  What a CSV file cannot say of itself stands beside it: see `_metadata`."""
     import pyarrow.csv as csv
