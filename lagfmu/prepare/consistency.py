@@ -152,12 +152,19 @@ def levelled(system: System, u: Sequence[float], q: Vector, p: Sequence[float]) 
     return [*u, *levels_at(system, 0.0, q, u, p)]
 
 
+def values_at_start(
+    eom: EquationsOfMotion, table: VariableTable, numbers: Mapping[Any, Any]
+) -> tuple[list[float], list[float]]:
+    """The inputs and the parameters at the start: `numbers`, else the table's and the model's values."""
+    p = [float(numbers.get(x.symbol, x.value)) for x in eom.parameters]
+    return [float(numbers.get(s, table[str(s)].start or 0.0)) for s in eom.u], p
+
+
 def begin(
     eom: EquationsOfMotion, table: VariableTable, system: System, numbers: Mapping[Any, Any]
 ) -> tuple[Start, list[float], list[float]]:
     """The start with the values of the table and `numbers`, the inputs and the parameters then."""
-    p = [float(numbers.get(x.symbol, x.value)) for x in eom.parameters]
-    u = [float(numbers.get(s, table[str(s)].start or 0.0)) for s in eom.u]
+    u, p = values_at_start(eom, table, numbers)
     q0 = [float(table[c].start or 0.0) for c in system.coordinates]
     v0 = [float(table[derivative(c)].start or 0.0) for c in system.coordinates]
     try:

@@ -139,13 +139,13 @@ def prepare(
         problems = [*error.problems, *_resting_motions(form.equations)]
         known = Derived(model, scene, form, whole)
         raise CannotStartError(error.name, problems, known) from error
-    missed = misses(form, whole, lowered, numbers, model.start)
+    missed = misses(form, whole, lowered, numbers, structure.start, model.start)
     if missed and not told_apart(form, missed):
         every = Form(derived)
         structure = examine(derived, laid.table(every, scene), lower(every), numbers)
         again = prepare(restarted(model, form, structure, missed), asked)
         started = again.form, again.whole, lower(again.form)
-        check_branch(model, misses(*started, numbers, model.start))
+        check_branch(model, misses(*started, numbers, again.structure.start, model.start))
         return again
     return Prepared(
         model=model,

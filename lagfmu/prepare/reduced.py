@@ -18,9 +18,10 @@ from ..interface.variables import VariableTable
 from ..mechanics.form import Form
 from ..model.model import Model
 from ..names import motion
+from ..solver.initial import Start
 from ..solver.observe import expand
 from ..solver.system import System
-from .consistency import Structure, begin, levelled
+from .consistency import Structure, levelled, values_at_start
 from .starts import ALLOWED, StartMovedWarning, check_given
 
 
@@ -29,13 +30,15 @@ def misses(
     table: VariableTable,
     system: System,
     numbers: Mapping[Any, Any],
+    begun: Start,
     wanted: Mapping[Any, float],
 ) -> dict[str, tuple[float, float]]:
-    """The values `wanted` that the form does not begin with, by name: as given, and as it begins."""
+    """The values `wanted` that the form, which begins with `begun`, does not begin with, by name: as given,
+    and as it begins."""
     eom = form.equations
     if form.reduction is None or not wanted:
         return {}
-    begun, u, p = begin(eom, table, system, numbers)
+    u, p = values_at_start(eom, table, numbers)
     q, v = np.array(begun.state.q), np.array(begun.state.v)
     full, q, v = expand(system, 0.0, q, v, levelled(system, u, q, p), p)
     has = dict(zip(motion(full.coordinates), [*q.tolist(), *v.tolist()], strict=True))
