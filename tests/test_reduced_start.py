@@ -10,7 +10,7 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Embedding, Holonomic, Model, Parameter, Scene, simulate
-from lagfmu.errors import ModelError
+from lagfmu.errors import CannotStartError
 from lagfmu.prepare.prepare import prepare
 from lagfmu.prepare.starts import StartMovedWarning
 
@@ -68,8 +68,8 @@ def test_what_follows_is_told():
 
 
 def test_a_start_off_the_constraints_is_refused():
-    """x = 3 m on a string of 2 m is no start of either formulation."""
-    with pytest.raises(ModelError):
+    """x = 3 m on a string of 2 m is no start of either formulation; what is known of it can be shown."""
+    with pytest.raises(CannotStartError):
         prepare(pendulum({x: 3.0}), Scene("Bob", formulation="minimal"))
 
 

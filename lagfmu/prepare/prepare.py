@@ -142,10 +142,15 @@ def prepare(
     missed = misses(form, whole, lowered, numbers, structure.start, model.start)
     if missed and not told_apart(form, missed):
         every = Form(derived)
-        structure = examine(derived, laid.table(every, scene), lower(every), numbers)
-        again = prepare(restarted(model, form, structure, missed), asked)
-        started = again.form, again.whole, lower(again.form)
-        check_branch(model, misses(*started, numbers, again.structure.start, model.start))
+        try:
+            structure = examine(derived, laid.table(every, scene), lower(every), numbers)
+            started = restarted(model, form, structure, missed)
+        except ModelError as error:
+            known = Derived(model, scene, form, whole)
+            raise CannotStartError(error.name, error.problems, known) from error
+        again = prepare(started, asked)
+        laid_again = again.form, again.whole, lower(again.form)
+        check_branch(model, misses(*laid_again, numbers, again.structure.start, model.start))
         return again
     return Prepared(
         model=model,
