@@ -30,7 +30,7 @@ from ..solver.failure import StepFailureError
 from ..solver.initial import start
 from ..solver.observe import observe
 from ..solver.rates import Past, estimated
-from ..solver.state import Settings
+from ..solver.state import Settings, tolerance_problem
 from ..solver.thresholds import SMALLEST_TOLERANCE
 from .result import Result
 
@@ -74,8 +74,8 @@ def simulate(
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
         if number is not None and not 0 < number < np.inf:
             raise SettingError(f"{what} = {number!r} s, expected a positive number")
-    if tolerance is not None and not 0 < tolerance < np.inf:
-        raise SettingError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+    if tolerance is not None and (problem := tolerance_problem(tolerance)):
+        raise SettingError(problem)
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared) and error_bars and not target.asked.error_bars:
