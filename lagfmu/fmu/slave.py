@@ -30,7 +30,7 @@ from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.rates import Past, estimated, half_connected, restored_past
 from ..solver.restored import restored, restored_settings
-from ..solver.state import Settings, State
+from ..solver.state import Settings, State, tolerance_problem
 from ..solver.system import System
 from ..solver.thresholds import SMALLEST_TOLERANCE
 from .references import end_once, keep, keep_module_of
@@ -116,10 +116,8 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         """Start and stop time [s]; the tolerance is the dial between speed and accuracy."""
         self.start_time = start_time
         self.stop_time = math.inf if stop_time is None else stop_time
-        if tolerance is not None and not 0 < tolerance < math.inf:
-            raise Refused(
-                f"fmi2SetupExperiment: tolerance = {tolerance!r}, expected a positive number"
-            )
+        if tolerance is not None and (problem := tolerance_problem(tolerance)):
+            raise Refused(f"fmi2SetupExperiment: {problem}")
         if not math.isfinite(start_time) or not self.stop_time > start_time:
             raise Refused(
                 f"fmi2SetupExperiment: start time {start_time!r} s and stop time {stop_time!r} s, "
@@ -538,7 +536,8 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             if variable[2] != "output":
                 self._check_saved(variable, value)
         start, stop, tolerance = (float(x) for x in state["experiment"])
-        if not (math.isfinite(start) and stop > start and 0 <= tolerance < math.inf):
+        good = tolerance == 0 or not tolerance_problem(tolerance)
+        if not (math.isfinite(start) and stop > start and good):
             raise ValueError(f"its experiment is {state['experiment']!r}")
         expected = list(map(float, state["expected"]))
         if len(expected) not in (0, len(self.inputs)) or not all(map(math.isfinite, expected)):

@@ -26,6 +26,7 @@ from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import tell
+from ..solver.state import tolerance_problem
 from .result import Result
 
 STARTS = re.compile(
@@ -68,8 +69,8 @@ def simulate(
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
         if number is not None and not 0 < number < np.inf:
             raise SettingError(f"{what} = {number!r} s, expected a positive number")
-    if tolerance is not None and not 0 < tolerance < np.inf:
-        raise SettingError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+    if tolerance is not None and (problem := tolerance_problem(tolerance)):
+        raise SettingError(problem)
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared) and error_bars and not target.asked.error_bars:
