@@ -25,6 +25,7 @@
 #include "instance.h"
 #include "optional.h"
 #include "restored.h"
+#include "thresholds.h"
 
 enum {
     INSTANTIATED = 1,
@@ -254,9 +255,11 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDef
     Component *c = component;
     Why text;
     if (!allowed(c, INSTANTIATED)) return forbidden(c, "fmi2SetupExperiment");
-    if (toleranceDefined && !(tolerance > 0 && tolerance <= DBL_MAX)) {
-        (void)fail(&text, "fmi2SetupExperiment: tolerance = %s, expected a positive number",
-                   digits(tolerance).text);
+    if (toleranceDefined && !(tolerance > 0 && tolerance <= LARGEST_TOLERANCE)) {
+        (void)fail(&text,
+                   "fmi2SetupExperiment: tolerance = %s, expected a positive number of at most %g (an "
+                   "error relative to each value), e.g. 1e-8",
+                   digits(tolerance).text, LARGEST_TOLERANCE);
         return refuse(c, text.text);
     }
     if (!isfinite(startTime) || (stopTimeDefined && !(stopTime > startTime))) {
