@@ -134,7 +134,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         """Project the start values, choose the contact modes."""
         if self.state is None:
             self._initialize()
-        self._outputs()
+        self.row()
         self.running = True
 
     def terminate(self) -> None:
@@ -158,7 +158,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             if self.barred:
                 if before.t == self.start_time:  # its magnitudes
                     self.observed = None
-                    self._outputs(keep=True)
+                    self.row(keep=True)
                     bars = self.bars
                 settings, self.coarse = optional_bars.paired_settings(settings, before, end)
             after_step = optional_bars.after_step if self.barred else None
@@ -171,7 +171,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             for k, value in zip(self.inputs, self.expected, strict=True):
                 self.values[k] = value
             self.observed = None
-            self._outputs(keep=True)
+            self.row(keep=True)
         except StepFailureError as error:
             self.state, self.values, self.observed, self.bars = before, values, None, bars
             self.past, self.fresh = past, fresh
@@ -353,10 +353,10 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         roles = [self._variable(vr, kind)[2] for vr in vrs]
         if not any(role in ("output", "start") for role in roles):
             return [self.values[vr] for vr in vrs]
-        row = self._outputs()
+        row = self.row()
         return [row[vr] for vr in vrs]
 
-    def _outputs(self, keep: bool = False) -> list[Any]:
+    def row(self, keep: bool = False) -> list[Any]:
         """All values by reference, the outputs solved anew where something was set or moved; `keep`: error
         bars are no smaller from here on."""
         if self.observed is None:
