@@ -3,6 +3,7 @@
  *   host LIBRARY GUID STOP STEP REFERENCE...
  *
  * prints one line a communication point: the time and the Real variables of the references, %.17g.
+ * The environment's RESOURCES is the URI of the FMU's resources, which native FMUs need not know.
  * With -DLINKED the FMU is linked into the program and LIBRARY is ignored. */
 #include <stdarg.h>
 #include <stdio.h>
@@ -71,8 +72,9 @@ int main(int count, char **arguments) {
     const fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
     (void)library;
     (void)found;
-    fmi2Component c =
-        GET(fmi2Instantiate)("host", fmi2CoSimulation, arguments[2], "", &callbacks, 0, 0);
+    const char *resources = getenv("RESOURCES");
+    fmi2Component c = GET(fmi2Instantiate)("host", fmi2CoSimulation, arguments[2],
+                                           resources == NULL ? "" : resources, &callbacks, 0, 0);
     if (c == NULL) return 5;
     check(GET(fmi2SetupExperiment)(c, 1, 1e-10, 0, 0, 0), "fmi2SetupExperiment");
     check(GET(fmi2EnterInitializationMode)(c), "fmi2EnterInitializationMode");

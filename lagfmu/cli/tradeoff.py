@@ -21,6 +21,7 @@ from ..model.goal import Goal
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
+from ..solver.state import tolerance_problem
 from ..study.tradeoff.choose import Choice, choose
 from ..study.tradeoff.figure import draw
 from ..study.tradeoff.importer import Importer
@@ -74,9 +75,11 @@ def compare(
     wrong = [m for m in methods if m not in INTEGRATORS]
     if wrong:
         raise UsageError("; ".join(unknown(m, INTEGRATORS) for m in wrong))
-    numbers = [*communications, *tolerances, *([] if repeats is None else [repeats])]
+    numbers = [*communications, *([] if repeats is None else [repeats])]
     if not all(0 < x < float("inf") for x in numbers):
-        raise UsageError("communication steps, tolerances and repeats must be positive numbers")
+        raise UsageError("communication steps and repeats must be positive numbers")
+    if problems := [p for p in map(tolerance_problem, tolerances) if p]:
+        raise UsageError("; ".join(problems))
     kind = target or ("python" if find_compiler() is None else "native")
     done: list[Measured] = []
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:

@@ -7,7 +7,7 @@ import hashlib
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -23,6 +23,7 @@ from ..prepare.prepare import Prepared
 from ..solver.system import System
 from .archive import pack, version
 from .description import model_description
+from .slave import LagfmuSlave
 
 SHIPPED = (
     "names.py",
@@ -65,27 +66,16 @@ class {name}(Fmi2Slave):
 
     system = SYSTEM
     variables = VARIABLES
-    default_tolerance = {tolerance!r}
-    numbers = {numbers!r}
-    default_method = {method!r}
-    default_step = {step!r}
     identity = {identity!r}
-{bars}'''
+{facts}'''
 
 
 def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
-    scene = prepared.scene
-    if scene.method not in IN_PYTHON:
-        raise BuildError(
-            f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
-            f"{', '.join(IN_PYTHON)}, or the target native"
-        )
-    methods = tuple(m for m in scene.selectable if m in IN_PYTHON)
-    table = prepared.table.offering(methods)
+    scene, table = prepared.scene, _offered(prepared)
     runtime = _runtime(scene, prepared.system, bool(prepared.model.splines))
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
-    text = _script(prepared, table, package, methods)
+    text = _script(prepared, table, package)
     module = f"{scene.name}_{_digest(text.encode())}"
     description = model_description(
         table,
@@ -113,9 +103,42 @@ def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
     return pack(contents)
 
 
-def _script(prepared: Prepared, table: VariableTable, package: str, methods: Sequence[str]) -> str:
+def _offered(prepared: Prepared) -> VariableTable:
+    """The variables, with the methods that are written in Python.  Raises BuildError."""
+    scene = prepared.scene
+    if scene.method not in IN_PYTHON:
+        raise BuildError(
+            f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
+            f"{', '.join(IN_PYTHON)}, or the target native"
+        )
+    return prepared.table.offering([m for m in scene.selectable if m in IN_PYTHON])
+
+
+def slave_of(prepared: Prepared) -> Any:
+    """What the FMU's script makes an instance of, for this process.  Raises BuildError."""
+    table = _offered(prepared)
+    members = {"system": prepared.system, "variables": [_row(v) for v in table.variables]}
+    return type(prepared.scene.name, (LagfmuSlave,), members | _facts(prepared, table))
+
+
+def _facts(prepared: Prepared, table: VariableTable) -> dict[str, Any]:
+    """The members of the slave's class, besides its equations and variables."""
+    scene, position = prepared.scene, {v.name: k for k, v in enumerate(table.variables)}
+    return {
+        "default_tolerance": scene.tolerance,
+        "numbers": {NUMBERS[m]: m for m in scene.selectable if m in IN_PYTHON},
+        "default_method": scene.method,
+        "default_step": scene.step,
+        "barred": tuple(
+            (position[v.name], position[v.bar_of]) for v in table.variables if v.bar_of
+        ),
+    }
+
+
+def _script(prepared: Prepared, table: VariableTable, package: str) -> str:
     scene, equations = prepared.scene, prepared.text
     rows = "".join(f"    {_row(v)!r},\n" for v in table.variables)
+    facts = {k: x for k, x in _facts(prepared, table).items() if x != ()}
     words = ["Embedding", "Friction", "Lookups", "Own", "Row", "System"]
     vocabulary = f"from {package}.fmu.entry import {', '.join(words)}"
     if "interval." in equations:
@@ -129,20 +152,9 @@ def _script(prepared: Prepared, table: VariableTable, package: str, methods: Seq
         package=package,
         equations="\n" + equations,
         variables=rows,
-        tolerance=scene.tolerance,
-        numbers={NUMBERS[m]: m for m in methods},
-        method=scene.method,
-        step=scene.step,
-        bars=_bars(table),
+        facts="".join(f"    {k} = {x!r}\n" for k, x in facts.items()),
         identity=f"{scene.name} {_digest(equations.encode(), rows.encode(), package.encode())}",
     )
-
-
-def _bars(table: VariableTable) -> str:
-    """The references of the error bars, and those of the variables whose bars they are."""
-    position = {v.name: k for k, v in enumerate(table.variables)}
-    found = tuple((position[v.name], position[v.bar_of]) for v in table.variables if v.bar_of)
-    return f"    barred = {found!r}\n" if found else ""
 
 
 def _row(v: Variable) -> tuple[Any, ...]:

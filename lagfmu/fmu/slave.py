@@ -30,7 +30,7 @@ from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.rates import Past, estimated, half_connected, restored_past
 from ..solver.restored import restored, restored_settings
-from ..solver.state import Settings, State
+from ..solver.state import Settings, State, tolerance_problem
 from ..solver.system import System
 from ..solver.thresholds import SMALLEST_TOLERANCE
 from .references import end_once, keep, keep_module_of
@@ -116,10 +116,8 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         """Start and stop time [s]; the tolerance is the dial between speed and accuracy."""
         self.start_time = start_time
         self.stop_time = math.inf if stop_time is None else stop_time
-        if tolerance is not None and not 0 < tolerance < math.inf:
-            raise Refused(
-                f"fmi2SetupExperiment: tolerance = {tolerance!r}, expected a positive number"
-            )
+        if tolerance is not None and (problem := tolerance_problem(tolerance)):
+            raise Refused(f"fmi2SetupExperiment: {problem}")
         if not math.isfinite(start_time) or not self.stop_time > start_time:
             raise Refused(
                 f"fmi2SetupExperiment: start time {start_time!r} s and stop time {stop_time!r} s, "
@@ -136,7 +134,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         """Project the start values, choose the contact modes."""
         if self.state is None:
             self._initialize()
-        self._outputs()
+        self.row()
         self.running = True
 
     def terminate(self) -> None:
@@ -160,7 +158,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             if self.barred:
                 if before.t == self.start_time:  # its magnitudes
                     self.observed = None
-                    self._outputs(keep=True)
+                    self.row(keep=True)
                     bars = self.bars
                 settings, self.coarse = optional_bars.paired_settings(settings, before, end)
             after_step = optional_bars.after_step if self.barred else None
@@ -173,7 +171,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             for k, value in zip(self.inputs, self.expected, strict=True):
                 self.values[k] = value
             self.observed = None
-            self._outputs(keep=True)
+            self.row(keep=True)
         except StepFailureError as error:
             self.state, self.values, self.observed, self.bars = before, values, None, bars
             self.past, self.fresh = past, fresh
@@ -355,10 +353,10 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         roles = [self._variable(vr, kind)[2] for vr in vrs]
         if not any(role in ("output", "start") for role in roles):
             return [self.values[vr] for vr in vrs]
-        row = self._outputs()
+        row = self.row()
         return [row[vr] for vr in vrs]
 
-    def _outputs(self, keep: bool = False) -> list[Any]:
+    def row(self, keep: bool = False) -> list[Any]:
         """All values by reference, the outputs solved anew where something was set or moved; `keep`: error
         bars are no smaller from here on."""
         if self.observed is None:
@@ -538,7 +536,8 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             if variable[2] != "output":
                 self._check_saved(variable, value)
         start, stop, tolerance = (float(x) for x in state["experiment"])
-        if not (math.isfinite(start) and stop > start and 0 <= tolerance < math.inf):
+        good = tolerance == 0 or not tolerance_problem(tolerance)
+        if not (math.isfinite(start) and stop > start and good):
             raise ValueError(f"its experiment is {state['experiment']!r}")
         expected = list(map(float, state["expected"]))
         if len(expected) not in (0, len(self.inputs)) or not all(map(math.isfinite, expected)):

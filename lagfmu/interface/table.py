@@ -35,6 +35,7 @@ from ..model.units import (
 )
 from ..names import Subject, derivative
 from ..solver.state import MAXIMUM_STEPS
+from ..solver.thresholds import LARGEST_TOLERANCE
 from .variables import Value, Variable, VariableTable
 
 SPEED = METRE / SECOND
@@ -296,7 +297,7 @@ class _Builder:
                 ONE,
                 "relative tolerance of each step; 0: the one of fmi2SetupExperiment, else "
                 f"{self.scene.tolerance!r}",
-                1.0,
+                float(LARGEST_TOLERANCE),
             ),
             *([step] if set(FIXED_STEP).intersection(methods) else []),
             setting(names.MAXIMUM_STEP, 0.0, SECOND, "largest adaptive step; 0: no limit"),

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from ..errors import ModelError
 from ..methods import METHODS, integrators, unknown
-from ..solver.state import DEFAULT_TOLERANCE
+from ..solver.state import DEFAULT_TOLERANCE, tolerance_problem
 from .model import NAME
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
@@ -89,10 +89,12 @@ class Scene:
         for method in (self.method, *(self.methods or ())):
             if method not in METHODS:
                 problems.append(unknown(method))
-        for what in ("stop_time", "step_size", "tolerance"):
+        for what in ("stop_time", "step_size"):
             value = getattr(self, what)
             if not 0 < value < float("inf"):
                 problems.append(f"{what} = {value!r}, expected a positive number")
+        if problem := tolerance_problem(self.tolerance):
+            problems.append(problem)
         if not 0 <= self.step < float("inf"):
             problems.append(f"step = {self.step!r}, expected a positive number, or 0")
         for what in ("outputs", "fixed", "inputs", "contacts", "frictions"):

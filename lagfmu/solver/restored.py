@@ -12,7 +12,7 @@ import math
 from dataclasses import fields
 from typing import Any
 
-from .state import Departure, Settings, Slide, State
+from .state import Departure, Settings, Slide, State, tolerance_problem
 from .stiffness import LATEST, MOST, Choice
 from .system import System
 
@@ -58,8 +58,8 @@ def restored_settings(raw: Any, methods: Any) -> Settings:
     for f in fields(Settings):
         if f.type == "float" and not 0 <= raw[f.name] < math.inf:
             raise ValueError(f"its {f.name} is {raw[f.name]!r}")
-    if not raw["tolerance"] > 0:
-        raise ValueError(f"its tolerance is {raw['tolerance']!r}")
+    if problem := tolerance_problem(raw["tolerance"]):
+        raise ValueError(f"its {problem}")
     return Settings(**raw)
 
 

@@ -19,19 +19,14 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import SettingError, SimulationError, VerificationError
+from ..fmu.python import slave_of
+from ..fmu.slave import Refused
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import Prepared, prepare
-from ..prepare.starts import ranks, tell
-from ..solver import bars as companion
-from ..solver.advance import advance
-from ..solver.failure import StepFailureError
-from ..solver.initial import start
-from ..solver.observe import observe
-from ..solver.rates import Past, estimated
-from ..solver.state import Settings
-from ..solver.thresholds import SMALLEST_TOLERANCE
+from ..prepare.starts import tell
+from ..solver.state import tolerance_problem
 from .result import Result
 
 STARTS = re.compile(
@@ -74,8 +69,8 @@ def simulate(
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
         if number is not None and not 0 < number < np.inf:
             raise SettingError(f"{what} = {number!r} s, expected a positive number")
-    if tolerance is not None and not 0 < tolerance < np.inf:
-        raise SettingError(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+    if tolerance is not None and (problem := tolerance_problem(tolerance)):
+        raise SettingError(problem)
     if isinstance(target, Model):
         target = prepare(target, scene)
     if isinstance(target, Prepared) and error_bars and not target.asked.error_bars:
@@ -163,10 +158,8 @@ def _simulate_model(
     inputs: Trajectory | None,
     besides: Sequence[str],
 ) -> Trajectory:
-    scene, table, system = prepared.scene, prepared.table, prepared.system
-    fixed = ("output", "estimate")
-    known: dict[str, Any] = {v.name: v.start for v in table.variables if v.role != "output"}
-    limits = {
+    scene, table = prepared.scene, prepared.table
+    settable = {
         v.name: _Settable(
             v.kind,
             v.minimum,
@@ -175,83 +168,44 @@ def _simulate_model(
             {m: NUMBERS[m] for m in v.items if m in IN_PYTHON},
         )
         for v in table.variables
-        if v.role not in fixed
+        if v.role not in ("output", "estimate")
     }
-    _check_values(scene.name, limits, values)
-    known |= values
-    method = known.get(names.METHOD, scene.method)
-    if not isinstance(method, str):
-        method = next(m for m, k in NUMBERS.items() if k == method)
-    settings = Settings(
-        method,
-        max(known[names.TOLERANCE] or tolerance or scene.tolerance, SMALLEST_TOLERANCE),
-        known.get(names.STEP, scene.step),
-        known[names.MAXIMUM_STEP],
-        known[names.MAXIMUM_STEPS],
-    )
-    p = [float(known[v.name]) for v in table.variables if v.role == "parameter"]
-    drives = [v for v in table.variables if v.role in ("input", "estimate")]
-    signals: Any = inputs
-
-    def drive(t: float) -> list[float]:
-        u = [
-            float(np.interp(t, signals["time"], signals[v.name]))
-            if inputs is not None and v.name in signals.dtype.names
-            else float(known[v.name])
-            for v in drives
-        ]
-        _check_values(scene.name, limits, {v.name: x for v, x in zip(drives, u, strict=True)})
-        return u
-
-    def warn(text: str) -> None:
-        if text:
-            warnings.warn(text, ErrorBarWarning, stacklevel=4)
-
-    with_bars = [v.bar_of for v in table.variables if v.bar_of]
-    fed = () if inputs is None else signals.dtype.names
-    past = Past()
+    _check_values(scene.name, settable, values)
     times = communication_points(stop_time or scene.stop_time, step_size or scene.step_size)
-    columns: list[tuple[str, Any]] = [("time", np.float64)]
-    kinds: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
+    fed = {} if inputs is None else {n: inputs[n] for n in inputs.dtype.names or () if n != "time"}
+    fed = {n: np.interp(times, np.asarray(inputs)["time"], x) for n, x in fed.items()}
+    for end in (np.min, np.max):
+        _check_values(scene.name, settable, {n: end(x) for n, x in fed.items()})
+    slave = slave_of(prepared)(instance_name=scene.name)
+    place = {v.name: k for k, v in enumerate(table.variables)}
     read = [*table.outputs, *(table[name] for name in besides)]
-    columns += [(v.name, kinds[v.kind]) for v in read]
+    kinds: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
+    columns = [("time", np.float64), *((v.name, kinds[v.kind]) for v in read)]
     result = np.zeros(len(times), dtype=columns)
+    rows = [place[v.name] for v in read]
     try:
-        q = [float(known[c]) for c in system.coordinates]
-        v = [float(known[names.derivative(c)]) for c in system.coordinates]
-        u = drive(0.0)
-        begun = start(system, settings, 0.0, q, v, u, p, ranks(system, table, values))
-        tell(begun.moved)
-        state = begun.state
-        bars = companion.begun(state, with_bars)
-        if with_bars:
-            warn(companion.halved(settings, state) if settings.step else "")
-        for k, t in enumerate(times):
+        slave.setup_experiment(0.0, float(times[-1]), tolerance)
+        for name, value in values.items():
+            whole = settable[name].kind == "Enumeration"
+            give = slave.set_integer if whole else slave.set_real
+            give([place[name]], [settable[name].items.get(value, value)])
+        slave.set_real([place[n] for n in fed], [float(x[0]) for x in fed.values()])
+        slave.exit_initialization_mode()
+        for k, t in enumerate(times.tolist()):
             if k:
-                given = drive(state.t)  # held over the step, as an importer of the FMU does
-                for i, d in enumerate(drives):
-                    u[i] = u[i] if d.role == "estimate" or d.name not in fed else given[i]
-                was_set = [drives[i].name in fed for i in system.estimated]
-                u, past = estimated(system, past, state.t, u, was_set)
-                fine, coarse = settings, settings
-                if with_bars:
-                    fine, coarse = companion.paired_settings(settings, state, float(t))
-                    bars, lost = companion.followed(system, coarse, bars, u, p, float(t))
-                    warn(lost)
-                noted = companion.after_step if with_bars else None
-                moved = advance(system, fine, state, u, p, float(t), noted)
-                u = system.inputs_at(u, moved.t - state.t)
-                state = moved
-            seen = observe(system, state, u, p)
-            if with_bars:
-                now = (state, seen)
-                bars, found, lost = companion.widened(system, settings, bars, with_bars, now, u, p)
-                warn(lost)
-                seen |= {names.bar(n): x for n, x in zip(with_bars, found, strict=True)}
-            driven = dict(zip((d.name for d in drives), u, strict=True))
-            result[k] = (t, *(driven[o.name] if o in drives else seen[o.name] for o in read))
-    except StepFailureError as error:
-        raise SimulationError(str(error)) from error
+                before = float(times[k - 1])
+                slave.set_real([place[n] for n in fed], [float(x[k - 1]) for x in fed.values()])
+                if not slave.do_step(before, t - before):
+                    raise SimulationError(slave.log_queue[-1].msg)
+            row = slave.row()
+            result[k] = (t, *(row[r] for r in rows))
+    except Refused as error:  # without what is done to a text on its way to an importer
+        raise SimulationError(str(error.__context__)) from error.__context__
+    finally:
+        tell(m.msg for m in slave.log_queue if STARTS.search(m.msg))
+        for m in slave.log_queue:
+            if m.msg.startswith("error bars") and m.category == "logStatusWarning":
+                warnings.warn(m.msg, ErrorBarWarning, stacklevel=3)
     return result
 
 

@@ -47,8 +47,9 @@ function problemsOf(variables, settings) {
     problems.push(`stepSize = ${settings.stepSize} s asks for more than ${LONGEST} points`);
   }
   const t = settings.tolerance;
-  if (t !== null && !(Number.isFinite(t) && t > 0)) {
-    problems.push(`tolerance = ${t}, expected a positive number, e.g. 1e-8`);
+  const { max } = variables.find((v) => v.name === "solver.tolerance");
+  if (t !== null && !(t > 0 && t <= max)) {
+    problems.push(`tolerance = ${t}, expected a positive number of at most ${max}, e.g. 1e-8`);
   }
   return problems;
 }

@@ -6,8 +6,8 @@
 - `echelon`: linear algebra where that is known
 - `coefficients`: the one-form of a constraint
 - `frobenius`, `form`: is a system integrable, is a one-form?
-- `quadrature`, `potential`, `inverse`, `ansatz`: integrals by one variable and of exact forms, inverse
-  functions, sums with constant coefficients
-- `factors`, `homogeneous`, `lie`, `natani`: one integrable form; `single` tries them in turn
-- `system`, `linear`, `elimination`: several forms; `integrals` tries them in turn
+- `quadrature`, `potential`, `ansatz`: integrals by one variable and of exact forms, sums with constant
+  coefficients
+- `factors`, `lie`: one integrable form; `single` tries them in turn
+- `pfaffians`, `linear`: several forms; `integrals` tries them in turn
 """

@@ -1,13 +1,11 @@
 """Integrating factors of the kinds of the textbooks (Ince, *Ordinary Differential Equations*, ch. II).
 
 mu with d(mu omega) = 0, that is, d(omega) = -d(log mu) ^ omega, is looked for as that of a linear or a
-Bernoulli equation, of separable variables, and as a function of one combination of the variables.  Each
-function yields log(mu).
+Bernoulli equation, and of separable variables.  Each function yields log(mu).
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,7 +13,6 @@ from sympy import log
 
 from ...model.elements import Expr
 from .form import OneForm
-from .frobenius import pairs
 from .potential import potential
 from .quadrature import quadrature
 
@@ -58,23 +55,3 @@ def separable(form: OneForm) -> Iterator[Expr | None]:
             inner = quadrature(tower.back(rate), y)
             if inner is not None:
                 yield -inner - log(form.terms[p])
-
-
-def combination(form: OneForm) -> Iterator[Expr | None]:
-    """mu a function of one combination u of the variables: d(omega) = -g du wedge omega."""
-    tower = form.tower
-    for x, y in itertools.combinations(form.x, 2):
-        for u in (x, y, x * y, y / x, x + y, x - y, x**2 + y**2):
-            du = form.gradient(tower.element(u))
-            places = list(pairs(len(form.x)))
-            wedges = [tower.reduce(form.wedge(du, form.a, i, j)) for i, j in places]
-            curls = [tower.reduce(form.curl(form.a, i, j)) for i, j in places]
-            first = next((k for k, w in enumerate(wedges) if not tower.is_zero(w)), None)
-            if first is None:
-                continue
-            g = tower.reduce(-curls[first] / wedges[first])
-            dg = form.gradient(g)
-            if all(tower.is_zero(c + g * w) for c, w in zip(curls, wedges, strict=True)) and all(
-                tower.is_zero(form.wedge(dg, du, i, j)) for i, j in places
-            ):
-                yield potential([tower.back(tower.reduce(g * d)) for d in du], form.x)

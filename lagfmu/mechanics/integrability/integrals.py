@@ -1,7 +1,6 @@
 """First integrals of an integrable Pfaffian system in closed form, by a bounded list of methods.
 
-In this order: known candidates, linear systems, each form alone, an ansatz for f, and elimination of a
-variable by each integral already found.
+In this order: known candidates, linear systems, each form alone, and an ansatz for f.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from contextlib import suppress
 
 from ...model.elements import Expr
 from .ansatz import combine, monomials, relations
-from .elimination import restricted
 from .frobenius import along
 from .linear import exponential_integrals
 from .pfaffians import Pfaffians
@@ -26,17 +24,12 @@ def first_integrals(
     rows: Sequence[Sequence[Expr]],
     variables: Sequence[Expr],
     known: Sequence[Expr] = (),
-    depth: int = 0,
 ) -> list[Expr]:
     """Independent first integrals of the integrable system that the reduced `rows` span.
 
     `forms` are further one-forms worth trying, and `known` candidates for integrals.
     """
     system = Pfaffians(rows, variables)
-
-    def inner(rows: Sequence[Sequence[Expr]], variables: Sequence[Expr]) -> list[Expr]:
-        return first_integrals((), rows, variables, (), depth + 1)
-
     for f in known:
         system.offer(f)
     if not system.complete():
@@ -51,11 +44,6 @@ def first_integrals(
             with suppress(*FAILURES):
                 for f in _polynomial_integrals(system, degree):
                     system.offer(f)
-    for f in list(system.found):
-        if not system.complete() and not late() and depth < 3:
-            with suppress(*FAILURES):
-                for g in restricted(system, f, inner):
-                    system.offer(g)
     return system.found
 
 

@@ -7,16 +7,14 @@ from collections.abc import Iterator, Sequence
 from sympy import exp, expand
 
 from ...model.elements import Expr
-from .factors import bernoulli, combination, separable
+from .factors import bernoulli, separable
 from .form import OneForm
-from .homogeneous import homogeneous
 from .lie import inverse_factors
-from .natani import natani
 from .potential import potential, tidy
 from .undecided import FAILURES, late
 
 
-def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Expr | None:
+def single(row: Sequence[Expr], variables: Sequence[Expr]) -> Expr | None:
     """f with df = mu * omega for an integrable one-form omega, or None."""
     try:
         form = OneForm(row, variables)
@@ -29,7 +27,7 @@ def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Ex
             return f if f is not None and form.solves(f) else None
     except FAILURES:
         return None
-    for method in _methods(form, depth):
+    for method in _methods(form):
         try:
             for f in method:
                 if late():
@@ -41,23 +39,17 @@ def single(row: Sequence[Expr], variables: Sequence[Expr], depth: int = 0) -> Ex
     return None
 
 
-def _methods(form: OneForm, depth: int) -> list[Iterator[Expr | None]]:
+def _methods(form: OneForm) -> list[Iterator[Expr | None]]:
     """Iterators over candidates for f, the cheap methods first."""
     if len(form.x) < 2:
         return [iter(form.x)]
 
-    def inner(row: Sequence[Expr], variables: Sequence[Expr]) -> Expr | None:
-        return single(row, variables, depth + 1)
-
-    found = [
+    return [
         _exact(form),
         _by_factors(form, bernoulli(form)),
         _by_factors(form, separable(form)),
-        homogeneous(form, inner),
-        _by_factors(form, combination(form)),
         inverse_factors(form),
     ]
-    return [*found, natani(form, inner)] if len(form.x) > 2 and depth < 3 else found
 
 
 def _exact(form: OneForm) -> Iterator[Expr | None]:

@@ -25,6 +25,7 @@
 #include "instance.h"
 #include "optional.h"
 #include "restored.h"
+#include "thresholds.h"
 
 enum {
     INSTANTIATED = 1,
@@ -254,9 +255,11 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDef
     Component *c = component;
     Why text;
     if (!allowed(c, INSTANTIATED)) return forbidden(c, "fmi2SetupExperiment");
-    if (toleranceDefined && !(tolerance > 0 && tolerance <= DBL_MAX)) {
-        (void)fail(&text, "fmi2SetupExperiment: tolerance = %s, expected a positive number",
-                   digits(tolerance).text);
+    if (toleranceDefined && !(tolerance > 0 && tolerance <= LARGEST_TOLERANCE)) {
+        (void)fail(&text,
+                   "fmi2SetupExperiment: tolerance = %s, expected a positive number of at most %g (an "
+                   "error relative to each value), e.g. 1e-8",
+                   digits(tolerance).text, LARGEST_TOLERANCE);
         return refuse(c, text.text);
     }
     if (!isfinite(startTime) || (stopTimeDefined && !(stopTime > startTime))) {
@@ -284,6 +287,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component component) {
     Component *c = component;
     if (!allowed(c, INITIALIZATION)) return forbidden(c, "fmi2ExitInitializationMode");
     if (instance_observe(&c->instance) != OK) return failed(c, fmi2Error);
+    if (c->instance.exchange) exchange_begin(&c->instance);
     c->instance.running = 1;
     c->instance.phase = c->instance.exchange ? EVENT : STEP_COMPLETE;
     return fmi2OK;

@@ -14,6 +14,7 @@
 #include "digits.h"
 #include "indicators.h"
 #include "optional.h"
+#include "thresholds.h"
 
 enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased */
 
@@ -71,15 +72,15 @@ static int offered(MethodName method) {
 static Status settings(Instance *x) {
     const Settings *s = &x->solver.settings, *given = &x->given;
     const Number list[] = {
-        {"solver.tolerance", s->tolerance, x->started ? DBL_MIN : 0, DBL_MAX},
+        {"solver.tolerance", s->tolerance, x->started ? SMALLEST_TOLERANCE : 0, LARGEST_TOLERANCE},
         {"solver.step", s->step, 0, DBL_MAX},
         {"solver.maximum_step", s->maximum_step, 0, DBL_MAX},
         {"solver.maximum_steps", s->maximum_steps, 0, DBL_MAX},
-        {"given tolerance", given->tolerance, 0, DBL_MAX},
+        {"given tolerance", given->tolerance, 0, LARGEST_TOLERANCE},
         {"given step", given->step, 0, DBL_MAX},
         {"given maximum step", given->maximum_step, 0, DBL_MAX},
         {"given maximum steps", given->maximum_steps, 0, DBL_MAX},
-        {"tolerance", x->tolerance, 0, DBL_MAX},
+        {"tolerance", x->tolerance, 0, LARGEST_TOLERANCE},
         {"start time", x->start_time, -DBL_MAX, DBL_MAX},
         {"stop time", x->stop_time, x->start_time, HUGE_VAL},
         {"time of the inputs", x->solver.drive.since, -DBL_MAX, DBL_MAX},

@@ -35,7 +35,7 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
         found.append(Probe("communication step", f"{bad:g} s", partial(_bad_step, bad)))
     for k in (1, 4, 14) if quick else range(1, 15):
         found.append(Probe("tolerance", f"1e-{k}", partial(_tolerance, 10.0**-k), k < 2 or k > 12))
-    for bad in (0.0, -1e-6, float("nan"), 1e-300, 1e3):
+    for bad in (0.0, -1e-6, float("nan"), 1e-300, 1.0, 1e3):
         found.append(Probe("tolerance", f"{bad:g}", partial(_tolerance, bad)))
     for method in INTEGRATORS:
         found.append(Probe("method", method, partial(_method, method)))

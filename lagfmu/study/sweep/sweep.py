@@ -27,6 +27,7 @@ from ...model.file import load
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
+from ...solver.state import tolerance_problem
 from ...verification.simulate import (
     Trajectory,
     check_inputs,
@@ -327,8 +328,8 @@ def _check_options(
         problems.append(f"workers = {workers}, expected a whole number from 1")
     if seed < 0:
         problems.append(f"seed = {seed}, expected a whole number from 0")
-    if tolerance is not None and not 0 < tolerance < np.inf:
-        problems.append(f"tolerance = {tolerance!r}, expected a positive number, e.g. 1e-8")
+    if tolerance is not None and (problem := tolerance_problem(tolerance)):
+        problems.append(problem)
     if resume and out is None:
         problems.append("resume needs the out of the sweep that was interrupted")
     if out is not None and out.suffix not in SUFFIXES:
