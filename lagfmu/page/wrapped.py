@@ -31,7 +31,8 @@ class _Word:
 def wrapped(text: str, width: int) -> list[str]:
     """The words of a text, all of them, in lines of at most `width` cells (longer if one word is); those that
     begin inside of brackets are indented."""
-    lines, words = [], list(_words(text))
+    words = list(_words(text))
+    lines: list[str] = []
     while words:
         indent = "  " * min(words[0].depth, 3) if lines else ""
         count = _taken(words, width - len(indent))
