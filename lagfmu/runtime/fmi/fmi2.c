@@ -287,6 +287,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component component) {
     Component *c = component;
     if (!allowed(c, INITIALIZATION)) return forbidden(c, "fmi2ExitInitializationMode");
     if (instance_observe(&c->instance) != OK) return failed(c, fmi2Error);
+    if (c->instance.exchange) exchange_begin(&c->instance);
     c->instance.running = 1;
     c->instance.phase = c->instance.exchange ? EVENT : STEP_COMPLETE;
     return fmi2OK;
@@ -446,6 +447,15 @@ static int is_offered(int method) {
 
 static fmi2Status valid_method(Component *c, const Variable *v, int method) {
     Why text;
+    if (method == RATTLE &&
+        !(MODEL_SYSTEM->separable && MODEL_SYSTEM->formulation == MULTIPLIERS)) {
+        (void)fail(&text,
+                   "'%s' = 'rattle': this method needs a constant mass matrix, forces without "
+                   "velocities, position constraints only and the formulation 'multipliers'; "
+                   "choose another",
+                   v->name);
+        return refuse(c, text.text);
+    }
     if (!is_offered(method)) {
         const char *comma = "";
         (void)fail(&text, "'%s' = %d, expected one of ", v->name, method);
@@ -454,15 +464,6 @@ static fmi2Status valid_method(Component *c, const Variable *v, int method) {
             why_append(&text, "%s%d (%s)", comma, k, METHOD_NAMES[k]);
             comma = ", ";
         }
-        return refuse(c, text.text);
-    }
-    if (method == RATTLE &&
-        !(MODEL_SYSTEM->separable && MODEL_SYSTEM->formulation == MULTIPLIERS)) {
-        (void)fail(&text,
-                   "'%s' = 'rattle': this method needs a constant mass matrix, forces without "
-                   "velocities, position constraints only and the formulation 'multipliers'; "
-                   "choose another",
-                   v->name);
         return refuse(c, text.text);
     }
     return fmi2OK;
