@@ -56,7 +56,7 @@ def stress(
     if not limit > 0:
         raise UsageError(f"the time limit is {limit!r} s, expected a positive number")
     if not console.is_terminal:
-        console = Console(file=console.file, width=WIDTH)
+        console = Console(file=console.file, width=WIDTH, emoji=False)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         made = partial(build, folder=Path(folder) / target, target=target, console=console)
         for name, make in works(paths, scenes, made):

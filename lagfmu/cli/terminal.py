@@ -21,8 +21,8 @@ from rich.text import Text
 from ..errors import LagfmuError, SettingError
 from ..verification.pipeline import WRONG_USAGE, UsageError
 
-console = Console()
-errors = Console(stderr=True)
+console = Console(emoji=False)  # "0.2:x:3" is what the user wrote
+errors = Console(stderr=True, emoji=False)
 
 PLAIN = {"≤": "<=", "≥": ">=", "−": "-", "–": "-", "→": "->", "●": "*", "µ": "u", "√": "sqrt"}
 ACCENTS = {"\u0307": "'", "\u0308": "''"}  # combining dots: derivatives
@@ -81,7 +81,7 @@ def _width(cell: RenderableType) -> int:
     """Of its longest line."""
     if not isinstance(cell, str):
         return 0
-    return max((line.cell_len for line in Text.from_markup(cell).split()), default=0)
+    return max((line.cell_len for line in Text.from_markup(cell, emoji=False).split()), default=0)
 
 
 def print_whole(console: Console, drawn: Table) -> None:
