@@ -18,7 +18,8 @@ from xml.etree import ElementTree as ET
 from .. import names
 from ..errors import SimulationError
 from ..fmu.write import write_whole
-from .report import Examined, as_json
+from .pipeline import as_json
+from .report import outcome
 from .simulate import Trajectory, communication_points, read_description, simulate
 from .verify import Verification
 
@@ -187,7 +188,7 @@ def _stable(found: Verification) -> str:
     """The report without what differs from run to run, so that the FMU's bytes do not."""
     from dataclasses import replace
 
-    return as_json([Examined(f"{found.name}.fmu", replace(found, seconds=0.0))])
+    return as_json([outcome(f"{found.name}.fmu", replace(found, seconds=0.0))])
 
 
 def _xml(root: ET.Element) -> bytes:
