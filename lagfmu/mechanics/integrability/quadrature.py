@@ -2,8 +2,7 @@
 
 Each term is integrated on its own: products of powers, exponentials, sines and cosines by
 int z**n exp(s z) dz with a complex rate s; rational functions and one function of a curved argument by
-SymPy (Bronstein, *Symbolic Integration I*, ch. 2); rational functions of the sine and cosine of one angle
-by t = tan(angle/2).  The integral of an unknown function is left as it stands.
+SymPy (Bronstein, *Symbolic Integration I*, ch. 2).  The integral of an unknown function is left as it stands.
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ from sympy import (
     log,
     sec,
     sin,
-    tan,
     together,
 )
 from sympy.core.function import AppliedUndef
@@ -88,7 +86,7 @@ def _search(term: Expr, x: Expr) -> Expr | None:
     # where all symbols are positive: the primitive is verified for what they are, afterwards
     names = {v: Dummy(v.name, positive=True) for v in sorted(term.free_symbols | {x}, key=str)}
     plain, variable = term.xreplace(names), names[x]
-    for method in (_oscillation, _heuristics, _half_angle):
+    for method in (_oscillation, _heuristics):
         try:
             found = method(plain, variable)
         except Exception:  # SymPy's heuristics may raise anything
@@ -173,19 +171,3 @@ def _oscillation(term: Expr, x: Expr) -> Expr | None:
             total += constant * x**k * (u * cos(angle) + v * sin(angle)) * exp(exponent)
             constant *= -k
     return total
-
-
-def _half_angle(term: Expr, x: Expr) -> Expr | None:
-    """A rational function of the sine and cosine of one angle, by the tangent of its half."""
-    angles = {node.args[0] for node in term.atoms(sin, cos, tan, sec, csc) if node.has(x)}
-    if len(angles) != 1:
-        return None
-    angle = angles.pop()
-    turn, t = angle.diff(x), Dummy("t", positive=True)
-    put = {sin(angle): 2 * t / (1 + t**2), cos(angle): (1 - t**2) / (1 + t**2)}
-    put[tan(angle)] = 2 * t / (1 - t**2)
-    plain = together(term.xreplace(put) * 2 / (turn * (1 + t**2))).cancel()
-    if turn.has(x) or plain.has(x):
-        return None
-    found = _heuristics(apart(plain, t), t)
-    return found if found is None else found.xreplace({t: tan(angle / 2)})
