@@ -335,7 +335,7 @@ def test_a_scale_of_a_difference_is_none_of_its_magnitudes(bench):
     of their peers, say nothing of their difference (0, so that rounding was called wrong)."""
     theta, r = sp.symbols("theta r", real=True)
     small, zero = 1e-15 * theta, sp.Integer(0)
-    law = CarriedForm("law", small, zero, *[None] * 4, theta - 2 * r, 10.0, 1e-12)
+    law = CarriedForm("law", zero, small, scale=theta - 2 * r)
     (form,) = judged_forms((law,), set())
     run = bench.ordinary
     rows = np.ones(len(run.rows))

@@ -27,8 +27,9 @@ from ...errors import SimulationError
 from ...fmu.closed_forms import CarriedForm
 from ...model.closed_form import output
 from ...model.elements import Expr
+from ...verification.evaluate import evaluate
 from ...verification.simulate import Trajectory
-from ...verification.verify import applies, evaluate
+from ...verification.verify import applies
 from .importer import Importer
 from .quantities import Quantity, magnitudes, quantities
 from .setting import Setting
@@ -191,7 +192,7 @@ def _in_time(
     open_forms = [
         c
         for c in closed_forms
-        if c.expected is not None and c.actual.is_Symbol and c.at_departure is None
+        if c.expected is not None and sp.sympify(c.actual).is_Symbol and c.at_departure is None
     ]
     always = [c for c in open_forms if c.while_closed is None and c.while_open is None]
     solved: dict[Expr, Expr] = {}
