@@ -192,7 +192,7 @@ def test_values_that_cannot_be_are_refused(pendulum):
         ("m", -1.0, ("'m' = -1.0", "bounds [0.0, inf]")),
         ("L", 0.0, ("'L' = 0.0", "positive")),
         ("x", math.nan, ("'x' = nan", "finite")),
-        ("solver.tolerance", 2.0, ("bounds [0.0, 1.0]",)),
+        ("solver.tolerance", 2.0, ("bounds [0.0, 0.1]",)),
         ("lambda.rod", 1.0, ("'lambda.rod'", "calculated")),
     ):
         text = one.refuses("SetReal", *one.set_call(name, value))

@@ -130,8 +130,8 @@ CHANGES = {
     "method": lambda whole, inner: whole["settings"].update(method="euler"),
     "another field": lambda whole, inner: whole["settings"].update(more=1),
     "tolerance": lambda whole, inner: whole["settings"].update(tolerance=0.0),
-    "a tolerance above 1": lambda whole, inner: whole["settings"].update(tolerance=1e3),
-    "an experiment's tolerance above 1": lambda whole, inner: whole.update(
+    "too large a tolerance": lambda whole, inner: whole["settings"].update(tolerance=1e3),
+    "too large a tolerance of the experiment": lambda whole, inner: whole.update(
         experiment=[0.0, 1.0, 2.0]
     ),
     "not a number": lambda whole, inner: inner.update(t=math.nan),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fmpy
 import numpy as np
 import pytest
 from conftest import MODELS
@@ -78,3 +79,35 @@ def test_both_targets_take_the_same_road(native_fmu, python_fmu):
     for name in ("lambda.front", "lambda.rear", "body.acceleration", "road.drag"):
         scale = np.abs(runs[0][name]).max()
         np.testing.assert_allclose(runs[0][name], runs[1][name], atol=1e-6 * scale, rtol=0)
+
+
+def in_model_exchange(path, **more):
+    """fmpy's CVODE, over the bump."""
+    return fmpy.simulate_fmu(
+        str(path),
+        fmi_type="ModelExchange",
+        stop_time=0.8,
+        output_interval=0.01,
+        relative_tolerance=1e-9,
+        output=["way", "theta", "lambda.front"],
+        **more,
+    )
+
+
+def test_left_alone_it_rolls_on_in_model_exchange_too(native_fmu):
+    """Nobody drives s: at 14 m/s the car has gone 11.2 m after 0.8 s, and pitches as in co-simulation."""
+    path = native_fmu("HalfCar")
+    run, other = simulate(path, 0.8, 0.01, tolerance=1e-10), in_model_exchange(path)
+    np.testing.assert_allclose(other["way"], 2.0 + v * other["time"], rtol=1e-13)
+    pitch = np.interp(run["time"], other["time"], other["theta"])
+    assert abs(run["theta"]).max() > 0.02
+    np.testing.assert_allclose(pitch, run["theta"], atol=1e-7)
+
+
+def test_driven_it_goes_where_it_is_driven(native_fmu):
+    """The importer's s, der(s) and der(s,2) stand from the first time that they are set: a car that is
+    held stands still."""
+    names = ["time", "s", "der(s)", "der(s,2)"]
+    held = np.array([(0.0, 2.0, 0.0, 0.0), (0.8, 2.0, 0.0, 0.0)], [(n, float) for n in names])
+    found = in_model_exchange(native_fmu("HalfCar"), input=held)
+    np.testing.assert_array_equal(found["way"], 2.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -49,7 +50,11 @@ from lagfmu.study.stress.probe import (
 )
 from lagfmu.study.stress.report import VERDICTS, Stressed
 from lagfmu.study.stress.summary import as_summary
+from lagfmu.study.stress.underflow import underflow
 from lagfmu.verification.pipeline import NOT_RUN, WRONG_USAGE
+from lagfmu.verification.verify import applies
+
+UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +126,96 @@ def test_a_small_error_of_an_output_is_found(bench, column, factor, what):
         rows[column][len(rows) // 2] *= factor
 
     assert what in judged(bench, change)
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "error", "what"),
+    [
+        ("FallingRod", "margin.grip", 1e-10, "margin.grip"),
+        ("FallingRod", "power.grip", 1e-10, "power.grip"),
+        ("Bowling", "margin.grip", 1e-10, "margin.grip"),
+        ("Bowling", "power.grip", 1e-10, "power.grip"),
+        ("RotatingWire", "bead.speed", 1e-10, "bead.speed"),
+        ("RotatingWire", "motor.power", 1e-10, "motor.power"),
+        ("Atwood", "der(x1,2)", 1e-10, "der(x1,2)"),
+    ],
+)
+def test_a_small_error_of_what_follows_from_other_outputs_is_found(
+    lawful, name, column, error, what
+):
+    """How far a friction is from slipping and the power that it takes, an output of one's own, an
+    acceleration with a closed form: off by 1e-10 at one instant. A power while it sticks is none."""
+    with Bench(lawful(name), quick=True) as one:
+        assert judged(one, lambda rows: None) == []
+        size = np.abs(one.ordinary.rows[column])
+        row = int(np.argmax(size))
+        assert size[row] > 0
+
+        def change(rows):
+            rows[column][row] *= 1 + error
+
+        assert what in judged(one, change)
+        if column == "power.grip" and one.ordinary.rows["sticks.grip"].any():
+
+            def heat(rows):
+                rows[column][int(np.argmax(rows["sticks.grip"]))] = -1e-100
+
+            assert what in judged(one, heat)
+
+
+@pytest.mark.parametrize("values", [{"r": 1e-300}, {"omega": 1e-300}])
+def test_what_underflows_in_an_output_of_ones_own_is_no_error(lawful, values):
+    """sqrt(r'^2 + (r phi')^2) of 1e-300 m/s is 0 in doubles; 1e-150 m/s is lost no more."""
+    with Bench(lawful("RotatingWire"), quick=True) as one:
+        run = one.run(values, one.times(one.span(values)))
+        assert [c for c in one.checks(run) if c.ratio > 1] == []
+        run.rows["bead.speed"] += 1e-150
+        assert "bead.speed" in [c.what for c in one.checks(run) if c.ratio > 1]
+
+
+def test_underflow_is_bounded_whatever_the_order():
+    """A product may lose the smallest normal number, eta, times its other factors above 1, a root the root of
+    eta, a quotient what its denominator loses; where nothing underflows the bound is far below rounding."""
+    a, b, c = symbols = sp.symbols("a b c", real=True)
+    eta = sys.float_info.min
+
+    def lost(e, *values):
+        return float(underflow(e).subs(dict(zip(symbols, values, strict=False))))
+
+    assert lost(a + b, 1.0, 1.0) == 0
+    assert lost(a * b * c, 1e-200, 1e-200, 1e200) == pytest.approx(eta * 1e200)
+    assert lost(sp.sqrt(a**2 + b**2), 0.0, 0.0) == pytest.approx(math.sqrt(2 * eta))
+    assert 0 < lost(sp.sqrt(a**2 + b**2), 3.0, 4.0) < 1e-300
+    assert 0 < lost(sp.sin(a * b) / c, 3.0, 4.0, 2.0) < 1e-300
+    assert lost(c / (a * b), 1e-160, 1e-158, 1e-200) > abs(1e-200 / (1e-160 * 1e-158) - 1e118)
+
+
+@pytest.mark.parametrize("name", ["J_s", "J_p", "J_c"])
+def test_an_acceleration_is_known_to_what_rounding_leaves_of_the_forces(tmp_path, name):
+    """Beside a part of 1e300 kg m^2 the light parts of a gear stand still but for 1e-16 of what would drive
+    them alone; an error of 1e-10 of the gear as it is built is found all the same."""
+    file = load(UNSEEN / "planetary_gear.py")
+    with pytest.warns(RedundantConstraintWarning):
+        prepared = prepare(file.model, file.scenes[0])
+    fmu = write(prepared, tmp_path, file.closed_forms, target="native")
+    lay_beside(fmu, prepared)
+    with Bench(fmu, quick=True) as one:
+        run = one.run({name: 1e300}, [0.0])
+        assert [c for c in one.checks(run) if c.ratio > 1] == []
+
+        def change(rows):
+            rows["der(carrier,2)"][3] *= 1 + 1e-10
+
+        assert "der(carrier,2)" in judged(one, change)
+
+
+def test_a_condition_without_a_value_does_not_hold(bench):
+    """inf - inf: nothing can be said where a closed form applies, so that it says nothing."""
+    a = sp.Symbol("a", positive=True)
+    form = CarriedForm("a", a, 2 * a, *[None] * 4, None, 10.0, 1e-12, when=1 / a - 1 / a**2)
+    run = bench.ordinary
+    assert applies(form, run.rows, dict(run.values) | {"a": 2.0}).all()
+    assert not applies(form, run.rows, dict(run.values) | {"a": 0.0}).any()
 
 
 def test_a_surface_that_pulls_is_found(bench):
@@ -336,7 +431,7 @@ def test_a_scale_of_a_difference_is_none_of_its_magnitudes(bench):
     theta, r = sp.symbols("theta r", real=True)
     small, zero = 1e-15 * theta, sp.Integer(0)
     law = CarriedForm("law", zero, small, scale=theta - 2 * r)
-    (form,) = judged_forms((law,), set())
+    (form,) = judged_forms((law,), set(), {})
     run = bench.ordinary
     rows = np.ones(len(run.rows))
     error, allowed, _ = form.judge(run, rows, rows == 1, {"theta": 2.0, "r": 1.0})
@@ -378,9 +473,6 @@ def test_probes_cover_the_ranges(bench):
     for p in "mga":
         assert sum(n.startswith(f"parameters: {p} = ") for n in names) >= 8
     assert len(names) == len(set(names))
-
-
-UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
 
 
 def test_what_balances_is_no_difference_of_runs(tmp_path):

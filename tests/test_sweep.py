@@ -292,7 +292,7 @@ def test_axes_are_crossed_in_the_order_in_which_they_are_given():
         (["--vary", "theta=1,2", "--sampling", "grid"], "latin-hypercube, sobol"),
         (["--vary", "theta=1,2", "--scene", "Other"], "is for a model file"),
         (["--vary", "theta=1,2", "--tolerance", "0"], "tolerance = 0.0"),
-        (["--vary", "theta=1,2", "--tolerance", "1000"], "at most 1"),
+        (["--vary", "theta=1,2", "--tolerance", "1000"], "at most 0.1"),
         (["--vary", "theta=1,2", "--resume"], "the out of the sweep"),
         (["--vary", "theta=1,2", "--plot", "runs.xyz"], ".svg, .png, .pdf"),
         (["--vary", "solver.method=1.5"], "expected a whole number"),

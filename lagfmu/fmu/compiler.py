@@ -1,7 +1,7 @@
 """C sources -> shared libraries for several platforms, by `ziglang` (from any host) or the system's cc.
 
-The objects of the runtime are the same for all FMUs: they are compiled once for a platform, into a
-folder of the user's cache that is named by their content, and linked from there.
+The objects of the runtime are the same for all FMUs: each is compiled once for a platform, into the user's
+cache, where its name tells what it was made of, and linked from there.
 """
 
 from __future__ import annotations
@@ -183,14 +183,15 @@ def compile_libraries(
 
 
 def is_first(platforms: Sequence[Platform], runtime: Mapping[str, bytes]) -> bool:
-    """True if the runtime's objects are not in the cache for one of the platforms."""
+    """True if an object of the runtime is not in the cache for one of the platforms."""
     compiler = find_compiler()
     if compiler is None:
         return False
     return any(
-        not _objects_folder(compiler, t, runtime).is_dir()
+        not place.exists()
         for p in platforms
         for t in (p.targets if compiler.cross else ("",))
+        for place in _places(compiler, t, runtime).values()
     )
 
 
@@ -202,15 +203,15 @@ def _library(
     runtime: Mapping[str, bytes],
     left_out: Collection[str],
 ) -> bytes:
-    objects = _objects(compiler, target, runtime)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         for file, content in {**runtime, **generated}.items():
             if file.endswith(".h") or file in generated:
                 Path(folder, file).write_bytes(content)
-        gone = {f"{Path(file).stem}.o" for file in (*left_out, *generated)}
-        linked = sorted(o.name for o in objects.iterdir() if o.name not in gone)
-        for made in linked:
-            shutil.copy(objects / made, folder)
+        linked = []
+        for file, made in _objects(compiler, target, runtime).items():
+            if file not in left_out and file not in generated:
+                linked.append(f"{file[:-2]}.o")
+                shutil.copy(made, Path(folder, linked[-1]))
         for file in sorted(f for f in generated if f.endswith(".c")):
             _compile(compiler, target, file, f"{file[:-2]}.o", folder)
             linked.append(f"{file[:-2]}.o")
@@ -220,37 +221,42 @@ def _library(
         return Path(folder, library).read_bytes()
 
 
-def _objects(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> Path:
-    """The folder that holds the runtime's objects, compiled if it is not there yet."""
-    place = _objects_folder(compiler, target, runtime)
-    if place.is_dir():
-        return place
-    place.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".lagfmu_", dir=str(place.parent)) as folder:
-        made = Path(folder, "objects")
-        made.mkdir()
+def _objects(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> dict[str, Path]:
+    """C file of the runtime -> its object in the cache, compiled if it is not there yet."""
+    places = _places(compiler, target, runtime)
+    wanted = [file for file, place in places.items() if not place.exists()]
+    if not wanted:
+        return places
+    _cache().mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".lagfmu_", dir=str(_cache())) as folder:
         for file, content in runtime.items():
             Path(folder, file).write_bytes(content)
-        for file in sorted(f for f in runtime if f.endswith(".c")):
-            _compile(compiler, target, file, f"objects/{file[:-2]}.o", folder)
-        with contextlib.suppress(OSError):  # another process was faster
-            made.rename(place)
-    return place
+        for file in wanted:
+            made = f"{file[:-2]}.o"
+            _compile(compiler, target, file, made, folder)
+            with contextlib.suppress(OSError):  # another process was faster
+                Path(folder, made).replace(places[file])
+    return places
 
 
-def _objects_folder(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> Path:
-    digest = hashlib.sha256()
-    for part in (
-        compiler.identity.encode(),
-        target.encode(),
-        *(
-            part
-            for file, content in sorted(runtime.items())
-            for part in (file.encode(), *map(str.encode, _flags(compiler, target, file)), content)
-        ),
-    ):
-        digest.update(len(part).to_bytes(8, "big") + part)
-    return _cache() / f"{target or 'host'}-{digest.hexdigest()[:24]}"
+def _places(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> dict[str, Path]:
+    """Where the objects are: named by compiler, platform, flags, all headers and the file's content."""
+    common = hashlib.sha256()
+
+    def take(digest: hashlib._Hash, *parts: bytes) -> str:
+        for part in parts:
+            digest.update(len(part).to_bytes(8, "big") + part)
+        return digest.hexdigest()[:24]
+
+    take(common, compiler.identity.encode(), target.encode())
+    for file in sorted(f for f in runtime if f.endswith(".h")):
+        take(common, file.encode(), runtime[file])
+    places = {}
+    for file in sorted(f for f in runtime if f.endswith(".c")):
+        flags = map(str.encode, _flags(compiler, target, file))
+        name = take(common.copy(), file.encode(), *flags, runtime[file])
+        places[file] = _cache() / f"{file[:-2]}-{target or 'host'}-{name}.o"
+    return places
 
 
 def _cache() -> Path:

@@ -337,7 +337,8 @@ def applies(
     if (until := closed_form.until_departure) is not None:
         chosen &= np.logical_and.accumulate(closed(until) & ~left(until))
     if closed_form.when is not None:
-        chosen &= evaluate(closed_form.when, result, result, values, closed_form.name) != 0
+        when = evaluate(closed_form.when, result, result, values, closed_form.name)
+        chosen &= (when != 0) & ~np.isnan(when)  # a condition without a value does not hold
     if (at := closed_form.at_departure) is not None:
         chosen &= (np.cumsum(left(at)) == 1) & closed(at)[0]
     return chosen

@@ -32,7 +32,7 @@ static const double AFAR_ARRIVED = 1e3 * DBL_EPSILON; /* slip, relative to its t
 static const double RANK_EASE = 0x1p-15; /* weight of a start value's rank below those that a stage frees */
 static const double LARGEST_ANGLE = 1e-3 * 0x1p52; /* [rad] neighbouring doubles are 1e-3 apart */
 static const double SMALLEST_TOLERANCE = 1e-14; /* of a step, relative: less is rounding, ... */
-static const double LARGEST_TOLERANCE = 1; /* ... and more lets errors be larger than the values */
+static const double LARGEST_TOLERANCE = 0.1; /* ... and from 0.7 on steps go through contacts unseen */
 
 /* ---- the motion's own sizes and times ---- */
 static const double TOUCH = 1e-9; /* |f| below this, in the constraint's own size, counts as touching */

@@ -27,10 +27,20 @@ static const double SHORT = 1e-2; /* natural time in which a contact closes what
 static const double CLOSE = 10;   /* condition of rows that stand for all, beyond which they are chosen anew */
 static const double LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
 
+void exchange_begin(Instance *x) {
+    memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
+}
+
 void exchange_set_time(Instance *x, double t) {
     Solver *s = &x->solver;
+    int driven = 0; /* an importer that drives inputs sets their values at each time itself */
+    for (int k = 0; k < s->system->inputs; k++) driven |= x->set[k];
     if (s->state.now.t != t) x->observed = x->evaluated = 0;
-    s->state.now.t = s->drive.since = t; /* the importer sets the inputs' values at each time itself */
+    s->state.now.t = t;
+    if (driven)
+        s->drive.since = t;
+    else
+        instance_move_inputs(x, t);
 }
 
 Status exchange_get_states(Instance *x, double *states) {

@@ -7,6 +7,9 @@
 
 #include "instance.h"
 
+/* The start is over.  Prescribed motions go on by their rates until the importer sets an input. */
+void exchange_begin(Instance *x);
+
 void exchange_set_time(Instance *x, double t);
 Status exchange_get_states(Instance *x, double *states);
 void exchange_set_states(Instance *x, const double *states);

@@ -287,6 +287,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component component) {
     Component *c = component;
     if (!allowed(c, INITIALIZATION)) return forbidden(c, "fmi2ExitInitializationMode");
     if (instance_observe(&c->instance) != OK) return failed(c, fmi2Error);
+    if (c->instance.exchange) exchange_begin(&c->instance);
     c->instance.running = 1;
     c->instance.phase = c->instance.exchange ? EVENT : STEP_COMPLETE;
     return fmi2OK;

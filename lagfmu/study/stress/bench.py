@@ -52,7 +52,11 @@ class Bench:
         self.facts: Facts = facts_of(path)
         self.quick = quick
         self.forms = (
-            *judged(self.facts.closed_forms, {i.name for i in self.facts.inputs}),
+            *judged(
+                self.facts.closed_forms,
+                {i.name for i in self.facts.inputs},
+                self.facts.roundings,
+            ),
             *laws(self.facts.laws),
         )
         self.folder = Path(fmpy.extract(str(path)))

@@ -13,12 +13,13 @@ largest angle so far [rad], at least 1: its error is tol * |angle|, that of its 
 `within` holds at the default tolerance, and errors are proportional to the tolerance only roughly.
 
 A closed form among the outputs of one instant has nothing to do with the integration: whatever the tolerance,
-it may be off by  LEEWAY * rounding * size,  with the size at that instant.
+it may be off by  LEEWAY * rounding * size,  with the size at that instant, and by what rounding leaves of
+accelerations in it: where forces balance on a light part, of what they would make of it alone (lagrange.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +62,8 @@ class JudgedForm:
     """A closed form ready to be judged; `pointwise`: it holds at each instant, whatever the inputs did.
 
     `instantaneous`: it relates the outputs of one instant, so that no error of the integration enters;
-    `law`: an equation that is solved at that instant, so that nothing but its own terms is its size.
+    `law`: an equation that is solved at that instant, so that nothing but its own terms is its size;
+    `left`: what rounding leaves in it of the accelerations that it speaks of.
     """
 
     closed_form: CarriedForm
@@ -71,6 +73,7 @@ class JudgedForm:
     pointwise: bool
     instantaneous: bool
     law: bool
+    left: Compiled
 
     def judge(
         self,
@@ -87,23 +90,18 @@ class JudgedForm:
         chosen = applies(self.closed_form, run.rows, run.values)
         if not self.instantaneous:
             chosen = chosen & undisturbed
-        actual = self.actual.at(run.rows[chosen], run.rows, run.values)
+        rows, result, values = run.rows[chosen], run.rows, run.values
+        actual = self.actual.at(rows, result, values)
         if len(actual) == 0:
             return 0.0, 1.0, 0
         first = np.full_like(actual, actual[0])
-        expected = (
-            first
-            if self.expected is None
-            else self.expected.at(run.rows[chosen], run.rows, run.values)
-        )
+        expected = first if self.expected is None else self.expected.at(rows, result, values)
         known = np.isfinite(expected) & np.isfinite(actual)  # elsewhere the form is not defined
         if not known.any():
             return 0.0, 1.0, 0
         least = None if self.law else floors
-        sizes = [
-            np.abs(expected),
-            *(np.abs(s.at(run.rows[chosen], run.rows, run.values, least)) for s in self.sizes),
-        ]
+        sizes = [np.abs(s.at(rows, result, values, least)) for s in self.sizes]
+        sizes.append(np.abs(expected))
         for s in sizes:
             known &= np.isfinite(s)
         if not known.any():
@@ -114,14 +112,17 @@ class JudgedForm:
             size = np.full(len(actual), size[known].max())
             tolerance = LEEWAY * self.closed_form.within * run.tolerance
             relative = np.maximum(relative, tolerance) * growth[chosen]
-        allowed = relative * size + np.finfo(float).tiny
+        left = np.nan_to_num(self.left.at(rows, result, values), posinf=0.0)
+        allowed = relative * size + LEEWAY * left + np.finfo(float).tiny
         error = np.abs(actual - expected)
         worst = int(np.argmax(np.where(known, error / allowed, -1.0)))
         return float(error[worst]), float(allowed[worst]), int(known.sum())
 
 
-def judged(closed_forms: tuple[CarriedForm, ...], inputs: set[str]) -> tuple[JudgedForm, ...]:
-    """Every closed form, compiled."""
+def judged(
+    closed_forms: tuple[CarriedForm, ...], inputs: set[str], roundings: Mapping[str, Expr]
+) -> tuple[JudgedForm, ...]:
+    """Every closed form, compiled; `roundings` of accelerations (lagrange.py)."""
     found = []
     for c in closed_forms:
         parts = [c.actual] + ([] if c.expected is None else [c.expected])
@@ -129,7 +130,9 @@ def judged(closed_forms: tuple[CarriedForm, ...], inputs: set[str]) -> tuple[Jud
         follows = any(
             u == "time" or names.initially(u) or names.read(u).head in names.EVENTS for u in used
         )
-        found.append(_judged(c, c.expected is not None and not follows, False, inputs))
+        instantaneous = c.expected is not None and not follows
+        left = _left(parts, roundings) if instantaneous else sp.S.Zero
+        found.append(_judged(c, instantaneous, False, inputs, left))
     return tuple(found)
 
 
@@ -139,10 +142,23 @@ def laws(closed_forms: tuple[CarriedForm, ...]) -> tuple[JudgedForm, ...]:
     One value that has to vanish is rounding of the run, not of itself.
     """
     alone = [c.expected == 0 and sp.sympify(c.actual).is_Symbol for c in closed_forms]
-    return tuple(_judged(c, True, not a, set()) for c, a in zip(closed_forms, alone, strict=True))
+    return tuple(
+        _judged(c, True, not a, set(), sp.S.Zero) for c, a in zip(closed_forms, alone, strict=True)
+    )
 
 
-def _judged(c: CarriedForm, instantaneous: bool, law: bool, inputs: set[str]) -> JudgedForm:
+def _left(parts: Sequence[Expr], roundings: Mapping[str, Expr]) -> Expr:
+    """By how much a statement may be missed where each acceleration is off by its rounding."""
+    difference = sp.Add(parts[0], *(-e for e in parts[1:]))
+    named = {str(s): s for s in difference.free_symbols}
+    return sp.Add(
+        *(sp.Abs(difference.diff(named[n])) * e for n, e in roundings.items() if n in named)
+    )
+
+
+def _judged(
+    c: CarriedForm, instantaneous: bool, law: bool, inputs: set[str], left: Expr
+) -> JudgedForm:
     parts = [c.actual] + ([] if c.expected is None else [c.expected])
     scale = [] if c.scale is None else [sp.sympify(c.scale)]
     # a difference of velocities is not one of the magnitudes that they have at least (Compiled.at)
@@ -157,6 +173,7 @@ def _judged(c: CarriedForm, instantaneous: bool, law: bool, inputs: set[str]) ->
         instantaneous or not inputs,
         instantaneous,
         law,
+        Compiled(left, c.name),
     )
 
 

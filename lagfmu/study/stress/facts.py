@@ -8,13 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import sympy as sp
+
 from ... import names
 from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm, tables_in, unpack_closed_forms
+from ...model.elements import Expr
 from ...verification.simulate import file_stem, read_description
 from ...verification.verify import RECORD, closed_forms_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
+ROUNDED = "rounding of "  # an acceleration: what the judge reads beside the laws
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
@@ -51,6 +55,7 @@ class Facts:
     contacts: tuple[str, ...]
     closed_forms: tuple[CarriedForm, ...]
     laws: tuple[CarriedForm, ...]
+    roundings: Mapping[str, Expr]
     dimensions: Mapping[str, Dimension]
     stop_time: float
     step_size: float
@@ -118,6 +123,7 @@ def facts_of(path: Path) -> Facts:
         for u in description.unitDefinitions
         if u.baseUnit is not None
     }
+    laid = _beside(path)
     experiment = description.defaultExperiment
     stop = float(getattr(experiment, "stopTime", None) or 1.0)
     coordinates = tuple(
@@ -152,7 +158,12 @@ def facts_of(path: Path) -> Facts:
         constraints=tuple(names.constraints((v.name for v in reals), names.MULTIPLIER)),
         contacts=tuple(names.constraints(variables, names.CONTACT)),
         closed_forms=tuple(closed_forms),
-        laws=_laws(path),
+        laws=tuple(c for c in laid if not c.name.startswith(ROUNDED)),
+        roundings={
+            c.name.removeprefix(ROUNDED): sp.sympify(c.expected)
+            for c in laid
+            if c.name.startswith(ROUNDED)
+        },
         dimensions={v.name: bases.get(v.unit, (0,) * len(BASE)) for v in reals}
         | {"time": (0, 0, 1) + (0,) * (len(BASE) - 3)},
         stop_time=stop,
@@ -173,9 +184,9 @@ def beside(path: Path) -> Path:
     return path.with_suffix(".lagrange.json")
 
 
-def _laws(path: Path) -> tuple[CarriedForm, ...]:
+def _beside(path: Path) -> list[CarriedForm]:
     file = beside(path)
-    return tuple(unpack_closed_forms(file.read_bytes(), str(file))) if file.exists() else ()
+    return list(unpack_closed_forms(file.read_bytes(), str(file))) if file.exists() else []
 
 
 def _settable(v: Any) -> Settable:

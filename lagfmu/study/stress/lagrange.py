@@ -18,8 +18,10 @@ where the terms of Q_j are its shares.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import sympy as sp
 
@@ -29,8 +31,10 @@ from ...model.closed_form import TIME, ClosedForm, in_variables, output
 from ...model.elements import Constraint, Expr
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
+from ...verification.verify import closed_forms_in
 from .closed_forms import magnitude
-from .facts import beside
+from .facts import ROUNDED, beside
+from .underflow import underflow
 
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
@@ -42,20 +46,15 @@ GAP = 4e-10  # of f, whose level a contact that closes within the gap of touchin
 
 def lay_beside(fmu: Path, prepared: Prepared) -> None:
     """Write the equations to where the judge of the FMU looks for them."""
-    forms = lagrange(prepared.model, frozenset(v.name for v in prepared.table.variables))
+    variables = frozenset(v.name for v in prepared.table.variables)
+    used = frozenset(n for c in closed_forms_in(fmu) for n in c.variables)
+    forms = [*lagrange(prepared.model, variables), *roundings(prepared.model, variables, used)]
     beside(fmu).write_bytes(pack_closed_forms(prepared.scene, forms, prepared.table))
 
 
 def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
     """The equations that can be held against an FMU with these variables."""
-    L, sides, masses = model.energy_expression, {}, {}
-    for q in model.coordinates:
-        v, name = q.diff(TIME), names.name(names.FORCE, "", name_of(q))
-        force = sp.sympify(model.forces.get(q, 0)) + (output(name) if name in variables else 0)
-        sides[q] = (L.diff(v).diff(TIME) - L.diff(q), force)
-        masses[q] = sp.Abs(in_variables(L.diff(v, 2)))
-    shares = _shares(model, variables)
-    terms = {q: sum(map(magnitude, map(in_variables, sides[q])), shares[q]) for q in sides}
+    sides, masses, terms = _sides(model, variables)
     forms = []
     for q, (inertia, force) in sides.items():
         others = [
@@ -66,14 +65,44 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
         ]
         scale = sp.Add(terms[q], *others)
         forms.append(_form(f"Lagrange's equation of {name_of(q)}", inertia, force, scale, None))
-    heavy = [q for q in sides if masses[q] != 0]
-    total = sp.Add(*(terms[q] / sp.sqrt(masses[q]) for q in heavy))
-    forms += _of_constraints(model, {q: total / sp.sqrt(masses[q]) for q in heavy})
+    forms += _of_constraints(model, _alone(masses, terms))
     forms += _of_shares(model, variables)
     for law in model.frictions:
         forms += _of_friction(model, law)
-    forms += [ClosedForm(o.name, o.expression, rounding=ROUNDING) for o in model.outputs]
+    for o in model.outputs:
+        least = _lost(o.expression)
+        forms.append(ClosedForm(o.name, o.expression, scale=least, rounding=ROUNDING))
     return [form for form in forms if _names(form) <= variables]
+
+
+def roundings(model: Model, variables: frozenset[str], used: frozenset[str]) -> list[ClosedForm]:
+    """What rounding leaves of each `used` acceleration in the metric of M, eps S / sqrt(M_jj), as forms
+    called ROUNDED + der(q,2): no solution of the equations in doubles is sure to be better, and where a
+    part of 1e300 kg m^2 hardly moves, a light one that turns with it is known to 1e-16 of what drives it."""
+    _, masses, terms = _sides(model, variables)
+    sizes = {names.derivative(name_of(q), 2): e for q, e in _alone(masses, terms).items()}
+    forms = [ClosedForm(ROUNDED + n, NOTHING * sizes[n], sp.S.Zero) for n in sizes if n in used]
+    return [form for form in forms if _names(form) <= variables]
+
+
+def _sides(model: Model, variables: frozenset[str]) -> tuple[Any, Any, Any]:
+    """Of each coordinate: the two sides of Lagrange's equation, M_qq, and the magnitude of all terms."""
+    L, sides, masses = model.energy_expression, {}, {}
+    for q in model.coordinates:
+        v, name = q.diff(TIME), names.name(names.FORCE, "", name_of(q))
+        force = sp.sympify(model.forces.get(q, 0)) + (output(name) if name in variables else 0)
+        sides[q] = (L.diff(v).diff(TIME) - L.diff(q), force)
+        masses[q] = sp.Abs(in_variables(L.diff(v, 2)))
+    shares = _shares(model, variables)
+    terms = {q: sum(map(magnitude, map(in_variables, sides[q])), shares[q]) for q in sides}
+    return sides, masses, terms
+
+
+def _alone(masses: Mapping[Expr, Expr], terms: Mapping[Expr, Expr]) -> dict[Expr, Expr]:
+    """S / sqrt(M_jj): what the terms would make of each acceleration in the metric of M."""
+    heavy = [q for q in masses if masses[q] != 0]
+    total = sp.Add(*(terms[q] / sp.sqrt(masses[q]) for q in heavy))
+    return {q: total / sp.sqrt(masses[q]) for q in heavy}
 
 
 def _shares(model: Model, variables: frozenset[str]) -> dict[Expr, Expr]:
@@ -129,12 +158,20 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
     work = (1 - sticks) * sp.Add(*(x * s for x, s in zip(lam, slip, strict=True)))
     forms.append(
         ClosedForm(
-            margin, static * N - force, output(margin), scale=force + static * N, rounding=ROUNDING
+            margin,
+            static * N - force,
+            output(margin),
+            scale=force + static * N + _lost(static * N - force),
+            rounding=ROUNDING,
         )
     )
     forms.append(
         ClosedForm(
-            power, work, output(power), scale=(1 - sticks) * force * speed, rounding=ROUNDING
+            power,
+            work,
+            output(power),
+            scale=(1 - sticks) * force * speed + _lost(work),
+            rounding=ROUNDING,
         )
     )
     for x, s in zip(lam, slip, strict=True):
@@ -150,6 +187,11 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
             )
         )
     return forms
+
+
+def _lost(e: Expr) -> Expr:
+    """The size beside which ROUNDING is what underflow may make of an expression that an FMU evaluates."""
+    return underflow(in_variables(sp.sympify(e))) / ROUNDING
 
 
 def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:

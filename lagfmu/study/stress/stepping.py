@@ -1,4 +1,4 @@
-"""Communication steps from 1e-9 to 1e6 natural times, tolerances 1 ... 1e-14, methods, long runs."""
+"""Communication steps from 1e-9 to 1e6 natural times, tolerances 1e-1 ... 1e-14, methods, long runs."""
 
 from __future__ import annotations
 

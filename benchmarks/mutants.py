@@ -1,0 +1,170 @@
+"""Which programming errors do the tests find?
+
+    python benchmarks/mutants.py [--stress] [--control] [WORD ...]
+
+Each defect of mutants.toml is made in a copy of the package, and the tests aimed at it run there until
+one fails.  Printed is a row a defect: what it breaks, and the test that noticed, or why none can.  WORD: only
+defects with one of these words in their file or description.  --stress: not the tests but `lagfmu stress`, of
+the models that a defect names.  --control: the same tests without any defect, first.  The exit code is 1 if a
+defect survives of which no reason is known, or one is found that was thought to make no difference.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+COPIED = ("lagfmu", "tests", "models", "pyproject.toml")
+PATIENCE = 100  # seconds of processor time, after which it is said to run without end
+STRICT = ("-std=c99", "-fsyntax-only", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+
+
+@dataclass(frozen=True)
+class Defect:
+    """`was` stands once in `file` (below lagfmu/) and becomes `becomes`; `breaks` says what no longer holds.
+
+    `tests` (arguments of pytest) are tried first, then those aimed at the file.  `survives` says why nothing
+    can notice.  `stress`: a file of models/ that has the feature.
+    """
+
+    file: str
+    was: str
+    becomes: str
+    breaks: str
+    tests: tuple[str, ...] = ()
+    survives: str = ""
+    stress: str = ""
+
+    def made_in(self, text: str) -> str:
+        """The file with the defect.  Raises ValueError if its place is not found, or not one."""
+        if text.count(self.was) != 1:
+            raise ValueError(f"{self.file}: found {text.count(self.was)} times: {self.was}")
+        return text.replace(self.was, self.becomes)
+
+
+def read() -> tuple[list[Defect], dict[str, list[str]]]:
+    """The defects, and file -> the tests that are aimed at it."""
+    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+    defects = [Defect(**{**d, "tests": tuple(d.get("tests", ()))}) for d in table["defect"]]
+    return defects, table["tests"]
+
+
+def _limited() -> None:
+    """In the child: an end to what has none, and the others on this machine first."""
+    import resource  # not on Windows
+
+    resource.setrlimit(resource.RLIMIT_CPU, (PATIENCE, PATIENCE))
+    os.nice(10)
+
+
+def _run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "400"}
+    return subprocess.run(
+        [sys.executable, "-m", *command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=_limited,
+    )
+
+
+def _found_by_tests(tests: list[str], folder: Path) -> str:
+    """The test that fails first; empty if none does."""
+    options = ["-x", "-v", "-n", "0", "--tb=no", "-p", "no:cacheprovider", "-k", "not python-"]
+    options[-1] = "not [python and not -python"  # the C runtime is not in those
+    run = _run(["pytest", *options, f"--basetemp={folder / 'made'}", *tests], folder)
+    if run.returncode == 0:
+        return ""
+    failed = re.findall(r"^(?:FAILED|ERROR) tests/\S+::(\w+)", run.stdout, re.MULTILINE)
+    if failed:
+        return failed[0]
+    begun = re.findall(r"^tests/\S+::(\w+)", run.stdout, re.MULTILINE)
+    if run.returncode >= 0 or not begun:
+        raise RuntimeError(f"pytest {' '.join(tests)}: {run.stdout[-2000:]}{run.stderr[-2000:]}")
+    return f"{begun[-1]} (signal {-run.returncode})"
+
+
+def _found_by_stress(model: str, folder: Path) -> str:
+    """The first wrong probe of `lagfmu stress`; empty if none is."""
+    options = ["--target", "native", "--quick", "--limit", "20"]
+    run = _run(["lagfmu", "stress", f"models/{model}.py", *options], folder)
+    if run.returncode == 0:
+        return ""
+    wrong = re.findall(r"^.*\bwrong\b.*$", run.stdout, re.MULTILINE)
+    return wrong[0].strip() if wrong else f"exit code {run.returncode}: {run.stderr.strip()[-200:]}"
+
+
+def _check(path: Path, text: str, folder: Path) -> None:
+    """Raises RuntimeError if the defect does not compile: that would be no defect."""
+    if path.suffix == ".py":
+        compile(text, str(path), "exec")
+        return
+    includes = [f"-I{p}" for p in (folder / "lagfmu" / "runtime").iterdir() if p.is_dir()]
+    run = subprocess.run(
+        ["cc", *STRICT, *includes, str(path)], capture_output=True, text=True, check=False
+    )
+    if run.returncode:
+        raise RuntimeError(run.stderr)
+
+
+def main() -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("words", nargs="*", metavar="WORD")
+    parser.add_argument("--stress", action="store_true")
+    parser.add_argument("--control", action="store_true")
+    asked = parser.parse_args()
+    defects, aimed = read()
+    if asked.stress:
+        defects = [d for d in defects if d.stress]
+    if asked.words:
+        defects = [d for d in defects if any(w in f"{d.file} {d.breaks}" for w in asked.words)]
+    surprises = 0
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        for name in COPIED:
+            copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+            copy(ROOT / name, folder / name)
+
+        def found(defect: Defect) -> str:
+            if asked.stress:
+                return _found_by_stress(defect.stress, folder)
+            tests = [*defect.tests, *aimed.get(defect.file, ())]
+            return _found_by_tests([t if t[0] == "-" else f"tests/{t}" for t in tests], folder)
+
+        if asked.control:
+            for defect in {(d.file, d.tests, d.stress): d for d in defects}.values():
+                if by := found(defect):
+                    raise RuntimeError(f"without any defect: {defect.file}, {by}")
+        print(
+            f"| file | defect | {'stress' if asked.stress else 'found by'} |\n| --- | --- | --- |"
+        )
+        for defect in defects:
+            path = folder / "lagfmu" / defect.file
+            right = path.read_text("utf-8")
+            path.write_text(defect.made_in(right), "utf-8")
+            _check(path, defect.made_in(right), folder)
+            by = found(defect)
+            path.write_text(right, "utf-8")
+            shutil.rmtree(folder / "made", ignore_errors=True)
+            if not asked.stress:
+                surprises += bool(by) == bool(defect.survives)
+            why = defect.survives or "?"
+            shown = f"`{by}`" if by else f"**nothing**{'' if asked.stress else ': ' + why}"
+            print(f"| {path.name} | {defect.breaks} | {shown} |", flush=True)
+    return int(surprises > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
