@@ -18,6 +18,7 @@ from ..api import package
 from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
+from ..fmu.described import read_description
 from ..fmu.native import takes_long
 from ..fmu.write import write_whole
 from ..interface.variables import VariableTable
@@ -41,7 +42,7 @@ from ..verification.pipeline import Outcome, UsageError, as_json, as_junit, exit
 from ..verification.plot import default_names
 from ..verification.reference import read_table
 from ..verification.result import NOT_YET, Result, as_text
-from ..verification.simulate import read_description, simulate
+from ..verification.simulate import simulate
 from ..verification.verify import Verification
 from .film import film
 from .options import (

@@ -17,10 +17,11 @@ from xml.etree import ElementTree as ET
 
 from .. import names
 from ..errors import SimulationError
+from ..fmu.described import experiment_of, read_description
 from ..fmu.write import write_whole
 from .pipeline import as_json
 from .report import outcome
-from .simulate import Trajectory, communication_points, read_description, simulate
+from .simulate import Trajectory, communication_points, simulate
 from .verify import Verification
 
 TOLERANCE = 1e-12
@@ -54,9 +55,8 @@ def reference_run(
     inputs: Trajectory | None = None,
 ) -> tuple[Trajectory, float, float]:
     """The run, its stop time and its communication step [s].  Raises SimulationError."""
-    experiment = read_description(fmu).defaultExperiment
-    stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
-    step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
+    experiment = experiment_of(read_description(fmu), stop_time, step_size)
+    stop, step = experiment.stop_time, experiment.step_size
     return simulate(fmu, stop, step, TOLERANCE, inputs=inputs), stop, step
 
 

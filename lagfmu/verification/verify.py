@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
+from ..fmu.described import experiment_of, numbers_of, read_description
 from .evaluate import evaluate
-from .simulate import Trajectory, read_description, simulate, steps_of
+from .simulate import Trajectory, simulate, steps_of
 
 RECORD = "resources/lagfmu.json"
 MODES = ("Boolean", "Real")  # what a mode may be: a Real where an FMU has Reals alone
@@ -131,13 +132,8 @@ def verify(
         stop_time = float(reference.table["time"][-1]) or None
     result = simulate(path, stop_time, step_size, tolerance, start_values, inputs, besides=besides)
     seconds = time.perf_counter() - begun
-    experiment = description.defaultExperiment
-    used = tolerance or float(getattr(experiment, "tolerance", None) or 1e-8)
-    values = {
-        v.name: float(v.start)
-        for v in description.modelVariables
-        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
-    }
+    used = tolerance or experiment_of(description).tolerance
+    values = numbers_of(description)
     values |= {k: float(v) for k, v in (start_values or {}).items() if not isinstance(v, str)}
     used = values.get(names.TOLERANCE) or used
     checks = [

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .choose import Choice
-from .figure import COLOURS, FAR, STYLE, method_handles, time_unit
+from .figure import COLOURS, FAR, method_handles, time_unit
 from .figure import curve as curve_of
 
 LINES = {"multipliers": "-", "nullspace": "--", "minimal": ":"}
@@ -21,9 +21,11 @@ def curve(choice: Choice) -> str:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    from ...verification.figure import STYLE
+
     measured = choice.survey
     factor, unit = time_unit((o.row for o in measured.options), measured.simulated)
-    with plt.rc_context(STYLE | {"svg.fonttype": "none", "font.size": 9}):
+    with plt.rc_context(STYLE | {"hatch.linewidth": 0.4, "svg.fonttype": "none", "font.size": 9}):
         figure, axis = plt.subplots(figsize=(6.6, 3.3), layout="constrained")
         axis.set_xscale("log")
         axis.set_yscale("log")

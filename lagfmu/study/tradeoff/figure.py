@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import BuildError
 from ...model.units import for_reading
 from .measure import Tradeoff, Weighed
 from .quantities import EVENT, FORCE, MULTIPLIER, OWN
@@ -27,16 +26,6 @@ COLOURS = {
     "rattle": "#ad1a72",
 }
 MARKERS = {"dop853": "o", "radau5": "^", "rk4": "D", "rattle": "v"}
-STYLE: dict[str, Any] = {
-    "svg.hashsalt": "lagfmu",
-    "font.size": 10,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "axes.axisbelow": True,
-    "hatch.linewidth": 0.4,
-}
 WORTH = 0.1  # part of the error of the last named point at which the next one is named
 FAR = 8.0  # times fmpy's own calls: what is slower has them below its panel
 UNITS = ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns"))
@@ -52,10 +41,12 @@ def draw(found: Tradeoff, outs: Sequence[str | os.PathLike[str]]) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    from ...verification.figure import STYLE, save
+
     groups = [g for g in found.groups if g != FORCE or MULTIPLIER not in found.groups]
     steps = list(dict.fromkeys(r.setting.communication for r in found.rows))
     factor, unit = time_unit(found.rows, found.simulated)
-    with plt.rc_context(STYLE):
+    with plt.rc_context(STYLE | {"font.size": 10, "hatch.linewidth": 0.4}):
         figure, axes = plt.subplots(
             len(groups),
             len(steps),
@@ -93,12 +84,7 @@ def draw(found: Tradeoff, outs: Sequence[str | os.PathLike[str]]) -> None:
         figure.suptitle(f"{found.name} ({found.target} FMU): speed against accuracy", fontsize=12.5)
         try:
             for out in outs:
-                path = Path(out)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                metadata = {"Date": None} if path.suffix == ".svg" else {}
-                figure.savefig(path, metadata=metadata, dpi=130)
-        except (OSError, ValueError) as error:
-            raise BuildError(f"cannot write the figure {str(out)!r}: {error}") from None
+                save(figure, Path(out))
         finally:
             plt.close(figure)
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from ... import names
 from ...errors import SimulationError
 from ...fmu.closed_forms import CarriedForm
+from ...fmu.described import numbers_of
 from ...model.closed_form import output
 from ...model.elements import Expr
 from ...verification.evaluate import evaluate
@@ -166,11 +167,7 @@ def _replaced(run: Trajectory, right: Mapping[str, NDArray[np.float64]]) -> Traj
 
 def _numbers(importer: Importer, given: Mapping[str, Any]) -> dict[str, float]:
     """The values of parameters, inputs and given start values by name."""
-    values = {
-        v.name: float(v.start)
-        for v in importer.description.modelVariables
-        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
-    }
+    values = numbers_of(importer.description)
     return values | {k: float(v) for k, v in given.items() if not isinstance(v, str)}
 
 
