@@ -79,7 +79,15 @@ def _counts(found: Sequence[Stressed]) -> list[str]:
     for f in found:
         counts = [f.count(v) for v in VERDICTS]
         checks = sum(r.checks for r in f.rows)
-        lines.append(cells(f.name, len(f.rows), *counts, checks, f"`{f.digest[:16]}`"))
+        lines.append(
+            cells(
+                f.name,
+                len(f.rows),
+                *counts,
+                checks,
+                f"`{f.digest if len(found) == 1 else f.digest[:16]}`",
+            )
+        )
     lines += ["", f"| family | {head} |", f"| --- |{rule}"]
     for family in dict.fromkeys(x for f in found for x in f.families):
         counts = [sum(f.count(v, family) for f in found) for v in VERDICTS]
