@@ -291,7 +291,7 @@ LINEAR_IN_PLACES = {
 
 @pytest.mark.parametrize("name", LINEAR_IN_PLACES)
 def test_linear_system_in_a_coordinate(name):
-    """dx = A x ds: any coordinate may be what time is above, x exp(-A s) is constant (though not looked for)."""
+    """dx = A x ds: any coordinate may be what time is above, x exp(-A s) is constant (not looked for)."""
     forms, names = LINEAR_IN_PLACES[name]
     answer = classify(forms, names)
     check(answer, Kind.INTEGRABLE, len(forms), len(forms), found=len(answer.integrals))
