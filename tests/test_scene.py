@@ -6,6 +6,7 @@ import re
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from lagfmu.page.savings import savings
 from lagfmu.prepare.prepare import Prepared, prepare
 from lagfmu.verification.simulate import Trajectory
 
+pytestmark = pytest.mark.python_cases(3)
 FORCES = ("lambda.*", "Q.*")
 Make = Callable[..., tuple[Path, Prepared]]
 
@@ -62,6 +64,12 @@ def largest_difference(one: Trajectory, other: Trajectory, names: Any) -> float:
         scale = np.abs(a).max() or 1.0
         worst = max(worst, float(np.abs(a - b).max() / scale))
     return worst
+
+
+@cache
+def exactly(path: Path) -> Trajectory:
+    """A full FMU's own run at the tolerance 1e-11, with dop853: several scenes are held against it."""
+    return simulate(path, tolerance=1e-11, start_values={"solver.method": "dop853"})
 
 
 def variables(path: Path) -> dict[str, Any]:
@@ -105,7 +113,7 @@ def test_numbers_in_the_code_are_the_parameters_values(name: str, fmu: Any, make
     """lambda and Q with every parameter folded in differ from the full FMU's by rounding, which a run
     at the tolerance 1e-11 carries no further than 1e-8 of their size."""
     path, _ = make(name, outputs=FORCES, fixed=["*"], method="dop853")
-    full = simulate(fmu(name), tolerance=1e-11, start_values={"solver.method": "dop853"})
+    full = exactly(fmu(name))
     run = simulate(path, tolerance=1e-11)
     names = [n for n in run.dtype.names if n != "time"]
     assert largest_difference(full, run, names) < 1e-8
@@ -123,7 +131,7 @@ def test_coordinates_alone_follow_the_same_motion(name: str, fmu: Any, make: Mak
     file, _ = scene_of(name)
     names = [str(q.func) for q in file.model.coordinates]
     path, prepared = make(name, outputs=names, method="dop853")
-    full = simulate(fmu(name), tolerance=1e-11, start_values={"solver.method": "dop853"})
+    full = exactly(fmu(name))
     run = simulate(path, tolerance=1e-11)
     assert outputs(path) == [n for n in full.dtype.names if n in names]
     assert largest_difference(full, run, names) < 1e-8
@@ -199,7 +207,7 @@ def test_a_number_may_open_a_contact_at_the_start() -> None:
 def test_an_input_that_nothing_drives_is_a_number(fmu: Any, make: Make) -> None:
     """The cart under no force moves as with F = 0 held, and F is not there."""
     path, _ = make("CartPendulum", inputs=[], method="dop853")
-    full = simulate(fmu("CartPendulum"), tolerance=1e-11, start_values={"solver.method": "dop853"})
+    full = exactly(fmu("CartPendulum"))
     run = simulate(path, tolerance=1e-11)
     assert "F" not in variables(path)
     assert largest_difference(full, run, ["s", "x", "y", "lambda.rod"]) < 1e-9
