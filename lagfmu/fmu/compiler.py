@@ -44,11 +44,10 @@ FLAGS = (
 FAST = "-O2"
 SMALL = ("-Os", "-Xclang", "-Oz")  # zig takes -Oz for -Os, which clang packs 7 % worse
 HOT = {  # where the time of a step and of a communication point goes; all else is compiled for size
-    *("model.c", "mechanism.c", "project.c", "friction.c"),
-    *("linear.c", "schur.c", "ldlt.c", "kkt.c", "lu.c"),
-    *("dop853.c", "rk4.c", "radau5.c", "rattle.c", "step_size.c", "stiffness.c"),
-    *("flow.c", "advance.c", "observe.c", "outputs.c", "indicators.c", "samples.c"),
-    *("system.c", "integrator.c"),
+    *("model.c", "mechanism.c", "project.c", "friction.c", "sensitivity.c"),
+    *("linear.c", "schur.c", "ldlt.c", "lu.c", "painleve.c"),
+    *("dop853.c", "rk4.c", "radau5.c", "rattle.c", "integrator.c"),
+    *("flow.c", "state.c", "observe.c", "clearance.c", "system.c"),
     "lagfmu.c",  # the runtime in one file
 }
 
@@ -276,12 +275,13 @@ def _suffix(target: str) -> str:
 
 def _link_flags(target: str, library: str) -> list[str]:
     if _suffix(target) == ".dylib":
-        return [*SHARED, "-Wl,-dead_strip", f"-Wl,-install_name,@rpath/{library}"]
+        return [*SHARED, "-Wl,-dead_strip", "-Wl,-x", f"-Wl,-install_name,@rpath/{library}"]
     if _suffix(target) == ".dll":
         return [*SHARED, "-Wl,--gc-sections"]
     if _suffix(target) == WASM.suffix:  # what the sources mark as exported
         return ["-mexec-model=reactor", "-s", "-Os", "-Wl,--gc-sections"]
-    return [*SHARED, "-Wl,--gc-sections", "-Wl,--build-id=none", f"-Wl,-soname,{library}"]
+    lean = ("-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,--hash-style=gnu", "-Wl,-Bsymbolic")
+    return [*SHARED, *lean, f"-Wl,-soname,{library}"]
 
 
 def _compile(compiler: Compiler, target: str, file: str, made: str, folder: str) -> None:

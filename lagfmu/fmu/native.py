@@ -8,7 +8,7 @@ from importlib.resources import files
 
 from ..codegen.c.amalgam import amalgamate, with_one_header
 from ..codegen.c.equations import model_source
-from ..codegen.c.optional import files_left_out, needs_tangents, optional_source
+from ..codegen.c.optional import files_left_out, held, needs_tangents, optional_source
 from ..codegen.c.tables import entanglements
 from ..codegen.c.variables import variables_source
 from ..errors import BuildError
@@ -81,17 +81,16 @@ def sources_of(prepared: Prepared) -> Sources:
             "another method"
         )
     everything = runtime_files()
-    gone = files_left_out(scene, system)
+    integrators = held(scene, form)
+    gone = files_left_out(scene, system, integrators)
     generated = {
         "model.c": model_source(form, needs_tangents(scene, system)).encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
+        "optional.c": optional_source(scene, system, integrators).encode(),
     }
-    parts = optional_source(scene, system)
-    if parts is not None:
-        generated["optional.c"] = parts.encode()
     gone |= generated.keys()
     runtime = {file: text for file, text in everything.items() if file not in gone}
-    shipped = amalgamate(runtime, version())
+    shipped = amalgamate(runtime, generated, version())
     shipped |= {file: with_one_header(text, runtime) for file, text in generated.items()}
     differentiable = scene.differentiable and not system.frictions
     common = {

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from ...mechanics.form import Form
 from ...methods import INTEGRATORS, METHODS
 from ...model.scene import Scene
 from ...solver.indicators import is_watched
 from ...solver.system import System
+from .tables import entanglements
 
 AT_EVENTS = {"events_find": "events.c"}
 AT_CONTACTS = {
@@ -44,12 +46,15 @@ const Optional OPTIONAL = {{
 """
 
 
-def optional_source(scene: Scene, system: System) -> str | None:
-    """C text that defines OPTIONAL; None if nothing is left out, as in the runtime's own optional.c."""
-    found, contacts = scene.integrators, bool(system.contacts or system.frictions)
-    everything = system.frictions and set(scene.selectable) == set(METHODS)
-    if everything and not scene.error_bars:
-        return None
+def held(scene: Scene, form: Form) -> tuple[str, ...]:
+    """The integrators of an FMU: those behind its methods; rattle only where it can step the equations."""
+    apart = "rattle" in scene.integrators and not entanglements(form.equations, form.formulation)
+    return tuple(m for m in scene.integrators if m != "rattle" or apart)
+
+
+def optional_source(scene: Scene, system: System, found: tuple[str, ...]) -> str:
+    """C text that defines OPTIONAL; `found` are the integrators."""
+    contacts = bool(system.contacts or system.frictions)
     menu = {m: m for m in found}
     if "auto" in scene.selectable:
         menu["auto"] = "dop853"
@@ -80,9 +85,9 @@ def needs_tangents(scene: Scene, system: System) -> bool:
     return scene.differentiable or "radau5" in scene.integrators
 
 
-def files_left_out(scene: Scene, system: System) -> frozenset[str]:
-    """The runtime's files that the FMU does without."""
-    gone = {f"{m}.c" for m in INTEGRATORS if m not in scene.integrators}
+def files_left_out(scene: Scene, system: System, found: tuple[str, ...]) -> frozenset[str]:
+    """The runtime's files that the FMU does without; `found` are its integrators."""
+    gone = {f"{m}.c" for m in INTEGRATORS if m not in found}
     if not system.frictions:
         gone |= {*FRICTION}
     if not scene.error_bars:

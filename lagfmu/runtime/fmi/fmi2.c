@@ -447,6 +447,15 @@ static int is_offered(int method) {
 
 static fmi2Status valid_method(Component *c, const Variable *v, int method) {
     Why text;
+    if (method == RATTLE &&
+        !(MODEL_SYSTEM->separable && MODEL_SYSTEM->formulation == MULTIPLIERS)) {
+        (void)fail(&text,
+                   "'%s' = 'rattle': this method needs a constant mass matrix, forces without "
+                   "velocities, position constraints only and the formulation 'multipliers'; "
+                   "choose another",
+                   v->name);
+        return refuse(c, text.text);
+    }
     if (!is_offered(method)) {
         const char *comma = "";
         (void)fail(&text, "'%s' = %d, expected one of ", v->name, method);
@@ -455,15 +464,6 @@ static fmi2Status valid_method(Component *c, const Variable *v, int method) {
             why_append(&text, "%s%d (%s)", comma, k, METHOD_NAMES[k]);
             comma = ", ";
         }
-        return refuse(c, text.text);
-    }
-    if (method == RATTLE &&
-        !(MODEL_SYSTEM->separable && MODEL_SYSTEM->formulation == MULTIPLIERS)) {
-        (void)fail(&text,
-                   "'%s' = 'rattle': this method needs a constant mass matrix, forces without "
-                   "velocities, position constraints only and the formulation 'multipliers'; "
-                   "choose another",
-                   v->name);
         return refuse(c, text.text);
     }
     return fmi2OK;
