@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import re
+import shutil
 import warnings
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import SettingError, SimulationError, VerificationError
+from ..fmu.archive import unpack
 from ..fmu.python import slave_of
 from ..fmu.slave import Refused
 from ..methods import IN_PYTHON, NUMBERS, unknown
@@ -311,9 +313,10 @@ def _simulate_fmu(
     values = {
         k: settable[k].items.get(v, v) if isinstance(v, str) else v for k, v in values.items()
     }
+    folder = unpack(path)
     try:
         result: Trajectory = fmpy.simulate_fmu(
-            str(path),
+            folder,
             stop_time=stop,
             output_interval=step,
             step_size=step,
@@ -329,6 +332,8 @@ def _simulate_fmu(
         raise SimulationError(_told(path, error, messages)) from None
     except Exception as error:
         raise SimulationError(f"{str(path)!r} cannot be simulated: {error}") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
     tell(moved)
     reached = float(result["time"][-1])
     if reached < stop * (1 - 1e-9):  # fmpy ends a run at fmi2Discard without a word

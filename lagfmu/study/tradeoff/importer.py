@@ -19,11 +19,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ...errors import SimulationError, VerificationError
+from ...fmu.archive import unpack
 from ...fmu.session import RefusalError, Session, plug, reason
 from ...names import TOLERANCE
 from ...verification.simulate import Trajectory, communication_points, read_description
@@ -59,7 +59,7 @@ class Importer(Session):
                 f"{str(fmu)!r} has no parameter {TOLERANCE!r}: it was not built by lagfmu, and "
                 "there is no setting to vary"
             )
-        folder = fmpy.extract(str(fmu))
+        folder = unpack(fmu)
         try:
             super().__init__(plug(fmu, description, folder), "tradeoff")
         except RefusalError as error:
