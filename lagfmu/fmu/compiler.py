@@ -313,8 +313,8 @@ def _run(compiler: Compiler, target: str, arguments: Sequence[str], folder: str)
     if run.returncode != 0:
         place = Path(folder).parent
         if "No space left" in run.stderr or shutil.disk_usage(place).free < LITTLE:
-            error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(place))
-            raise TemporaryFolderError(error, CACHE if place == _cache() else "TMPDIR")
+            full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(place))
+            raise TemporaryFolderError(full, CACHE if place == _cache() else "TMPDIR")
         lines = [line for line in run.stderr.splitlines() if line.strip()]
         first = next(
             (line for line in lines if "error" in line), lines[0] if lines else "no message"
