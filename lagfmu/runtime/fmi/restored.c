@@ -15,6 +15,7 @@
 #include "digits.h"
 #include "indicators.h"
 #include "optional.h"
+#include "prescribed.h"
 #include "thresholds.h"
 
 enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased */
@@ -25,7 +26,7 @@ enum { FLAG, COUNT, SIZE, LIMIT, FINITE };
 
 /* How many of them there are; more than ONE stand behind a pointer. */
 enum {
-    ONE, N, TWICE_N, ROWS, CONTACTS, CONTACTS_N, FRICTIONS, FRICTIONS_N, INPUTS, JUMPS, PARAMETERS, WATCHED, DENSE
+    ONE, N, TWICE_N, ROWS, CONTACTS, CONTACTS_N, FRICTIONS, FRICTIONS_N, INPUTS, LEVELS, PARAMETERS, WATCHED, DENSE
 };
 
 typedef struct {
@@ -83,7 +84,7 @@ static const Saved OF_SOLVER[] = {
     NOW("largest local error", local_old.most[1], SIZE),
     SOLVER("coordinates", state.q, FINITE, N),
     SOLVER("velocities", state.v, FINITE, N),
-    SOLVER("levels of jumps", state.level, FINITE, JUMPS),
+    SOLVER("levels of jumps", state.level, FINITE, LEVELS),
     SOLVER("levels", state.offset, FINITE, ROWS),
     SOLVER("scales", state.scale, SIZE, TWICE_N),
     SOLVER("sizes", state.size, SIZE, N),
@@ -158,7 +159,7 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
                         [FRICTIONS] = system->frictions,
                         [FRICTIONS_N] = system->frictions * n,
                         [INPUTS] = system->inputs,
-                        [JUMPS] = system->jumps,
+                        [LEVELS] = system->jumps,
                         [PARAMETERS] = system->parameters,
                         [WATCHED] = indicators_count(system),
                         [DENSE] = now == NULL ? 0 : now->dense_arrays * ny};
@@ -240,20 +241,6 @@ static Status slides(Instance *x, const Solver *s) {
     return OK;
 }
 
-/* The points that rates are estimated from go back in time. */
-static Status pasts(Instance *x) {
-    for (int i = 0; i < x->solver.system->estimated_count; i++) {
-        const Past *past = &x->past[i];
-        if (past->count < 0 || past->count > RATES_KEPT || !(fabs(past->rate) <= DBL_MAX))
-            return restored_none(x, "past of an input", past->count);
-        for (int k = 0; k < past->count; k++)
-            if (!(fabs(past->u[k]) <= DBL_MAX && fabs(past->t[k]) <= DBL_MAX) ||
-                (k > 0 && !(past->t[k] < past->t[k - 1])))
-                return restored_none(x, "past of an input", past->t[k]);
-    }
-    return OK;
-}
-
 /* What the importer has set is inside of the bounds that the description states. */
 static Status bounds(Instance *x) {
     for (int k = 0; k < VARIABLE_COUNT; k++) {
@@ -276,6 +263,6 @@ Status instance_restored(Instance *x) {
     if (together(x) != OK) return FAILED;
     if (each(x, &x->solver, x, OF_INSTANCE, sizeof OF_INSTANCE / sizeof *OF_INSTANCE) != OK) return FAILED;
     if (restored_solver(x, &x->solver) != OK) return FAILED;
-    if (pasts(x) != OK || bounds(x) != OK) return FAILED;
+    if (bounds(x) != OK || (PRESCRIBED != NULL && PRESCRIBED->restored(x) != OK)) return FAILED;
     return ERROR_BARS != NULL ? ERROR_BARS->restored(x) : OK;
 }
