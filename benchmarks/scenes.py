@@ -25,7 +25,7 @@ from rich.table import Table
 
 from lagfmu.fmu.write import TARGETS, write
 from lagfmu.model.file import load
-from lagfmu.page.savings import Cost, cost
+from lagfmu.page.savings import NATIVE, OPERATIONS, PYTHON, Cost, cost
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.tradeoff.importer import Importer
 from lagfmu.study.tradeoff.setting import Setting
@@ -123,8 +123,8 @@ def show(entries: list[Entry]) -> None:
         if e.model != before:
             table.add_section()
             whole, before = e, e.model
-        row = [e.model if e is whole else "", e.scene, str(e.cost.operations)]
-        row += [str(e.cost.python_bytes), str(e.cost.native_bytes)]
+        row = [e.model if e is whole else "", e.scene, str(e.cost[OPERATIONS])]
+        row += [str(e.cost[PYTHON]), str(e.cost[NATIVE])]
         row += [
             f"{e.binary / 1e3:.1f}",
             f"{e.sizes['native'] / 1e3:.0f}",

@@ -925,10 +925,10 @@ print(digest.hexdigest())
 
 
 def test_text_does_not_depend_on_the_hash_seed() -> None:
-    """Three processes with different PYTHONHASHSEED print the same bytes."""
+    """Two processes with different PYTHONHASHSEED print the same bytes."""
     found = set()
-    models = [str(MODELS / f"{name}.py") for name in ("pendulum", "cart_pendulum", "hemisphere")]
-    for seed in ("0", "1", "2"):
+    models = [str(MODELS / f"{name}.py") for name in ("cart_pendulum", "hemisphere")]
+    for seed in ("1", "2"):
         found.add(
             subprocess.run(
                 [sys.executable, "-c", SOURCES_IN_ANOTHER_PROCESS, *models],

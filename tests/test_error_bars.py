@@ -93,13 +93,14 @@ def test_the_time_of_departure_lies_within_its_bar(barred):
         assert abs(found[name][-1] - exact[name][-1]) <= bar < 1e3 * tolerance
 
 
-def test_an_event_in_the_middle_of_a_long_step_lies_within_its_bar(barred):
+def test_an_event_in_the_middle_of_a_long_step_lies_within_its_bar(barred, target):
     """A particle that slides down with friction leaves; both runs take the same step to where it does, whose
     error the companion must not share: the time, and the flight that follows from it."""
     names = ("departure.surface.time", "r", "theta")
+    tolerances = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9) if target == "native" else (1e-5, 1e-8)
     for step in (0.25, 0.5):
         exact = run(barred("RoughHemisphere"), 1.5, step, relative_tolerance=1e-13)
-        for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9):
+        for tolerance in tolerances:
             found = run(barred("RoughHemisphere"), 1.5, step, relative_tolerance=tolerance)
             for name in names:
                 bar = found[bar_of(name)][-1]
@@ -107,11 +108,11 @@ def test_an_event_in_the_middle_of_a_long_step_lies_within_its_bar(barred):
             assert found[bar_of(names[0])][-1] < 10 * tolerance
 
 
-def test_the_time_at_which_slipping_starts_lies_within_its_bar(barred):
+def test_the_time_at_which_slipping_starts_lies_within_its_bar(barred, target):
     """A block on a belt sticks, and slips when the spring pulls as hard as friction can: again and again."""
-    name = "slipping.grip.time"
-    exact = run(barred("Belt"), 4.0, 0.1, relative_tolerance=1e-13)
-    for tolerance in (1e-5, 1e-8):
+    name, tight = "slipping.grip.time", {"native": 1e-13, "python": 1e-10}[target]
+    exact = run(barred("Belt"), 4.0, 0.1, relative_tolerance=tight)
+    for tolerance in (1e-5, 1e-8) if target == "native" else (1e-6,):
         found = run(barred("Belt"), 4.0, 0.1, relative_tolerance=tolerance)
         count = found["slipping.grip.count"]
         assert (count == exact["slipping.grip.count"]).all()

@@ -172,7 +172,7 @@ def test_the_mechanism_is_drawn(name: str, page: Page, prepared: Callable[[str],
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("width", [400, 1280])
-def test_it_fits_the_screen(width: int, theme: str, page: Page, tmp_path: Path) -> None:
+def test_it_fits_the_screen(width: int, theme: str, page: Page) -> None:
     """At 400 pixels and on a desktop nothing is cut off sideways, and the theme is the reader's."""
     page.tab.set_viewport_size({"width": width, "height": 900})
     page.tab.emulate_media(color_scheme=theme)
@@ -182,7 +182,6 @@ def test_it_fits_the_screen(width: int, theme: str, page: Page, tmp_path: Path) 
     paper = page.tab.evaluate("() => getComputedStyle(document.body).backgroundColor")
     light = sum(int(c) for c in paper.removeprefix("rgb(").removesuffix(")").split(",")) > 384
     assert light == (theme == "light")
-    page.tab.screenshot(path=str(tmp_path / f"{theme}-{width}.png"))
 
 
 def test_a_slider_moves_the_fmu(page: Page, native: Native) -> None:

@@ -23,6 +23,7 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu
 from lagfmu.model.model import name_of
 
+pytestmark = pytest.mark.python_cases(6)
 ALL = sorted(FILES)
 REPOSITORY = Path(__file__).parent.parent
 

@@ -16,6 +16,10 @@ import pytest
 from fmi2 import EXCHANGE, OK, Library, Single
 from fmpy.fmi1 import FMICallException
 from instance import instance
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Holonomic, Input, Model, Parameter, Scene, build_fmu
 
 HEAD = 80  # bytes before the record: magic, layout, byte order, size, checksum, GUID
 SUM = 24  # where the checksum stands
@@ -114,6 +118,91 @@ def test_a_forged_state_is_refused_or_harmless(native_fmu, tmp_path, name, kind)
     accepted, refused = map(int, done.stdout.split())
     assert refused > 200
     assert accepted > 100  # most doubles can be anything finite
+
+
+def whole_words(saved: bytes) -> list[int]:
+    """The record as whole numbers, four bytes each."""
+    return list(struct.unpack(f"={(len(saved) - HEAD) // 4}i", saved[HEAD:]))
+
+
+def reasons(one: Single, saved: bytes, places: list[int], word: bytes) -> list[str]:
+    """What is said of the state with another word at each of the places."""
+    found = []
+    for place in places:
+        state, data = one.loaded(forged(saved, place, word)), one.saved()
+        found.append(one.refuses("SetFMUstate", state))
+        one.does("SetFMUstate", data)
+    return found
+
+
+def test_a_method_that_the_fmu_does_not_hold_is_refused(library):
+    """Wherever one state has the number of rk4 and the other that of radau5, no other number will do."""
+    states = []
+    for method in ("rk4", "radau5"):
+        one = library("PendulumCartesian")()
+        one.set("solver.method", method)
+        states.append(one.bytes_of(one.saved()))
+    pairs = enumerate(zip(*map(whole_words, states), strict=True))
+    places = [HEAD + 4 * k for k, pair in pairs if pair == (3, 4)]
+    for number in (-1, 0, 1_000_000):
+        said = reasons(one, states[1], places, struct.pack("=i", number))
+        assert said
+        assert all("method" in text for text in said)
+
+
+def test_a_contact_is_open_or_closed(library):
+    """Of the numbers that a departure changes from 1 to 0 one is the contact's mode; 2 is none."""
+    one = library("Hemisphere")().start()
+    states = [one.bytes_of(one.saved())]
+    while one.get("lambda.surface") > 0:
+        one.step(0.5)
+    states.append(one.bytes_of(one.saved()))
+    pairs = enumerate(zip(*map(whole_words, states), strict=True))
+    places = [HEAD + 4 * k for k, pair in pairs if pair == (1, 0)]
+    one.does("SetFMUstate", one.loaded(states[0]))
+    said = []
+    for place in places:
+        state = one.loaded(forged(states[0], place, struct.pack("=i", 2)))
+        if one.call("SetFMUstate", state) != OK:
+            said.append(one.log[-1][2])
+    assert any("modes" in text for text in said)
+
+
+def test_a_coordinate_is_a_number(library):
+    """NaN in place of a coordinate, wherever the saved state holds it."""
+    one = library("PendulumCartesian")().start()
+    one.step(0.3)
+    saved, value = one.bytes_of(one.saved()), struct.pack("=d", one.get("x"))
+    saved = one.bytes_of(one.saved())  # as it was read
+    places = [k for k in range(HEAD, len(saved) - 7, 8) if saved[k : k + 8] == value]
+    said = reasons(one, saved, places, struct.pack("=d", math.nan))
+    assert any("coordinates" in text for text in said)
+
+
+def test_an_estimated_motion_has_no_more_points_than_there_is_room_for(tmp_path):
+    """One point more is kept at each step, up to four; five are refused."""
+    place, drive = dynamicsymbols("x u")
+    mass = symbols("m", positive=True)
+    model = Model(
+        name="Estimating",
+        lagrangian=mass * place.diff() ** 2 / 2,
+        coordinates={place: "m"},
+        constraints=[Holonomic("held", place - drive)],
+        parameters=[Parameter(mass, 1.0, "kg")],
+        inputs=[Input(drive, "m", rates="estimated")],
+        start={place: 0.0},
+    )
+    path = build_fmu(model, tmp_path, Scene(model.name), target="native", check=False)
+    one, states = Library(path, tmp_path / "unpacked")().start(), []
+    for k in range(5):
+        one.set("u", 0.01 * k)
+        one.step(0.1)
+        states.append(one.bytes_of(one.saved()))
+    counts = enumerate(zip(*map(whole_words, states), strict=True))
+    places = [HEAD + 4 * k for k, word in counts if word == (1, 2, 3, 4, 4)]
+    said = reasons(one, states[-1], places, struct.pack("=i", 5))
+    assert said
+    assert all("past of an input" in text for text in said)
 
 
 def forged_text(saved: bytes, change) -> bytes:

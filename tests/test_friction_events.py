@@ -248,6 +248,7 @@ TRANSITIONS = {
 }
 
 
+@pytest.mark.python_cases(5)
 @pytest.mark.parametrize("target", ["native", "python"])
 @pytest.mark.parametrize("name", sorted(TRANSITIONS))
 def test_rollback_across_each_kind_of_transition_changes_no_bit(

@@ -838,6 +838,85 @@ def test_modes_are_found_where_the_active_set_goes_in_a_circle(bench):
     assert list(closed) == [0, 1, 0, 0, 0]
 
 
+@pytest.mark.parametrize("unit", [1e-9, -1e-9, 1.0, -1.0, 1e9, -1e9])
+def test_what_a_wall_does_depends_on_no_unit_and_no_side(unit, bench):
+    """f = c x in whatever unit of length, of a floor (c > 0) or a ceiling (c < 0): 1 N towards it is met by
+    lambda = 1/|c|, with 1 N away from it the body leaves."""
+    model = Model(
+        name="Wall",
+        lagrangian=m * x.diff() ** 2 / 2,
+        forces={x: push},
+        coordinates={x: "m"},
+        constraints=[Contact("wall", arm * x)],
+        parameters=[MASS, Parameter(arm, 1.0, "1")],
+        inputs=[Input(push, "N")],
+        start={x: 1.0},
+    )
+    one = bench(model)
+    one.p[1] = unit
+    still = doubles([0])
+    for away, guess in itertools.product((False, True), (0, 1)):
+        one.drive([1.0 if away == (unit > 0) else -1.0])
+        closed = integers([guess])
+        assert not one.c.bench_modes(one.handle, still, still, closed, integers([1]), None), (
+            one.why()
+        )
+        assert closed[0] != away
+        assert not one.c.bench_motion(one.handle, c_double(0), still, still, closed)
+        assert one.array("lambda", 1)[0] == pytest.approx(0 if away else 1 / abs(unit))
+
+
+LEGS = {  # where five legs stand [m], and the torques [N m] with the weight of 1 N
+    "in a line": ([(2, 2), (2, 1), (1, 0), (-2, 0), (0, 0)], (-0.75, 0.75)),
+    "in a trapezoid": ([(-2, -1), (-1, -1), (2, 2), (0, 0), (-1, 2)], (-0.5, 0.75)),
+    "in a kite": ([(-1, 2), (1, -2), (1, -1), (1, 2), (0, 0)], (0.75, -0.75)),
+}
+
+
+@pytest.mark.filterwarnings("ignore:.*follow from the others")
+@pytest.mark.parametrize("case", LEGS)
+def test_what_the_legs_of_a_table_carry_depends_on_no_order(case, bench):
+    """Five legs of a table that tips, several of which could be the ones that stay: whoever comes first,
+    each carries the same, none pulls, none goes into the floor, and what rises carries nothing."""
+    places, torques = LEGS[case]
+    across, along = symbols("a0:5", real=True), symbols("b0:5", real=True)
+    z, roll, pitch = dynamicsymbols("z roll pitch")
+    model = Model(
+        name="Table",
+        lagrangian=m * (z.diff() ** 2 + 4 * arm**2 * (roll.diff() ** 2 + pitch.diff() ** 2)) / 2,
+        forces={z: -push, roll: lift * arm, pitch: s * arm},
+        coordinates={z: "m", roll: "rad", pitch: "rad"},
+        constraints=[
+            Contact(f"leg{k}", z + a * roll + b * pitch)
+            for k, (a, b) in enumerate(zip(across, along, strict=True))
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(arm, 1.0, "m"),
+            *(Parameter(k, 1.0, "m") for k in (*across, *along)),
+        ],
+        inputs=[Input(push, "N"), Input(lift, "N"), Input(s, "N")],
+        start={z: 1.0},
+    )
+    one = bench(model)
+    still, found = doubles([0, 0, 0]), []
+    one.drive([1.0, *torques])
+    for order in itertools.islice(itertools.permutations(range(5)), 0, None, 7):
+        stand = np.array(places, float)[list(order)]
+        one.p[2:] = stand.T.ravel()
+        closed = integers([1] * 5)
+        assert not one.c.bench_modes(one.handle, still, still, closed, integers([1] * 5), None)
+        assert not one.c.bench_motion(one.handle, c_double(0), still, still, closed)
+        carried, rising = np.zeros(5), one.array("vdot", 3)
+        carried[list(order)] = one.array("lambda", 5)
+        found.append(carried)
+        lifted = rising[0] + np.array(places) @ rising[1:]
+        assert (carried >= 0).all()
+        assert (lifted >= -1e-12).all()
+        assert abs(carried @ lifted) < 1e-12
+    np.testing.assert_allclose(found, [found[0]] * len(found), atol=1e-12)
+
+
 def test_a_contact_that_is_leaving_is_not_closed_again(bench):
     """Where the force presses, only the flag keeps it open."""
     one = bench(walls(1)[0])

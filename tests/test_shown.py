@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import unicodedata
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import MODELS
+from rich.cells import cell_len
 from typer.testing import CliRunner
 
 import lagfmu
@@ -14,6 +16,7 @@ from lagfmu import Conserved, Result, output
 from lagfmu.cli.app import app
 from lagfmu.fmu.closed_forms import carried
 from lagfmu.model.file import load
+from lagfmu.page.wrapped import wrapped
 from lagfmu.verification.plot import moments
 from lagfmu.verification.verify import check_closed_form
 
@@ -24,6 +27,43 @@ def simulated(*words: object) -> dict[str, list[str]]:
     assert done.exit_code == 0, done.output
     rows = [line.split() for line in done.output.splitlines() if line.strip()]
     return {row[0]: row[1:] for row in rows if len(row) in (2, 3) and row[0] != "wrote"}
+
+
+def test_an_equation_is_broken_before_its_operators() -> None:
+    """No word is lost or cut; a line begins with = + or -, inside of brackets only where it has to, and then
+    further to the right."""
+    text = "m x'' + c x' = 2 (x1 - x2) lambda_1 + (a + b + c + d + e + f + g + h + i) lambda_2"
+    for width in (20, 30, 44, 60, 100):
+        lines = wrapped(text, width)
+        assert " ".join(line.strip() for line in lines) == text
+        assert max(map(len, lines)) <= width
+    assert wrapped(text, 44) == [
+        "m x'' + c x' = 2 (x1 - x2) lambda_1",
+        "+ (a + b + c + d + e + f + g + h + i)",
+        "lambda_2",
+    ]
+    assert wrapped(text, 30)[-2:] == ["+ (a + b + c + d + e + f + g", "  + h + i) lambda_2"]
+    assert wrapped("", 10) == [""]
+    assert wrapped("a" * 20, 10) == [
+        "a" * 20
+    ]  # one word longer than a line is left to the terminal
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_no_line_that_show_prints_is_longer_than_the_terminal_is_wide(width: int) -> None:
+    """The kinetic energy of eight bobs and the accelerations of their links are 120 to 160 letters long; what
+    is printed is the same at every width, to the last word."""
+    words = ["show", str(MODELS / "chain.py"), "-p", "n=8"]
+    said = CliRunner().invoke(app, words, env={"COLUMNS": str(width)})
+    assert said.exit_code == 0
+    lines = said.output.splitlines()
+    assert max(cell_len(line.rstrip()) for line in lines) <= width
+    assert "…" not in said.output
+    whole = unicodedata.normalize("NFC", " ".join(said.output.split()))
+    squares = " + ".join(f"ẋ{k}² + ẏ{k}²" for k in "₁₂₃₄₅₆₇₈")
+    assert f"T = m ({squares})/2" in whole
+    right = "4 ẋ₇ ẋ₈ + 4 ẏ₇ ẏ₈ - 2 ẋ₇² - 2 ẏ₇² - 2 ẋ₈² - 2 ẏ₈²"
+    assert f"2 (x₈ - x₇) ẍ₈ + 2 (y₈ - y₇) ÿ₈ = {right}" in whole
 
 
 def test_a_departure_that_has_not_been_has_no_time() -> None:
@@ -92,3 +132,9 @@ def test_a_landing_without_rebound_takes_energy() -> None:
     assert not check.passed
     assert check.error == pytest.approx(1.0)
     assert "first missed at t = 0.46 s, where contact 'floor' has just closed" in str(check)
+
+
+def test_degrees_of_freedom_are_counted_with_the_contacts_closed() -> None:
+    """On the sphere the particle has one; the line says so, since in flight it has two."""
+    shown = CliRunner().invoke(app, ["show", str(MODELS / "hemisphere.py")]).output
+    assert "N = n - rank G = 2 - 1 = 1, with every contact closed" in shown

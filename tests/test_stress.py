@@ -212,7 +212,7 @@ def test_an_acceleration_is_known_to_what_rounding_leaves_of_the_forces(tmp_path
 def test_a_condition_without_a_value_does_not_hold(bench):
     """inf - inf: nothing can be said where a closed form applies, so that it says nothing."""
     a = sp.Symbol("a", positive=True)
-    form = CarriedForm("a", a, 2 * a, *[None] * 4, None, 10.0, 1e-12, when=1 / a - 1 / a**2)
+    form = CarriedForm("a", 2 * a, a, when=1 / a - 1 / a**2)
     run = bench.ordinary
     assert applies(form, run.rows, dict(run.values) | {"a": 2.0}).all()
     assert not applies(form, run.rows, dict(run.values) | {"a": 0.0}).any()
@@ -430,7 +430,7 @@ def test_a_scale_of_a_difference_is_none_of_its_magnitudes(bench):
     of their peers, say nothing of their difference (0, so that rounding was called wrong)."""
     theta, r = sp.symbols("theta r", real=True)
     small, zero = 1e-15 * theta, sp.Integer(0)
-    law = CarriedForm("law", small, zero, *[None] * 4, theta - 2 * r, 10.0, 1e-12)
+    law = CarriedForm("law", zero, small, scale=theta - 2 * r)
     (form,) = judged_forms((law,), set(), {})
     run = bench.ordinary
     rows = np.ones(len(run.rows))
@@ -452,14 +452,14 @@ def test_a_force_is_known_to_what_the_smallest_lambda_makes_of_it(prepared):
 
 def test_a_closed_form_is_not_judged_by_what_underflows_on_its_way(bench):
     """2 l (f^2/g) with l = 5e-324, f = 1e-10 and g = 1e-50 is 1e-293 and no 0: only l f underflows."""
-    from lagfmu.study.stress.closed_forms import Compiled
+    from lagfmu.verification.evaluate import Compiled
 
     if np.finfo(np.longdouble).maxexp <= np.finfo(float).maxexp:
         pytest.skip("no numbers of a wider range here")
     length, f, g = sp.symbols("length f g", positive=True)
     compiled = Compiled(sp.Mul(2, length, f, f, 1 / g, evaluate=False), "thrust")
-    run = replace(bench.ordinary, values={"length": 5e-324, "f": 1e-10, "g": 1e-50})
-    found = compiled.at(np.ones(len(run.rows), dtype=bool), run)
+    rows = bench.ordinary.rows
+    found = compiled.at(rows, rows, {"length": 5e-324, "f": 1e-10, "g": 1e-50})
     assert found == pytest.approx(2 * 5e-324 * 1e30, rel=1e-12)
 
 

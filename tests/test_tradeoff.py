@@ -19,12 +19,12 @@ from scipy.special import ellipj, ellipk
 from test_cli import SMALL, lagfmu
 
 from lagfmu import Scene, simulate
-from lagfmu.cli.terminal import print_whole
 from lagfmu.errors import BuildError, SimulationError
 from lagfmu.fmu.write import write
 from lagfmu.methods import EVALUATIONS, NUMBERS
 from lagfmu.model.file import load
 from lagfmu.model.goal import Goal, parse
+from lagfmu.page.table import print_whole
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.tradeoff import choose as choosing
 from lagfmu.study.tradeoff.choose import choose, pick

@@ -18,6 +18,7 @@ from ..api import package
 from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
 from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
+from ..fmu.described import read_description
 from ..fmu.native import takes_long
 from ..fmu.write import write_whole
 from ..interface.variables import VariableTable
@@ -31,19 +32,17 @@ from ..model.model import Model
 from ..model.scene import Scene
 from ..model.units import for_reading
 from ..names import DEPARTURE_TIME, METHOD, SLIP_TIME, those
+from ..page.table import new_table, print_whole
 from ..page.text import show as show_prepared
 from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
-from ..study.stress.report import all_as_json as probed_as_json
 from ..study.tradeoff.page import section
-from ..study.tradeoff.report import all_as_json as measured_as_json
 from ..verification.crosscheck import as_csv, write_crosscheck
-from ..verification.pipeline import Suite, UsageError, as_junit, exit_code
+from ..verification.pipeline import Outcome, UsageError, as_json, as_junit, exit_code
 from ..verification.plot import default_names
 from ..verification.reference import read_table
-from ..verification.report import as_json
 from ..verification.result import NOT_YET, Result, as_text
-from ..verification.simulate import read_description, simulate
+from ..verification.simulate import simulate
 from ..verification.verify import Verification
 from .film import film
 from .options import (
@@ -63,7 +62,7 @@ from .options import (
 from .stress import LIMIT
 from .stress import stress as stress_fmus
 from .sweep import sweep
-from .terminal import console, errors, new_table, plainly, prepare_streams, print_whole
+from .terminal import console, errors, plainly, prepare_streams
 from .tradeoff import chosen_for, compare
 from .verify import examine
 
@@ -295,7 +294,7 @@ def verify_command(
         for one in done:
             if one.found is not None:
                 _print(one.found)
-        _finish("verify", [one.suite for one in done], as_json(done), json, junit)
+        _finish("verify", done, json, junit)
 
 
 @app.command(name="reference")
@@ -482,7 +481,7 @@ def tradeoff(
             scene or (),
             full,
         )
-        _finish("tradeoff", [one.suite for one in done], measured_as_json(done), json, junit)
+        _finish("tradeoff", done, json, junit)
 
 
 @app.command()
@@ -506,23 +505,23 @@ def stress(
     """
     with plainly():
         done = stress_fmus(targets, out, console, target.value, scene or (), quick, limit)
-        _finish("stress", [one.suite for one in done], probed_as_json(done), json, junit)
+        _finish("stress", done, json, junit)
 
 
 def _finish(
-    command: str, suites: Sequence[Suite], text: str, json: Path | None, junit: Path | None
+    command: str, outcomes: Sequence[Outcome], json: Path | None, junit: Path | None
 ) -> None:
     """Write what a pipeline reads, say what could not be run, and end with the exit code."""
     if json is not None:
-        write_whole(json, text.encode())
+        write_whole(json, as_json(outcomes).encode())
     if junit is not None:
-        write_whole(junit, as_junit(f"lagfmu {command}", suites))
-    for suite in suites:
-        if suite.error:
+        write_whole(junit, as_junit(f"lagfmu {command}", outcomes))
+    for one in outcomes:
+        if one.error:
             errors.print(
-                f"[bold red]error:[/] {escape(suite.error)}", highlight=False, soft_wrap=True
+                f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
             )
-    raise typer.Exit(exit_code(suites))
+    raise typer.Exit(exit_code(outcomes))
 
 
 def _load(path: Path, added: list[str] | None, arguments: list[str] | None = None) -> ModelFile:

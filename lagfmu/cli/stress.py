@@ -18,7 +18,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from ..errors import BuildError, LagfmuError
+from ..errors import BuildError
 from ..fmu.write import write, write_whole
 from ..model.file import ModelFile
 from ..model.model import Model
@@ -28,11 +28,11 @@ from ..study.stress.facts import facts_of
 from ..study.stress.geometry import lay_geometry, twin
 from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import UNFINISHED, WRONG, Verdict
-from ..study.stress.report import MEANING, Stressed, Tried, as_json, as_markdown, summary, table
+from ..study.stress.report import MEANING, Stressed, data, outcome, summary, table
 from ..study.stress.summary import as_summary
-from ..verification.pipeline import UsageError
+from ..verification.pipeline import Outcome, UsageError, text_of
 from .tradeoff import progress
-from .works import works
+from .works import studied
 
 LIMIT = 60.0  # [s] for one probe
 START = 120.0  # [s] for the process to begin with the first one
@@ -47,25 +47,22 @@ def stress(
     scenes: Sequence[str] = (),
     quick: bool = False,
     limit: float = LIMIT,
-) -> list[Tried]:
+) -> list[Outcome]:
     """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json, .md, and OUT/TARGET.md.
 
     What cannot be built or run does not keep the others from it.  Raises UsageError.
     """
-    tried: list[Tried] = []
     if not limit > 0:
         raise UsageError(f"the time limit is {limit!r} s, expected a positive number")
     if not console.is_terminal:
-        console = Console(file=console.file, width=WIDTH)
+        console = Console(file=console.file, width=WIDTH, emoji=False)
+
+    def study(name: str, fmu: Path) -> Outcome:
+        return outcome(name, _one(fmu, out, console, quick, limit))
+
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         made = partial(build, folder=Path(folder) / target, target=target, console=console)
-        for name, make in works(paths, scenes, made):
-            try:
-                tried.append(Tried(name, _one(make(), out, console, quick, limit)))
-            except LagfmuError as error:
-                tried.append(Tried(name, None, str(error)))
-    if not tried:
-        raise UsageError(f"no FMU is called {', '.join(scenes) or 'anything'}")
+        tried = studied(paths, scenes, made, study)
     found = [t.found for t in tried if t.found is not None]
     if found:
         console.print(summary(found))
@@ -109,8 +106,8 @@ def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> S
     one = Stressed(facts.name, facts.target, digest, quick, limit, bool(facts.laws), tuple(rows))
     console.print(table(one))
     stem = out / one.target / one.name
-    write_whole(stem.with_suffix(".json"), as_json(one).encode())
-    write_whole(stem.with_suffix(".md"), as_markdown(one).encode())
+    write_whole(stem.with_suffix(".json"), text_of(data(one)).encode())
+    write_whole(stem.with_suffix(".md"), as_summary([one], every_probe=True).encode())
     console.print(f"[green]wrote[/] {escape(str(stem))}.json, .md", soft_wrap=True)
     return one
 

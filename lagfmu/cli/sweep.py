@@ -19,9 +19,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from ..errors import LagfmuError, SettingError
 from ..model.units import for_reading
+from ..page.table import new_table, print_whole
 from ..verification.reference import read_table
 from .options import InputFile, StepSize, StopTime, Tolerance
-from .terminal import console, new_table, plainly, print_whole
+from .terminal import console, plainly
 
 SHOWN = 5  # reasons in the summary
 FEW = 20  # runs that are shown each by itself

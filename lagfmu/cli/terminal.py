@@ -8,21 +8,18 @@ import sys
 import tempfile
 import unicodedata
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console, RenderableType
+from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
-from rich.text import Text
 
 from ..errors import LagfmuError, SettingError
 from ..verification.pipeline import WRONG_USAGE, UsageError
 
-console = Console()
-errors = Console(stderr=True)
+console = Console(emoji=False)  # "0.2:x:3" is what the user wrote
+errors = Console(stderr=True, emoji=False)
 
 PLAIN = {"≤": "<=", "≥": ">=", "−": "-", "–": "-", "→": "->", "●": "*", "µ": "u", "√": "sqrt"}
 ACCENTS = {"\u0307": "'", "\u0308": "''"}  # combining dots: derivatives
@@ -62,46 +59,6 @@ def prepare_streams() -> None:
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(errors="lagfmu.spelled")
-
-
-def new_table(title: str, *columns: str, text: Sequence[str] = ()) -> Table:
-    """An empty table: columns of numbers to the right, in one piece; those named in `text` may fold."""
-    drawn = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for heading in columns:
-        drawn.add_column(
-            heading,
-            justify="left" if heading in text else "right",
-            no_wrap=heading not in text,
-            overflow="fold",
-        )
-    return drawn
-
-
-def _width(cell: RenderableType) -> int:
-    """Of its longest line."""
-    if not isinstance(cell, str):
-        return 0
-    return max((line.cell_len for line in Text.from_markup(cell).split()), default=0)
-
-
-def print_whole(console: Console, drawn: Table) -> None:
-    """Print a table without cutting anything: row by row in words where the console is too narrow."""
-    for column in drawn.columns:
-        if column.no_wrap:
-            column.min_width = max(map(_width, (column.header, *column.cells)))
-    unbounded = console.options.update(width=10_000)
-    if console.measure(drawn, options=unbounded).minimum <= console.width:
-        console.print(drawn)
-        return
-    console.print(drawn.title or "", style="bold", highlight=False)
-    headings = [" ".join(str(c.header).split()) for c in drawn.columns]
-    for cells in zip(*(c.cells for c in drawn.columns), strict=True):
-        parts = [
-            f"{heading} {cell}".strip()
-            for heading, cell in zip(headings, cells, strict=True)
-            if cell
-        ]
-        console.print("  " + ", ".join(parts), highlight=False)
 
 
 @contextlib.contextmanager

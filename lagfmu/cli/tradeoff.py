@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
-from ..errors import LagfmuError
 from ..fmu.compiler import find_compiler
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
@@ -20,16 +19,16 @@ from ..model.file import ModelFile
 from ..model.goal import Goal
 from ..model.model import Model
 from ..model.scene import Scene
+from ..page.table import print_whole
 from ..prepare.prepare import prepare
 from ..solver.state import tolerance_problem
 from ..study.tradeoff.choose import Choice, choose
 from ..study.tradeoff.figure import draw
 from ..study.tradeoff.importer import Importer
 from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure, quick_plan
-from ..study.tradeoff.report import Measured, as_csv, as_json, digits, remarks, summary, table
-from ..verification.pipeline import UsageError
-from .terminal import print_whole
-from .works import works
+from ..study.tradeoff.report import as_csv, data, digits, outcome, remarks, summary, table
+from ..verification.pipeline import Outcome, UsageError, text_of
+from .works import studied
 
 
 @contextlib.contextmanager
@@ -66,7 +65,7 @@ def compare(
     repeats: int | None = None,
     scenes: Sequence[str] = (),
     full: bool = False,
-) -> list[Measured]:
+) -> list[Outcome]:
     """Measure model files and FMUs, print tables, write OUT/TARGET/NAME.json, .csv, .svg and .png.
 
     Without a `target` native FMUs where there is a compiler, else python ones; `full`: the whole grid.
@@ -81,7 +80,6 @@ def compare(
     if problems := [p for p in map(tolerance_problem, tolerances) if p]:
         raise UsageError("; ".join(problems))
     kind = target or ("python" if find_compiler() is None else "native")
-    done: list[Measured] = []
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
 
         def build(file: ModelFile, scene: Scene) -> Path:
@@ -89,22 +87,18 @@ def compare(
                 prepared = prepare(file.model, scene)
                 return write(prepared, Path(folder) / kind, file.closed_forms, target=kind)
 
-        for name, make in works(paths, scenes, build):
-            try:
-                fmu = make()
-                with Importer(fmu) as importer:
-                    plan = default_plan(importer) if full else quick_plan(importer)
-                if communications:
-                    plan = replace(plan, communications=tuple(sorted(set(communications))))
-                if tolerances:
-                    plan = replace(plan, tolerances=tuple(sorted(set(tolerances), reverse=True)))
-                if methods:
-                    plan = replace(plan, methods=tuple(methods))
-                done.append(Measured(name, _one(fmu, plan, repeats, out, console)))
-            except LagfmuError as error:
-                done.append(Measured(name, None, str(error)))
-    if not done:
-        raise UsageError(f"no FMU is called {', '.join(scenes)}")
+        def study(name: str, fmu: Path) -> Outcome:
+            with Importer(fmu) as importer:
+                plan = default_plan(importer) if full else quick_plan(importer)
+            if communications:
+                plan = replace(plan, communications=tuple(sorted(set(communications))))
+            if tolerances:
+                plan = replace(plan, tolerances=tuple(sorted(set(tolerances), reverse=True)))
+            if methods:
+                plan = replace(plan, methods=tuple(methods))
+            return outcome(name, _one(fmu, plan, repeats, out, console))
+
+        done = studied(paths, scenes, build, study)
     found = [m.found for m in done if m.found is not None]
     if len(found) > 1:
         print_whole(console, summary(found))
@@ -119,7 +113,7 @@ def _one(fmu: Path, plan: Plan, repeats: int | None, out: Path, console: Console
     for line in remarks(one):
         console.print(f"  {escape(line)}", highlight=False, soft_wrap=True)
     stem = out / one.target / one.name
-    write_whole(stem.with_suffix(".json"), as_json(one).encode())
+    write_whole(stem.with_suffix(".json"), text_of(data(one)).encode())
     write_whole(stem.with_suffix(".csv"), as_csv(one).encode())
     draw(one, [stem.with_suffix(".svg"), stem.with_suffix(".png")])
     console.print(f"[green]wrote[/] {escape(str(stem))}.json, .csv, .svg, .png", soft_wrap=True)

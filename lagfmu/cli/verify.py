@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SettingError, SimulationError, VerificationError
-from ..verification.pipeline import UsageError
+from ..verification.pipeline import Outcome, UsageError
 from ..verification.reference import Reference, read_table
-from ..verification.report import Examined
+from ..verification.report import outcome
 from ..verification.verify import verify
 
 
@@ -41,7 +41,7 @@ def examine(
     reference: Path | None,
     rtol: Sequence[str],
     atol: float,
-) -> list[Examined]:
+) -> list[Outcome]:
     """Each FMU; one that cannot be run does not keep the others from it.  Raises UsageError."""
     if reference is None and (rtol or atol):
         raise UsageError("--rtol and --atol are for --reference")
@@ -59,7 +59,7 @@ def examine(
             found = verify(fmu, values, stop_time, step_size, tolerance, signals, table)
         except (SimulationError, VerificationError) as error:
             misused = isinstance(error, SettingError)
-            done.append(Examined(str(fmu), None, str(error), misused))
+            done.append(Outcome(str(fmu), error=str(error), misused=misused))
         else:
-            done.append(Examined(str(fmu), found))
+            done.append(outcome(str(fmu), found))
     return done

@@ -6,7 +6,7 @@ import difflib
 import json
 import warnings
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import sympy as sp
@@ -28,24 +28,13 @@ CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 
 
 @dataclass(frozen=True)
-class CarriedForm:
+class CarriedForm(ClosedForm):
     """A closed form (or what is conserved) as an FMU carries it, in symbols named as the FMU's variables.
 
     `expected` is None for a conserved quantity; `accuracy` is the relative error that the FMU was built
     to hold, as long as it runs with the settings that it was built with.
     """
 
-    name: str
-    actual: Expr
-    expected: Expr | None
-    while_closed: str | None
-    while_open: str | None
-    until_departure: str | None
-    at_departure: str | None
-    scale: Expr | None
-    within: float
-    rounding: float
-    when: Expr | None = None
     accuracy: float | None = None
 
     def allowed(self, tolerance: float, as_built: bool) -> float:
@@ -102,27 +91,13 @@ def carried(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> lis
     for form in closed_forms:
         if form.only is not None and scene.name not in form.only:
             continue
-        scale = None if form.scale is None else in_variables(form.scale)
+        said = {f.name: getattr(form, f.name) for f in fields(form)}
         if isinstance(form, Conserved):
-            actual, expected, leaving = form.expression, None, None
-        else:
-            actual = output(form.name) if form.actual is None else form.actual
-            expected, leaving = in_variables(form.expected), form.at_departure
-        found.append(
-            CarriedForm(
-                name=form.name,
-                actual=in_variables(actual),
-                expected=expected,
-                while_closed=form.while_closed,
-                while_open=form.while_open,
-                until_departure=form.until_departure,
-                at_departure=leaving,
-                scale=scale,
-                within=form.within,
-                rounding=form.rounding,
-                when=None if form.when is None else in_variables(form.when),
-            )
-        )
+            said |= {"actual": said.pop("expression"), "expected": None}
+        elif form.actual is None:
+            said["actual"] = output(form.name)
+        said |= {k: in_variables(said[k]) for k in EXPRESSIONS if said[k] is not None}
+        found.append(CarriedForm(**said))
     return found
 
 

@@ -319,12 +319,12 @@ class Session:
         """One run, as run() in batch.c."""
         times = plan.times
         values = dict(zip(plan.vary, row.tolist(), strict=True)) | self._driven(plan, 0)
-        first, last = float(times[0]), float(times[-1])
-        self.prepare(values, plan.tolerance or None, last, first)
+        self.prepare(values, plan.tolerance or None, float(times[-1]), float(times[0]))
         self.call("exitInitializationMode")
-        kept, largest = found.result[r], np.zeros(len(plan.keep))
-        before = self._observe(plan, kept, largest, None, 0, float(times[0]))
-        self._whole(found, r, 0, before)
+        kept, whole = found.result[r], found.trajectory
+        points = np.zeros((len(times), len(kept))) if whole is None else whole[r]
+        points[0] = self._seen(plan)
+        seen, when = [points[0]], [float(times[0])]  # with what was seen at departures
         count, earlier = self._departures(plan)[0], None
         for k in range(1, len(times)):
             t, h = float(times[k - 1]), float(times[k] - times[k - 1])
@@ -338,48 +338,28 @@ class Session:
                     later = self.call("getFMUstate")
                     self.call("setFMUstate", earlier)
                     self.call("doStep", t, latest - t)
-                    self._observe(plan, kept, largest, None, -1, latest)
+                    seen.append(self._seen(plan))
+                    when.append(latest)
                     self.call("setFMUstate", later)
                     self.call("freeFMUstate", later)
                 self.call("freeFMUstate", earlier)
                 count = now
             self.give(self._driven(plan, k))
-            before = self._observe(plan, kept, largest, before, k, float(times[k]))
-            self._whole(found, r, k, before)
-
-    def _observe(
-        self,
-        plan: Plan,
-        kept: NDArray[np.float64],
-        largest: NDArray[np.float64],
-        before: NDArray[np.float64] | None,
-        point: int,
-        t: float,
-    ) -> NDArray[np.float64]:
-        """As observe() in batch.c; returns the values."""
-        seen = np.array([self.get(name) for name, _ in plan.keep])
-        first, times = point == 0, plan.times
-        for k, (_, what) in enumerate(plan.keep):
-            x = seen[k]
-            if what == MAX:
-                kept[k] = x if first or x > kept[k] else kept[k]
-            elif what == MIN:
-                kept[k] = x if first or x < kept[k] else kept[k]
-            elif what == MEAN:
-                kept[k] = 0.0 if first else kept[k]
-                if point > 0 and before is not None:
-                    width = float(times[-1] - times[0])
-                    kept[k] += (x + before[k]) / 2 * (t - float(times[point - 1])) / width
-            elif what == TIME_OF_MAX:
-                kept[k] = t if first or x > largest[k] else kept[k]
+            points[k] = self._seen(plan)
+            seen.append(points[k])
+            when.append(float(times[k]))
+        for k, (column, (_, what)) in enumerate(zip(np.transpose(seen), plan.keep, strict=True)):
+            if what == MEAN:
+                at, width = points[:, k], float(times[-1] - times[0])
+                parts = (at[1:] + at[:-1]) / 2 * np.diff(times) / width
+                kept[k] = sum(parts.tolist())
             else:
-                kept[k] = x
-            largest[k] = x if first or x > largest[k] else largest[k]
-        return seen
+                place = {MAX: column.argmax(), MIN: column.argmin(), TIME_OF_MAX: column.argmax()}
+                last = int(place.get(what, len(column) - 1))
+                kept[k] = when[last] if what == TIME_OF_MAX else column[last]
 
-    def _whole(self, found: Outcome, r: int, k: int, seen: NDArray[np.float64]) -> None:
-        if found.trajectory is not None:
-            found.trajectory[r, k] = seen
+    def _seen(self, plan: Plan) -> NDArray[np.float64]:
+        return np.array([self.get(name) for name, _ in plan.keep])
 
     def _driven(self, plan: Plan, k: int) -> dict[str, float]:
         """The inputs at a communication point."""

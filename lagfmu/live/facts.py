@@ -13,6 +13,7 @@ import fmpy
 
 from .. import names
 from ..fmu.archive import pack
+from ..fmu.described import experiment_of
 from ..model.units import for_reading
 
 NUMBERS = ("Real", "Integer", "Boolean")
@@ -33,16 +34,15 @@ def facts(description: bytes, picture: dict[str, Any] | None) -> dict[str, Any]:
     """The facts as the page's scripts read them (web/api.js); numbers in SI, times in s."""
     archive = io.BytesIO(pack({"modelDescription.xml": description}))  # fmpy reads archives only
     read = fmpy.read_model_description(archive, validate=False)
-    experiment = read.defaultExperiment
-    stop = float(getattr(experiment, "stopTime", None) or 1.0)
+    experiment = experiment_of(read)
     named = {v.name for v in read.modelVariables}
     return {
         "name": read.modelName,
         "description": read.description or "",
         "experiment": {
-            "stopTime": stop,
-            "stepSize": float(getattr(experiment, "stepSize", None) or stop / 500),
-            "tolerance": float(getattr(experiment, "tolerance", None) or 1e-8),
+            "stopTime": experiment.stop_time,
+            "stepSize": experiment.step_size,
+            "tolerance": experiment.tolerance,
         },
         "variables": [_variable(v, named) for v in read.modelVariables],
         "picture": picture,

@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
 from .equations import EquationsOfMotion
 
+Group = tuple[frozenset[int], frozenset[int]]  # coordinates, rows
 
-def coupled(eom: EquationsOfMotion) -> list[tuple[frozenset[int], frozenset[int]]]:
-    """(coordinates, rows) that one linear solve ties together, by the sparsity of M, G and frictions."""
-    parent = list(range(eom.n + eom.m))
 
-    def root(i: int) -> int:
-        while parent[i] != i:
-            parent[i] = parent[parent[i]]
-            i = parent[i]
-        return i
-
-    for i, j in eom.M.todok():
-        parent[root(i)] = root(j)
-    for k, j in eom.G.todok():
-        parent[root(eom.n + k)] = root(j)
+def coupled(eom: EquationsOfMotion) -> list[Group]:
+    """What one linear solve ties together, by the sparsity of M, G and frictions."""
     position = {c.name: eom.n + k for k, c in enumerate(eom.constraints)}
+    pairs = list(eom.M.todok())
     for law in eom.frictions:
         first, *others = (position[name] for name in (*law.of, *law.normal))
-        for i in others:
-            parent[root(i)] = root(first)
-    groups: dict[int, list[int]] = {}
-    for i in range(eom.n + eom.m):
-        groups.setdefault(root(i), []).append(i)
+        pairs += [(first, i) for i in others]
+    return _tied(eom, pairs)
+
+
+def constrained_together(eom: EquationsOfMotion) -> list[Group]:
+    """What the constraints alone tie together; rows that hold nothing are left out."""
+    return [group for group in _tied(eom, []) if group[0]]
+
+
+def _tied(eom: EquationsOfMotion, pairs: list[tuple[int, int]]) -> list[Group]:
+    pairs = [*pairs, *((eom.n + k, j) for k, j in eom.G.todok())]
+    size = eom.n + eom.m
+    i, j = np.array(pairs, dtype=int).reshape(-1, 2).T
+    count, of = connected_components(coo_array((np.ones(len(i)), (i, j)), (size, size)))
+    groups = [np.flatnonzero(of == g).tolist() for g in range(count)]
     return [
         (frozenset(i for i in g if i < eom.n), frozenset(i - eom.n for i in g if i >= eom.n))
-        for g in groups.values()
+        for g in groups
     ]

@@ -19,48 +19,47 @@ from .model import name_of
 TIME = dynamicsymbols._t
 
 
+@dataclass(frozen=True, kw_only=True)
+class Statement:
+    """Where something holds of an FMU's outputs, and how well.
+
+    `while_closed`, `while_open`: only while that contact is so.  `until_departure`: only as long as that
+    contact, closed at the start, has not opened.  `when`: only where this expression of outputs, parameters,
+    initial values and time is not 0 (contacts and counts are numbers in it).  Errors are measured relative to
+    `scale` (default: the largest magnitude of `expected` along the run) and allowed up to `within` times the
+    solver's tolerance, but at least `rounding`.  `only`: the FMUs that it applies to.
+    """
+
+    while_closed: str | None = None
+    while_open: str | None = None
+    until_departure: str | None = None
+    when: Expr | None = None
+    scale: Expr | None = None
+    within: float = 10.0
+    rounding: float = 1e-12
+    only: tuple[str, ...] | None = None
+
+
 @dataclass(frozen=True)
-class ClosedForm:
+class ClosedForm(Statement):
     """`actual` equals `expected` at every communication point at which it applies.
 
-    `name` is an output's name (then `actual` may be left out) or a label.  `while_closed`,
-    `while_open`: only while that contact is so.  `until_departure`: only as long as that contact, closed
-    at the start, has not opened; `at_departure`: only once, when it has first opened, to be used with
-    the `departure` symbols.  `when`: only where this expression of outputs, parameters,
-    initial values and time is not 0 (contacts and counts are numbers in it).  Errors are measured relative
-    to `scale` (default: the
-    largest magnitude of `expected` along the run) and allowed up to `within` times the solver's
-    tolerance, but at least `rounding`.  `only`: the FMUs that it applies to.
+    `name` is an output's name (then `actual` may be left out) or a label.  `at_departure`: only once, when
+    that contact, closed at the start, has first opened, to be used with the `departure` symbols.
     """
 
     name: str
     expected: Expr
     actual: Expr | None = None
-    while_closed: str | None = None
-    while_open: str | None = None
-    until_departure: str | None = None
     at_departure: str | None = None
-    when: Expr | None = None
-    scale: Expr | None = None
-    within: float = 10.0
-    rounding: float = 1e-12
-    only: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
-class Conserved:
+class Conserved(Statement):
     """`expression` keeps the value that it has at the first communication point where it applies."""
 
     name: str
     expression: Expr
-    while_closed: str | None = None
-    while_open: str | None = None
-    until_departure: str | None = None
-    when: Expr | None = None
-    scale: Expr | None = None
-    within: float = 10.0
-    rounding: float = 1e-12
-    only: tuple[str, ...] | None = None
 
 
 def output(name: str) -> Expr:

@@ -16,25 +16,9 @@ from ..model.elements import Expr
 from ..model.units import Unit
 from ..prepare.prepare import Prepared, prepare
 
-
-@dataclass(frozen=True)
-class Cost:
-    """What an FMU holds and does.
-
-    `operations` of one evaluation of the right-hand side: of the equations, common subexpressions
-    counted once, and the multiplications and divisions of the solution for accelerations and lambda.
-    """
-
-    outputs: int
-    parameters: int
-    inputs: int
-    coordinates: int
-    constraints: int
-    contacts: int
-    methods: int
-    operations: int
-    python_bytes: int
-    native_bytes: int
+PYTHON, NATIVE = "bytes of generated Python", "bytes of generated C"
+OPERATIONS = "operations of the right-hand side"
+Cost = dict[str, int]  # what an FMU holds and does
 
 
 @dataclass(frozen=True)
@@ -47,19 +31,7 @@ class Savings:
 
     def rows(self) -> list[tuple[str, int, int]]:
         """(what, full FMU, this scene)."""
-        titles = {
-            "outputs": "outputs",
-            "parameters": "adjustable parameters",
-            "inputs": "inputs",
-            "coordinates": "coordinates that are integrated",
-            "constraints": "constraints that are solved with them",
-            "contacts": "contacts that are watched",
-            "methods": "methods to choose from",
-            "operations": "operations of the right-hand side",
-            "python_bytes": "bytes of generated Python",
-            "native_bytes": "bytes of generated C",
-        }
-        return [(t, getattr(self.full, a), getattr(self.scene, a)) for a, t in titles.items()]
+        return [(what, self.full[what], self.scene[what]) for what in self.full]
 
 
 def savings(prepared: Prepared) -> Savings | None:
@@ -75,22 +47,23 @@ def cost(prepared: Prepared) -> Cost:
     """Counted on the equations that code is printed from."""
     form, stepped = prepared.coded, prepared.coded.stepped
     tangents = needs_tangents(prepared.scene, prepared.system)
-    return Cost(
-        outputs=len(prepared.table.outputs),
-        parameters=len(form.equations.p),
-        inputs=len(form.equations.u),
-        coordinates=stepped.n,
-        constraints=stepped.m,
-        contacts=len(prepared.system.contacts),
-        methods=len(prepared.scene.selectable),
-        operations=operations(stepped),
-        python_bytes=len(prepared.text.encode()),
-        native_bytes=len(model_source(form, tangents).encode()),
-    )
+    return {
+        "outputs": len(prepared.table.outputs),
+        "adjustable parameters": len(form.equations.p),
+        "inputs": len(form.equations.u),
+        "coordinates that are integrated": stepped.n,
+        "constraints that are solved with them": stepped.m,
+        "contacts that are watched": len(prepared.system.contacts),
+        "methods to choose from": len(prepared.scene.selectable),
+        OPERATIONS: operations(stepped),
+        PYTHON: len(prepared.text.encode()),
+        NATIVE: len(model_source(form, tangents).encode()),
+    }
 
 
 def operations(eom: EquationsOfMotion) -> int:
-    """Of one evaluation of the accelerations; see Cost."""
+    """Of one evaluation of the right-hand side: of the equations, common subexpressions counted once, and the
+    multiplications and divisions of the solution for accelerations and lambda."""
     mass, jacobian = eom.M.todok(), eom.G.todok()
     lower = sorted((i, j) for i, j in mass if i >= j)
     entries = sorted(jacobian)

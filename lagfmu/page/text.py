@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import sympy as sp
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -18,6 +19,9 @@ from ..solver.precedence import OMITTED
 from .documentation import shown
 from .savings import Savings, savings
 from .typeset import Notation, typeset
+from .wrapped import wrapped
+
+INDENT = 6
 
 
 def show(prepared: Prepared, console: Console) -> None:
@@ -34,14 +38,16 @@ def show(prepared: Prepared, console: Console) -> None:
 
     _heading(console, "Degrees of freedom")
     count = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
+    if any(isinstance(c, Contact) for c in prepared.equations.constraints):
+        count += ", with every contact closed"
     console.print(Text(count))
     if structure.redundant:
         names, shared = ", ".join(structure.redundant), ", ".join(structure.shared)
         text = (
-            f"  redundant: {names}; λ is not unique for {shared}: of all λ with the same Q the one with "
+            f"redundant: {names}; λ is not unique for {shared}: of all λ with the same Q the one with "
             "the least norm, rows scaled so that g M⁻¹ gᵀ = 1; Q is unique"
         )
-        console.print(Text(text), soft_wrap=True)
+        _print(console, "  ", text)
 
     saved = savings(prepared)
     if saved is not None:
@@ -72,10 +78,7 @@ def show_equations(prepared: Prepared | Derived, console: Console) -> None:
             _heading(console, section.title)
         width = max((len(e.label) for e in section.equations), default=0)
         for equation in section.equations:
-            line = Text("  ")
-            line.append(f"{equation.label:{width}}   ", style="dim")
-            line.append(equation.text)
-            console.print(line, soft_wrap=True)
+            _line(console, f"{equation.label:{width}}", equation.text)
 
 
 def show_what_is_known(known: Derived, console: Console) -> None:
@@ -104,7 +107,7 @@ def _given(prepared: Prepared | Derived, console: Console) -> None:
 
 def _savings(saved: Savings, console: Console) -> None:
     for text in saved.left_out:
-        console.print(Text(f"  {text}"), soft_wrap=True)
+        _print(console, "  ", text)
     table = Table(box=None, header_style="dim", padding=(0, 2))
     for column in ("", "full FMU", "this scene"):
         table.add_column(column, justify="right" if column else "left")
@@ -160,18 +163,25 @@ def _class(
     _line(console, label, str(found.kind) + note)
     names = "|".join(name_of(q) for q in eom.model.coordinates)
     certificate = re.sub(rf"\b({names})\(t\)", r"\1", found.certificate)
-    console.print(Text(f"      {certificate}", style="dim"), soft_wrap=True)
+    _print(console, "      ", certificate, "dim")
     notation = Notation(eom)
     for integral in found.integrals:
         text = notation.show(eom.plain(integral.f))[1]
-        console.print(Text(f"      keeps {text} constant"), soft_wrap=True)
+        _print(console, "      ", f"keeps {text} constant")
 
 
 def _line(console: Console, label: str, text: str) -> None:
-    line = Text("  ")
-    line.append(f"{label}   ", style="dim")
-    line.append(text)
-    console.print(line, soft_wrap=True)
+    _print(console, f"  {label}   ", text)
+
+
+def _print(console: Console, head: str, text: str, style: str = "") -> None:
+    """A text behind its heading, in as many lines as it takes; a long heading stands above it."""
+    if cell_len(head) > console.width // 3 and cell_len(head + text) > console.width:
+        console.print(Text(head.rstrip(), style="dim"), soft_wrap=True)
+        head = " " * INDENT
+    for line in wrapped(text, max(console.width - cell_len(head), INDENT)):
+        console.print(Text.assemble((head, "dim"), (line, style)), soft_wrap=True)
+        head = " " * cell_len(head)
 
 
 def _units(prepared: Prepared) -> Table:
@@ -196,4 +206,4 @@ def _starts(prepared: Prepared, console: Console) -> None:
     for m in moved:
         unit = shown(prepared.whole[m.name].unit)
         said = "is left out: it becomes" if m.rank == OMITTED else f"= {m.given!r} is projected to"
-        console.print(Text(f"  {m.name} {said} {m.used!r} {unit}".rstrip()), soft_wrap=True)
+        _print(console, "  ", f"{m.name} {said} {m.used!r} {unit}")

@@ -17,9 +17,11 @@ from xml.etree import ElementTree as ET
 
 from .. import names
 from ..errors import SimulationError
+from ..fmu.described import experiment_of, read_description
 from ..fmu.write import write_whole
-from .report import Examined, as_json
-from .simulate import Trajectory, communication_points, read_description, simulate
+from .pipeline import as_json
+from .report import outcome
+from .simulate import Trajectory, communication_points, simulate
 from .verify import Verification
 
 TOLERANCE = 1e-12
@@ -53,9 +55,8 @@ def reference_run(
     inputs: Trajectory | None = None,
 ) -> tuple[Trajectory, float, float]:
     """The run, its stop time and its communication step [s].  Raises SimulationError."""
-    experiment = read_description(fmu).defaultExperiment
-    stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
-    step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
+    experiment = experiment_of(read_description(fmu), stop_time, step_size)
+    stop, step = experiment.stop_time, experiment.step_size
     return simulate(fmu, stop, step, TOLERANCE, inputs=inputs), stop, step
 
 
@@ -187,7 +188,7 @@ def _stable(found: Verification) -> str:
     """The report without what differs from run to run, so that the FMU's bytes do not."""
     from dataclasses import replace
 
-    return as_json([Examined(f"{found.name}.fmu", replace(found, seconds=0.0))])
+    return as_json([outcome(f"{found.name}.fmu", replace(found, seconds=0.0))])
 
 
 def _xml(root: ET.Element) -> bytes:

@@ -1,10 +1,23 @@
-"""A matplotlib figure that a notebook shows by itself, without pyplot and whatever the backend."""
+"""Figures of matplotlib, without pyplot and whatever the backend: their style, and how they are written."""
 
 from __future__ import annotations
 
 import io
+from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
+
+from ..errors import BuildError
+
+STYLE: dict[str, Any] = {
+    "svg.hashsalt": "lagfmu",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "axes.axisbelow": True,
+}
 
 
 class Drawn(Figure):
@@ -14,3 +27,14 @@ class Drawn(Figure):
         picture = io.BytesIO()
         self.savefig(picture, format="png", dpi=110)
         return picture.getvalue()
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write it, the same bytes each time; the ending says the format.  Raises BuildError."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        metadata = {"Date": None} if path.suffix == ".svg" else {}
+        figure.savefig(path, metadata=metadata, dpi=150)
+    except (OSError, ValueError) as error:
+        raise BuildError(f"cannot write the figure {str(path)!r}: {error}") from None
+    return path

@@ -1,9 +1,12 @@
-"""What every command that judges FMUs hands to a pipeline: an exit code, and JUnit's XML."""
+"""What every command that judges FMUs hands to a pipeline: an exit code, JSON, and JUnit's XML."""
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
@@ -29,11 +32,14 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Suite:
-    """The statements about one FMU; `error`: why it could not be run, or (`misused`) was not."""
+class Outcome:
+    """What came of one FMU, or of a file of which none could be made: what was `found`, as cases and as
+    `data` for JSON; or `error`: why it could not be run, or (`misused`) was not."""
 
-    name: str
-    cases: Sequence[Case]
+    file: str
+    found: Any = None
+    cases: Sequence[Case] = ()
+    data: Mapping[str, Any] = field(default_factory=dict)
     error: str = ""
     properties: Mapping[str, str] = field(default_factory=dict)
     misused: bool = False
@@ -47,20 +53,43 @@ class Suite:
         return FAILS if not known or any(c.failure for c in known) else HOLDS
 
 
-def exit_code(suites: Sequence[Suite]) -> int:
+def exit_code(outcomes: Sequence[Outcome]) -> int:
     """The largest of all."""
-    return max((s.code for s in suites), default=HOLDS)
+    return max((o.code for o in outcomes), default=HOLDS)
 
 
-def as_junit(command: str, suites: Sequence[Suite]) -> bytes:
+def as_json(outcomes: Sequence[Outcome]) -> str:
+    """All that was found, in one list."""
+    return text_of(
+        [
+            {"file": o.file, "verdict": VERDICTS[o.code], "error": o.error or None, **o.data}
+            for o in outcomes
+        ]
+    )
+
+
+def text_of(data: Any) -> str:
+    """As JSON; numbers that are not finite, which it does not know, become null."""
+    return json.dumps(_plain(data), indent=1, allow_nan=False) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def as_junit(command: str, outcomes: Sequence[Outcome]) -> bytes:
     """JUnit's XML: of what nothing is known is skipped, an FMU that could not be run is an error."""
     document = JUnitXml(command)
-    for s in suites:
-        suite = TestSuite(s.name)
+    for s in outcomes:
+        suite = TestSuite(s.file)
         for name, value in s.properties.items():
             suite.add_property(name, value)
         if s.error:
-            case = TestCase("runs", s.name, 0.0)
+            case = TestCase("runs", s.file, 0.0)
             case.result = [Error(s.error, VERDICTS[s.code])]
             suite.add_testcase(case)
         for c in s.cases:

@@ -38,18 +38,13 @@ def plot(
 
     Raises BuildError if a name is unknown or the file cannot be written.
     """
+    from .figure import save
+
     chosen = _chosen(result, names)
-    path = Path(out)
     with panels(result, units, chosen) as (figure, _):
         if title:
             figure.suptitle(title, fontsize=12)
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, metadata=metadata, dpi=150)
-        except (OSError, ValueError) as error:
-            raise BuildError(f"cannot write the figure {str(path)!r}: {error}") from None
-    return path
+        return save(figure, Path(out))
 
 
 def figure_of(
@@ -80,22 +75,14 @@ def panels(
     """The figure and its panels, one a unit, multipliers first, while the style of it holds."""
     import matplotlib as mpl
 
-    from .figure import Drawn
+    from .figure import STYLE, Drawn
 
     known = list(result.dtype.names or ())
     members_of: dict[tuple[bool, str], list[str]] = {}
     for n in chosen:
         later = names.read(n).quantity != names.MULTIPLIER
         members_of.setdefault((later, units.get(n, "")), []).append(n)
-    style: dict[str, Any] = {
-        "svg.hashsalt": "lagfmu",
-        "font.size": 11,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.grid": True,
-        "grid.alpha": 0.3,
-    }
-    with mpl.rc_context(style):
+    with mpl.rc_context(STYLE | {"font.size": 11}):
         figure = Drawn(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
         axes = figure.subplots(len(members_of), 1, sharex=True, squeeze=False)
         for axis, ((_, unit), members) in zip(axes[:, 0], members_of.items(), strict=True):

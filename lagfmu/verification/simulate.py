@@ -6,7 +6,6 @@ import difflib
 import os
 import re
 import warnings
-import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,7 +17,8 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from .. import names
-from ..errors import SettingError, SimulationError, VerificationError
+from ..errors import SettingError, SimulationError
+from ..fmu.described import experiment_of, has_error_bars, items_of, read_description
 from ..fmu.python import slave_of
 from ..fmu.slave import Refused
 from ..methods import IN_PYTHON, NUMBERS, unknown
@@ -117,12 +117,6 @@ def check_inputs(inputs: Trajectory | None, variables: Sequence[Any]) -> None:
         problems.append("the times are not sorted, expected rising seconds")
     if problems:
         raise SettingError(f"inputs: {'; '.join(problems)}")
-
-
-def has_error_bars(variables: Sequence[Any]) -> bool:
-    """True if one of the variables, a table's or fmpy's, is the error bar of another."""
-    known = {v.name for v in variables}
-    return any(names.barred(n) in known for n in known)
 
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
@@ -246,34 +240,6 @@ def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[
         raise SettingError(f"{what}: " + "; ".join(problems))
 
 
-def items_of(variable: Any) -> dict[str, int]:
-    """Name -> number of the items of fmpy's ScalarVariable, if it is an Enumeration."""
-    if variable.type != "Enumeration" or variable.declaredType is None:
-        return {}
-    return {item.name: int(item.value) for item in variable.declaredType.items}
-
-
-def read_description(path: Path) -> Any:
-    """fmpy's ModelDescription.  Raises VerificationError if the file is missing or no FMU."""
-    if not path.is_file():
-        raise VerificationError(f"{str(path)!r}: there is no such file")
-    try:
-        return fmpy.read_model_description(str(path), validate=False)
-    except (zipfile.BadZipFile, KeyError, OSError) as error:
-        raise VerificationError(
-            f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
-        ) from None
-    except Exception as error:
-        raise VerificationError(
-            f"{str(path)!r}: modelDescription.xml cannot be read ({error})"
-        ) from None
-
-
-def file_stem(description: Any) -> str:
-    """The name of the model as the name of a file in the folder that is meant, whatever it holds."""
-    return re.sub(r"[^\w-]", "_", description.modelName or "") or "FMU"
-
-
 def _simulate_fmu(
     path: Path,
     stop_time: float | None,
@@ -284,7 +250,6 @@ def _simulate_fmu(
     besides: Sequence[str],
 ) -> Trajectory:
     description = read_description(path)
-    experiment = description.defaultExperiment
     messages: list[str] = []
     moved: list[str] = []
 
@@ -294,8 +259,8 @@ def _simulate_fmu(
         elif STARTS.search(text := message.decode(errors="replace").strip()):
             moved.append(text)
 
-    stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
-    step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
+    experiment = experiment_of(description, stop_time, step_size)
+    stop, step = experiment.stop_time, experiment.step_size
     _check_count(stop, step)
     settable = {
         v.name: _Settable(

@@ -6,22 +6,21 @@ import math
 import os
 import time
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import sympy as sp
 from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
 from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
-from ..model.elements import Expr
-from .simulate import Trajectory, read_description, simulate, steps_of
+from ..fmu.described import experiment_of, numbers_of, read_description
+from .evaluate import evaluate
+from .simulate import Trajectory, simulate, steps_of
 
 RECORD = "resources/lagfmu.json"
 MODES = ("Boolean", "Real")  # what a mode may be: a Real where an FMU has Reals alone
@@ -133,13 +132,8 @@ def verify(
         stop_time = float(reference.table["time"][-1]) or None
     result = simulate(path, stop_time, step_size, tolerance, start_values, inputs, besides=besides)
     seconds = time.perf_counter() - begun
-    experiment = description.defaultExperiment
-    used = tolerance or float(getattr(experiment, "tolerance", None) or 1e-8)
-    values = {
-        v.name: float(v.start)
-        for v in description.modelVariables
-        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
-    }
+    used = tolerance or experiment_of(description).tolerance
+    values = numbers_of(description)
     values |= {k: float(v) for k, v in (start_values or {}).items() if not isinstance(v, str)}
     used = values.get(names.TOLERANCE) or used
     checks = [
@@ -357,45 +351,3 @@ def _departures(closed_form: CarriedForm) -> list[str]:
     counted = set() if closed_form.when is None else {str(s) for s in closed_form.when.free_symbols}
     told = {s.constraint for s in map(names.read, symbols) if s.head == names.DEPARTURE}
     return sorted(c for c in told if names.name(names.DEPARTURES, c) not in counted)
-
-
-def evaluate(
-    expression: Expr,
-    rows: Trajectory,
-    result: Trajectory,
-    values: Mapping[str, float],
-    name: str,
-) -> NDArray[np.float64]:
-    """An expression of closed form `name` at `rows` of the run `result`, parameters in `values`.
-
-    Raises VerificationError if it uses what the FMU does not have.
-    """
-    symbols = sorted(expression.free_symbols, key=str)
-    known = rows.dtype.names or ()
-    columns = []
-    for symbol in symbols:
-        text = str(symbol)
-        inner = names.initially(text)
-        if inner in known:
-            column = result[inner][0]
-        elif text in known:
-            column = rows[text]
-        elif text in values:
-            column = values[text]
-        else:
-            raise VerificationError(
-                f"closed form {name!r} uses {text!r}, which is no output or parameter of the FMU"
-            )
-        columns.append(np.asarray(column, dtype=float))
-    function = _function(tuple(symbols), expression)
-    with np.errstate(all="ignore"):
-        return np.broadcast_to(np.asarray(function(*columns), dtype=float), len(rows)).copy()
-
-
-@lru_cache(maxsize=1024)
-def _function(symbols: tuple[Expr, ...], expression: Expr) -> Callable[..., Any]:
-    """The numeric function of an expression, which takes SymPy much longer than the run that it is for."""
-    function: Callable[..., Any] = sp.lambdify(
-        symbols, expression, modules=["scipy", "numpy"], dummify=True
-    )
-    return function

@@ -19,6 +19,7 @@ from sympy.polys.polyerrors import PolynomialError
 
 from ...model.elements import Expr
 from .. import shorter
+from ..coupling import constrained_together
 from ..equations import EquationsOfMotion
 
 Pivots = tuple[int, ...]
@@ -32,8 +33,8 @@ def null_space(eom: EquationsOfMotion) -> Expr:
     constraint has a unit vector.  Redundant rows are left out.
     """
     columns: list[dict[int, Expr]] = []
-    for coordinates, rows in _groups(eom):
-        columns += _group_columns(eom.G, coordinates, rows)
+    for coordinates, rows in constrained_together(eom):
+        columns += _group_columns(eom.G, sorted(coordinates), sorted(rows))
     entries = {(i, b): e for b, column in enumerate(columns) for i, e in column.items()}
     return sp.SparseMatrix(eom.n, len(columns), entries)
 
@@ -60,31 +61,7 @@ def lambda_free(eom: EquationsOfMotion) -> list[Expr]:
 
 def largest_group(eom: EquationsOfMotion) -> int:
     """The largest number of constraints in one group of coordinates: the size of S's minors."""
-    return max((len(rows) for _, rows in _groups(eom)), default=0)
-
-
-def _groups(eom: EquationsOfMotion) -> list[tuple[list[int], list[int]]]:
-    """(coordinates, rows) that G's sparsity ties together, in the order of the coordinates."""
-    place = {j: j for j in range(eom.n)}  # coordinate -> its group
-
-    def root(j: int) -> int:
-        while place[j] != j:
-            j = place[j]
-        return j
-
-    rows: dict[int, list[int]] = {}
-    for k, j in sorted(eom.G.todok()):
-        rows.setdefault(k, []).append(j)
-    for touched in rows.values():
-        first = min(root(j) for j in touched)
-        for j in touched:
-            place[root(j)] = first
-    groups: dict[int, tuple[list[int], list[int]]] = {}
-    for j in range(eom.n):
-        groups.setdefault(root(j), ([], []))[0].append(j)
-    for k, touched in sorted(rows.items()):
-        groups[root(touched[0])][1].append(k)
-    return list(groups.values())
+    return max((len(rows) for _, rows in constrained_together(eom)), default=0)
 
 
 def _group_columns(G: Expr, coordinates: list[int], rows: list[int]) -> list[dict[int, Expr]]:
@@ -136,20 +113,11 @@ def _at_random(A: Expr) -> Expr:
 
 
 def _independent(numbers: Expr, order: Any) -> list[int]:
-    """Rows that add to the rank, taken greedily in `order` (Gaussian elimination)."""
-    kept: list[int] = []
-    reduced: list[tuple[int, list[Expr]]] = []
-    for k in order:
-        row = list(numbers.row(k))
-        size = max((abs(x) for x in row), default=0)
-        for pivot, other in reduced:
-            factor = row[pivot] / other[pivot]
-            row = [a - factor * b for a, b in zip(row, other, strict=True)]
-        best = max(range(len(row)), key=lambda j, row=row: abs(row[j]))  # type: ignore[misc]
-        if abs(row[best]) > 1e-25 * size:
-            kept.append(k)
-            reduced.append((best, row))
-    return kept
+    """Rows that add to the rank, taken greedily in `order`."""
+    rows = list(order)
+    columns = numbers.extract(rows, list(range(numbers.cols))).T
+    small = 1e-25 * max((abs(x) for x in columns), default=0)
+    return [rows[k] for k in columns.rref(iszerofunc=lambda x: abs(x) <= small)[1]]
 
 
 def _pivots(A: Expr, numbers: Expr) -> Pivots:

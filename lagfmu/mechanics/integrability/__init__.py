@@ -9,5 +9,5 @@
 - `quadrature`, `potential`, `ansatz`: integrals by one variable and of exact forms, sums with constant
   coefficients
 - `factors`, `lie`: one integrable form; `single` tries them in turn
-- `pfaffians`, `linear`: several forms; `integrals` tries them in turn
+- `pfaffians`: several forms; `integrals` tries the methods in turn
 """

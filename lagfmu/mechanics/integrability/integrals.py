@@ -1,6 +1,6 @@
 """First integrals of an integrable Pfaffian system in closed form, by a bounded list of methods.
 
-In this order: known candidates, linear systems, each form alone, and an ansatz for f.
+In this order: known candidates, each form alone, and an ansatz for f.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from contextlib import suppress
 from ...model.elements import Expr
 from .ansatz import combine, monomials, relations
 from .frobenius import along
-from .linear import exponential_integrals
 from .pfaffians import Pfaffians
 from .single import single
 from .tower import Tower
@@ -32,10 +31,6 @@ def first_integrals(
     system = Pfaffians(rows, variables)
     for f in known:
         system.offer(f)
-    if not system.complete():
-        with suppress(*FAILURES):
-            for f in exponential_integrals(system):
-                system.offer(f)
     for row in forms if len(forms) == 1 else (*forms, *rows):  # one row is that of one form
         if not system.complete() and not late() and system.contains(row):
             system.offer(single(row, variables))

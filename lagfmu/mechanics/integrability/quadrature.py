@@ -1,9 +1,7 @@
 """Integrals by one variable, where a short attempt finds them.
 
-Each term is integrated on its own: products of powers, exponentials, sines and cosines by
-int z**n exp(s z) dz with a complex rate s; rational functions and one function of a curved argument by
-SymPy (Bronstein, *Symbolic Integration I*, ch. 2); rational functions of the sine and cosine of one angle
-by t = tan(angle/2).  The integral of an unknown function is left as it stands.
+Each term is integrated on its own by SymPy: rational functions (Bronstein, *Symbolic Integration I*, ch. 2),
+and what its rules for people find.  The integral of an unknown function is left as it stands.
 """
 
 from __future__ import annotations
@@ -16,7 +14,6 @@ from sympy import (
     Function,
     I,
     Integral,
-    Mul,
     Piecewise,
     Poly,
     Pow,
@@ -27,18 +24,15 @@ from sympy import (
     erf,
     erfc,
     erfi,
-    exp,
     expand,
     integrate,
     log,
     sec,
     sin,
-    tan,
     together,
 )
 from sympy.core.function import AppliedUndef
 from sympy.integrals.manualintegrate import manualintegrate
-from sympy.simplify.fu import TR8
 
 from ...model.elements import Expr
 from .undecided import late, spend
@@ -88,20 +82,19 @@ def _search(term: Expr, x: Expr) -> Expr | None:
     # where all symbols are positive: the primitive is verified for what they are, afterwards
     names = {v: Dummy(v.name, positive=True) for v in sorted(term.free_symbols | {x}, key=str)}
     plain, variable = term.xreplace(names), names[x]
-    for method in (_oscillation, _heuristics, _half_angle):
-        try:
-            found = method(plain, variable)
-        except Exception:  # SymPy's heuristics may raise anything
-            continue
-        if found is None:
-            continue
-        while found.has(Piecewise):
-            piece = next(iter(found.atoms(Piecewise)))
-            found = found.xreplace({piece: piece.args[0].expr})
-        found = found.replace(erfc, _error_function)
-        if not found.has(Integral, S.NaN, S.ComplexInfinity):
-            return found.xreplace({new: old for old, new in names.items()})
-    return None
+    try:
+        found = _heuristics(plain, variable)
+    except Exception:  # SymPy's heuristics may raise anything
+        return None
+    if found is None:
+        return None
+    while found.has(Piecewise):
+        piece = next(iter(found.atoms(Piecewise)))
+        found = found.xreplace({piece: piece.args[0].expr})
+    found = found.replace(erfc, _error_function)
+    if found.has(Integral, S.NaN, S.ComplexInfinity):
+        return None
+    return found.xreplace({new: old for old, new in names.items()})
 
 
 def _error_function(u: Expr) -> Expr:
@@ -141,51 +134,3 @@ def _heuristics(term: Expr, x: Expr) -> Expr | None:
         lambda e: inverse[type(e.base)](*e.base.args) ** -e.exp,
     )
     return None if other == term else manualintegrate(other, x)
-
-
-def _oscillation(term: Expr, x: Expr) -> Expr | None:
-    """The integral of a sum of x**n exp(a x) sin(b x + c), products of sines included."""
-    if not term.has(sin, cos, exp):
-        return None
-    total: Expr = S.Zero
-    for part in Add.make_args(expand(TR8(term))):
-        constant, rest = part.as_independent(x, as_Add=False)
-        power, exponent, wave = 0, S.Zero, None
-        for factor in Mul.make_args(rest):
-            if isinstance(factor, exp):
-                exponent += factor.args[0]
-            elif isinstance(factor, sin | cos) and wave is None:
-                wave = factor
-            elif factor != 1:
-                base, power = factor.as_base_exp()
-                if base != x or not power.is_Integer or not 0 <= power <= 6:
-                    return None
-        rate = expand(exponent).diff(x)
-        angle = wave.args[0] if wave is not None else S.Zero
-        turn = angle.diff(x)
-        if rate.has(x) or turn.has(x) or rate == turn == 0:
-            return None
-        # y = (u cos + v sin) exp is stood for by u - i v: to integrate is to divide by a + i b
-        u, v = (S.One, S.Zero) if wave is None or isinstance(wave, cos) else (S.Zero, S.One)
-        size = rate**2 + turn**2
-        for k in range(power, -1, -1):
-            u, v = (u * rate - v * turn) / size, (u * turn + v * rate) / size
-            total += constant * x**k * (u * cos(angle) + v * sin(angle)) * exp(exponent)
-            constant *= -k
-    return total
-
-
-def _half_angle(term: Expr, x: Expr) -> Expr | None:
-    """A rational function of the sine and cosine of one angle, by the tangent of its half."""
-    angles = {node.args[0] for node in term.atoms(sin, cos, tan, sec, csc) if node.has(x)}
-    if len(angles) != 1:
-        return None
-    angle = angles.pop()
-    turn, t = angle.diff(x), Dummy("t", positive=True)
-    put = {sin(angle): 2 * t / (1 + t**2), cos(angle): (1 - t**2) / (1 + t**2)}
-    put[tan(angle)] = 2 * t / (1 - t**2)
-    plain = together(term.xreplace(put) * 2 / (turn * (1 + t**2))).cancel()
-    if turn.has(x) or plain.has(x):
-        return None
-    found = _heuristics(apart(plain, t), t)
-    return found if found is None else found.xreplace({t: tan(angle / 2)})

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -28,7 +28,7 @@ from ... import names
 from ...fmu.session import RefusalError
 from .closed_forms import judged, laws
 from .facts import Facts, facts_of
-from .judge import EPS, Check, invariants, lost
+from .judge import EPS, Check, differ, invariants, lost
 from .player import Drive, Player, Run, Values, play
 
 SHIFT = 1e-6
@@ -90,6 +90,24 @@ class Bench:
     def points(self) -> int:
         """Communication steps of a run."""
         return 20 if self.quick or self.facts.target == "python" else 100
+
+    def refuses(self, ask: Callable[[Player], Any]) -> Finding:
+        """It must be refused, and what goes on is as if it had not been asked."""
+        h, refusal = self.facts.step_size, None
+        with self.another("asked") as one, self.another("not asked") as two:
+            for each in (one, two):
+                each.begin({}, None)
+                each.step(h)
+            two.step(h)
+            try:
+                ask(one)
+            except RefusalError as error:
+                refusal = error
+            checks = [Check("refused", 0.0 if refusal else 1.0, 0.5)]
+            if refusal is not None and refusal.status != 4:  # after fmi2Fatal nothing may be called
+                one.step(h)
+                checks.append(differ(two.read(), one.read(), "as if it had not been asked:"))
+        return Finding(tuple(checks), refusal)
 
     # ------------------------------------------------------------------ natural times
 

@@ -4,12 +4,11 @@ values that are read and then set in initialization mode."""
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .facts import Facts
-from .judge import EPS, Check
+from .judge import EPS, Check, differ
 from .player import Player, Run, table
 from .probe import Probe
 
@@ -32,11 +31,6 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
     return found
 
 
-def _differ(a: dict[str, Any], b: dict[str, Any], what: str) -> Check:
-    names = [n for n in a if a[n] != b[n]]
-    return Check(what + "".join(f" {n}" for n in names[:3]), float(len(names)), 0.5)
-
-
 def _initialization(bench: Bench) -> Finding:
     """What was read before does not outlive what is set: as if it had been set at once."""
     others = [
@@ -55,11 +49,11 @@ def _initialization(bench: Bench) -> Finding:
                 two.give(before)
             shown = two.read()
             two.call("exitInitializationMode")
-            checks.append(_differ(right, shown, "shown:"))
-            checks.append(_differ(right, two.read(), "begun:"))
+            checks.append(differ(right, shown, "shown:"))
+            checks.append(differ(right, two.read(), "begun:"))
             for each in (one, two):
                 each.step(h)
-            checks.append(_differ(one.read(), two.read(), "after a step:"))
+            checks.append(differ(one.read(), two.read(), "after a step:"))
     return Finding(tuple(checks))
 
 
@@ -83,20 +77,15 @@ def _stop_time(bench: Bench) -> Finding:
         with bench.another("saves") as one, bench.another("takes over") as two:
             one.begin({}, None, stop)
             one.step(h)
-            state = one.save()
-            data = one.call("serializeFMUstate", state)
-            one.call("freeFMUstate", state)
             two.begin({}, None, None if stop else 2 * h)
-            state = two.call("deSerializeFMUstate", data)
-            two.restore(state, h)
-            two.call("freeFMUstate", state)
+            one.hand(two)
             for each in (one, two):
                 each.step(h)
-            checks.append(_differ(one.read(), two.read(), "same bits up to it:"))
+            checks.append(differ(one.read(), two.read(), "same bits up to it:"))
             passed[stop] = _passes(two, h)
             if stop is None:
                 one.step(h)
-                checks.append(_differ(one.read(), two.read(), "same bits behind it:"))
+                checks.append(differ(one.read(), two.read(), "same bits behind it:"))
     return Finding(
         (
             Check("stops where it was to stop", float(passed[2 * h]), 0.5),
@@ -140,12 +129,7 @@ def _goes_on(name: str, bench: Bench) -> Finding:
                 if k == SAVED and not anew:
                     two.begin({}, None)
                     two.step(0.5 * begin)
-                    state = one.save()
-                    data, moment = one.call("serializeFMUstate", state), one.time
-                    one.call("freeFMUstate", state)
-                    state = two.call("deSerializeFMUstate", data)
-                    two.restore(state, moment)
-                    two.call("freeFMUstate", state)
+                    one.hand(two)
                     one, two = two, one
                 one.step(part * facts.stop_time)
                 values = _polynomial(bench, name, one.time - begin)

@@ -19,24 +19,21 @@ accelerations in it: where forces balance on a light part, of what they would ma
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
 from ... import names
-from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm
 from ...model.elements import Expr
+from ...verification.evaluate import Compiled
 from ...verification.verify import applies
 from .player import Run
 
 LEEWAY = 10.0
-TINY = 1e-150  # whose square a double holds
 Column = NDArray[np.float64]
 
 
@@ -58,61 +55,6 @@ def magnitude(e: Expr) -> Expr:
         if not slope.has(sp.Derivative, sp.Subs, sp.DiracDelta):  # else a jump or no formula
             return sp.Abs(e) + sp.Abs(slope) * magnitude(e.args[0])
     return sp.Abs(e)
-
-
-def function(symbols: Sequence[Expr], expressions: Any) -> Callable[..., Any]:
-    """Of numbers in place of the symbols, as sp.lambdify makes one, which goes through all once for each
-    symbol whose name Python does not allow: here once for all of them."""
-    plain = [sp.Symbol(f"x{k}") for k in range(len(symbols))]
-    named = dict(zip(symbols, plain, strict=True))
-    several = isinstance(expressions, list)
-    renamed = [sp.sympify(e).xreplace(named) for e in (expressions if several else [expressions])]
-    made: Callable[..., Any] = sp.lambdify(
-        plain, renamed if several else renamed[0], modules=["scipy", "numpy"]
-    )
-    return made
-
-
-class Compiled:
-    """An expression in the FMU's variables, as a function of a run."""
-
-    def __init__(self, expression: Expr, name: str) -> None:
-        self.name = name
-        self.symbols = sorted(sp.sympify(expression).free_symbols, key=str)
-        self.function = function(self.symbols, expression)
-
-    def at(
-        self, chosen: NDArray[np.bool_], run: Run, floors: Mapping[str, float] | None = None
-    ) -> Column:
-        """Its values at the chosen rows; magnitudes below `floors` are taken for those."""
-        rows, known, columns = run.rows[chosen], run.rows.dtype.names or (), []
-        for text in map(str, self.symbols):
-            if inner := names.initially(text):
-                column: Any = run.rows[inner][0]
-            elif text in known:
-                column = rows[text]
-            elif text in run.values:
-                column = run.values[text]
-            else:
-                raise VerificationError(f"closed form {self.name!r} uses {text!r}: not in the FMU")
-            column = np.asarray(column, dtype=float)
-            if floors is not None and text in floors:
-                column = np.maximum(np.abs(column), floors[text])
-            columns.append(column)
-        with np.errstate(all="ignore"):
-            found = np.asarray(self._evaluated(columns), dtype=float)
-        return np.broadcast_to(found, len(rows)).copy()
-
-    def _evaluated(self, columns: list[Any]) -> Any:
-        """In a wider range of exponents, where there is one and what comes in is near the end of a double's:
-        a product of several factors passes through places at which doubles have no digits left."""
-        far = [
-            c for c in columns if np.any((c != 0) & ~((np.abs(c) > TINY) & (np.abs(c) < 1 / TINY)))
-        ]
-        if far:
-            with contextlib.suppress(TypeError):  # functions that know doubles only
-                return self.function(*(c.astype(np.longdouble) for c in columns))
-        return self.function(*columns)
 
 
 @dataclass(frozen=True)
@@ -148,16 +90,18 @@ class JudgedForm:
         chosen = applies(self.closed_form, run.rows, run.values)
         if not self.instantaneous:
             chosen = chosen & undisturbed
-        actual = self.actual.at(chosen, run)
+        rows, result, values = run.rows[chosen], run.rows, run.values
+        actual = self.actual.at(rows, result, values)
         if len(actual) == 0:
             return 0.0, 1.0, 0
         first = np.full_like(actual, actual[0])
-        expected = first if self.expected is None else self.expected.at(chosen, run)
+        expected = first if self.expected is None else self.expected.at(rows, result, values)
         known = np.isfinite(expected) & np.isfinite(actual)  # elsewhere the form is not defined
         if not known.any():
             return 0.0, 1.0, 0
         least = None if self.law else floors
-        sizes = [np.abs(expected), *(np.abs(s.at(chosen, run, least)) for s in self.sizes)]
+        sizes = [np.abs(s.at(rows, result, values, least)) for s in self.sizes]
+        sizes.append(np.abs(expected))
         for s in sizes:
             known &= np.isfinite(s)
         if not known.any():
@@ -168,7 +112,7 @@ class JudgedForm:
             size = np.full(len(actual), size[known].max())
             tolerance = LEEWAY * self.closed_form.within * run.tolerance
             relative = np.maximum(relative, tolerance) * growth[chosen]
-        left = np.nan_to_num(self.left.at(chosen, run), posinf=0.0)
+        left = np.nan_to_num(self.left.at(rows, result, values), posinf=0.0)
         allowed = relative * size + LEEWAY * left + np.finfo(float).tiny
         error = np.abs(actual - expected)
         worst = int(np.argmax(np.where(known, error / allowed, -1.0)))

@@ -22,9 +22,10 @@ import sympy as sp
 
 from ... import names
 from ...fmu.session import RefusalError
+from ...verification.evaluate import function
 from ...verification.verify import applies
 from .bench import Bench, Finding
-from .closed_forms import JudgedForm, function, magnitude
+from .closed_forms import JudgedForm, magnitude
 from .facts import Facts
 from .judge import Check
 from .player import table

@@ -13,8 +13,8 @@ import sympy as sp
 from ... import names
 from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm, tables_in, unpack_closed_forms
+from ...fmu.described import experiment_of, file_stem, is_python, read_description
 from ...model.elements import Expr
-from ...verification.simulate import file_stem, read_description
 from ...verification.verify import RECORD, closed_forms_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
@@ -115,7 +115,6 @@ def facts_of(path: Path) -> Facts:
             "judged by: stress the model's full FMU"
         )
     with zipfile.ZipFile(path) as archive:
-        python = "resources/slavemodule.txt" in archive.namelist()
         tables = tables_in(archive.read(RECORD), str(path))
     reals = [v for v in description.modelVariables if v.type == "Real"]
     bases = {
@@ -124,8 +123,7 @@ def facts_of(path: Path) -> Facts:
         if u.baseUnit is not None
     }
     laid = _beside(path)
-    experiment = description.defaultExperiment
-    stop = float(getattr(experiment, "stopTime", None) or 1.0)
+    experiment = experiment_of(description)
     coordinates = tuple(
         v.name for v in reals if names.derivative(v.name, 2) in variables and v.causality != "input"
     )
@@ -136,7 +134,7 @@ def facts_of(path: Path) -> Facts:
     return Facts(
         path=path,
         name=file_stem(description),
-        target="python" if python else "native",
+        target="python" if is_python(path) else "native",
         description=description,
         variables=variables,
         outputs=tuple(
@@ -166,9 +164,9 @@ def facts_of(path: Path) -> Facts:
         },
         dimensions={v.name: bases.get(v.unit, (0,) * len(BASE)) for v in reals}
         | {"time": (0, 0, 1) + (0,) * (len(BASE) - 3)},
-        stop_time=stop,
-        step_size=float(getattr(experiment, "stepSize", None) or stop / 500),
-        tolerance=float(getattr(experiment, "tolerance", None) or 1e-8),
+        stop_time=experiment.stop_time,
+        step_size=experiment.step_size,
+        tolerance=experiment.tolerance,
         tabulated=bool(tables),
     )
 

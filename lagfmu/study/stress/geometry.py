@@ -19,7 +19,7 @@ from ...model.model import Contact, Model, Nonholonomic, name_of
 from ...model.reactions import reactions_in
 from ...names import read
 from ...prepare.prepare import Prepared
-from .closed_forms import function
+from ...verification.evaluate import function
 
 Column = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -6,7 +6,6 @@ import math
 from functools import partial
 
 from ... import names
-from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .facts import Facts
 from .judge import Check
@@ -79,24 +78,4 @@ def _driven(name: str, shape: str, size: float, bench: Bench) -> Finding:
 
 
 def _not_finite(name: str, value: float, bench: Bench) -> Finding:
-    """It must be refused; what goes on is as if it had not been set."""
-    h = bench.facts.step_size
-    with bench.another("untouched") as one:
-        one.begin({}, None)
-        one.step(h)
-        one.step(h)
-        right = one.read()
-    with bench.another("touched") as one:
-        one.begin({}, None)
-        one.step(h)
-        refusal: RefusalError | None = None
-        try:
-            one.give({name: value})
-        except RefusalError as error:
-            refusal = error
-        checks = [Check("refused", 0.0 if refusal else 1.0, 0.5)]
-        if refusal is not None and refusal.status != 4:  # after fmi2Fatal nothing may be called
-            one.step(h)
-            differ = [n for n, v in one.read().items() if v != right[n]]
-            checks.append(Check("as untouched: " + ", ".join(differ), float(len(differ)), 0.5))
-    return Finding(tuple(checks), refusal)
+    return bench.refuses(lambda one: one.give({name: value}))

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,12 @@ class Check:
         if not np.isfinite(self.error):
             return float("inf")
         return self.error / self.allowed if self.allowed > 0 else float(self.error > 0) * np.inf
+
+
+def differ(a: Mapping[str, Any], b: Mapping[str, Any], what: str) -> Check:
+    """To the last bit; the first names of those that are not."""
+    names = [n for n in a if a[n] != b[n]]
+    return Check(what + "".join(f" {n}" for n in names[:3]), float(len(names)), 0.5)
 
 
 def invariants(facts: Facts, run: Run, forms: Sequence[JudgedForm], elapsed: Column) -> list[Check]:

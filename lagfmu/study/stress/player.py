@@ -76,6 +76,16 @@ class Player(Session):
         self.call("setFMUstate", state)
         self.time = time
 
+    def hand(self, other: Player, state: Any = None, time: float | None = None) -> None:
+        """By the bytes of a state, else of the present one, the other goes on from there."""
+        kept = self.save() if state is None else state
+        data = self.call("serializeFMUstate", kept)
+        if state is None:
+            self.call("freeFMUstate", kept)
+        taken = other.call("deSerializeFMUstate", data)
+        other.restore(taken, self.time if time is None else time)
+        other.call("freeFMUstate", taken)
+
 
 def table(facts: Facts, count: int) -> Trajectory:
     """An empty table: time, outputs, inputs."""

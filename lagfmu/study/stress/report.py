@@ -1,21 +1,18 @@
-"""A stress run for the terminal, as JSON with every row, and as Markdown that can be filed."""
+"""A stress run for the terminal, and with every row for a pipeline; as Markdown: summary.py."""
 
 from __future__ import annotations
 
-import json
-import math
 import platform
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from ...verification import pipeline
-from ...verification.pipeline import Case, Suite
+from ...page.table import new_table
+from ...verification.pipeline import Case, Outcome
 from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Verdict
 
 FORMAT = 1
@@ -65,17 +62,13 @@ class Stressed:
 
 def table(found: Stressed) -> Table:
     """One line a probe."""
-    drawn = Table(
-        title=f"{found.name} ({found.target})",
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+    last = "nearest to its limit, or the reason"
+    drawn = new_table(
+        f"{found.name} ({found.target})",
+        *("probe", "verdict", "checks", "ratio", last),
+        text=("probe", last),
+        words=("verdict",),
     )
-    drawn.add_column("probe")
-    drawn.add_column("verdict", no_wrap=True)
-    drawn.add_column("checks", justify="right", no_wrap=True)
-    drawn.add_column("ratio", justify="right", no_wrap=True)
-    drawn.add_column("nearest to its limit, or the reason")
     family = ""
     for row in found.rows:
         if row.family != family:
@@ -86,17 +79,16 @@ def table(found: Stressed) -> Table:
             escape(row.probe),
             f"[{COLOURS[row.verdict]}]{row.verdict}[/]",
             str(row.checks),
-            _ratio(row),
-            escape(_text(row)),
+            ratio_of(row),
+            escape(remark(row)),
         )
     return drawn
 
 
 def summary(all_found: Sequence[Stressed]) -> Table:
     """One line an FMU."""
-    drawn = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for column in ("FMU", "target", "probes", *VERDICTS, "checks"):
-        drawn.add_column(column, justify="left" if column in ("FMU", "target") else "right")
+    columns = ("FMU", "target", "probes", *VERDICTS, "checks")
+    drawn = new_table("", *columns, words=("FMU", "target"))
     for f in all_found:
         counts = [f"[{COLOURS[v]}]{f.count(v)}[/]" if f.count(v) else "0" for v in VERDICTS]
         checks = str(sum(r.checks for r in f.rows))
@@ -104,28 +96,20 @@ def summary(all_found: Sequence[Stressed]) -> Table:
     return drawn
 
 
-def _ratio(row: Verdict) -> str:
+def ratio_of(row: Verdict) -> str:
+    """Of the check that came nearest to its limit."""
     return f"{row.ratio:.1e}" if row.ratio else ""
 
 
-def _text(row: Verdict) -> str:
+def remark(row: Verdict) -> str:
+    """What came nearest to its limit, or the reason."""
     nearest = row.closest if row.verdict == RIGHT and row.ratio else ""
     return "; ".join(t for t in (nearest, row.detail) if t)
 
 
-@dataclass(frozen=True)
-class Tried:
-    """An FMU, or a file of which none could be made: what was found, or why it could not be run."""
-
-    file: str
-    found: Stressed | None
-    error: str = ""
-
-    @property
-    def suite(self) -> Suite:
-        """A case a probe: wrong fails, unfinished is skipped, a clear refusal is as good as right."""
-        rows = () if self.found is None else self.found.rows
-        return Suite(self.file, [_case(r) for r in rows], self.error)
+def outcome(file: str, found: Stressed) -> Outcome:
+    """A case a probe: wrong fails, unfinished is skipped, a clear refusal is as good as right."""
+    return Outcome(file, found, [_case(r) for r in found.rows], data(found))
 
 
 def _case(row: Verdict) -> Case:
@@ -134,23 +118,8 @@ def _case(row: Verdict) -> Case:
     return Case(row.probe, row.family, failure, skipped, row.seconds)
 
 
-def all_as_json(tried: Sequence[Tried]) -> str:
-    """Every FMU with all its rows, in one list."""
-    data = [
-        {"file": t.file, "verdict": pipeline.VERDICTS[t.suite.code]}
-        | {"error": t.error or None}
-        | ({} if t.found is None else _data(t.found))
-        for t in tried
-    ]
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
-
-
-def as_json(found: Stressed) -> str:
-    """Everything."""
-    return json.dumps(_data(found), indent=1, allow_nan=False) + "\n"
-
-
-def _data(found: Stressed) -> dict[str, Any]:
+def data(found: Stressed) -> dict[str, Any]:
+    """Everything, as JSON knows it."""
     return {
         "format": FORMAT,
         "fmu": found.name,
@@ -165,42 +134,5 @@ def _data(found: Stressed) -> dict[str, Any]:
             "python": sys.version.split()[0],
         },
         "verdicts": {v: found.count(v) for v in VERDICTS},
-        "rows": [
-            asdict(r) | {"ratio": r.ratio if math.isfinite(r.ratio) else None} for r in found.rows
-        ],
+        "rows": [asdict(r) for r in found.rows],
     }
-
-
-def as_markdown(found: Stressed) -> str:
-    """A summary by family, what is wrong first, then every row."""
-    lines = [f"# Stress of {found.name} ({found.target})", ""]
-    lines += [f"SHA-256 of the FMU: `{found.digest}`.", ""]
-    if not found.laws:
-        lines += [WITHOUT, ""]
-    if found.quick:
-        lines += ["A quick run: some of the probes only.", ""]
-    lines += [MEANING, ""]
-    lines.append(cells("family", "probes", *VERDICTS))
-    lines.append("| --- |" + " ---: |" * (1 + len(VERDICTS)))
-    for family in found.families:
-        counts = [found.count(v, family) for v in VERDICTS]
-        lines.append(cells(family, sum(counts), *counts))
-    counts = [found.count(v) for v in VERDICTS]
-    lines += [cells("all", sum(counts), *counts), ""]
-    for title, verdict in (("Wrong", WRONG), ("Unfinished", UNFINISHED)):
-        bad = [r for r in found.rows if r.verdict == verdict]
-        if bad:
-            lines += [f"## {title}", ""]
-            lines += [f"- {r.family}, {r.probe}: {r.detail}" for r in bad] + [""]
-    lines += ["## Every probe", ""]
-    lines += ["| family | probe | verdict | checks | ratio | nearest to its limit, or reason |"]
-    lines += ["| --- | --- | --- | ---: | ---: | --- |"]
-    for r in found.rows:
-        answer = f"**{WRONG}**" if r.verdict == WRONG else r.verdict
-        lines.append(cells(r.family, r.probe, answer, r.checks, _ratio(r), _text(r)))
-    return "\n".join(lines) + "\n"
-
-
-def cells(*contents: object) -> str:
-    """A row of a Markdown table."""
-    return "| " + " | ".join(str(c).replace("|", "\\|") for c in contents) + " |"

@@ -12,7 +12,7 @@ from ... import names
 from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .facts import Facts
-from .judge import Check
+from .judge import Check, differ
 from .player import Player, clear, play, table
 from .probe import Probe
 
@@ -35,11 +35,6 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
     name = f"{count} interleaved"
     found.append(Probe("instances", name, partial(_interleaved, count), False))
     return found
-
-
-def _differ(a: dict[str, Any], b: dict[str, Any], what: str) -> Check:
-    names = [n for n in a if a[n] != b[n]]
-    return Check(what + "".join(f" {n}" for n in names[:3]), float(len(names)), 0.5)
 
 
 def _across(contact: str, bench: Bench) -> Finding:
@@ -68,24 +63,21 @@ def _window(bench: Bench, middle: float) -> Finding:
         one.step(h)
         beyond = one.read()
         one.restore(state, begin)
-        checks = [_differ(before, one.read(), "restored as it was:")]
+        checks = [differ(before, one.read(), "restored as it was:")]
         one.step(h)
-        checks.append(_differ(right, one.read(), "same bits when repeated:"))
+        checks.append(differ(right, one.read(), "same bits when repeated:"))
         one.step(h)
-        checks.append(_differ(beyond, one.read(), "same bits after that:"))
+        checks.append(differ(beyond, one.read(), "same bits after that:"))
         one.restore(state, begin)
         for _ in range(PARTS):
             one.step(h / PARTS)
         checks += _near(bench, right, one.read(), begin + h)
-        data = one.call("serializeFMUstate", state)
         two.begin({}, None)
-        taken = two.call("deSerializeFMUstate", data)
-        two.restore(taken, begin)
-        checks.append(_differ(before, two.read(), "as serialized:"))
+        one.hand(two, state, begin)
+        checks.append(differ(before, two.read(), "as serialized:"))
         two.step(h)
-        checks.append(_differ(right, two.read(), "same bits from the bytes:"))
+        checks.append(differ(right, two.read(), "same bits from the bytes:"))
         one.call("freeFMUstate", state)
-        two.call("freeFMUstate", taken)
     return Finding(tuple(checks), None, f"t = {middle:.6g} s")
 
 
@@ -134,7 +126,7 @@ def _corrupt(bench: Bench) -> Finding:
             except RefusalError as error:
                 refusal = error if refusal is None or clear(refusal) else refusal
                 if error.status != 4:
-                    checks.append(_differ(before, one.read(), f"as before, {what}:"))
+                    checks.append(differ(before, one.read(), f"as before, {what}:"))
     return Finding(tuple(checks), refusal)
 
 

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from ... import names
-from ...fmu.session import RefusalError
 from ...methods import FIXED_STEP, INTEGRATORS
 from .bench import REFERENCE, Bench, Finding
 from .facts import Facts
@@ -85,26 +84,7 @@ def _pieces(count: int, bench: Bench) -> Finding:
 
 
 def _bad_step(size: float, bench: Bench) -> Finding:
-    """It must be refused, and the next step must be as if nothing had been asked."""
-    with bench.another("step") as one:
-        one.begin({}, None)
-        one.step(bench.facts.step_size)
-        state = one.save()
-        one.step(bench.facts.step_size)
-        right = one.read()
-        one.restore(state, one.time - bench.facts.step_size)
-        refusal = None
-        try:
-            one.call("doStep", one.time, size)
-        except RefusalError as error:
-            refusal = error
-        checks = [Check("refused", 0.0 if refusal else 1.0, 0.5)]
-        if refusal is not None and refusal.status != 4:  # after fmi2Fatal nothing may be called
-            one.step(bench.facts.step_size)
-            differ = [n for n, v in one.read().items() if v != right[n]]
-            checks.append(Check("as before: " + ", ".join(differ), float(len(differ)), 0.5))
-        one.call("freeFMUstate", state)
-    return Finding(tuple(checks), refusal)
+    return bench.refuses(lambda one: one.call("doStep", one.time, size))
 
 
 def _tolerance(tolerance: float, bench: Bench) -> Finding:

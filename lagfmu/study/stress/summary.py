@@ -1,4 +1,4 @@
-"""One Markdown page over all FMUs of a stress run: what a reviewer files."""
+"""A stress run as a Markdown page, of one FMU with every probe or over all: what a reviewer files."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from collections import Counter
 from collections.abc import Sequence
 from importlib import metadata
 
-from .probe import REFUSED, RIGHT
-from .report import MEANING, VERDICTS, WITHOUT, Stressed, cells
+from .probe import REFUSED, RIGHT, WRONG
+from .report import MEANING, VERDICTS, WITHOUT, Stressed, ratio_of, remark
 
 PACKAGES = ("lagfmu", "sympy", "numpy", "scipy", "fmpy", "pythonfmu")
 REASONS = 20  # most frequent ones that are listed
 
 
-def as_summary(found: Sequence[Stressed]) -> str:
+def as_summary(found: Sequence[Stressed], every_probe: bool = False) -> str:
     """Versions, counts by FMU and by family, whatever is not right or refused, reasons of refusals."""
     target = found[0].target
+    names = f"{len(found)} FMUs" if len(found) > 1 else found[0].name
     lines = [
-        f"# Stress of {len(found)} FMUs ({target})",
+        f"# Stress of {names} ({target})",
         "",
         *_circumstances(found),
         "",
@@ -32,7 +33,24 @@ def as_summary(found: Sequence[Stressed]) -> str:
         if verdict not in (RIGHT, REFUSED):
             lines += _listed(found, verdict)
     lines += _reasons(found)
+    if every_probe:
+        lines += _every(found)
     return "\n".join(lines) + "\n"
+
+
+def cells(*contents: object) -> str:
+    """A row of a table."""
+    return "| " + " | ".join(str(c).replace("|", "\\|") for c in contents) + " |"
+
+
+def _every(found: Sequence[Stressed]) -> list[str]:
+    lines = ["", "## Every probe", ""]
+    lines += ["| family | probe | verdict | checks | ratio | nearest to its limit, or reason |"]
+    lines += ["| --- | --- | --- | ---: | ---: | --- |"]
+    for r in (r for f in found for r in f.rows):
+        answer = f"**{WRONG}**" if r.verdict == WRONG else r.verdict
+        lines.append(cells(r.family, r.probe, answer, r.checks, ratio_of(r), remark(r)))
+    return lines
 
 
 def _circumstances(found: Sequence[Stressed]) -> list[str]:
@@ -61,7 +79,15 @@ def _counts(found: Sequence[Stressed]) -> list[str]:
     for f in found:
         counts = [f.count(v) for v in VERDICTS]
         checks = sum(r.checks for r in f.rows)
-        lines.append(cells(f.name, len(f.rows), *counts, checks, f"`{f.digest[:16]}`"))
+        lines.append(
+            cells(
+                f.name,
+                len(f.rows),
+                *counts,
+                checks,
+                f"`{f.digest if len(found) == 1 else f.digest[:16]}`",
+            )
+        )
     lines += ["", f"| family | {head} |", f"| --- |{rule}"]
     for family in dict.fromkeys(x for f in found for x in f.families):
         counts = [sum(f.count(v, family) for f in found) for v in VERDICTS]

@@ -14,37 +14,25 @@ from .table import INFINITE, happened, numbers, one_by_one, varied
 FIGURES = (".svg", ".png", ".pdf")
 FAILED, NOTHING = "#c0392b", "#e8e8e8"
 INK = "#1f5fa8"
-STYLE = {
-    "svg.hashsalt": "lagfmu",
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "axes.axisbelow": True,
-}
 
 
 def plot(found: Any, path: Path) -> Path:
-    """Draw the numbers that were kept.  Raises SimulationError if the file cannot be written."""
+    """Draw the numbers that were kept.  Raises BuildError if the file cannot be written."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
+
+    from ...verification.figure import STYLE, save
 
     names = numbers(found)
     if not names:
         raise SimulationError("there is nothing to plot: keep numbers of each run")
     dims = [d for d in found["status"].dims if d != "run"]
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE | {"font.size": 9}):
         if "run" in found.dims or len(dims) > 2:
             figure = _scatter(found, names, Figure)
         else:
             figure = _grid(found, names, dims, Figure)
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
-        except (OSError, ValueError) as error:
-            raise SimulationError(f"cannot write {str(path)!r}: {error}") from None
-    return path
+        return save(figure, path)
 
 
 def _drawn(found: Any, name: str) -> Any:

@@ -21,6 +21,7 @@ from ... import names
 from ...errors import SettingError, SimulationError
 from ...fmu.archive import version
 from ...fmu.compiler import find_compiler
+from ...fmu.described import experiment_of, read_description
 from ...fmu.session import TYPES, Plan, plug
 from ...fmu.write import write
 from ...model.file import load
@@ -33,7 +34,6 @@ from ...verification.simulate import (
     check_inputs,
     communication_points,
     missing,
-    read_description,
 )
 from .design import Design, Values, design
 from .engine import connected, distributed, local
@@ -310,13 +310,11 @@ def _design(
 
 
 def _times(path: Path, stop_time: float | None, step_size: float | None) -> NDArray[np.float64]:
-    experiment = read_description(path).defaultExperiment
     for what, value in (("stop_time", stop_time), ("step_size", step_size)):
         if value is not None and not 0 < value < np.inf:
             raise SettingError(f"{what} = {value!r} s, expected a positive number")
-    stop = stop_time or float(getattr(experiment, "stopTime", None) or 1.0)
-    step = step_size or float(getattr(experiment, "stepSize", None) or stop / 500)
-    return communication_points(stop, step)
+    experiment = experiment_of(read_description(path), stop_time, step_size)
+    return communication_points(experiment.stop_time, experiment.step_size)
 
 
 def _check_options(

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from .choose import Choice
-from .figure import COLOURS, FAR, MARKERS, STYLE, UNITS
-from .survey import Option
+from .figure import COLOURS, FAR, method_handles, time_unit
+from .figure import curve as curve_of
 
 LINES = {"multipliers": "-", "nullspace": "--", "minimal": ":"}
 
@@ -21,15 +21,15 @@ def curve(choice: Choice) -> str:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    from ...verification.figure import STYLE
+
     measured = choice.survey
-    fastest = min(o.row.median for o in measured.options) / measured.simulated
-    factor, unit = next((u for u in UNITS if fastest * u[0] >= 0.5), UNITS[-1])
-    factor /= measured.simulated
-    with plt.rc_context(STYLE | {"svg.fonttype": "none", "font.size": 9}):
+    factor, unit = time_unit((o.row for o in measured.options), measured.simulated)
+    with plt.rc_context(STYLE | {"hatch.linewidth": 0.4, "svg.fonttype": "none", "font.size": 9}):
         figure, axis = plt.subplots(figsize=(6.6, 3.3), layout="constrained")
         axis.set_xscale("log")
         axis.set_yscale("log")
-        for method, colour in COLOURS.items():
+        for method in COLOURS:
             for formulation, line in LINES.items():
                 own = [
                     o
@@ -37,8 +37,7 @@ def curve(choice: Choice) -> str:
                     if (o.row.setting.method, o.formulation) == (method, formulation)
                     and np.isfinite(o.error)
                 ]
-                if own:
-                    _line(axis, own, factor, colour, MARKERS[method], line)
+                curve_of(axis, [o.error for o in own], [o.row for o in own], factor, line)
         chosen = choice.option
         place = (chosen.error, factor * chosen.row.median)
         axis.plot(*place, "*", markersize=17, markerfacecolor="#f2c200", markeredgecolor="#222222")
@@ -58,7 +57,7 @@ def curve(choice: Choice) -> str:
         axis.set_ylabel(f"wall time per simulated second in {unit}")
         axis.invert_xaxis()
         figure.legend(
-            handles=_legend(choice, plt), loc="outside right center", frameon=False, fontsize=8
+            handles=_legend(choice), loc="outside right center", frameon=False, fontsize=8
         )
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
@@ -69,48 +68,23 @@ def curve(choice: Choice) -> str:
     )
 
 
-def _line(axis: Any, own: list[Option], factor: float, colour: str, marker: str, line: str) -> None:
-    y = np.array([factor * o.row.median for o in own])
-    low = np.array([factor * o.row.quartiles[0] for o in own])
-    high = np.array([factor * o.row.quartiles[1] for o in own])
-    axis.errorbar(
-        [o.error for o in own],
-        y,
-        yerr=[y - low, high - y],
-        color=colour,
-        marker=marker,
-        linestyle=line,
-        markersize=4,
-        linewidth=1.4,
-        elinewidth=0.8,
-    )
-
-
 def _near(choice: Choice) -> bool:
     measured = choice.survey
     return min(o.row.median for o in measured.options) < FAR * measured.floor
 
 
-def _legend(choice: Choice, plt: Any) -> list[Any]:
+def _legend(choice: Choice) -> list[Any]:
     from matplotlib.lines import Line2D
 
     options = choice.survey.options
     methods = {o.row.setting.method for o in options}
     found = {o.formulation for o in options}
-    handles = [
-        Line2D([], [], color=c, marker=MARKERS[m], markersize=4, linewidth=1.4, label=m)
-        for m, c in COLOURS.items()
-        if m in methods
-    ]
+    handles = method_handles(methods, _near(choice))
     handles += [
         Line2D([], [], color="#333333", linestyle=line, label=f)
         for f, line in LINES.items()
         if f in found and len(found) > 1
     ]
-    if _near(choice):
-        handles.append(
-            Line2D([], [], color="#777777", linestyle=":", linewidth=1.2, label="fmpy's own calls")
-        )
     handles.append(
         Line2D(
             [],

@@ -9,15 +9,14 @@ dotted line is the time that fmpy's own calls take.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import BuildError
 from ...model.units import for_reading
-from .measure import Tradeoff
+from .measure import Tradeoff, Weighed
 from .quantities import EVENT, FORCE, MULTIPLIER, OWN
 
 COLOURS = {
@@ -27,16 +26,6 @@ COLOURS = {
     "rattle": "#ad1a72",
 }
 MARKERS = {"dop853": "o", "radau5": "^", "rk4": "D", "rattle": "v"}
-STYLE: dict[str, Any] = {
-    "svg.hashsalt": "lagfmu",
-    "font.size": 10,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "axes.axisbelow": True,
-    "hatch.linewidth": 0.4,
-}
 WORTH = 0.1  # part of the error of the last named point at which the next one is named
 FAR = 8.0  # times fmpy's own calls: what is slower has them below its panel
 UNITS = ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns"))
@@ -52,10 +41,12 @@ def draw(found: Tradeoff, outs: Sequence[str | os.PathLike[str]]) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    from ...verification.figure import STYLE, save
+
     groups = [g for g in found.groups if g != FORCE or MULTIPLIER not in found.groups]
     steps = list(dict.fromkeys(r.setting.communication for r in found.rows))
-    factor, unit = _time_unit(found)
-    with plt.rc_context(STYLE):
+    factor, unit = time_unit(found.rows, found.simulated)
+    with plt.rc_context(STYLE | {"font.size": 10, "hatch.linewidth": 0.4}):
         figure, axes = plt.subplots(
             len(groups),
             len(steps),
@@ -82,7 +73,7 @@ def draw(found: Tradeoff, outs: Sequence[str | os.PathLike[str]]) -> None:
         for j, h in enumerate(steps):
             for i, group in enumerate(groups):
                 name_front(axes[i, j], found, h, group, factor)
-        handles = _legend(found, plt)
+        handles = _legend(found)
         figure.legend(
             handles=handles,
             loc="outside lower center",
@@ -93,12 +84,7 @@ def draw(found: Tradeoff, outs: Sequence[str | os.PathLike[str]]) -> None:
         figure.suptitle(f"{found.name} ({found.target} FMU): speed against accuracy", fontsize=12.5)
         try:
             for out in outs:
-                path = Path(out)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                metadata = {"Date": None} if path.suffix == ".svg" else {}
-                figure.savefig(path, metadata=metadata, dpi=130)
-        except (OSError, ValueError) as error:
-            raise BuildError(f"cannot write the figure {str(out)!r}: {error}") from None
+                save(figure, Path(out))
         finally:
             plt.close(figure)
 
@@ -115,21 +101,7 @@ def panel(axis: Any, found: Tradeoff, h: float, group: str, factor: float) -> No
         axis.step(xs, ys, where="pre", color="#b9b9b9", linewidth=5, solid_capstyle="round")
     for method in COLOURS:
         own = [r for r in rows if r.setting.method == method and np.isfinite(found.worst(r, group))]
-        x = np.array([found.worst(r, group) for r in own])
-        y = np.array([factor * r.median for r in own])
-        low = np.array([factor * r.quartiles[0] for r in own])
-        high = np.array([factor * r.quartiles[1] for r in own])
-        axis.errorbar(
-            x,
-            y,
-            yerr=[y - low, high - y],
-            color=COLOURS[method],
-            marker=MARKERS[method],
-            markersize=4.5,
-            linewidth=1.6,
-            elinewidth=1,
-            alpha=0.95,
-        )
+        curve(axis, [found.worst(r, group) for r in own], own, factor)
     axis.plot(xs, ys, "o", markersize=10, markerfacecolor="none", color="#222222", linewidth=0)
     axis.axhline(factor * found.floor[h], color="#777777", linewidth=1.2, linestyle=":")
     if not _near(found):
@@ -144,6 +116,30 @@ def panel(axis: Any, found: Tradeoff, h: float, group: str, factor: float) -> No
     own_error = _own(found, group)
     axis.axvspan(own_error, own_error * 1e-9, facecolor="none", edgecolor="#999999", hatch="///")
     axis.margins(0.08)
+
+
+def curve(
+    axis: Any, errors: Sequence[float], rows: Sequence[Weighed], factor: float, line: str = "-"
+) -> None:
+    """One method: wall times over errors, with quartiles."""
+    if not rows:
+        return
+    method = rows[0].setting.method
+    y, low, high = (
+        factor * np.array(x) for x in zip(*((r.median, *r.quartiles) for r in rows), strict=True)
+    )
+    axis.errorbar(
+        errors,
+        y,
+        yerr=[y - low, high - y],
+        color=COLOURS[method],
+        marker=MARKERS[method],
+        linestyle=line,
+        markersize=4.5,
+        linewidth=1.6,
+        elinewidth=1,
+        alpha=0.95,
+    )
 
 
 def name_front(axis: Any, found: Tradeoff, h: float, group: str, factor: float) -> None:
@@ -220,11 +216,11 @@ def _near(found: Tradeoff) -> bool:
     )
 
 
-def _time_unit(found: Tradeoff) -> tuple[float, str]:
+def time_unit(rows: Iterable[Weighed], simulated: float) -> tuple[float, str]:
     """Factor from the seconds of a run to a unit of wall time per simulated second, and the unit."""
-    fastest = min(r.median for r in found.rows) / found.simulated
+    fastest = min(r.median for r in rows) / simulated
     factor, unit = next((u for u in UNITS if fastest * u[0] >= 0.5), UNITS[-1])
-    return factor / found.simulated, unit
+    return factor / simulated, unit
 
 
 def _error_label(found: Tradeoff, group: str) -> str:
@@ -241,16 +237,27 @@ def _error_label(found: Tradeoff, group: str) -> str:
     }.get(group, "largest error of a coordinate, relative to its largest magnitude")
 
 
-def _legend(found: Tradeoff, plt: Any) -> list[Any]:
+def method_handles(present: Collection[str], own_calls: bool) -> list[Any]:
+    """The methods of a legend, and the line of fmpy's own calls."""
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
-    present = {r.setting.method for r in found.rows}
     handles: list[Any] = [
         Line2D([], [], color=c, marker=MARKERS[m], markersize=5, linewidth=1.6, label=m)
         for m, c in COLOURS.items()
         if m in present
     ]
+    if own_calls:
+        handles.append(
+            Line2D([], [], color="#777777", linestyle=":", linewidth=1.2, label="fmpy's own calls")
+        )
+    return handles
+
+
+def _legend(found: Tradeoff) -> list[Any]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles = method_handles({r.setting.method for r in found.rows}, _near(found))
     handles.append(
         Line2D(
             [],
@@ -264,10 +271,6 @@ def _legend(found: Tradeoff, plt: Any) -> list[Any]:
             label="Pareto front",
         )
     )
-    if _near(found):
-        handles.append(
-            Line2D([], [], color="#777777", linestyle=":", linewidth=1.2, label="fmpy's own calls")
-        )
     handles.append(
         Patch(facecolor="none", edgecolor="#999999", hatch="///", label="reference's own error")
     )

@@ -13,7 +13,6 @@ import itertools
 import math
 import shutil
 import time
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -24,9 +23,10 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ...errors import SimulationError, VerificationError
+from ...fmu.described import experiment_of, is_python, read_description
 from ...fmu.session import RefusalError, Session, plug, reason
 from ...names import TOLERANCE
-from ...verification.simulate import Trajectory, communication_points, read_description
+from ...verification.simulate import Trajectory, communication_points
 from .setting import Setting
 
 KINDS = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
@@ -42,12 +42,9 @@ class Importer(Session):
     def __init__(self, fmu: Path) -> None:
         self.path = fmu
         self.description = description = read_description(fmu)
-        with zipfile.ZipFile(fmu) as archive:
-            files = set(archive.namelist())
-        self.target = "python" if "resources/slavemodule.txt" in files else "native"
-        experiment = description.defaultExperiment
-        self.stop_time = float(getattr(experiment, "stopTime", None) or 1.0)
-        self.step_size = float(getattr(experiment, "stepSize", None) or self.stop_time / 500)
+        self.target = "python" if is_python(fmu) else "native"
+        experiment = experiment_of(description)
+        self.stop_time, self.step_size = experiment.stop_time, experiment.step_size
         self.variables = {v.name: v for v in description.modelVariables}
         self.outputs = [
             v

@@ -16,8 +16,9 @@ import numpy as np
 from ... import names
 from ...errors import LagfmuError, SimulationError, VerificationError
 from ...fmu.closed_forms import CarriedForm
+from ...fmu.described import file_stem, numbers_of
 from ...methods import FIXED_STEP, INTEGRATORS
-from ...verification.simulate import file_stem, steps_of
+from ...verification.simulate import steps_of
 from ...verification.verify import check_closed_form, closed_forms_in
 from .front import front
 from .importer import Importer
@@ -271,11 +272,7 @@ def weigh(
     """
     run = importer.observe(setting, limit=limit)
     errors = reference.errors(run)
-    parameters = {
-        v.name: float(v.start)
-        for v in importer.description.modelVariables
-        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
-    }
+    parameters = numbers_of(importer.description)
     checks = [check_closed_form(c, run, parameters, setting.tolerance) for c in closed_forms]
     return Weighed(
         setting=setting,

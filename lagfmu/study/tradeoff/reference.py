@@ -25,10 +25,12 @@ from numpy.typing import NDArray
 from ... import names
 from ...errors import SimulationError
 from ...fmu.closed_forms import CarriedForm
+from ...fmu.described import numbers_of
 from ...model.closed_form import output
 from ...model.elements import Expr
+from ...verification.evaluate import evaluate
 from ...verification.simulate import Trajectory
-from ...verification.verify import applies, evaluate
+from ...verification.verify import applies
 from .importer import Importer
 from .quantities import Quantity, magnitudes, quantities
 from .setting import Setting
@@ -165,11 +167,7 @@ def _replaced(run: Trajectory, right: Mapping[str, NDArray[np.float64]]) -> Traj
 
 def _numbers(importer: Importer, given: Mapping[str, Any]) -> dict[str, float]:
     """The values of parameters, inputs and given start values by name."""
-    values = {
-        v.name: float(v.start)
-        for v in importer.description.modelVariables
-        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
-    }
+    values = numbers_of(importer.description)
     return values | {k: float(v) for k, v in given.items() if not isinstance(v, str)}
 
 
@@ -191,7 +189,7 @@ def _in_time(
     open_forms = [
         c
         for c in closed_forms
-        if c.expected is not None and c.actual.is_Symbol and c.at_departure is None
+        if c.expected is not None and sp.sympify(c.actual).is_Symbol and c.at_departure is None
     ]
     always = [c for c in open_forms if c.while_closed is None and c.while_open is None]
     solved: dict[Expr, Expr] = {}

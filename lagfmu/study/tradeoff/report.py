@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
-import json
-import math
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from ...verification.pipeline import VERDICTS, Case, Suite
+from ...page.table import new_table
+from ...verification.pipeline import Case, Outcome
 from .measure import Tradeoff, Weighed
 from .quantities import EVENT, FORCE, MOTION, MULTIPLIER, OWN
 
@@ -28,20 +25,11 @@ def table(found: Tradeoff, communication: float) -> Table:
     """One line a setting at one communication step: errors, time, spread; the front is marked."""
     chosen = found.front(communication)
     points = round(found.simulated / communication)
-    drawn = Table(
-        title=f"{found.name} ({found.target}), {points} communication steps of "
-        f"{communication:.3g} s",
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+    drawn = new_table(
+        f"{found.name} ({found.target}), {points} communication steps of {communication:.3g} s",
+        *("", "method", "dial", *(SYMBOLS[g] for g in found.groups), "steps", "ms/s"),
+        words=("", "method"),
     )
-    drawn.add_column("", no_wrap=True)
-    drawn.add_column("method", no_wrap=True)
-    drawn.add_column("dial", justify="right", no_wrap=True)
-    for group in found.groups:
-        drawn.add_column(SYMBOLS[group], justify="right", no_wrap=True)
-    for column in ("steps", "ms/s"):
-        drawn.add_column(column, justify="right", no_wrap=True)
     method = ""
     for row in (r for r in found.rows if r.setting.communication == communication):
         if method not in ("", row.setting.method):
@@ -117,15 +105,11 @@ def cheapest(
 
 def summary(all_found: Sequence[Tradeoff]) -> Table:
     """For each FMU and communication step, the cheapest setting at three accuracies of lambda."""
-    drawn = Table(
-        title="The cheapest setting for an error of λ, and its wall time in ms per simulated second",
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+    drawn = new_table(
+        "The cheapest setting for an error of λ, and its wall time in ms per simulated second",
+        *("FMU", "every", "error", "setting", "ms/s"),
+        text=("FMU",),
     )
-    drawn.add_column("FMU", overflow="fold")
-    for column in ("every", "error", "setting", "ms/s"):
-        drawn.add_column(column, justify="right", no_wrap=True)
     for found in all_found:
         head = f"{found.name} ({found.target})"
         for h in dict.fromkeys(r.setting.communication for r in found.rows):
@@ -140,46 +124,18 @@ def summary(all_found: Sequence[Tradeoff]) -> Table:
     return drawn
 
 
-@dataclass(frozen=True)
-class Measured:
-    """An FMU, or a scene of which none could be made: what was measured, or why it could not be."""
-
-    file: str
-    found: Tradeoff | None
-    error: str = ""
-
-    @property
-    def suite(self) -> Suite:
-        """A case a setting, which fails if a closed form does not hold at its tolerance; a method that
-        the FMU refuses is skipped."""
-        if self.found is None:
-            return Suite(self.file, (), self.error)
-        cases = [
-            Case(str(r.setting), self.found.name, "; ".join(r.broken), "", r.median)
-            for r in self.found.rows
-        ]
-        cases += [
-            Case(m, self.found.name, "", f"refused: {why}") for m, why in self.found.refused.items()
-        ]
-        return Suite(self.file, cases)
-
-
-def all_as_json(measured: Sequence[Measured]) -> str:
-    """Every FMU with all its rows, in one list."""
-    data = [
-        {"file": m.file, "verdict": VERDICTS[m.suite.code], "error": m.error or None}
-        | ({} if m.found is None else _data(m.found))
-        for m in measured
+def outcome(file: str, found: Tradeoff) -> Outcome:
+    """A case a setting, which fails if a closed form does not hold at its tolerance; a method that the FMU
+    refuses is skipped."""
+    cases = [
+        Case(str(r.setting), found.name, "; ".join(r.broken), "", r.median) for r in found.rows
     ]
-    return json.dumps(_plain(data), indent=1, allow_nan=False) + "\n"
+    cases += [Case(m, found.name, "", f"refused: {why}") for m, why in found.refused.items()]
+    return Outcome(file, found, cases, data(found))
 
 
-def as_json(found: Tradeoff) -> str:
-    """Everything, with units in the keys: seconds of wall time, relative errors."""
-    return json.dumps(_plain(_data(found)), indent=1, allow_nan=False) + "\n"
-
-
-def _data(found: Tradeoff) -> dict[str, Any]:
+def data(found: Tradeoff) -> dict[str, Any]:
+    """Everything, as JSON knows it, with units in the keys: seconds of wall time, relative errors."""
     reference = found.reference
     fronts = [row for h in found.floor for row in found.front(h)]
     return {
@@ -228,15 +184,6 @@ def _data(found: Tradeoff) -> dict[str, Any]:
         "refused": dict(found.refused),
         "cut_short": list(found.cut),
     }
-
-
-def _plain(value: Any) -> Any:
-    """Numbers that JSON knows: what is not finite becomes null."""
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_plain(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def as_csv(found: Tradeoff) -> str:

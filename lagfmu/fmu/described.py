@@ -1,0 +1,83 @@
+"""What the modelDescription.xml of an FMU says, as fmpy reads it."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+from .. import names
+from ..errors import VerificationError
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Times in s; the tolerance is relative."""
+
+    stop_time: float
+    step_size: float
+    tolerance: float
+
+
+def experiment_of(
+    description: Any, stop_time: float | None = None, step_size: float | None = None
+) -> Experiment:
+    """The default experiment, with another stop time or communication step where they are given."""
+    said = description.defaultExperiment
+    stop = stop_time or float(getattr(said, "stopTime", None) or 1.0)
+    step = step_size or float(getattr(said, "stepSize", None) or stop / 500)
+    return Experiment(stop, step, float(getattr(said, "tolerance", None) or 1e-8))
+
+
+def numbers_of(description: Any) -> dict[str, float]:
+    """The described values of parameters and inputs, by name."""
+    return {
+        v.name: float(v.start)
+        for v in description.modelVariables
+        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
+    }
+
+
+def is_python(fmu: Path) -> bool:
+    """True for a python FMU."""
+    with zipfile.ZipFile(fmu) as archive:
+        return "resources/slavemodule.txt" in archive.namelist()
+
+
+def has_error_bars(variables: Sequence[Any]) -> bool:
+    """True if one of the variables, a table's or fmpy's, is the error bar of another."""
+    known = {v.name for v in variables}
+    return any(names.barred(n) in known for n in known)
+
+
+def items_of(variable: Any) -> dict[str, int]:
+    """Name -> number of the items of fmpy's ScalarVariable, if it is an Enumeration."""
+    if variable.type != "Enumeration" or variable.declaredType is None:
+        return {}
+    return {item.name: int(item.value) for item in variable.declaredType.items}
+
+
+def read_description(path: Path) -> Any:
+    """fmpy's ModelDescription.  Raises VerificationError if the file is missing or no FMU."""
+    if not path.is_file():
+        raise VerificationError(f"{str(path)!r}: there is no such file")
+    try:
+        return fmpy.read_model_description(str(path), validate=False)
+    except (zipfile.BadZipFile, KeyError, OSError) as error:
+        raise VerificationError(
+            f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
+        ) from None
+    except Exception as error:
+        raise VerificationError(
+            f"{str(path)!r}: modelDescription.xml cannot be read ({error})"
+        ) from None
+
+
+def file_stem(description: Any) -> str:
+    """The name of the model as the name of a file in the folder that is meant, whatever it holds."""
+    return re.sub(r"[^\w-]", "_", description.modelName or "") or "FMU"

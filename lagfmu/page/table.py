@@ -1,0 +1,53 @@
+"""Tables for the terminal: none is cut, however narrow the console."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+
+def new_table(
+    title: str, *columns: str, text: Sequence[str] = (), words: Sequence[str] = ()
+) -> Table:
+    """An empty table: columns of numbers to the right, in one piece; `words` to the left, and `text`, which
+    may fold."""
+    drawn = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for heading in columns:
+        drawn.add_column(
+            heading,
+            justify="left" if heading in (*text, *words) else "right",
+            no_wrap=heading not in text,
+            overflow="fold",
+        )
+    return drawn
+
+
+def _width(cell: RenderableType) -> int:
+    """Of its longest line."""
+    if not isinstance(cell, str):
+        return 0
+    return max((line.cell_len for line in Text.from_markup(cell, emoji=False).split()), default=0)
+
+
+def print_whole(console: Console, drawn: Table) -> None:
+    """Print a table without cutting anything: row by row in words where the console is too narrow."""
+    for column in drawn.columns:
+        if column.no_wrap:
+            column.min_width = max(map(_width, (column.header, *column.cells)))
+    unbounded = console.options.update(width=10_000)
+    if console.measure(drawn, options=unbounded).minimum <= console.width:
+        console.print(drawn)
+        return
+    console.print(drawn.title or "", style="bold", highlight=False)
+    headings = [" ".join(str(c.header).split()) for c in drawn.columns]
+    for cells in zip(*(c.cells for c in drawn.columns), strict=True):
+        parts = [
+            f"{heading} {cell}".strip()
+            for heading, cell in zip(headings, cells, strict=True)
+            if cell
+        ]
+        console.print("  " + ", ".join(parts), highlight=False)

@@ -1,0 +1,96 @@
+"""Expressions in an FMU's variables, evaluated on what a run returned."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from .. import names
+from ..errors import VerificationError
+from ..model.elements import Expr
+from .simulate import Trajectory
+
+TINY = 1e-150  # whose square a double holds
+
+
+def function(symbols: Sequence[Expr], expressions: Any) -> Callable[..., Any]:
+    """Of numbers in place of the symbols, as sp.lambdify makes one, which goes through all once for each
+    symbol whose name Python does not allow: here once for all of them."""
+    plain = [sp.Symbol(f"x{k}") for k in range(len(symbols))]
+    named = dict(zip(symbols, plain, strict=True))
+    several = isinstance(expressions, list)
+    renamed = [sp.sympify(e).xreplace(named) for e in (expressions if several else [expressions])]
+    made: Callable[..., Any] = sp.lambdify(
+        plain, renamed if several else renamed[0], modules=["scipy", "numpy"]
+    )
+    return made
+
+
+class Compiled:
+    """An expression of the closed form `name`, as a function of a run."""
+
+    def __init__(self, expression: Expr, name: str) -> None:
+        self.name = name
+        self.symbols = sorted(sp.sympify(expression).free_symbols, key=str)
+        self.function = function(self.symbols, expression)
+
+    def at(
+        self,
+        rows: Trajectory,
+        result: Trajectory,
+        values: Mapping[str, float],
+        floors: Mapping[str, float] | None = None,
+    ) -> NDArray[np.float64]:
+        """Its values at `rows` of the run `result`, parameters in `values`; magnitudes below `floors` are
+        taken for those.  Raises VerificationError if it uses what the FMU does not have."""
+        known, columns = rows.dtype.names or (), []
+        for text in map(str, self.symbols):
+            inner = names.initially(text)
+            if inner in known:
+                column: Any = result[inner][0]
+            elif text in known:
+                column = rows[text]
+            elif text in values:
+                column = values[text]
+            else:
+                raise VerificationError(
+                    f"closed form {self.name!r} uses {text!r}, which is no output or parameter of the FMU"
+                )
+            column = np.asarray(column, dtype=float)
+            if floors is not None and text in floors:
+                column = np.maximum(np.abs(column), floors[text])
+            columns.append(column)
+        with np.errstate(all="ignore"):
+            found = np.asarray(self._evaluated(columns), dtype=float)
+        return np.broadcast_to(found, len(rows)).copy()
+
+    def _evaluated(self, columns: list[Any]) -> Any:
+        """In a wider range of exponents, where there is one and what comes in is near the end of a double's:
+        a product of several factors passes through places at which doubles have no digits left."""
+        far = [
+            c for c in columns if np.any((c != 0) & ~((np.abs(c) > TINY) & (np.abs(c) < 1 / TINY)))
+        ]
+        if far:
+            with contextlib.suppress(TypeError):  # functions that know doubles only
+                return self.function(*(c.astype(np.longdouble) for c in columns))
+        return self.function(*columns)
+
+
+_compiled = lru_cache(maxsize=1024)(Compiled)  # SymPy takes longer for one than the run takes
+
+
+def evaluate(
+    expression: Expr,
+    rows: Trajectory,
+    result: Trajectory,
+    values: Mapping[str, float],
+    name: str,
+) -> NDArray[np.float64]:
+    """See Compiled.at."""
+    return _compiled(expression, name).at(rows, result, values)

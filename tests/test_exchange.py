@@ -1,0 +1,192 @@
+"""Model exchange call by call: what an importer's integrator is told at the state that it has set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from ctypes import byref, c_double, c_int
+from functools import cache
+
+import numpy as np
+import pytest
+from fmi2 import EXCHANGE, Library, Single
+from sympy import Rational, sin, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu
+from lagfmu.fmu.compiler import find_compiler
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+
+G, RADIUS = 10.0, 0.2
+t = dynamicsymbols._t
+x, y, z, u, phi, roll, pitch = dynamicsymbols("x y z u phi roll pitch")
+m, g, A, w, R = symbols("m g A w R", positive=True)
+MASS, GRAVITY = Parameter(m, 2.0, "kg"), Parameter(g, G, "m/s^2")
+
+
+def shaken() -> Model:
+    """A block pushed by A sin(w t), over a table that an importer moves."""
+    return Model(
+        name="Shaken",
+        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
+        forces={y: A * sin(w * t)},
+        coordinates={y: "m"},
+        constraints=[Contact("table", y - u)],
+        parameters=[MASS, GRAVITY, Parameter(A, 3.0, "N"), Parameter(w, 2.0, "rad/s")],
+        inputs=[Input(u, "m")],
+        start={y: 1.0},
+    )
+
+
+def ball() -> Model:
+    """A ball that rolls once it lies on the floor."""
+    return Model(
+        name="Lander",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
+        + Rational(1, 5) * m * R**2 * phi.diff() ** 2
+        - m * g * y,
+        coordinates={x: "m", y: "m", phi: "rad"},
+        constraints=[
+            Contact("floor", y - R),
+            Holonomic("rolling", x - R * phi, while_closed="floor"),
+        ],
+        parameters=[MASS, GRAVITY, Parameter(R, RADIUS, "m")],
+        start={x: 0.5, y: 1.0, phi: 0.3},
+    )
+
+
+def table() -> Model:
+    """A plate on five legs, two more than it needs."""
+    legs = [(2, 2), (2, -2), (-2, 2), (-2, -2), (0, 1)]
+    return Model(
+        name="Plate",
+        lagrangian=m * (z.diff() ** 2 + R**2 * (roll.diff() ** 2 + pitch.diff() ** 2)) / 2
+        - m * g * z,
+        coordinates={z: "m", roll: "rad", pitch: "rad"},
+        constraints=[
+            Contact(f"leg{k}", z + a * R * roll + b * R * pitch) for k, (a, b) in enumerate(legs)
+        ],
+        parameters=[MASS, GRAVITY, Parameter(R, RADIUS, "m")],
+        start={z: 0.0},
+    )
+
+
+@pytest.fixture(scope="module")
+def of(tmp_path_factory) -> Callable[[Callable[[], Model]], Library]:
+    """of(MODEL): its binary."""
+    folder = tmp_path_factory.mktemp("exchange")
+
+    @cache
+    def build(model: Callable[[], Model]) -> Library:
+        made = model()
+        scene = Scene(made.name, stop_time=10.0)
+        path = build_fmu(made, folder, scene, target="native", check=False)
+        return Library(path, folder / made.name)
+
+    return build
+
+
+def continuous(library: Library, **values: float) -> Single:
+    """An instance in continuous-time mode, the events of its start over."""
+    one = library(kind=EXCHANGE)
+    one.does("SetupExperiment", 1, c_double(1e-8), c_double(0), 0, c_double(0))
+    for name, value in values.items():
+        one.set(name, value)
+    one.does("EnterInitializationMode")
+    one.does("ExitInitializationMode")
+    one.events()
+    one.does("EnterContinuousTimeMode")
+    return one
+
+
+def landed(library: Library) -> Single:
+    """The ball, let down onto the floor at x = 0.5 m and phi = 0.3."""
+    one = continuous(library)
+    one.states((0.5, 0.0, RADIUS - 1e-7, -1.0, 0.3, 0.0))
+    one.does("EnterEventMode")
+    one.events()
+    one.does("EnterContinuousTimeMode")
+    return one
+
+
+def test_a_force_is_that_of_the_time(of):
+    """m y'' = A sin(w t) - m g at each time that is set, the state left as it is."""
+    one = continuous(of(shaken))
+    for time in (0.3, 0.8, 0.3):
+        one.does("SetTime", c_double(time))
+        _, acceleration = one.array("GetDerivatives", 2)
+        assert acceleration == pytest.approx(3 * np.sin(2 * time) / 2 - G, rel=1e-14)
+
+
+def test_a_motion_is_where_the_importer_has_set_it(of):
+    """The table is at u whatever der(u) and der(u,2) are: an importer sets all three at each time, and none
+    is carried on from an earlier one."""
+    one = continuous(of(shaken))
+    for time in (0.25, 1.0):
+        one.does("SetTime", c_double(time))
+        for name, value in {"u": 0.1, "der(u)": 0.4, "der(u,2)": -0.3}.items():
+            one.set(name, value)
+        assert one.get("residual.table") == pytest.approx(0.9, rel=1e-14)
+        (indicator,) = one.array("GetEventIndicators", 1)
+        assert indicator == pytest.approx(0.9, rel=1e-8)
+
+
+def test_a_restored_state_has_its_contacts(of):
+    """In flight y'' = -g, on the floor y'' = 0, whichever was saved first and restored last."""
+    one = continuous(of(ball))
+    flight = one.saved()
+    one.states((0.5, 0.0, RADIUS - 1e-7, -1.0, 0.3, 0.0))
+    one.does("EnterEventMode")
+    one.events()
+    one.does("EnterContinuousTimeMode")
+    rolling = one.saved()
+    for state, expected in ((rolling, 0.0), (flight, -G), (rolling, 0.0)):
+        one.does("SetFMUstate", state)
+        assert one.array("GetDerivatives", 6)[3] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_ball_that_has_landed_rolls_from_where_it_is(of):
+    """x - R phi keeps the level at which it landed: nothing turns the ball back to x = R phi, and no step
+    needs a projection."""
+    one = landed(of(ball))
+    event, end = c_int(), c_int()
+    for way in (0.0, 0.7):
+        speed = 1.0
+        one.states((0.5 + way, speed, RADIUS, 0.0, 0.3 + way / RADIUS, speed / RADIUS))
+        found = one.array("GetDerivatives", 6)
+        assert found == pytest.approx([speed, 0, 0, 0, speed / RADIUS, 0], abs=1e-9)
+        assert one.get("residual.rolling") == pytest.approx(0, abs=1e-12)
+        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
+        assert not event.value
+
+
+def test_looking_at_the_indicators_changes_no_derivative(of):
+    """A plate on five legs, a little beside its floor as an integrator leaves it: the accelerations are the
+    same bits whether or not the indicators were read."""
+    one = continuous(of(table))
+    for height in (0.0, 1e-7, -1e-7):
+        one.states((height, 1e-6, 1e-7, 0.0, -2e-7, 1e-6))
+        before = one.array("GetDerivatives", 6)
+        indicators = one.array("GetEventIndicators", 5)
+        assert one.array("GetDerivatives", 6) == before
+        assert sum(indicators) == pytest.approx(2 * G, rel=1e-3)
+
+
+def test_time_has_no_unit(library):
+    """The pendulum whose g is 1e6 times as large does in a millisecond what the other does in a second: the
+    drift dies out 1e3 times as fast, f'' = -alpha^2 f, and velocities are 1e3 times as large."""
+    alphas, speeds, sizes = [], [], []
+    for factor in (1.0, 1e6):
+        gravity = 9.81 * factor
+        one = continuous(library("PendulumCartesian"), g=gravity)
+        px, _, py, _ = one.array("GetContinuousStates", 4)
+        nominals = one.array("GetNominalsOfContinuousStates", 4)
+        sizes.append(nominals[0])
+        speeds.append(nominals[1])
+        one.states((1.001 * px, 0.0, 1.001 * py, 0.0))
+        _, ax, _, ay = one.array("GetDerivatives", 4)
+        f = (1.001**2 - 1) * (px**2 + py**2)
+        alphas.append(np.sqrt(-2 * (1.001 * px * ax + 1.001 * py * ay) / f))
+    assert sizes[1] == pytest.approx(sizes[0], rel=1e-12)
+    assert speeds[1] == pytest.approx(1e3 * speeds[0], rel=1e-9)
+    assert alphas[1] == pytest.approx(1e3 * alphas[0], rel=1e-6)
