@@ -84,7 +84,9 @@ class Shown:
         self.prepared = prepared
 
     def __repr__(self) -> str:
-        console = Console(file=io.StringIO(), width=100, color_system=None, force_jupyter=False)
+        console = Console(
+            file=io.StringIO(), width=100, color_system=None, force_jupyter=False, emoji=False
+        )
         show_prepared(self.prepared, console)
         text: str = console.file.getvalue()  # type: ignore[attr-defined]
         return text.rstrip()

@@ -29,10 +29,12 @@ from lagfmu import (
     LagfmuError,
     Model,
     Nonholonomic,
+    Output,
     Parameter,
     Scene,
     build_fmu,
     derive,
+    multiplier,
     simulate,
     verify,
 )
@@ -148,6 +150,15 @@ N = ReferenceFrame("N")
             {"parameters": (Parameter(m, True, "kg"), *CONSTANTS[1:])},
             ("parameter 'm' is True", "finite number"),
         ),
+        (  # a text, though it reads like a number
+            {"parameters": (Parameter(m, "1.0", "kg"), *CONSTANTS[1:])},
+            ("parameter 'm' is '1.0'", "finite number, without quotes"),
+        ),
+        (
+            {"parameters": (Parameter(m, 1.0, "kg", min="0", max=3), *CONSTANTS[1:])},
+            ("min of parameter 'm' is '0'", "without quotes"),
+        ),
+        ({"start": {x: "0.6", y: -0.8}}, ("start of x is '0.6'", "without quotes")),
     ],
 )
 def test_what_cannot_be_used_is_told_with_what_to_write_instead(changes, parts):
@@ -431,7 +442,16 @@ def test_all_that_is_wrong_with_an_embedding_is_listed():
 def test_a_minimal_formulation_that_does_not_exist_is_refused():
     """x^2 + y^2 - L^2 is linear in no coordinate, and no embedding is given."""
     message = refusal(lambda: prepare(pendulum(), Scene("P", formulation="minimal")))
-    says(message, "no minimal formulation", "Embedding", "'multipliers'")
+    says(message, "scene 'P'", "no minimal formulation", "Embedding", "'multipliers'")
+
+
+def test_a_multiplier_of_a_constraint_without_a_unit_is_not_blamed():
+    """Where the terms of a constraint disagree, that alone is told, not that its lambda has no unit."""
+    mixed = Holonomic("rod", x**2 + y - L)
+    push = Output("push", multiplier("rod"), "N")
+    message = refusal(lambda: pendulum(constraints=[mixed], outputs=[push]), ModelError)
+    says(message, "1 problem:", "constraint 'rod'", "unit m2")
+    assert "'push'" not in message
 
 
 @pytest.mark.parametrize(
@@ -443,6 +463,9 @@ def test_a_minimal_formulation_that_does_not_exist_is_refused():
         ({"step_size": 0.0}, ("step_size = 0.0", "positive")),
         ({"tolerance": -1e-8}, ("tolerance = -1e-08", "positive")),
         ({"tolerance": 1000.0}, ("tolerance = 1000.0", "at most 0.1")),
+        ({"tolerance": "1e-6"}, ("tolerance = '1e-6'", "positive number")),
+        ({"stop_time": "4"}, ("stop_time = '4'", "positive number")),
+        ({"step": "0.1"}, ("step = '0.1'", "positive number")),
         ({"name": "my scene"}, ("'my scene'", "not a name that FMI allows")),
     ],
 )

@@ -186,7 +186,7 @@ def test_show_tells_classes_freedoms_units_and_projected_starts():
     printed = stream.getvalue()
     assert "circle   holonomic" in printed
     assert "edge and scaled" in printed
-    assert "N = n - rank G = 4 - 3 = 1" in printed
+    assert "N = n - rank G = 4 - 3 = 1\n" in printed
     assert re.search(r"lambda.circle +N/m", printed)
     assert re.search(r"Q.theta +N·m", printed)
     assert "x = 0.5 is projected to 0.707106" in printed

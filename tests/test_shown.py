@@ -132,3 +132,9 @@ def test_a_landing_without_rebound_takes_energy() -> None:
     assert not check.passed
     assert check.error == pytest.approx(1.0)
     assert "first missed at t = 0.46 s, where contact 'floor' has just closed" in str(check)
+
+
+def test_degrees_of_freedom_are_counted_with_the_contacts_closed() -> None:
+    """On the sphere the particle has one; the line says so, since in flight it has two."""
+    shown = CliRunner().invoke(app, ["show", str(MODELS / "hemisphere.py")]).output
+    assert "N = n - rank G = 2 - 1 = 1, with every contact closed" in shown

@@ -55,7 +55,7 @@ def stress(
     if not limit > 0:
         raise UsageError(f"the time limit is {limit!r} s, expected a positive number")
     if not console.is_terminal:
-        console = Console(file=console.file, width=WIDTH)
+        console = Console(file=console.file, width=WIDTH, emoji=False)
 
     def study(name: str, fmu: Path) -> Outcome:
         return outcome(name, _one(fmu, out, console, quick, limit))

@@ -18,8 +18,8 @@ from rich.markup import escape
 from ..errors import LagfmuError, SettingError
 from ..verification.pipeline import WRONG_USAGE, UsageError
 
-console = Console()
-errors = Console(stderr=True)
+console = Console(emoji=False)  # "0.2:x:3" is what the user wrote
+errors = Console(stderr=True, emoji=False)
 
 PLAIN = {"≤": "<=", "≥": ">=", "−": "-", "–": "-", "→": "->", "●": "*", "µ": "u", "√": "sqrt"}
 ACCENTS = {"\u0307": "'", "\u0308": "''"}  # combining dots: derivatives

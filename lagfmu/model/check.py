@@ -5,7 +5,6 @@ A term of the energy is in J, a generalized force in J/[coordinate]; a constrain
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import sympy as sp
@@ -14,7 +13,7 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
 from ..names import read
-from .elements import Contact, Expr, ModelFields, Nonholonomic, name_of
+from .elements import Contact, Expr, ModelFields, Nonholonomic, is_number, name_of
 from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
@@ -61,19 +60,21 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
         for bound, value in (("min", p.min), ("max", p.max)):
             if value is not None:
                 _finite(f"{bound} of parameter {name_of(p.symbol)!r}", value, problems)
+        if any(b is not None and not is_number(b) for b in (p.min, p.max)):
+            continue
         if p.min is not None and p.max is not None and p.min > p.max:
             problems.append(
                 f"parameter {name_of(p.symbol)!r}: min = {p.min!r} is above max = {p.max!r}, so that "
                 "no value is allowed: exchange them"
             )
-        elif _number(p.value) and (
+        elif is_number(p.value) and (
             (p.min is not None and p.value < p.min) or (p.max is not None and p.value > p.max)
         ):
             problems.append(
                 f"parameter {name_of(p.symbol)!r} = {p.value!r} is outside its own bounds "
                 f"[{p.min}, {p.max}]"
             )
-        if p.symbol.is_positive and _number(p.value) and not p.value > 0:
+        if p.symbol.is_positive and is_number(p.value) and not p.value > 0:
             problems.append(
                 f"parameter {name_of(p.symbol)!r} = {p.value!r}, but its symbol was declared "
                 "positive: give a positive value or drop the assumption"
@@ -91,7 +92,7 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
                 f"rates of input {name_of(i.symbol)!r} is {i.rates!r}, but only an input that stands in "
                 "a constraint (a prescribed motion) has rates: leave it out"
             )
-        if _number(i.rate) and i.rate != 0 and i not in model.prescribed:
+        if is_number(i.rate) and i.rate != 0 and i not in model.prescribed:
             problems.append(
                 f"rate of input {name_of(i.symbol)!r} is {i.rate!r}, but only an input that stands in a "
                 "constraint (a prescribed motion) has one: leave it out"
@@ -132,18 +133,10 @@ def _check_start(
         _finite(f"{what} of {plain(state)}", value, problems)
 
 
-def _number(value: object) -> bool:
-    if isinstance(value, (bool, sp.logic.boolalg.Boolean)):
-        return False  # float(True) is 1.0
-    try:
-        return math.isfinite(float(value))  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        return False
-
-
 def _finite(what: str, value: object, problems: list[str]) -> None:
-    if not _number(value):
-        problems.append(f"{what} is {value!r}, expected a finite number")
+    if not is_number(value):
+        quotes = ", without quotes" if isinstance(value, str) else ""
+        problems.append(f"{what} is {value!r}, expected a finite number{quotes}")
 
 
 def splines_of(model: ModelFields) -> list[Spline]:

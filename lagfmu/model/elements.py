@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -177,6 +178,16 @@ class ModelFields:
         for relation in self.embedding.relations.values() if self.embedding else ():
             used |= sp.sympify(relation).atoms(AppliedUndef)
         return tuple(i for i in self.inputs if i.symbol in used)
+
+
+def is_number(value: object) -> bool:
+    """True for a finite number; a text that reads like one is none, nor is a truth value."""
+    if isinstance(value, (str, bytes, bool, sp.logic.boolalg.Boolean)):
+        return False  # float("0.4") is 0.4, float(True) is 1.0
+    try:
+        return math.isfinite(float(value))  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return False
 
 
 def name_of(symbol: Expr) -> str:

@@ -41,6 +41,8 @@ def check_output_units(model: ModelFields, units: Mapping[Expr, Unit], problems:
         except UnitError as error:
             problems.append(str(error))
             continue
+        if any(r not in known for r in reactions_in(o.expression)):
+            continue  # of a constraint without a unit of its own, which is told there
         problems += check_dimension(sp.sympify(o.expression), unit, known, what)
         if o.otherwise is not None and not sp.sympify(o.otherwise).is_number:
             problems += check_dimension(sp.sympify(o.otherwise), unit, known, f"{what}, otherwise")

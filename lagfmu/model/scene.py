@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from ..errors import ModelError
 from ..methods import METHODS, integrators, unknown
 from ..solver.state import DEFAULT_TOLERANCE, tolerance_problem
-from .model import NAME
+from .elements import NAME, is_number
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
 EVERYTHING = ("*",)
@@ -91,11 +91,11 @@ class Scene:
                 problems.append(unknown(method))
         for what in ("stop_time", "step_size"):
             value = getattr(self, what)
-            if not 0 < value < float("inf"):
+            if not is_number(value) or not value > 0:
                 problems.append(f"{what} = {value!r}, expected a positive number")
         if problem := tolerance_problem(self.tolerance):
             problems.append(problem)
-        if not 0 <= self.step < float("inf"):
+        if not is_number(self.step) or self.step < 0:
             problems.append(f"step = {self.step!r}, expected a positive number, or 0")
         for what in ("outputs", "fixed", "inputs", "contacts", "frictions"):
             problems += self._listed(what)

@@ -30,7 +30,7 @@ def _width(cell: RenderableType) -> int:
     """Of its longest line."""
     if not isinstance(cell, str):
         return 0
-    return max((line.cell_len for line in Text.from_markup(cell).split()), default=0)
+    return max((line.cell_len for line in Text.from_markup(cell, emoji=False).split()), default=0)
 
 
 def print_whole(console: Console, drawn: Table) -> None:

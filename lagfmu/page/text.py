@@ -38,6 +38,8 @@ def show(prepared: Prepared, console: Console) -> None:
 
     _heading(console, "Degrees of freedom")
     count = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
+    if any(isinstance(c, Contact) for c in prepared.equations.constraints):
+        count += ", with every contact closed"
     console.print(Text(count))
     if structure.redundant:
         names, shared = ", ".join(structure.redundant), ", ".join(structure.shared)

@@ -208,7 +208,10 @@ def _asked(
     chosen = replace(scene, formulation=scene.formulation or "multipliers")
     form = Form(eom, None, chosen.formulation or "multipliers")
     if form.formulation == "minimal" and not eom.frictions:
-        form = replace(form, reduction=reduce(eom))
+        try:
+            form = replace(form, reduction=reduce(eom))
+        except DerivationError as error:
+            raise DerivationError(f"scene {scene.name!r}: {error}") from error
     elif scene.formulation is None and not scene.complete and not eom.frictions:
         try:
             reduced = Form(eom, reduce(eom), "minimal")

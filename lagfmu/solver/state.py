@@ -17,7 +17,7 @@ MAXIMUM_STEPS = 5000.0  # that make no headway, in one communication step
 
 def tolerance_problem(tolerance: float) -> str:
     """Why no step can be taken at this relative tolerance; nothing if one can."""
-    if 0 < tolerance <= LARGEST_TOLERANCE:
+    if not isinstance(tolerance, str) and 0 < tolerance <= LARGEST_TOLERANCE:
         return ""
     return (
         f"tolerance = {tolerance!r}, expected a positive number of at most {LARGEST_TOLERANCE:g} (an error "
