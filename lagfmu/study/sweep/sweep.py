@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...errors import SettingError, SimulationError
-from ...fmu.archive import version
+from ...fmu.archive import unpack, version
 from ...fmu.described import experiment_of, read_description
 from ...fmu.session import TYPES, Plan, plug
 from ...fmu.write import as_fmu
@@ -219,7 +219,7 @@ def _run(
         (n, table[n * chunk : (n + 1) * chunk]) for n in range(-(-total // chunk)) if n not in done
     ]
     finished = total - sum(len(v) for _, v in left)
-    folder = fmpy.extract(str(study.path))
+    folder = unpack(study.path)
     plugged = plug(study.path, read_description(study.path), folder)
     if progress is not None:
         progress(finished, total, 0)
