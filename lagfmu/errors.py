@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from typing import Any
 
@@ -52,6 +53,17 @@ class DerivationError(LagfmuError):
 
 class BuildError(LagfmuError):
     """An FMU, a plot or a report that cannot be built or written."""
+
+
+class TemporaryFolderError(LagfmuError):
+    """Temporary files that cannot be written; for what the user names see its own errors."""
+
+    def __init__(self, error: OSError, variable: str = "TMPDIR") -> None:
+        where = error.filename or tempfile.gettempdir()
+        super().__init__(
+            f"{where}: {error.strerror or error}: is the disk full? The environment variable {variable} "
+            "chooses another folder for temporary files"
+        )
 
 
 class VerificationError(LagfmuError):

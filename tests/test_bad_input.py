@@ -700,6 +700,51 @@ def test_a_temporary_folder_that_cannot_be_written_is_told(tmp_path):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no limits of files there")
+@pytest.mark.parametrize(
+    ("command", "code", "kept"),
+    [
+        ("simulate FMU --csv KEPT", 1, "runs.csv"),
+        ("verify FMU --json KEPT", 3, "all.json"),
+        ("sweep FMU --vary m1=1,2 --out KEPT", 1, "runs.csv"),
+        ("tradeoff FMU --json KEPT", 3, "all.json"),
+        ("stress FMU --quick --json KEPT", 3, "all.json"),
+        ("build MODEL --target python --out KEPT", 1, "Atwood.fmu"),
+    ],
+)
+def test_a_full_disk_is_told_with_its_folder_and_the_remedy(
+    native_fmu, tmp_path, command, code, kept
+):
+    """Where no temporary file may grow beyond 20 kB: one line of stderr, nothing is left in the folder, and
+    what a good run had written is there still, or newer and whole."""
+    temporary, good = tmp_path / "temporary", tmp_path / kept
+    temporary.mkdir()
+    good.write_text("good")
+    words = command.replace("FMU", str(native_fmu("Atwood"))).replace("KEPT", str(good))
+    words = words.replace("MODEL", str(Path(__file__).parent.parent / "models" / "atwood.py"))
+    done = subprocess.run(
+        [sys.executable, "-c", SMALL_FILES, *words.split()],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env=os.environ | {"TMPDIR": str(temporary)},
+    )
+    assert done.returncode == code, done.stderr
+    (line,) = [text for text in done.stderr.splitlines() if text.startswith("error:")]
+    says(line, str(temporary), "TMPDIR", "is the disk full?")
+    assert "Traceback" not in done.stderr + done.stdout
+    assert list(temporary.iterdir()) == []
+    assert good.read_text() == "good" or "is the disk full" in good.read_text()
+
+
+SMALL_FILES = """
+import resource, signal, sys
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+from lagfmu.cli.app import app
+app(sys.argv[1:])
+"""
 NO_ROOM = """
 import errno, sys, tempfile
 from lagfmu.cli.app import app

@@ -24,7 +24,7 @@ from typer.testing import CliRunner
 
 from lagfmu import Contact
 from lagfmu.cli.app import app
-from lagfmu.errors import BuildError
+from lagfmu.errors import BuildError, LagfmuError
 from lagfmu.fmu import compiler
 from lagfmu.fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
 from lagfmu.fmu.write import write
@@ -454,3 +454,30 @@ def test_an_empty_cache_folder_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """LAGFMU_CACHE= is not the working folder: no compiled files are strewn about it."""
     monkeypatch.setenv("LAGFMU_CACHE", "")
     assert compiler._cache() != Path("")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the compiler is a shell script")
+@pytest.mark.parametrize(("place", "variable"), [("cache", "LAGFMU_CACHE"), ("other", "TMPDIR")])
+def test_a_compiler_without_room_is_told_from_one_that_fails(
+    tmp_path, monkeypatch, place, variable
+):
+    """The full folder is named, and what chooses another; a compiler that has room is to blame itself."""
+    program, folder = tmp_path / "cc", tmp_path / place / "x"
+    folder.mkdir(parents=True)
+    monkeypatch.setenv("LAGFMU_CACHE", str(tmp_path / "cache"))
+    only = compiler.Compiler((str(program),), False, "cc")
+
+    def refusal(said):
+        program.write_text(f"#!/bin/sh\necho '{said}' >&2\nexit 1\n")
+        program.chmod(0o755)
+        with pytest.raises(LagfmuError) as caught:
+            compiler._run(only, "", [], str(folder))
+        return str(caught.value)
+
+    told = refusal("ld: final link failed: No space left on device")
+    assert told.startswith(f"{folder.parent}: No space left on device")
+    assert f"environment variable {variable} " in told
+    assert "compiler failed" in refusal("error: no such file")
+    usage = shutil.disk_usage(tmp_path)._replace(free=0)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
+    assert f"environment variable {variable} " in refusal("")

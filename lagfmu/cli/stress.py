@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -18,7 +20,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from ..errors import BuildError
+from ..errors import BuildError, TemporaryFolderError
 from ..fmu.write import write, write_whole
 from ..model.file import ModelFile
 from ..model.model import Model
@@ -27,7 +29,7 @@ from ..prepare.prepare import prepare
 from ..study.stress.facts import facts_of
 from ..study.stress.geometry import lay_geometry, twin
 from ..study.stress.lagrange import lay_beside
-from ..study.stress.probe import UNFINISHED, WRONG, Verdict
+from ..study.stress.probe import NO_ROOM, UNFINISHED, WRONG, Verdict
 from ..study.stress.report import MEANING, Stressed, data, outcome, summary, table
 from ..study.stress.summary import as_summary
 from ..verification.pipeline import Outcome, UsageError, text_of
@@ -126,6 +128,8 @@ def _probe(fmu: Path, console: Console, quick: bool, limit: float) -> list[Verdi
                     first = line["end"] + 1
                 elif "probe" in line:
                     tick(f"{line['family']}: {line['probe']}", line["begin"], total)
+            if job.process.returncode == NO_ROOM:
+                raise TemporaryFolderError(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
             if job.cut is None:
                 break
             if job.latest is None:

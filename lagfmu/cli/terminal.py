@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import contextlib
 import sys
-import tempfile
 import unicodedata
 import warnings
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from ..errors import LagfmuError, SettingError
+from ..errors import LagfmuError, SettingError, TemporaryFolderError
 from ..verification.pipeline import WRONG_USAGE, UsageError
 
 console = Console(emoji=False)  # "0.2:x:3" is what the user wrote
@@ -74,14 +73,9 @@ def plainly() -> Iterator[None]:
             )
             misused = isinstance(error, (UsageError, SettingError))
             raise typer.Exit(WRONG_USAGE if misused else 1) from None
-        except OSError as error:  # of temporary files; for what the user names see its own errors
-            where = error.filename or tempfile.gettempdir()
-            errors.print(
-                f"[bold red]error:[/] {escape(f'{where}: {error.strerror or error}')}: is the disk full? "
-                "The environment variable TMPDIR chooses another folder for temporary files",
-                highlight=False,
-                soft_wrap=True,
-            )
+        except OSError as error:
+            text = escape(str(TemporaryFolderError(error)))
+            errors.print(f"[bold red]error:[/] {text}", highlight=False, soft_wrap=True)
             raise typer.Exit(1) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import SettingError, SimulationError, VerificationError
+from ..errors import LagfmuError, SettingError, SimulationError
 from ..verification.pipeline import Outcome, UsageError
 from ..verification.reference import Reference, read_table
 from ..verification.report import outcome
@@ -57,7 +57,7 @@ def examine(
     for fmu in fmus:
         try:
             found = verify(fmu, values, stop_time, step_size, tolerance, signals, table)
-        except (SimulationError, VerificationError) as error:
+        except LagfmuError as error:
             misused = isinstance(error, SettingError)
             done.append(Outcome(str(fmu), error=str(error), misused=misused))
         else:

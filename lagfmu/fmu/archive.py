@@ -1,11 +1,18 @@
-"""The archive of an FMU: a zip file whose bytes depend on its contents only."""
+"""The archive of an FMU: a zip file whose bytes depend on its contents only; and its files, unpacked."""
 
 from __future__ import annotations
 
 import importlib.metadata
 import io
+import shutil
+import tempfile
 import zipfile
 from collections.abc import Mapping
+from pathlib import Path
+
+import fmpy
+
+from ..errors import TemporaryFolderError
 
 
 def version() -> str:
@@ -27,3 +34,17 @@ def pack(contents: Mapping[str, bytes]) -> bytes:
                 info, contents[name], compresslevel=9
             )  # that of `archive` is not taken
     return buffer.getvalue()
+
+
+def unpack(fmu: Path) -> str:
+    """A temporary folder with the files of an FMU, which the caller removes.  Raises TemporaryFolderError."""
+    folder = ""
+    try:
+        folder = tempfile.mkdtemp(prefix="lagfmu_")
+        fmpy.extract(str(fmu), unzipdir=folder)
+    except BaseException as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise TemporaryFolderError(error) from None
+        raise
+    return folder

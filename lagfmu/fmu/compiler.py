@@ -7,6 +7,7 @@ cache, where its name tells what it was made of, and linked from there.
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import importlib.metadata
 import importlib.util
@@ -23,10 +24,12 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from ..errors import BuildError
+from ..errors import BuildError, TemporaryFolderError
 
 HOST, ALL = "host", "all"
 TIMEOUT = 600  # seconds for one call of the compiler
+LITTLE = 100_000  # bytes of room, in which a compiler that fails has failed for want of it
+CACHE = "LAGFMU_CACHE"
 FLAGS = (
     "-std=c99",
     "-fPIC",
@@ -210,7 +213,7 @@ def _library(
         for file, made in _objects(compiler, target, runtime).items():
             if file not in left_out and file not in generated:
                 linked.append(f"{file[:-2]}.o")
-                shutil.copy(made, Path(folder, linked[-1]))
+                Path(folder, linked[-1]).write_bytes(made.read_bytes())
         for file in sorted(f for f in generated if f.endswith(".c")):
             _compile(compiler, target, file, f"{file[:-2]}.o", folder)
             linked.append(f"{file[:-2]}.o")
@@ -260,8 +263,8 @@ def _places(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> di
 
 def _cache() -> Path:
     """The user's cache folder of lagfmu, below LAGFMU_CACHE if that is set, and not empty."""
-    if os.environ.get("LAGFMU_CACHE"):
-        return Path(os.environ["LAGFMU_CACHE"])
+    if os.environ.get(CACHE):
+        return Path(os.environ[CACHE])
     if sys.platform == "win32" and "LOCALAPPDATA" in os.environ:
         return Path(os.environ["LOCALAPPDATA"], "lagfmu")
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "lagfmu")
@@ -308,6 +311,10 @@ def _run(compiler: Compiler, target: str, arguments: Sequence[str], folder: str)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise BuildError(f"the C compiler {compiler.command[0]} cannot run: {error}") from None
     if run.returncode != 0:
+        place = Path(folder).parent
+        if "No space left" in run.stderr or shutil.disk_usage(place).free < LITTLE:
+            full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(place))
+            raise TemporaryFolderError(full, CACHE if place == _cache() else "TMPDIR")
         lines = [line for line in run.stderr.splitlines() if line.strip()]
         first = next(
             (line for line in lines if "error" in line), lines[0] if lines else "no message"

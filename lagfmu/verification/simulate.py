@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import re
+import shutil
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import SettingError, SimulationError
+from ..fmu.archive import unpack
 from ..fmu.described import experiment_of, has_error_bars, items_of, read_description
 from ..fmu.python import slave_of
 from ..fmu.slave import Refused
@@ -276,9 +278,10 @@ def _simulate_fmu(
     values = {
         k: settable[k].items.get(v, v) if isinstance(v, str) else v for k, v in values.items()
     }
+    folder = unpack(path)
     try:
         result: Trajectory = fmpy.simulate_fmu(
-            str(path),
+            folder,
             stop_time=stop,
             output_interval=step,
             step_size=step,
@@ -294,6 +297,8 @@ def _simulate_fmu(
         raise SimulationError(_told(path, error, messages)) from None
     except Exception as error:
         raise SimulationError(f"{str(path)!r} cannot be simulated: {error}") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
     tell(moved)
     reached = float(result["time"][-1])
     if reached < stop * (1 - 1e-9):  # fmpy ends a run at fmi2Discard without a word

@@ -1,4 +1,4 @@
-"""A scene -> optional.c: which parts of the runtime its FMU holds; see runtime/optional.h."""
+"""A scene -> optional.c: which parts of the runtime its FMU holds; see runtime/simulation/optional.h."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Variable table -> variables.c: the FMU's variables as runtime/variables.h declares them.
+"""Variable table -> variables.c: the FMU's variables as runtime/fmi/variables.h declares them.
 
 Position = value reference.  Where a value lies follows from what the variable is of.
 """

@@ -20,11 +20,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ... import names
+from ...fmu.archive import unpack
 from ...fmu.session import RefusalError
 from .closed_forms import judged, laws
 from .facts import Facts, facts_of
@@ -59,7 +59,7 @@ class Bench:
             ),
             *laws(self.facts.laws),
         )
-        self.folder = Path(fmpy.extract(str(path)))
+        self.folder = Path(unpack(path))
         self._player: Player | None = None
 
     def __enter__(self) -> Bench:

@@ -6,6 +6,7 @@ command knows what the FMU was doing when it takes this process down.
 
 from __future__ import annotations
 
+import errno
 import json
 import sys
 import time
@@ -14,6 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ...errors import TemporaryFolderError
 from . import (
     calls,
     derivatives,
@@ -28,7 +30,7 @@ from . import (
 )
 from .bench import Bench
 from .facts import Facts
-from .probe import Probe, attempt, verdict
+from .probe import NO_ROOM, Probe, attempt, verdict
 
 FAMILIES = (
     parameters,
@@ -70,5 +72,15 @@ def main(fmu: str, results: str, first: str, quick: str) -> None:
         tell(done=True)
 
 
+def _no_room(error: Exception) -> bool:
+    full = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return isinstance(error, TemporaryFolderError) or getattr(error, "errno", None) in full
+
+
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except Exception as error:
+        if not _no_room(error):
+            raise
+        sys.exit(NO_ROOM)  # what it would say has no room either

@@ -18,11 +18,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ...errors import SimulationError, VerificationError
+from ...fmu.archive import unpack
 from ...fmu.described import experiment_of, is_python, read_description
 from ...fmu.session import RefusalError, Session, plug, reason
 from ...names import TOLERANCE
@@ -56,7 +56,7 @@ class Importer(Session):
                 f"{str(fmu)!r} has no parameter {TOLERANCE!r}: it was not built by lagfmu, and "
                 "there is no setting to vary"
             )
-        folder = fmpy.extract(str(fmu))
+        folder = unpack(fmu)
         try:
             super().__init__(plug(fmu, description, folder), "tradeoff")
         except RefusalError as error:
