@@ -117,8 +117,8 @@ def _found_by_stress(model: str, folder: Path) -> str:
     end, said = _run(["lagfmu", "stress", f"models/{model}.py", *options], folder)
     if end == 0:
         return ""
-    wrong = re.findall(r"^.*\bwrong\b.*$", said, re.MULTILINE)
-    return wrong[0].strip() if wrong else f"exit code {end}: {said.strip()[-200:]}"
+    wrong = re.findall(r"^ (\S.*?)\s+wrong\s", said, re.MULTILINE)
+    return wrong[0] if wrong else f"exit code {end}: {said.strip()[-200:]}"
 
 
 def _check(path: Path, text: str, folder: Path) -> None:

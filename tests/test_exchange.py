@@ -190,3 +190,25 @@ def test_time_has_no_unit(library):
     assert sizes[1] == pytest.approx(sizes[0], rel=1e-12)
     assert speeds[1] == pytest.approx(1e3 * speeds[0], rel=1e-9)
     assert alphas[1] == pytest.approx(1e3 * alphas[0], rel=1e-6)
+
+
+def test_a_skate_that_slips_sideways_is_set_straight(library):
+    """Its place being right, a hundredth of its speed across the blade asks for an event, in which
+    x' sin phi = y' cos phi is met again, and the importer is told that its states were moved."""
+    one = continuous(library("KnifeEdge"))
+    along, across = np.array([np.cos(0.5), np.sin(0.5)]), np.array([-np.sin(0.5), np.cos(0.5)])
+    event, end = c_int(), c_int()
+    for slip in (0.0, 0.02):
+        vx, vy = 2 * along + slip * across
+        one.states((0.0, vx, 0.0, vy, 0.5, 0.3))
+        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
+        assert bool(event.value) == (slip > 0)
+    one.does("EnterEventMode")
+    assert one.events().values
+    one.does("EnterContinuousTimeMode")
+    _, vx, _, vy, _, turning = one.array("GetContinuousStates", 6)
+    assert vx * np.sin(0.5) - vy * np.cos(0.5) == pytest.approx(0, abs=1e-14)
+    assert np.hypot(vx, vy) == pytest.approx(2, rel=1e-3)
+    assert turning == 0.3
+    one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
+    assert not event.value
