@@ -90,14 +90,12 @@ def remarks(found: Tradeoff) -> list[str]:
     return lines + list(found.cut)
 
 
-def cheapest(
-    found: Tradeoff, goal: float, communication: float | None = None, group: str | None = None
-) -> Weighed | None:
-    """The fastest row whose error in the group (lambda, if it has one) is at most `goal`."""
+def cheapest(found: Tradeoff, goal: float, communication: float | None = None) -> Weighed | None:
+    """The fastest row whose error (of lambda, if there is one) is at most `goal`."""
     good = [
         r
         for r in found.rows
-        if found.worst(r, group or found.headline) <= goal
+        if found.worst(r, found.headline) <= goal
         and (communication is None or r.setting.communication == communication)
     ]
     return min(good, key=lambda r: r.median, default=None)
