@@ -868,11 +868,13 @@ def test_an_fmu_with_a_bad_model_description_is_not_verified(fmu, tmp_path, desc
 
 
 def test_an_fmu_whose_binary_is_missing_or_damaged_is_not_verified(fmu, tmp_path):
-    """The process lives on and says what is wrong."""
+    """The process lives on, says what is wrong, and stands in the folder that it stood in."""
+    here = Path.cwd()
     for content in (None, b"no ELF"):
         name = "binaries/linux64/Atwood.so"
         path = rewritten(fmu("Atwood"), tmp_path / "X.fmu", name, content)
         says(refusal(lambda path=path: verify(path)), "X.fmu")
+    assert Path.cwd() == here
 
 
 def test_an_fmu_whose_script_raises_is_not_verified(python_fmu, tmp_path):
