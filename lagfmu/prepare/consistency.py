@@ -82,8 +82,7 @@ def examine(
     for trial in range(TRIALS):
         q, v = np.array(begun.state.q), np.array(begun.state.v)
         if trial:  # a nearby configuration that satisfies the constraints as well
-            size = np.maximum(np.abs(q), np.abs(q).max(initial=0.0)) + 1e-3
-            shift = [0.1 * s * generator.uniform(-1, 1) for s in size]
+            shift = [0.1 * s * generator.uniform(-1, 1) for s in _spans(system, begun, p)]
             try:
                 q = _nearby(system, begun, q + np.array(shift), v, u, p)
             except StepFailureError:
@@ -111,6 +110,20 @@ def examine(
         )
     missed = _missed(table, system, begun, u, p)
     return Structure(eom.n, eom.m, rank, redundant, shared, begun, missed)
+
+
+def _spans(system: System, begun: Start, p: Sequence[float]) -> list[float]:
+    """Ten times what each coordinate may be moved by and still be near: the least length among the model's
+    parts, if it has any. In a chain of 40 bars the places are up to 40 bars from the origin; a tenth of that
+    is far."""
+    numbers = system.folded or (0.0,) * system.n
+    spans = []
+    for part, number, size in zip(
+        system.extent or ((),) * system.n, numbers, begun.state.size, strict=True
+    ):
+        lengths = [x for x in (*(abs(p[i]) for i in part), number) if x > 0] or [size or 1e-3]
+        spans.append(max(min(lengths), 1e-3 * max(lengths)))
+    return spans
 
 
 def _missed(
