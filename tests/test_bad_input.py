@@ -331,6 +331,22 @@ def test_a_redundant_constraint_warns_and_its_multipliers_share_the_force(tmp_pa
         assert two[name] == pytest.approx(one[name], rel=1e-6, abs=1e-7)
 
 
+def test_walls_that_cannot_be_touched_at_once_are_not_redundant():
+    """A bob between two walls, and in the angle of three: each wall's normal follows from the others', and
+    none is touched with those, so that no lambda is ever shared.  A second floor at the same height is."""
+    walls = [Contact("left", x + L), Contact("right", 2 * L - x), Contact("floor", y + 2 * L)]
+    walls.append(Contact("roof", 5 * L - x - y))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        structure = prepare(pendulum(constraints=walls)).structure
+    assert structure.redundant == structure.shared == ()
+    assert structure.rank == 2
+    below = Contact("below", 2 * y + 4 * L)
+    with pytest.warns(RedundantConstraintWarning, match="'below' follows from the others"):
+        structure = prepare(pendulum(constraints=[*walls, below])).structure
+    assert structure.shared == ("floor", "below")
+
+
 def test_the_multipliers_that_are_not_unique_are_named_and_no_others():
     """Of two equal rods and a plane only the rods' lambda is shared, though one alone is redundant; `show`
     says so, and which norm is the least."""
