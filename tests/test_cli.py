@@ -265,6 +265,16 @@ def test_the_version_is_that_of_the_package():
     assert lagfmu("--version") == f"lagfmu {importlib.metadata.version('lagfmu')}"
 
 
+def test_the_version_is_told_without_waiting():
+    """Neither SymPy nor SciPy is imported for a number that a script asks for."""
+    code = (
+        "import sys\nfrom lagfmu.cli import main\nsys.argv = ['lagfmu', '--version']\nmain()\n"
+        "assert not {'sympy', 'scipy', 'pint'} & sys.modules.keys()\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == f"lagfmu {importlib.metadata.version('lagfmu')}\n"
+
+
 def test_types_are_told_to_users_type_checkers():
     """PEP 561: the package has the marker py.typed."""
     assert importlib.resources.files("lagfmu").joinpath("py.typed").is_file()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import difflib
 import enum
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,6 @@ from rich.markup import escape
 
 from ..api import package
 from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
-from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.described import read_description
 from ..fmu.native import takes_long
@@ -44,6 +42,7 @@ from ..verification.reference import read_table
 from ..verification.result import NOT_YET, Result, as_text
 from ..verification.simulate import simulate
 from ..verification.verify import Verification
+from . import say_version
 from .film import film
 from .options import (
     NARROWING,
@@ -75,7 +74,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"lagfmu {version()}")
+        say_version()
         raise typer.Exit
 
 
@@ -610,8 +609,3 @@ def _print_last(name: str, result: Result, names: Sequence[str] = ()) -> None:
 def _save(path: Path, result: Any) -> None:
     """All columns; names are quoted, because that of an acceleration holds a comma."""
     write_whole(path, as_csv(result, [n for n in result.dtype.names if n != "time"]).encode())
-
-
-def main() -> None:
-    """Entry point of `python -m lagfmu`."""
-    sys.exit(app())
