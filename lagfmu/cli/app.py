@@ -36,7 +36,7 @@ from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
 from ..study.tradeoff.page import section
 from ..verification.crosscheck import as_csv, write_crosscheck
-from ..verification.pipeline import Outcome, UsageError, as_json, as_junit, exit_code
+from ..verification.pipeline import Report, UsageError, as_json, as_junit, exit_code
 from ..verification.plot import default_names
 from ..verification.reference import read_table
 from ..verification.result import NOT_YET, Result, as_text
@@ -507,20 +507,18 @@ def stress(
         _finish("stress", done, json, junit)
 
 
-def _finish(
-    command: str, outcomes: Sequence[Outcome], json: Path | None, junit: Path | None
-) -> None:
+def _finish(command: str, reports: Sequence[Report], json: Path | None, junit: Path | None) -> None:
     """Write what a pipeline reads, say what could not be run, and end with the exit code."""
     if json is not None:
-        write_whole(json, as_json(outcomes).encode())
+        write_whole(json, as_json(reports).encode())
     if junit is not None:
-        write_whole(junit, as_junit(f"lagfmu {command}", outcomes))
-    for one in outcomes:
+        write_whole(junit, as_junit(f"lagfmu {command}", reports))
+    for one in reports:
         if one.error:
             errors.print(
                 f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
             )
-    raise typer.Exit(exit_code(outcomes))
+    raise typer.Exit(exit_code(reports))
 
 
 def _load(path: Path, added: list[str] | None, arguments: list[str] | None = None) -> ModelFile:

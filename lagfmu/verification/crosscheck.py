@@ -20,7 +20,7 @@ from ..errors import SimulationError
 from ..fmu.described import experiment_of, read_description
 from ..fmu.write import write_whole
 from .pipeline import as_json
-from .report import outcome
+from .report import report
 from .simulate import Trajectory, communication_points, simulate
 from .verify import Verification
 
@@ -188,7 +188,7 @@ def _stable(found: Verification) -> str:
     """The report without what differs from run to run, so that the FMU's bytes do not."""
     from dataclasses import replace
 
-    return as_json([outcome(f"{found.name}.fmu", replace(found, seconds=0.0))])
+    return as_json([report(f"{found.name}.fmu", replace(found, seconds=0.0))])
 
 
 def _xml(root: ET.Element) -> bytes:

@@ -101,7 +101,6 @@ def play(
     times: Sequence[float],
     tolerance: float | None = None,
     drive: Drive | None = None,
-    stop: float | None = None,
     late: bool = False,
 ) -> Run:
     """A run over the communication points `times` (from 0), or as far as the FMU goes; `late`: inputs are set
@@ -113,7 +112,7 @@ def play(
     fed = {i.name: known[i.name] for i in facts.inputs}
     reached, refusal = 0, None
     try:
-        player.begin(values, tolerance, stop)
+        player.begin(values, tolerance)
         for k, t in enumerate(times):
             if k:
                 player.step(t - player.time)
