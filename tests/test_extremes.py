@@ -719,8 +719,8 @@ def tray() -> Model:
 
 @pytest.mark.parametrize("amplitude", [1e-300, 1e-160, 1e-20, 1e-12, 1e-6])
 def test_a_place_near_zero_is_projected_to_rounding_of_the_terms(build, amplitude):
-    """Swings of 1e-6 rad to 1e-300 rad: L (1 - cos theta) is rounding of L, the height is 0 but for 5e-13 m; no
-    step "cannot be projected", and theta swings as cos(sqrt(g/L) t)."""
+    """Swings of 1e-6 rad to 1e-300 rad: L (1 - cos theta) is rounding of L, the height is 0 but for 5e-13 m;
+    no step "cannot be projected", and theta swings as cos(sqrt(g/L) t)."""
     with instance(build(tray())) as one:
         one.start({"theta": amplitude}, tolerance=1e-9)
         seen, reason = walk(one, 0.1, 20)
