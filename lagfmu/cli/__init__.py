@@ -4,15 +4,20 @@ import sys
 
 from ..fmu.archive import version
 
+INTERRUPTED = 130  # the exit status that shells know for Ctrl-C
+
 
 def main() -> None:
     """The `lagfmu` command, also as `python -m lagfmu`.  Asked for its version it waits for no SymPy."""
     if sys.argv[1:] == ["--version"]:
         say_version()
         return
-    from .app import app
+    try:
+        from .app import app
 
-    app()
+        app()
+    except KeyboardInterrupt:  # while SymPy is still being loaded; later the command ends likewise
+        sys.exit(INTERRUPTED)
 
 
 def say_version() -> None:
