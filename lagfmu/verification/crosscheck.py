@@ -17,11 +17,11 @@ from xml.etree import ElementTree as ET
 
 from .. import names
 from ..errors import SimulationError
-from ..fmu.described import experiment_of, read_description
+from ..fmu.described import Trajectory, experiment_of, read_description
 from ..fmu.write import write_whole
 from .pipeline import as_json
 from .report import report
-from .simulate import Trajectory, communication_points, simulate
+from .simulate import communication_points, simulate
 from .verify import Verification
 
 TOLERANCE = 1e-12

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .. import names
 from ..errors import SettingError, SimulationError
 from ..fmu.archive import unpack
-from ..fmu.described import experiment_of, has_error_bars, items_of, read_description
+from ..fmu.described import Trajectory, experiment_of, has_error_bars, items_of, read_description
 from ..fmu.python import slave_of
 from ..fmu.slave import Refused
 from ..methods import IN_PYTHON, NUMBERS, unknown
@@ -36,7 +36,6 @@ STARTS = re.compile(
     r"start value .* misses the constraints|has no start value"
 )  # a message of a move
 MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
-Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
 
 class ErrorBarWarning(UserWarning):

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ... import names
+from ...fmu.described import Trajectory
 from ...fmu.session import RefusalError, Session, plug
-from ...verification.simulate import Trajectory
 from .facts import Facts
 
 KINDS: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}

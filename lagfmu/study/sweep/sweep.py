@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from ... import names
 from ...errors import SettingError, SimulationError
 from ...fmu.archive import unpack, version
-from ...fmu.described import experiment_of, read_description
+from ...fmu.described import Trajectory, experiment_of, read_description
 from ...fmu.session import TYPES, Plan, plug
 from ...fmu.write import as_fmu
 from ...model.model import Model
 from ...model.scene import Scene
 from ...solver.state import tolerance_problem
 from ...verification.simulate import (
-    Trajectory,
     check_inputs,
     communication_points,
     missing,

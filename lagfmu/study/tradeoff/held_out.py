@@ -11,7 +11,8 @@ import numpy as np
 from ... import names
 from ...errors import SimulationError
 from ...fmu.closed_forms import CarriedForm
-from ...verification.simulate import Trajectory, steps_of
+from ...fmu.described import Trajectory
+from ...verification.simulate import steps_of
 from .importer import Importer
 from .measure import wider
 from .reference import refer
