@@ -39,7 +39,6 @@ SUNDIALS = (
     *("-lsundials_sunnonlinsolfixedpoint", "-lsundials_generic"),
 )
 GCC = ("gcc",)
-FMI_LAYER = ("fmi2.c", "instance.c", "exchange.c")
 
 
 @dataclass
@@ -172,7 +171,7 @@ def solver(out: Path, command: tuple[str, ...] = GCC) -> Path:
     made = [
         compiled(objects / f"{p.stem}.o", [p], "-c", command=command)
         for p in sorted(RUNTIME.glob("*/*.c"))
-        if p.name not in FMI_LAYER
+        if p.parent.name != "fmi"
     ]
     subprocess.run(["ar", "rcs", str(archive), *map(str, made)], check=True, timeout=60)
     return archive

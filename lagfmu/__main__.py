@@ -1,5 +1,5 @@
 """`python -m lagfmu` is the `lagfmu` command."""
 
-from .cli.app import main
+from .cli import main
 
 main()

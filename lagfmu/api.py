@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -14,8 +13,8 @@ from typing import Any
 from rich.console import Console
 
 from .errors import VerificationError
-from .fmu.compiler import HOST, chosen, find_compiler, host
-from .fmu.write import put, write
+from .fmu.compiler import HOST, chosen, host
+from .fmu.write import as_fmu, put, write
 from .live.playable import playable
 from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
@@ -120,17 +119,8 @@ def verify(
 ) -> Verification:
     """verification.verify.verify() of an FMU; a model, or a model file with its closed forms, is built first
     (natively where a compiler is at hand)."""
-    options = (start_values, stop_time, step_size, tolerance, inputs, reference)
-    if not isinstance(target, Model):
-        path = Path(target)
-        if path.suffix != ".py":
-            return verify_fmu(path, *options)
-        file = load(path)
-        target, closed_forms = file.model, closed_forms or file.closed_forms
-        scene = scene or file.scenes[0]
-    kind = "native" if find_compiler() is not None else "python"
-    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        return verify_fmu(write(prepare(target, scene), folder, closed_forms, kind), *options)
+    with as_fmu(target, scene, closed_forms) as fmu:
+        return verify_fmu(fmu, start_values, stop_time, step_size, tolerance, inputs, reference)
 
 
 def package(

@@ -331,6 +331,22 @@ def test_a_redundant_constraint_warns_and_its_multipliers_share_the_force(tmp_pa
         assert two[name] == pytest.approx(one[name], rel=1e-6, abs=1e-7)
 
 
+def test_walls_that_cannot_be_touched_at_once_are_not_redundant():
+    """A bob between two walls, and in the angle of three: each wall's normal follows from the others', and
+    none is touched with those, so that no lambda is ever shared.  A second floor at the same height is."""
+    walls = [Contact("left", x + L), Contact("right", 2 * L - x), Contact("floor", y + 2 * L)]
+    walls.append(Contact("roof", 5 * L - x - y))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        structure = prepare(pendulum(constraints=walls)).structure
+    assert structure.redundant == structure.shared == ()
+    assert structure.rank == 2
+    below = Contact("below", 2 * y + 4 * L)
+    with pytest.warns(RedundantConstraintWarning, match="'below' follows from the others"):
+        structure = prepare(pendulum(constraints=[*walls, below])).structure
+    assert structure.shared == ("floor", "below")
+
+
 def test_the_multipliers_that_are_not_unique_are_named_and_no_others():
     """Of two equal rods and a plane only the rods' lambda is shared, though one alone is redundant; `show`
     says so, and which norm is the least."""
@@ -868,11 +884,13 @@ def test_an_fmu_with_a_bad_model_description_is_not_verified(fmu, tmp_path, desc
 
 
 def test_an_fmu_whose_binary_is_missing_or_damaged_is_not_verified(fmu, tmp_path):
-    """The process lives on and says what is wrong."""
+    """The process lives on, says what is wrong, and stands in the folder that it stood in."""
+    here = Path.cwd()
     for content in (None, b"no ELF"):
         name = "binaries/linux64/Atwood.so"
         path = rewritten(fmu("Atwood"), tmp_path / "X.fmu", name, content)
         says(refusal(lambda path=path: verify(path)), "X.fmu")
+    assert Path.cwd() == here
 
 
 def test_an_fmu_whose_script_raises_is_not_verified(python_fmu, tmp_path):

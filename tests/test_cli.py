@@ -265,6 +265,34 @@ def test_the_version_is_that_of_the_package():
     assert lagfmu("--version") == f"lagfmu {importlib.metadata.version('lagfmu')}"
 
 
+def test_the_version_is_told_without_waiting():
+    """Neither SymPy nor SciPy is imported for a number that a script asks for."""
+    code = (
+        "import sys\nfrom lagfmu.cli import main\nsys.argv = ['lagfmu', '--version']\nmain()\n"
+        "assert not {'sympy', 'scipy', 'pint'} & sys.modules.keys()\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == f"lagfmu {importlib.metadata.version('lagfmu')}\n"
+
+
+@pytest.mark.parametrize("interrupted", ["lagfmu.cli.app", "lagfmu.prepare.prepare"])
+def test_ctrl_c_while_it_is_loading_ends_without_a_traceback(interrupted):
+    """Half of a short command's time goes by before it begins."""
+    lines = [
+        "import sys",
+        "class Pressed:",
+        "    def find_spec(self, name, *_):",
+        f"        if name == {interrupted!r}: raise KeyboardInterrupt",
+        "sys.meta_path.insert(0, Pressed())",
+        "sys.argv = ['lagfmu', 'show', 'bead.py']",
+        "from lagfmu.cli import main",
+        "main()",
+    ]
+    command = [sys.executable, "-c", "\n".join(lines)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
+
+
 def test_types_are_told_to_users_type_checkers():
     """PEP 561: the package has the marker py.typed."""
     assert importlib.resources.files("lagfmu").joinpath("py.typed").is_file()

@@ -23,7 +23,7 @@ from test_forged_states import forged_text
 from typer.testing import CliRunner
 
 from lagfmu import Output, Scene, sweep
-from lagfmu.cli import app
+from lagfmu.cli.app import app
 from lagfmu.errors import SimulationError
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write

@@ -8,6 +8,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from ctypes import c_double, c_size_t
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,10 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.prepare.consistency import RedundantConstraintWarning
+from lagfmu.prepare.prepare import prepare
+from lagfmu.solver.failure import StepFailureError
+from lagfmu.solver.instant import Instant as At
+from lagfmu.solver.motion import project
 from lagfmu.verification.simulate import simulate
 
 pytestmark = pytest.mark.python_cases(4)
@@ -697,3 +702,83 @@ def test_a_prescribed_motion_may_jump(target, tmp_path):
             one.step(0.01)
             assert abs(one.get("residual.tie")) <= 1e-15
             assert math.isfinite(one.get("lambda.tie"))
+
+
+def tray() -> Model:
+    """A point on a circle of 1 m, its height as a coordinate of its own, which is 0 at the lowest point."""
+    theta, height = dynamicsymbols("theta h")
+    return Model(
+        name="Tray",
+        lagrangian=m * (L**2 * theta.diff() ** 2 + height.diff() ** 2) / 2 - m * g * height,
+        coordinates={theta: "rad", height: "m"},
+        constraints=[Holonomic("circle", L * (1 - cos(theta)) - height)],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(g, g0, "m/s^2"), Parameter(L, 1.0, "m")],
+        start={theta: 1e-6},
+    )
+
+
+@pytest.mark.parametrize("amplitude", [1e-300, 1e-160, 1e-20, 1e-12, 1e-6])
+def test_a_place_near_zero_is_projected_to_rounding_of_the_terms(build, amplitude):
+    """Swings of 1e-6 rad to 1e-300 rad: L (1 - cos theta) is rounding of L, the height is 0 but for 5e-13 m;
+    no step "cannot be projected", and theta swings as cos(sqrt(g/L) t)."""
+    with instance(build(tray())) as one:
+        one.start({"theta": amplitude}, tolerance=1e-9)
+        seen, reason = walk(one, 0.1, 20)
+    assert reason == ""
+    expected = [math.cos(math.sqrt(g0) * 0.1 * k) for k in range(21)]
+    assert [a["theta"] / amplitude for a in seen] == pytest.approx(expected, abs=1e-6)
+
+
+def reeled() -> Model:
+    """A mass on a string that is reeled in at c: at t = L/c it has no length, and G = (2 x, 2 y) vanishes."""
+    c = symbols("c", positive=True)
+    return Model(
+        name="Reeled",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("string", x**2 + y**2 - (L - c * dynamicsymbols._t) ** 2)],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(L, 1.0, "m"), Parameter(c, 1.0, "m/s")],
+        start={x: 1.0, y: 0.0, x.diff(): -1.0, y.diff(): 0.0},
+    )
+
+
+@pytest.mark.parametrize("step", [0.25, 0.37, 1.0])
+def test_a_step_into_a_singular_configuration_is_right_or_names_it(build, step):
+    """Where the string ends no direction is left to hold the mass by: either it goes on straight,
+    x = L - c t, or the message says that the configuration is singular, not to take smaller steps."""
+    with instance(build(reeled())) as one:
+        one.start(tolerance=1e-9)
+        seen, reason = walk(one, step, math.ceil(1.5 / step))
+    for k, a in enumerate(seen):
+        assert a["x"] == pytest.approx(1 - step * k, abs=1e-6)
+    assert reason == "" or "singular" in reason
+
+
+def stretched() -> Model:
+    """The parallelogram with its bars in line, whose frame grows by e t^3: no bar can give way along it."""
+    theta, e = dynamicsymbols("theta"), symbols("e", positive=True)
+    line = parallelogram()
+    along, across = line.constraints
+    growing = along.expression - e * dynamicsymbols._t**3
+    return replace(
+        line,
+        name="Stretched",
+        constraints=[Holonomic("along", growing), across],
+        parameters=[*line.parameters, Parameter(e, 0.5, "m/s^3")],
+        start={phi: 0.0, theta: 0.0, psi: 0.0},
+    )
+
+
+def test_a_parallelogram_in_line_is_named_as_singular(build):
+    """d(along)/dq = 0 in line: the frame grows and nothing can follow. The message names the constraint and
+    the singular configuration; smaller steps would not help."""
+    with instance(build(stretched())) as one:
+        one.start(tolerance=1e-6)
+        _, reason = walk(one, 0.1, 3)
+    assert reason != ""
+    if one.native:  # the python engine gives up in a trial step before it projects
+        assert "'along' (missed by 0.0005): the configuration is singular" in reason
+    system = prepare(stretched(), Scene("Stretched")).system
+    at = At(system, 0.1, [], [float(p.value) for p in stretched().parameters])
+    with pytest.raises(StepFailureError, match=r"'along' .*the configuration is singular"):
+        project(at, np.zeros(3), np.zeros(3), [0, 1], np.zeros(2), np.ones(3))

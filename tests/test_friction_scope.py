@@ -25,7 +25,7 @@ from lagfmu import (
     multiplier,
     simulate,
 )
-from lagfmu.cli import app
+from lagfmu.cli.app import app
 from lagfmu.errors import LagfmuError, ModelError
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write

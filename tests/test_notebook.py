@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import derive
-from lagfmu.cli import app
+from lagfmu.cli.app import app
 from lagfmu.errors import DerivationError
 from lagfmu.model.file import load
 from lagfmu.model.library import known

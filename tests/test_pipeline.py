@@ -17,7 +17,7 @@ from sympy import symbols
 from typer.testing import CliRunner
 
 from lagfmu import ClosedForm, Scene, build_fmu
-from lagfmu.cli import app
+from lagfmu.cli.app import app
 from lagfmu.model.file import load
 from lagfmu.verification.reference import read_table
 

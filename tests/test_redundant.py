@@ -10,6 +10,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+from linkages import rods
 from redundant import SYSTEMS
 from runs import simulate_fmu
 
@@ -19,6 +20,7 @@ from lagfmu.fmu.write import write
 from lagfmu.prepare.consistency import RedundantConstraintWarning
 from lagfmu.prepare.prepare import prepare
 from lagfmu.prepare.starts import StartMovedWarning
+from lagfmu.solver.precedence import Stage
 
 SPAN = 1.0  # s
 Pair = tuple[Path, Path]
@@ -130,3 +132,21 @@ def test_multipliers_of_redundant_constraints_are_shared_with_least_norm(pair):
         np.testing.assert_allclose(redundant[name], plain[name], atol=1e-6)
     assert not redundant["unique.crank3"].any()
     assert plain["unique.crank1"].all()
+
+
+@pytest.mark.parametrize("count", [4, 24])
+def test_configurations_beside_the_start_are_near_it(monkeypatch, count):
+    """Dependent constraints are told at four configurations beside the start, each a tenth of a bar away: a
+    few of Newton's steps, however long the linkage of bars of 1 m is (it took 40, or did not arrive)."""
+    taken = []
+    nearest = Stage.nearest
+
+    def counted(self, *arguments):
+        taken.append(1)
+        return nearest(self, *arguments)
+
+    monkeypatch.setattr(Stage, "nearest", counted)
+    zigzag = [(0.8 * k, 0.6 * (k % 2)) for k in range(1, count + 1)]
+    found = prepare(rods(f"Zigzag{count}", zigzag)).structure
+    assert found.degrees_of_freedom == count - 2
+    assert 4 <= len(taken) <= 4 * 7

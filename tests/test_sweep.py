@@ -23,7 +23,7 @@ from conftest import MODELS
 from typer.testing import CliRunner
 
 import lagfmu
-from lagfmu.cli import app
+from lagfmu.cli.app import app
 from lagfmu.errors import LagfmuError, SimulationError
 from lagfmu.fmu.archive import version
 from lagfmu.fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, Session, plug

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import difflib
 import enum
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,6 @@ from rich.markup import escape
 
 from ..api import package
 from ..errors import CannotStartError, LagfmuError, SimulationError, VerificationError
-from ..fmu.archive import version
 from ..fmu.compiler import HOST, NAMES
 from ..fmu.described import read_description
 from ..fmu.native import takes_long
@@ -38,12 +36,13 @@ from ..page.text import show_what_is_known
 from ..prepare.prepare import prepare
 from ..study.tradeoff.page import section
 from ..verification.crosscheck import as_csv, write_crosscheck
-from ..verification.pipeline import Outcome, UsageError, as_json, as_junit, exit_code
+from ..verification.pipeline import Report, UsageError, as_json, as_junit, exit_code
 from ..verification.plot import default_names
 from ..verification.reference import read_table
 from ..verification.result import NOT_YET, Result, as_text
 from ..verification.simulate import simulate
 from ..verification.verify import Verification
+from . import say_version
 from .film import film
 from .options import (
     NARROWING,
@@ -75,7 +74,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"lagfmu {version()}")
+        say_version()
         raise typer.Exit
 
 
@@ -508,20 +507,18 @@ def stress(
         _finish("stress", done, json, junit)
 
 
-def _finish(
-    command: str, outcomes: Sequence[Outcome], json: Path | None, junit: Path | None
-) -> None:
+def _finish(command: str, reports: Sequence[Report], json: Path | None, junit: Path | None) -> None:
     """Write what a pipeline reads, say what could not be run, and end with the exit code."""
     if json is not None:
-        write_whole(json, as_json(outcomes).encode())
+        write_whole(json, as_json(reports).encode())
     if junit is not None:
-        write_whole(junit, as_junit(f"lagfmu {command}", outcomes))
-    for one in outcomes:
+        write_whole(junit, as_junit(f"lagfmu {command}", reports))
+    for one in reports:
         if one.error:
             errors.print(
                 f"[bold red]error:[/] {escape(one.error)}", highlight=False, soft_wrap=True
             )
-    raise typer.Exit(exit_code(outcomes))
+    raise typer.Exit(exit_code(reports))
 
 
 def _load(path: Path, added: list[str] | None, arguments: list[str] | None = None) -> ModelFile:
@@ -610,8 +607,3 @@ def _print_last(name: str, result: Result, names: Sequence[str] = ()) -> None:
 def _save(path: Path, result: Any) -> None:
     """All columns; names are quoted, because that of an acceleration holds a comma."""
     write_whole(path, as_csv(result, [n for n in result.dtype.names if n != "time"]).encode())
-
-
-def main() -> None:
-    """Entry point of `python -m lagfmu`."""
-    sys.exit(app())

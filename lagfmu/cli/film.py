@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BuildError
+from ..fmu.described import Trajectory
 from ..fmu.write import write_whole
 from ..live.playable import Told
 from ..live.recording import recorded
 from ..live.render import render
 from ..page.picture import values
-from ..verification.simulate import Trajectory
 
 RATE, MOST = 25, 300  # frames per second, and of a film
 ENDINGS = (".gif", ".mp4", ".html")

@@ -30,9 +30,9 @@ from ..study.stress.facts import facts_of
 from ..study.stress.geometry import lay_geometry, twin
 from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import NO_ROOM, UNFINISHED, WRONG, Verdict
-from ..study.stress.report import MEANING, Stressed, data, outcome, summary, table
+from ..study.stress.report import MEANING, Stressed, data, report, summary, table
 from ..study.stress.summary import as_summary
-from ..verification.pipeline import Outcome, UsageError, text_of
+from ..verification.pipeline import Report, UsageError, text_of
 from .tradeoff import progress
 from .works import studied
 
@@ -49,7 +49,7 @@ def stress(
     scenes: Sequence[str] = (),
     quick: bool = False,
     limit: float = LIMIT,
-) -> list[Outcome]:
+) -> list[Report]:
     """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json, .md, and OUT/TARGET.md.
 
     What cannot be built or run does not keep the others from it.  Raises UsageError.
@@ -59,8 +59,8 @@ def stress(
     if not console.is_terminal:
         console = Console(file=console.file, width=WIDTH, emoji=False)
 
-    def study(name: str, fmu: Path) -> Outcome:
-        return outcome(name, _one(fmu, out, console, quick, limit))
+    def study(name: str, fmu: Path) -> Report:
+        return report(name, _one(fmu, out, console, quick, limit))
 
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         made = partial(build, folder=Path(folder) / target, target=target, console=console)

@@ -26,8 +26,8 @@ from ..study.tradeoff.choose import Choice, choose
 from ..study.tradeoff.figure import draw
 from ..study.tradeoff.importer import Importer
 from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure, quick_plan
-from ..study.tradeoff.report import as_csv, data, digits, outcome, remarks, summary, table
-from ..verification.pipeline import Outcome, UsageError, text_of
+from ..study.tradeoff.report import as_csv, data, digits, remarks, report, summary, table
+from ..verification.pipeline import Report, UsageError, text_of
 from .works import studied
 
 
@@ -65,7 +65,7 @@ def compare(
     repeats: int | None = None,
     scenes: Sequence[str] = (),
     full: bool = False,
-) -> list[Outcome]:
+) -> list[Report]:
     """Measure model files and FMUs, print tables, write OUT/TARGET/NAME.json, .csv, .svg and .png.
 
     Without a `target` native FMUs where there is a compiler, else python ones; `full`: the whole grid.
@@ -87,7 +87,7 @@ def compare(
                 prepared = prepare(file.model, scene)
                 return write(prepared, Path(folder) / kind, file.closed_forms, target=kind)
 
-        def study(name: str, fmu: Path) -> Outcome:
+        def study(name: str, fmu: Path) -> Report:
             with Importer(fmu) as importer:
                 plan = default_plan(importer) if full else quick_plan(importer)
             if communications:
@@ -96,7 +96,7 @@ def compare(
                 plan = replace(plan, tolerances=tuple(sorted(set(tolerances), reverse=True)))
             if methods:
                 plan = replace(plan, methods=tuple(methods))
-            return outcome(name, _one(fmu, plan, repeats, out, console))
+            return report(name, _one(fmu, plan, repeats, out, console))
 
         done = studied(paths, scenes, build, study)
     found = [m.found for m in done if m.found is not None]

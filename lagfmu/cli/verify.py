@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import LagfmuError, SettingError, SimulationError
-from ..verification.pipeline import Outcome, UsageError
+from ..verification.pipeline import Report, UsageError
 from ..verification.reference import Reference, read_table
-from ..verification.report import outcome
+from ..verification.report import report
 from ..verification.verify import verify
 
 
@@ -41,7 +41,7 @@ def examine(
     reference: Path | None,
     rtol: Sequence[str],
     atol: float,
-) -> list[Outcome]:
+) -> list[Report]:
     """Each FMU; one that cannot be run does not keep the others from it.  Raises UsageError."""
     if reference is None and (rtol or atol):
         raise UsageError("--rtol and --atol are for --reference")
@@ -59,7 +59,7 @@ def examine(
             found = verify(fmu, values, stop_time, step_size, tolerance, signals, table)
         except LagfmuError as error:
             misused = isinstance(error, SettingError)
-            done.append(Outcome(str(fmu), error=str(error), misused=misused))
+            done.append(Report(str(fmu), error=str(error), misused=misused))
         else:
-            done.append(outcome(str(fmu), found))
+            done.append(report(str(fmu), found))
     return done

@@ -9,7 +9,7 @@ from pathlib import Path
 from ..errors import LagfmuError
 from ..model.file import ModelFile, load
 from ..model.scene import Scene
-from ..verification.pipeline import Outcome, UsageError
+from ..verification.pipeline import Report, UsageError
 
 Make = Callable[[], Path]
 
@@ -18,8 +18,8 @@ def studied(
     paths: Sequence[Path],
     scenes: Sequence[str],
     build: Callable[[ModelFile, Scene], Path],
-    study: Callable[[str, Path], Outcome],
-) -> list[Outcome]:
+    study: Callable[[str, Path], Report],
+) -> list[Report]:
     """What came of `study` of each FMU, given what it is called; `scenes`: only these of model files.
 
     What cannot be built or run does not keep the others from it.  Raises UsageError.
@@ -30,7 +30,7 @@ def studied(
             try:
                 done.append(study(name, make()))
             except LagfmuError as error:
-                done.append(Outcome(name, error=str(error)))
+                done.append(Report(name, error=str(error)))
     if not done:
         raise UsageError(f"no FMU is called {', '.join(scenes) or 'anything'}")
     return done

@@ -10,9 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+from numpy.typing import NDArray
 
 from .. import names
 from ..errors import VerificationError
+
+Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ the binary has it, else through the same loop written here: slower, with the sam
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import re
 from collections.abc import Mapping, Sequence
@@ -153,12 +154,13 @@ class Session:
         addLoggerProxy(ctypes.byref(callbacks))  # formats a message with its arguments
         MESSAGES.clear()
         try:
-            self.slave = FMU2Slave(
-                instanceName=self.name,
-                guid=self.plug.guid,
-                modelIdentifier=self.plug.identifier,
-                unzipDirectory=self.plug.folder,
-            )
+            with contextlib.chdir("."):  # fmpy stays in the folder of a library that it cannot load
+                self.slave = FMU2Slave(
+                    instanceName=self.name,
+                    guid=self.plug.guid,
+                    modelIdentifier=self.plug.identifier,
+                    unzipDirectory=self.plug.folder,
+                )
             ours = hasattr(self.slave.dll, "lagfmu_batch")  # it gives its reasons unasked
             self.slave.instantiate(callbacks=callbacks, loggingOn=not ours)
         except Exception as error:

@@ -573,7 +573,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         try:
             check, _, text = state.rstrip(b"\0").partition(b" ")
-            if int(check, 16) != zlib.crc32(text):
+            if check != b"%08x" % zlib.crc32(text):
                 raise ValueError("their check sum is wrong")
             return dict(json.loads(text.decode("ascii")))
         except (

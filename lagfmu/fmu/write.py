@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..errors import BuildError
+from ..errors import BuildError, SettingError
 from ..model.closed_form import ClosedForm, Conserved
+from ..model.file import load
+from ..model.model import Model
+from ..model.scene import Scene
 from ..page.documentation import page, with_figures
 from ..page.picture import IN_FMU, as_bytes, picture_of
-from ..prepare.prepare import Prepared
+from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
 from .closed_forms import pack_closed_forms
-from .compiler import HOST
+from .compiler import HOST, find_compiler
 
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
 TARGETS = ("python", "native")
@@ -72,6 +76,39 @@ def write(
         path = path / f"{prepared.scene.name}.fmu"
     write_whole(path, content)
     return path
+
+
+@contextlib.contextmanager
+def as_fmu(
+    target: Model | str | os.PathLike[str],
+    scene: Scene | str | None = None,
+    closed_forms: Sequence[ClosedForm | Conserved] = (),
+) -> Iterator[Path]:
+    """An FMU as it is; of a model, or a model file, one that is built (natively where a compiler is at hand)
+    into a folder that goes again.  `scene`: of a file also by name, else its first."""
+    if isinstance(target, Model):
+        model, chosen = target, scene if isinstance(scene, Scene) else Scene(target.name)
+    else:
+        path = Path(target)
+        if path.suffix != ".py":
+            if scene is not None:
+                raise SettingError(
+                    f"scene {scene!r} is for a model file: {str(path)!r} is one already"
+                )
+            yield path
+            return
+        file = load(path)
+        model, closed_forms = file.model, closed_forms or file.closed_forms
+        names = [s.name for s in file.scenes]
+        if isinstance(scene, Scene):
+            chosen = scene
+        elif scene is not None and scene not in names:
+            raise SettingError(f"{path}: no FMU is called {scene!r}; known: {', '.join(names)}")
+        else:
+            chosen = file.scenes[0 if scene is None else names.index(scene)]
+    kind = "native" if find_compiler() is not None else "python"
+    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+        yield write(prepare(model, chosen), folder, closed_forms, kind)
 
 
 def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]] = ()) -> None:

@@ -15,9 +15,9 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
+from ..page.template import template
 from .markup import Section, as_json
 
 APPLICATION = (
@@ -57,7 +57,7 @@ def render(playable: Playable) -> str:
     """The HTML text; the same for the same parts."""
     application = _script(_joined(APPLICATION))
     library = _script(f"/*\n{_text('vendor', LICENCE)}*/\n{_text('vendor', LIBRARY)}")
-    return _template().render(
+    return template("live/web/page.html.j2").render(
         name=playable.name,
         description=playable.facts["description"],
         equations=playable.equations,
@@ -96,11 +96,3 @@ def _hash(text: str) -> str:
 @cache
 def _text(*parts: str) -> str:
     return files("lagfmu").joinpath("live", "web", *parts).read_text(encoding="utf-8")
-
-
-@cache
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    return environment.from_string(_text("page.html.j2"))

@@ -144,12 +144,22 @@ class EquationsOfMotion(Displayed):
         if not any(s.ends != "periodic" for s in self.model.splines):
             return []
         known = {*self.q, *self.v, *self.u, *self.p, TIME}
-        flat = [*self.M.todok().values(), *self.F, *self.G.todok().values(), *self.nu, *self.gamma]
-        flat += [*self.f, *(o.expression for o in self.outputs)]
+        flat = [*self.solved, *self.f, *(o.expression for o in self.outputs)]
         calls = {c for e in flat if e is not None for c in sp.sympify(e).atoms(SplineBase)}
         found = {(c.spline, c.args[0]) for c in calls if c.spline.ends != "periodic"}
         state = [pair for pair in found if pair[1].free_symbols <= known]
         return sorted(state, key=lambda pair: (pair[0].name, str(pair[1])))
+
+    @property
+    def solved(self) -> list[Expr]:
+        """The expressions of the linear equations for accelerations and lambda: M, F, G, nu, gamma."""
+        return [
+            *self.M.todok().values(),
+            *self.F,
+            *self.G.todok().values(),
+            *self.nu,
+            *self.gamma,
+        ]
 
     @property
     def vdot(self) -> tuple[Expr, ...]:

@@ -76,8 +76,7 @@ def folded(eom: EquationsOfMotion, numbers: Mapping[Expr, Expr]) -> EquationsOfM
         rates={s: r for s, r in eom.rates.items() if s not in numbers},
         numbers={**eom.numbers, **numbers},
     )
-    flat = [*made.M.todok().values(), *made.F, *made.G.todok().values(), *made.nu, *made.gamma]
-    flat += [o.expression for o in made.outputs if o.otherwise is None]
+    flat = made.solved + [o.expression for o in made.outputs if o.otherwise is None]
     if any(e.has(sp.zoo, sp.oo, sp.nan) for e in flat):
         given = ", ".join(f"{s} = {float(n)!r}" for s, n in numbers.items())
         raise ModelError(
@@ -126,8 +125,7 @@ def idle(form: Form) -> list[Expr]:
 
 
 def _expressions(eom: EquationsOfMotion) -> list[Expr]:
-    flat = [*eom.M.todok().values(), *eom.F, *eom.G.todok().values(), *eom.nu, *eom.gamma]
-    flat += [*eom.f, eom.kinetic, eom.potential]
+    flat = [*eom.solved, *eom.f, eom.kinetic, eom.potential]
     flat += [e for o in eom.outputs for e in (o.expression, o.otherwise)]
     flat += [eom.plain(c.restitution) for c in eom.constraints if isinstance(c, Contact)]
     flat += [e for law in eom.frictions for e in law.expressions]

@@ -30,7 +30,7 @@ RATES = (
 
 
 def problems_of(model: ModelFields) -> list[str]:
-    """All problems of a model whose containers are right (`modelkinds.check_containers`)."""
+    """All problems of a model whose containers are right (`kinds.check_containers`)."""
     problems: list[str] = []
     check_types(model, problems)
     if problems:

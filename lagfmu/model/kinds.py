@@ -1,6 +1,6 @@
 """What each field of a Model must hold to be read at all: dicts and lists, expressions, texts, names.
 
-Nothing here knows what a name or an expression means; `modelcheck.py` does.
+Nothing here knows what a name or an expression means; `check.py` does.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Two forms are accepted (the lectures' two): a Lagrangian L = T - V with non-conservative generalized
 forces Q_nc (ME 6590 eq. 3), or the kinetic energy K with all generalized forces F_q (eq. 2).
 
-Everything that is wrong with a model (`modelcheck.py`) is reported at once, in one ModelError.
+Everything that is wrong with a model (`check.py`) is reported at once, in one ModelError.
 """
 
 from __future__ import annotations

@@ -9,10 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 
-import jinja2
 from latex2mathml.converter import convert
 from markupsafe import Markup
 
@@ -23,6 +20,7 @@ from ..model.units import Unit, for_reading
 from ..prepare.prepare import Prepared
 from ..solver.precedence import OMITTED
 from .savings import savings
+from .template import template
 from .typeset import typeset
 
 MEANING = {
@@ -89,7 +87,7 @@ def page(
     model, structure, table = prepared.model, prepared.structure, prepared.table
     acting, whole = prepared.equations.constraints, prepared.whole
     sections = typeset(prepared.form)
-    return _template("documentation").render(
+    return template("page/documentation.html.j2").render(
         link=Markup(LINK),
         figures=Markup(FIGURES),
         name=prepared.scene.name,
@@ -160,14 +158,5 @@ def _group(v: Variable) -> str:
 def with_figures(text: str, figures: Sequence[tuple[str, ...]]) -> str:
     """The page with rows (closed form, largest error, allowed, verdict) of a verification in their place."""
     link = '<li><a href="#verification">Verification</a></li>'
-    found = _template("verification").render(figures=figures)
+    found = template("page/verification.html.j2").render(figures=figures)
     return text.replace(LINK, link).replace(FIGURES, found.rstrip())
-
-
-@cache
-def _template(name: str) -> jinja2.Template:
-    text = files("lagfmu").joinpath(f"page/{name}.html.j2").read_text(encoding="utf-8")
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    return environment.from_string(text)

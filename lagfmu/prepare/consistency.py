@@ -82,16 +82,17 @@ def examine(
     for trial in range(TRIALS):
         q, v = np.array(begun.state.q), np.array(begun.state.v)
         if trial:  # a nearby configuration that satisfies the constraints as well
-            size = np.maximum(np.abs(q), np.abs(q).max(initial=0.0)) + 1e-3
-            shift = [0.1 * s * generator.uniform(-1, 1) for s in size]
+            shift = [0.1 * s * generator.uniform(-1, 1) for s in _spans(system, begun, p)]
             try:
                 q = _nearby(system, begun, q + np.array(shift), v, u, p)
             except StepFailureError:
                 continue
         inputs = levelled(system, u, q, p)
         full, q, v = expand(system, 0.0, q, v, inputs, p)
-        M, _, G, _, _ = Instant(full, 0.0, inputs, p).evaluate(q, v)
-        ranks.append(_rank(full, G))
+        at = Instant(full, 0.0, inputs, p)
+        M, _, G, _, _ = at.evaluate(q, v)
+        f = at.residual(q) if full.contacts else np.zeros(full.m)
+        ranks.append(_rank(full, G, f, np.abs(G) @ np.abs(q)))
         masses.append(M)
     size = np.abs([M.diagonal() for M in masses]).max(axis=0)
     negative = negative_energy(full, masses[0], size)
@@ -109,6 +110,20 @@ def examine(
         )
     missed = _missed(table, system, begun, u, p)
     return Structure(eom.n, eom.m, rank, redundant, shared, begun, missed)
+
+
+def _spans(system: System, begun: Start, p: Sequence[float]) -> list[float]:
+    """Ten times what each coordinate may be moved by and still be near: the least length among the model's
+    parts, if it has any. In a chain of 40 bars the places are up to 40 bars from the origin; a tenth of that
+    is far."""
+    numbers = system.folded or (0.0,) * system.n
+    spans = []
+    for part, number, size in zip(
+        system.extent or ((),) * system.n, numbers, begun.state.size, strict=True
+    ):
+        lengths = [x for x in (*(abs(p[i]) for i in part), number) if x > 0] or [size or 1e-3]
+        spans.append(max(min(lengths), 1e-3 * max(lengths)))
+    return spans
 
 
 def _missed(
@@ -241,31 +256,44 @@ def _nearby(
         return project_from_afar(at, q, v, rows, np.array(begun.state.size))
 
 
-def _rank(full: System, G: Matrix) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
+def _rank(
+    full: System, G: Matrix, f: Vector, size: Vector
+) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
     """Rank of G with rows scaled to unit norm; the rows that add nothing to those before them: what is left
     of each beside the span of those (Gram and Schmidt, twice); and all whose multiplier is not unique: those
-    with a part in the null space of G^T (Wojtyra 2005)."""
+    with a part in the null space of G^T (Wojtyra 2005).  Contacts come last: one that cannot be closed
+    while those on which it depends are (a wall on either side) is no redundancy."""
     norm = np.linalg.norm(G, axis=1)
-    G = G / np.where(norm > 0, norm, 1.0)[:, None]
+    norm = np.where(norm > 0, norm, 1.0)
+    G, f, size = G / norm[:, None], f / norm, size / norm
     span = np.zeros((0, full.n))
-    redundant = []
-    for k in range(full.m):
+    redundant: list[str] = []
+    rows: list[int] = []
+    for k in sorted(range(full.m), key=lambda k: k in full.contacts):
         if full.rows[k].friction is not None:
             continue  # it holds as long as it sticks
         rest = G[k].copy()
         for _ in range(2):
             rest -= span.T @ (span @ rest)
-        size = float(np.linalg.norm(rest))
-        if len(span) < full.n and size > np.sqrt(RANK):
-            span = np.vstack([span, rest / size])
+        length = float(np.linalg.norm(rest))
+        if len(span) < full.n and length > np.sqrt(RANK):
+            span = np.vstack([span, rest / length])
+        elif k in full.contacts and _apart(k, rows, G, f, size):
+            continue
         else:
             redundant.append(full.rows[k].name)
-    return len(span), tuple(redundant), _shared(full, G, len(redundant))
+        rows.append(k)
+    return len(span), tuple(redundant), _shared(full, G, sorted(rows), len(redundant))
 
 
-def _shared(full: System, G: Matrix, count: int) -> tuple[str, ...]:
-    """Rows with a part in the null space of G^T, which has `count` dimensions."""
-    rows = [k for k in range(full.m) if full.rows[k].friction is None]
+def _apart(k: int, rows: Sequence[int], G: Matrix, f: Vector, size: Vector) -> bool:
+    """Whether row k, as it follows from `rows`, still has a gap when all of those have none."""
+    share = np.linalg.lstsq(G[rows].T, G[k], rcond=RANK)[0]
+    return bool(abs(f[k] - share @ f[rows]) > MISSED * (size[k] + np.abs(share) @ size[rows]))
+
+
+def _shared(full: System, G: Matrix, rows: Sequence[int], count: int) -> tuple[str, ...]:
+    """Those of `rows` with a part in the null space of G^T, which has `count` dimensions."""
     if not count or not rows:
         return ()
     left = np.linalg.svd(G[rows])[0][:, len(rows) - count :]

@@ -55,18 +55,13 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
             )
         if _projected(at, q, v, rows) is None:
             return _missed(at, q, v, rows, f, values)
-        contrary = _first_contrary(system, G, nu, rows)
-        if contrary:
-            return (
-                f"constraints {contrary} contradict each other: no velocities satisfy them together "
-                "at the start; correct them, or leave one out"
-            )
-        contrary = _first_contrary(system, G, gamma, rows)
-        if contrary:
-            return (
-                f"constraints {contrary} contradict each other: no accelerations satisfy them together "
-                "at the start; correct them, or leave one out"
-            )
+        for right, what in ((nu, "velocities"), (gamma, "accelerations")):
+            contrary = _first_contrary(system, G, right, rows)
+            if contrary:
+                return (
+                    f"constraints {contrary} contradict each other: no {what} satisfy them together at "
+                    "the start; correct them, or leave one out"
+                )
     return None
 
 

@@ -4,7 +4,7 @@ equations change.
     0 .. contacts - 1   of a contact: lambda >= 0 while it is closed; while it is open f >= 0, left only at
                         f < -gap, within which contacts touch
     then                of a jump of the forces: h on the side of its level (jumps.py)
-    then two a friction (slides.py): the reserve of its cone while it sticks, the slip velocity along its
+    then two a friction (slipping.py): the reserve of its cone while it sticks, the slip velocity along its
                         direction while it slips; its normal force while it slips on what is no contact
 
 A further kind takes the numbers after these: its values stand in `indicators`, its ranges in `ranges`, what

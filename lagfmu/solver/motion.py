@@ -121,18 +121,20 @@ def project(
         miss, steepness = np.abs(f), np.abs(G[fixed])
         if (miss <= 2 * EPS * (steepness @ np.abs(q))).all():
             break
-        error = (miss / (steepness @ np.maximum(np.abs(q), size))).max()
+        reach = steepness @ np.maximum(np.abs(q), size)
+        error = np.divide(miss, reach, out=np.full(len(miss), np.inf), where=reach > 0)[
+            miss > 0
+        ].max()
         if error < EPS**2 or (error > before / 2 and error < PROJECTION_SMALL):
             break  # f vanishes with q, or rounding in f is all that is left
         if count == PROJECTION_ITERATIONS:
             if error < PROJECTION_ROUNDING:
                 break  # linear convergence, or terms that are larger than q tells
             worst = [at.system.rows[k].name for k, a in zip(fixed, miss, strict=True) if a > 0]
-            cause = (
-                "the configuration is singular, or nearly so"
-                if error > PROJECTION_LINEAR * before
-                else ""
-            )
+            slower = (
+                not error < PROJECTION_LINEAR * before
+            )  # infinite: no coordinate moves a row here
+            cause = "the configuration is singular, or nearly so" if slower else ""
             raise StepFailureError(
                 f"the step to t = {float(at.t)!r} s cannot be projected onto the constraints "
                 f"{', '.join(map(repr, worst))} (missed by {miss.max():.3g}): "

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.linalg
 
 from .system import Matrix, System, Vector
 from .thresholds import SHARE_DEPENDENT, SHARE_ROUNDS, SHARE_WIDE
@@ -28,7 +29,7 @@ def best_share(
     stuck: Sequence[int],
 ) -> tuple[Vector, Vector]:
     """The multipliers (m) to report, and those of the largest reserve."""
-    Z = null_space(G, rows)
+    Z = dependencies(G, rows)
     if not len(Z):
         return lam, lam
 
@@ -59,31 +60,14 @@ def best_share(
     return lam + (low * best) @ Z, lam + best @ Z
 
 
-def null_space(G: Matrix, rows: Sequence[int]) -> Matrix:
-    """Z (dependent rows, m), orthonormal: Z G = 0, by elimination of each row by those before it."""
-    basis: list[Vector] = []  # orthonormal combinations of rows
-    made: list[Vector] = []  # and of what they are made
-    found: list[Vector] = []
-    m = len(G)
-    for k in rows:
-        norm = float(np.linalg.norm(G[k]))
-        rest, of = G[k].copy(), np.zeros(m)
-        of[k] = 1.0
-        for _ in range(2):  # twice is enough (Kahan)
-            for b, c in zip(basis, made, strict=True):
-                part = float(b @ rest)
-                rest, of = rest - part * b, of - part * c
-        left = float(np.linalg.norm(rest))
-        if left > SHARE_DEPENDENT * norm:
-            basis.append(rest / left)
-            made.append(of / left)
-        else:
-            found.append(of)
-    for i, z in enumerate(found):
-        for other in found[:i]:
-            z = z - (other @ z) * other
-        found[i] = z / np.linalg.norm(z)
-    return np.array(found).reshape(len(found), m)
+def dependencies(G: Matrix, rows: Sequence[int]) -> Matrix:
+    """Z (dependent rows, m), orthonormal: Z G = 0, of rows that are scaled to one size first."""
+    norm = np.linalg.norm(G[rows], axis=1)
+    norm = np.where(norm > 0, norm, 1.0)
+    found = scipy.linalg.null_space((G[rows] / norm[:, None]).T, rcond=SHARE_DEPENDENT)
+    Z = np.zeros((found.shape[1], len(G)))
+    Z[:, rows] = np.linalg.qr(found / norm[:, None])[0].T
+    return Z
 
 
 def _highest(worst: object, count: int, wide: float) -> Vector:

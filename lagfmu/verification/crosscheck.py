@@ -17,11 +17,11 @@ from xml.etree import ElementTree as ET
 
 from .. import names
 from ..errors import SimulationError
-from ..fmu.described import experiment_of, read_description
+from ..fmu.described import Trajectory, experiment_of, read_description
 from ..fmu.write import write_whole
 from .pipeline import as_json
-from .report import outcome
-from .simulate import Trajectory, communication_points, simulate
+from .report import report
+from .simulate import communication_points, simulate
 from .verify import Verification
 
 TOLERANCE = 1e-12
@@ -188,7 +188,7 @@ def _stable(found: Verification) -> str:
     """The report without what differs from run to run, so that the FMU's bytes do not."""
     from dataclasses import replace
 
-    return as_json([outcome(f"{found.name}.fmu", replace(found, seconds=0.0))])
+    return as_json([report(f"{found.name}.fmu", replace(found, seconds=0.0))])
 
 
 def _xml(root: ET.Element) -> bytes:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import VerificationError
+from ..fmu.described import Trajectory
 from ..model.elements import Expr
-from .simulate import Trajectory
 
 TINY = 1e-150  # whose square a double holds
 

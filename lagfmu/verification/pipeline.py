@@ -32,7 +32,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Report:
     """What came of one FMU, or of a file of which none could be made: what was `found`, as cases and as
     `data` for JSON; or `error`: why it could not be run, or (`misused`) was not."""
 
@@ -53,17 +53,17 @@ class Outcome:
         return FAILS if not known or any(c.failure for c in known) else HOLDS
 
 
-def exit_code(outcomes: Sequence[Outcome]) -> int:
+def exit_code(reports: Sequence[Report]) -> int:
     """The largest of all."""
-    return max((o.code for o in outcomes), default=HOLDS)
+    return max((r.code for r in reports), default=HOLDS)
 
 
-def as_json(outcomes: Sequence[Outcome]) -> str:
+def as_json(reports: Sequence[Report]) -> str:
     """All that was found, in one list."""
     return text_of(
         [
-            {"file": o.file, "verdict": VERDICTS[o.code], "error": o.error or None, **o.data}
-            for o in outcomes
+            {"file": r.file, "verdict": VERDICTS[r.code], "error": r.error or None, **r.data}
+            for r in reports
         ]
     )
 
@@ -81,10 +81,10 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def as_junit(command: str, outcomes: Sequence[Outcome]) -> bytes:
+def as_junit(command: str, reports: Sequence[Report]) -> bytes:
     """JUnit's XML: of what nothing is known is skipped, an FMU that could not be run is an error."""
     document = JUnitXml(command)
-    for s in outcomes:
+    for s in reports:
         suite = TestSuite(s.file)
         for name, value in s.properties.items():
             suite.add_property(name, value)

@@ -12,8 +12,8 @@ import numpy as np
 
 from .. import names
 from ..errors import BuildError
+from ..fmu.described import Trajectory
 from ..model.units import for_reading
-from .simulate import Trajectory
 
 COLOURS = ("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72", "#6940a5", "#64473a")
 DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # once the colours are used up

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from .pipeline import Case, Outcome
+from .pipeline import Case, Report
 from .verify import Check, Verification
 
 
-def outcome(file: str, found: Verification) -> Outcome:
+def report(file: str, found: Verification) -> Report:
     """A case a statement; numbers as numbers."""
     cases = [  # one run serves all: its time at the first
         _case(c, found.name, 0.0 if k else found.seconds) for k, c in enumerate(found.checks)
@@ -22,7 +22,7 @@ def outcome(file: str, found: Verification) -> Outcome:
         "uncovered_outputs": found.uncovered,
     }
     uncovered = {"uncovered outputs": ", ".join(found.uncovered)}
-    return Outcome(file, found, cases, data, properties=uncovered)
+    return Report(file, found, cases, data, properties=uncovered)
 
 
 def _case(check: Check, fmu: str, seconds: float) -> Case:

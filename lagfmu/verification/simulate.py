@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import os
 import re
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from .. import names
 from ..errors import SettingError, SimulationError
 from ..fmu.archive import unpack
-from ..fmu.described import experiment_of, has_error_bars, items_of, read_description
+from ..fmu.described import Trajectory, experiment_of, has_error_bars, items_of, read_description
 from ..fmu.python import slave_of
 from ..fmu.slave import Refused
 from ..methods import IN_PYTHON, NUMBERS, unknown
@@ -35,7 +36,6 @@ STARTS = re.compile(
     r"start value .* misses the constraints|has no start value"
 )  # a message of a move
 MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
-Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
 
 class ErrorBarWarning(UserWarning):
@@ -190,7 +190,8 @@ def _simulate_model(
         for k, t in enumerate(times.tolist()):
             if k:
                 before = float(times[k - 1])
-                slave.set_real([place[n] for n in fed], [float(x[k - 1]) for x in fed.values()])
+                if fed:
+                    slave.set_real([place[n] for n in fed], [float(x[k - 1]) for x in fed.values()])
                 if not slave.do_step(before, t - before):
                     raise SimulationError(slave.log_queue[-1].msg)
             row = slave.row()
@@ -280,19 +281,20 @@ def _simulate_fmu(
     }
     folder = unpack(path)
     try:
-        result: Trajectory = fmpy.simulate_fmu(
-            folder,
-            stop_time=stop,
-            output_interval=step,
-            step_size=step,
-            relative_tolerance=tolerance,
-            start_values=values,
-            output=[v.name for v in description.modelVariables if v.causality == "output"]
-            + list(besides),
-            input=inputs,
-            logger=logger,
-            debug_logging=True,
-        )
+        with contextlib.chdir("."):  # fmpy stays in the folder of a library that it cannot load
+            result: Trajectory = fmpy.simulate_fmu(
+                folder,
+                stop_time=stop,
+                output_interval=step,
+                step_size=step,
+                relative_tolerance=tolerance,
+                start_values=values,
+                output=[v.name for v in description.modelVariables if v.causality == "output"]
+                + list(besides),
+                input=inputs,
+                logger=logger,
+                debug_logging=True,
+            )
     except FMICallException as error:
         raise SimulationError(_told(path, error, messages)) from None
     except Exception as error:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
-from ..fmu.described import experiment_of, numbers_of, read_description
+from ..fmu.described import Trajectory, experiment_of, numbers_of, read_description
 from .evaluate import evaluate
-from .simulate import Trajectory, simulate, steps_of
+from .simulate import simulate, steps_of
 
 RECORD = "resources/lagfmu.json"
 MODES = ("Boolean", "Real")  # what a mode may be: a Real where an FMU has Reals alone

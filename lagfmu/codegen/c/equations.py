@@ -1,4 +1,4 @@
-"""Equations of motion -> model.c: their numeric form as `const System`, see runtime/system.h.
+"""Equations of motion -> model.c: their numeric form as `const System`, see runtime/base/system.h.
 
 The C twin of codegen/py/equations.py, with the same layout: M as the non-zeros of its lower triangle, G
 as its non-zeros, both sorted by row, then column.  Equations and patterns only; no solver text.

@@ -1,4 +1,4 @@
-"""A scene -> optional.c: which parts of the runtime its FMU holds; see runtime/optional.h."""
+"""A scene -> optional.c: which parts of the runtime its FMU holds; see runtime/simulation/optional.h."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ AT_CONTACTS = {
 }
 BESIDE = ("after_step", "at_trial", "at_event", "inside")  # of companion.c
 COMPANION = ("bars.c", "companion.c")  # behind ERROR_BARS of variables.c
+MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
 FRICTION = ("friction.c", "painleve.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
 NO_RUNGS = """
 #include "dependent.h"
@@ -67,6 +68,7 @@ def optional_source(scene: Scene, system: System, found: tuple[str, ...]) -> str
     ]
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
+    rows += ["    .jumps = &JUMPS,\n"] if system.floors else []
     rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
     if scene.error_bars:
         rows += [f"    .{part} = companion_{part},\n" for part in BESIDE]
@@ -92,6 +94,10 @@ def files_left_out(scene: Scene, system: System, found: tuple[str, ...]) -> froz
         gone |= {*FRICTION}
     if not scene.error_bars:
         gone |= {*COMPANION}
+    if not system.floors:
+        gone.add("jumps.c")
+    if not system.prescribed:
+        gone |= {*MOTIONS}
     if not is_watched(system):
         gone |= {*AT_EVENTS.values(), *BEHIND_EVENTS}
     if not (system.contacts or system.frictions):

@@ -1,6 +1,6 @@
 """SymPy expressions -> C99 expressions of doubles: no integers, the functions of <math.h> only.
 
-The only C printer of expressions; cfunction.py makes functions of them.
+The only C printer of expressions; function.py makes functions of them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Variable table -> variables.c: the FMU's variables as runtime/variables.h declares them.
+"""Variable table -> variables.c: the FMU's variables as runtime/fmi/variables.h declares them.
 
 Position = value reference.  Where a value lies follows from what the variable is of.
 """
@@ -25,6 +25,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 
 #include "bars.h"
 #include "identity.h"
+#include "prescribed.h"
 #include "state.h"
 #include "variables.h"
 
@@ -37,6 +38,7 @@ const char *const MODEL_IDENTIFIER = {identifier};
 const char *const MODEL_GUID = LAGFMU_GUID;
 const double DEFAULT_TOLERANCE = {tolerance};
 const int DEFAULT_METHOD = {method};
+const Prescribed *const PRESCRIBED = {motions};
 {bars}"""
 NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
 WITH_BARS = f"""const ErrorBars *const ERROR_BARS = &BARS;
@@ -63,6 +65,7 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
         identifier=string(scene.name),
         tolerance=repr(float(scene.tolerance)),
         method=scene.method.upper(),
+        motions="&MOTIONS" if system.prescribed else "NULL",
         bars=WITH_BARS if scene.error_bars else NO_BARS,
     )
 

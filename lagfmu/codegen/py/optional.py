@@ -9,7 +9,10 @@ from ...model.scene import Scene
 from ...solver.indicators import is_watched
 from ...solver.system import System
 
-FRICTION = ("friction.py", "painleve.py", "rubbing.py", "share.py", "slides.py")
+FRICTION = (
+    *("friction.py", "painleve.py", "rest.py", "rubbing.py", "share.py", "slides.py"),
+    "slipping.py",
+)
 CONTACTS = ("complementarity.py", "contacts.py", "impact.py", "switch.py")
 EVENTS = ("clearance.py", "events.py", "samples.py")
 CONSTRAINTS = ("nullspace.py", "orthogonal.py")

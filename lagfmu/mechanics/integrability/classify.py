@@ -10,7 +10,7 @@ part; its rank is the number of independent first integrals (Bryant et al., *Ext
 Systems*, ch. II).  All ranks are generic: they hold away from singular points.
 
 That a coefficient vanishes is proven by exact arithmetic; that one does not is decided by its
-values with 60 digits at random points (`lagfmu/pfaffian/`).
+values with 60 digits at random points (samples.py).
 """
 
 from __future__ import annotations

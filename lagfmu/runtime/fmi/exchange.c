@@ -16,7 +16,6 @@
 #include <string.h>
 
 #include "indicators.h"
-#include "jumps.h"
 #include "flow.h"
 #include "magnitudes.h"
 #include "optional.h"
@@ -153,7 +152,7 @@ Status exchange_indicators(Instance *x, double *indicators) {
     for (int k = 0; k < system->jumps; k++) /* of a floor: how far to the next whole number */
         if (system->floors[k])
             indicators[system->contacts + k] =
-                range_inside(jumps_range(s, k), indicators[system->contacts + k]);
+                range_inside(OPTIONAL.jumps->range(s, k), indicators[system->contacts + k]);
     if (system->frictions > 0) {
         const int first = indicators_first_of_frictions(system);
         OPTIONAL.slides->indicators(s, indicators + first);
@@ -230,7 +229,8 @@ Status exchange_step_done(Instance *x, int *event) {
     Solver *s = &x->solver;
     double worst;
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
-    *event = jumps_stale(s, flow_instant(s, s->state.now.t), s->state.q);
+    *event = s->system->jumps > 0 &&
+             OPTIONAL.jumps->stale(s, flow_instant(s, s->state.now.t), s->state.q);
     if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
     if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
@@ -250,11 +250,12 @@ static Status settle_jumps(Instance *x, int *changed) {
     Solver *s = &x->solver;
     const Instant at = flow_instant(s, s->state.now.t);
     int again = 0;
-    jumps_settle(s, at, s->state.q, s->state.v, NULL, changed);
+    *changed = 0;
     if (s->system->jumps == 0) return OK;
+    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, NULL, changed);
     x->evaluated = 0;
     if (evaluate(x) != OK) return FAILED; /* what rests on a surface may be about to leave it */
-    jumps_settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
+    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
     *changed |= again;
     x->evaluated = 0;
     return OK;

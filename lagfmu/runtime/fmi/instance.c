@@ -10,7 +10,7 @@
 #include "flow.h"
 #include "magnitudes.h"
 #include "outputs.h"
-#include "rates.h"
+#include "prescribed.h"
 #include "thresholds.h"
 
 /* ------------------------------------------------------------------ memory */
@@ -73,27 +73,6 @@ void instance_reset(Instance *x) {
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
 }
 
-/* ------------------------------------------------------------------ prescribed motions */
-
-static int is_estimated(const System *s, int k) {
-    for (int i = 0; i < s->estimated_count; i++)
-        if (s->estimated[i] == k) return 1;
-    return 0;
-}
-
-/* A prescribed motion was set to another place or other rates than it went by. */
-static int has_turned(const Instance *x) {
-    const System *s = x->solver.system;
-    const double *u = x->solver.drive.value;
-    for (int i = 0; i < s->prescribed_count; i++) {
-        const int k = s->prescribed[i];
-        if (is_estimated(s, k)) continue;
-        for (int order = 0; order <= 2; order++)
-            if (u[k + order] != x->expected[k + order]) return 1;
-    }
-    return 0;
-}
-
 /* The state as the importer left it: what is set next may be the rest of the motion. */
 static void unfollow(Instance *x) {
     const int phase = x->phase;
@@ -104,7 +83,8 @@ static void unfollow(Instance *x) {
 
 /* What is read of a motion that was set is read at the state with which the next step begins. */
 static Status follow(Instance *x) {
-    if (x->followed || x->exchange || !x->started || !x->running || !has_turned(x)) return OK;
+    if (PRESCRIBED == NULL || x->followed || x->exchange || !x->started || !x->running) return OK;
+    if (!PRESCRIBED->turned(x)) return OK;
     instance_save(x, x->backup);
     x->followed = 1;
     x->observed = x->evaluated = 0;
@@ -217,7 +197,7 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
 }
 
 /* The inputs are others than those under which the runs have stepped ahead. */
-static void inputs_changed(Instance *x) {
+void instance_inputs_changed(Instance *x) {
     solver_inputs_changed(&x->solver);
     if (ERROR_BARS != NULL) ERROR_BARS->inputs_changed(x);
 }
@@ -237,7 +217,7 @@ static void set_input(Instance *x, int k, double value) {
     drive->value[k] = value;
     if (same) return;
     x->observed = x->evaluated = 0;
-    if (x->started) inputs_changed(x);
+    if (x->started) instance_inputs_changed(x);
 }
 
 void instance_set(Instance *x, const Variable *v, double value) {
@@ -267,19 +247,10 @@ void instance_set(Instance *x, const Variable *v, double value) {
     }
 }
 
-/* Where a prescribed motion stands in u: 0, 1 or 2 for u, der(u), der(u,2); -1 for other inputs. */
-static int order_in_motion(const System *s, int k) {
-    for (int i = 0; i < s->estimated_count; i++)
-        if (k == s->estimated[i] + 3) return 3;
-    for (int i = 0; i < s->prescribed_count; i++)
-        if (k >= s->prescribed[i] && k <= s->prescribed[i] + 2) return k - s->prescribed[i];
-    return -1;
-}
-
 void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value) {
     unfollow(x);
     Drive *drive = &x->solver.drive;
-    const int k = v->index, place = order_in_motion(x->solver.system, k);
+    const int k = v->index, place = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
     if (place >= 0) { /* its derivatives are inputs themselves */
         if (place + order <= 2) {
             set_input(x, k + order, value);
@@ -292,7 +263,7 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
     if (*where == value) return;
     *where = value;
     x->observed = x->evaluated = 0;
-    if (x->started) inputs_changed(x);
+    if (x->started) instance_inputs_changed(x);
 }
 
 /* ------------------------------------------------------------------ start */
@@ -366,49 +337,6 @@ Status instance_observe(Instance *x) {
 }
 
 /* ------------------------------------------------------------------ step */
-
-static const char *input_name(int k) {
-    for (int j = 0; j < VARIABLE_COUNT; j++)
-        if (VARIABLES[j].place == AT_INPUT && VARIABLES[j].index == k) return VARIABLES[j].name;
-    return "";
-}
-
-/* The rates of motions that have only values; one that was not set keeps its latest, one that never was
- * goes on by its rates. */
-static void estimate_rates(Instance *x) {
-    const System *s = x->solver.system;
-    double *u = x->solver.drive.value;
-    for (int i = 0; i < s->estimated_count; i++) {
-        const int k = s->estimated[i];
-        Past *past = &x->past[i];
-        if (!x->set[k] && past->count == 0) continue;
-        if (!x->set[k]) u[k] = past->u[0];
-        const int given = !x->set[k + 1] ? 0 : x->set[k + 2] ? 2 : 1;
-        rates_estimate(past, x->solver.state.now.t, u + k, given);
-        inputs_changed(x);
-    }
-}
-
-/* Once, at the first step that shows it: of a prescribed motion not all three inputs are connected. */
-static void warn_of_rates(Instance *x) {
-    const System *s = x->solver.system;
-    const double *u = x->solver.drive.value, h = x->solver.state.now.span;
-    Why names = {""};
-    if ((x->warned & 1) || !(h > 0)) return;
-    for (int i = 0; i < s->prescribed_count; i++) {
-        const int k = s->prescribed[i];
-        if (is_estimated(s, k) || !rates_half_connected(u + k, x->expected + k, h)) continue;
-        why_append(&names, "%s%s", names.text[0] == '\0' ? "" : ", ", input_name(k));
-    }
-    if (names.text[0] == '\0') return;
-    (void)snprintf(x->note, sizeof x->note,
-                   "prescribed motion %.200s has moved over the last %.3g s otherwise than its rates der() "
-                   "and der(,2) say, so that the forces of constraint are wrong: connect all three "
-                   "inputs, or build the FMU with Input(..., rates=\"estimated\")",
-                   names.text, h);
-    x->tell(x->context, NOTE_WARNING, x->note);
-    x->warned |= 1;
-}
 
 /* Once for each: a table is looked up beyond its ends. */
 static void warn_of_tables(Instance *x) {
@@ -517,8 +445,7 @@ Status instance_step(Instance *x, double t_end) {
     }
     unfollow(x);
     instance_save(x, x->backup);
-    if (s->system->estimated_count > 0) estimate_rates(x);
-    if (s->system->prescribed_count > 0) warn_of_rates(x);
+    if (PRESCRIBED != NULL) PRESCRIBED->begin_step(x);
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     if (s->system->contacts + s->system->frictions > 0) note_modes(x);
     if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
@@ -624,9 +551,8 @@ Status instance_rates(Instance *x, Direction *d) {
     memcpy(w->dq, s->state.v, (size_t)system->n * sizeof *w->dq);
     memcpy(w->dv, vdot, (size_t)system->n * sizeof *w->dv);
     for (int k = 0; k < system->inputs; k++) {
-        const int order = order_in_motion(system, k);
-        const int last = is_estimated(system, k - order) ? 3 : 2;
-        w->du[k] = order < 0 ? s->drive.first[k] : order < last ? s->drive.value[k + 1] : 0;
+        const int order = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
+        w->du[k] = order < 0 ? s->drive.first[k] : PRESCRIBED->rate(x, k, order);
     }
     *d = (Direction){1, w->dq, w->dv, w->du};
     return instance_differentiate(x, *d);

@@ -66,6 +66,9 @@ double instance_setting(const Instance *x, const Variable *v);
 /* Sets a variable that is not an output, and whose value has been checked. */
 void instance_set(Instance *x, const Variable *v, double value);
 
+/* The inputs are others than those under which the runs have stepped ahead. */
+void instance_inputs_changed(Instance *x);
+
 /* Sets the derivative of an input with respect to time; order 1 or 2. */
 void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value);
 

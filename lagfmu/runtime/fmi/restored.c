@@ -10,58 +10,132 @@
 #include <limits.h>
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "digits.h"
 #include "indicators.h"
 #include "optional.h"
+#include "prescribed.h"
 #include "thresholds.h"
 
 enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased */
 
-typedef struct {
-    const char *name;
-    double value, low, high;
-} Number;
+/* What a number can be: an int that is 0 or 1, or counts; a double that is 0 or more, and may be infinite,
+ * or any finite one. */
+enum { FLAG, COUNT, SIZE, LIMIT, FINITE };
+
+/* How many of them there are; more than ONE stand behind a pointer. */
+enum {
+    ONE, N, TWICE_N, ROWS, CONTACTS, CONTACTS_N, FRICTIONS, FRICTIONS_N, INPUTS, LEVELS, PARAMETERS, WATCHED, DENSE
+};
 
 typedef struct {
     const char *name;
-    const double *values;
-    int count;
-    double low;
-} Doubles;
+    unsigned short at; /* of Solver or Instance */
+    unsigned char sort, many;
+} Saved;
 
-typedef struct {
-    const char *name;
-    const int *values;
-    int count, high; /* from 0 */
-} Ints;
+#define NOW(name, member, sort) {name, offsetof(Solver, state.now.member), sort, ONE}
+#define SOLVER(name, member, sort, many) {name, offsetof(Solver, member), sort, many}
+#define INSTANCE(name, member, sort, many) {name, offsetof(Instance, member), sort, many}
+
+static const Saved OF_SOLVER[] = {
+    NOW("stiffness mode", choice.implicit, FLAG),
+    NOW("stiffness turn", choice.turn, FLAG),
+    NOW("stiffness memory", choice.unseen, COUNT),
+    NOW("stiffness memory", choice.stiff, COUNT),
+    NOW("stiffness memory", choice.other, COUNT),
+    NOW("stiffness memory", choice.taken, COUNT),
+    NOW("stiffness memory", choice.brief, COUNT),
+    NOW("stiffness memory", choice.failures, COUNT),
+    NOW("stiffness memory", choice.retries, COUNT),
+    NOW("stiffness memory", choice.longest, LIMIT),
+    NOW("stiffness memory", choice.span, LIMIT),
+    NOW("time of stiffness", choice.time, FINITE),
+    NOW("h rho", choice.product, LIMIT),
+    NOW("rho / sigma", choice.ratio, LIMIT),
+    NOW("step count", steps, COUNT),
+    NOW("step count", tiny, COUNT),
+    NOW("count of impacts", strikes, COUNT),
+    NOW("mode of the step ahead", ahead, FLAG),
+    NOW("mode of the step ahead", between, FLAG),
+    NOW("mode of the step ahead", fresh, FLAG),
+    NOW("rank of the constraints", dependent, FLAG),
+    NOW("count of events", event_count, COUNT),
+    NOW("time", t, FINITE),
+    NOW("natural rate", rate, LIMIT),
+    NOW("step", step, LIMIT),
+    NOW("communication step", span, SIZE),
+    NOW("next step", h_next, LIMIT),
+    NOW("error of the step", error_old, LIMIT),
+    NOW("integrator's time", t_integrator, FINITE),
+    NOW("integrator's time", t_old, FINITE),
+    NOW("time of the event", event_time, FINITE),
+    NOW("energy dissipated", lost, FINITE),
+    NOW("energy dissipated", lost_old, FINITE),
+    NOW("energy dissipated", lost_ahead, FINITE),
+    NOW("sum of local errors", local.sum[0], SIZE),
+    NOW("sum of local errors", local.sum[1], SIZE),
+    NOW("largest local error", local.most[0], SIZE),
+    NOW("largest local error", local.most[1], SIZE),
+    NOW("sum of local errors", local_old.sum[0], SIZE),
+    NOW("sum of local errors", local_old.sum[1], SIZE),
+    NOW("largest local error", local_old.most[0], SIZE),
+    NOW("largest local error", local_old.most[1], SIZE),
+    SOLVER("coordinates", state.q, FINITE, N),
+    SOLVER("velocities", state.v, FINITE, N),
+    SOLVER("levels of jumps", state.level, FINITE, LEVELS),
+    SOLVER("levels", state.offset, FINITE, ROWS),
+    SOLVER("scales", state.scale, SIZE, TWICE_N),
+    SOLVER("sizes", state.size, SIZE, N),
+    SOLVER("gaps", state.gap, SIZE, CONTACTS),
+    SOLVER("rank of the constraints", state.basis, FLAG, ROWS),
+    SOLVER("modes", state.closed, FLAG, CONTACTS),
+    SOLVER("modes", state.armed, FLAG, CONTACTS),
+    SOLVER("counts", state.count, COUNT, CONTACTS),
+    SOLVER("departures", state.departure_time, FINITE, CONTACTS),
+    SOLVER("departures", state.departure_q, FINITE, CONTACTS_N),
+    SOLVER("departures", state.departure_v, FINITE, CONTACTS_N),
+    SOLVER("counts", state.slip_count, COUNT, FRICTIONS),
+    SOLVER("starts of slipping", state.slip_time, FINITE, FRICTIONS),
+    SOLVER("starts of slipping", state.slip_q, FINITE, FRICTIONS_N),
+    SOLVER("starts of slipping", state.slip_v, FINITE, FRICTIONS_N),
+    SOLVER("indicators", state.indicator, FINITE, WATCHED),
+    SOLVER("step ahead", integrator.y, FINITE, TWICE_N),
+    SOLVER("step ahead", integrator.y_old, FINITE, TWICE_N),
+    SOLVER("step ahead", integrator.f, FINITE, TWICE_N),
+    SOLVER("step ahead", integrator.f_old, FINITE, TWICE_N),
+    SOLVER("step ahead", integrator.dense, FINITE, DENSE),
+    SOLVER("inputs", drive.value, FINITE, INPUTS),
+    SOLVER("inputs", drive.first, FINITE, INPUTS),
+    SOLVER("inputs", drive.second, FINITE, INPUTS),
+    SOLVER("parameters", p, FINITE, PARAMETERS),
+};
+
+static const Saved OF_INSTANCE[] = {
+    INSTANCE("type", exchange, FLAG, ONE),
+    INSTANCE("mode", started, FLAG, ONE),
+    INSTANCE("mode", running, FLAG, ONE),
+    INSTANCE("solver.tolerance", solver.settings.tolerance, SIZE, ONE),
+    INSTANCE("solver.step", solver.settings.step, SIZE, ONE),
+    INSTANCE("solver.maximum_step", solver.settings.maximum_step, SIZE, ONE),
+    INSTANCE("solver.maximum_steps", solver.settings.maximum_steps, SIZE, ONE),
+    INSTANCE("given tolerance", given.tolerance, SIZE, ONE),
+    INSTANCE("given step", given.step, SIZE, ONE),
+    INSTANCE("given maximum step", given.maximum_step, SIZE, ONE),
+    INSTANCE("given maximum steps", given.maximum_steps, SIZE, ONE),
+    INSTANCE("tolerance", tolerance, SIZE, ONE),
+    INSTANCE("start time", start_time, FINITE, ONE),
+    INSTANCE("time of the inputs", solver.drive.since, FINITE, ONE),
+    INSTANCE("inputs", set, FLAG, INPUTS),
+    INSTANCE("inputs", expected, FINITE, INPUTS),
+    INSTANCE("start values", q0, FINITE, N),
+    INSTANCE("start values", v0, FINITE, N),
+};
 
 Status restored_none(Instance *x, const char *name, double value) {
     return fail(&x->solver.why, "the saved state is none of this FMU's: its %s is %s", name,
                 digits(value).text);
-}
-
-static Status numbers(Instance *x, const Number *list, size_t count) {
-    for (size_t k = 0; k < count; k++)
-        if (!(list[k].value >= list[k].low && list[k].value <= list[k].high))
-            return restored_none(x, list[k].name, list[k].value);
-    return OK;
-}
-
-static Status doubles(Instance *x, const Doubles *list, size_t count) {
-    for (size_t k = 0; k < count; k++)
-        for (int j = 0; j < list[k].count; j++)
-            if (!(list[k].values[j] >= list[k].low && list[k].values[j] <= DBL_MAX))
-                return restored_none(x, list[k].name, list[k].values[j]);
-    return OK;
-}
-
-static Status ints(Instance *x, const Ints *list, size_t count) {
-    for (size_t k = 0; k < count; k++)
-        for (int j = 0; j < list[k].count; j++)
-            if (list[k].values[j] < 0 || list[k].values[j] > list[k].high)
-                return restored_none(x, list[k].name, list[k].values[j]);
-    return OK;
 }
 
 /* The methods that this FMU holds; before the start none may be chosen yet. */
@@ -69,179 +143,100 @@ static int offered(MethodName method) {
     return (int)method > 0 && (int)method < METHOD_COUNT && OPTIONAL.methods[method] != NULL;
 }
 
-static Status settings(Instance *x) {
-    const Settings *s = &x->solver.settings, *given = &x->given;
-    const Number list[] = {
-        {"solver.tolerance", s->tolerance, x->started ? SMALLEST_TOLERANCE : 0, LARGEST_TOLERANCE},
-        {"solver.step", s->step, 0, DBL_MAX},
-        {"solver.maximum_step", s->maximum_step, 0, DBL_MAX},
-        {"solver.maximum_steps", s->maximum_steps, 0, DBL_MAX},
-        {"given tolerance", given->tolerance, 0, LARGEST_TOLERANCE},
-        {"given step", given->step, 0, DBL_MAX},
-        {"given maximum step", given->maximum_step, 0, DBL_MAX},
-        {"given maximum steps", given->maximum_steps, 0, DBL_MAX},
-        {"tolerance", x->tolerance, 0, LARGEST_TOLERANCE},
-        {"start time", x->start_time, -DBL_MAX, DBL_MAX},
-        {"stop time", x->stop_time, x->start_time, HUGE_VAL},
-        {"time of the inputs", x->solver.drive.since, -DBL_MAX, DBL_MAX},
-    };
-    if (!offered(given->method)) return restored_none(x, "given method", (double)given->method);
-    if (x->started && !offered(s->method)) return restored_none(x, "method", (double)s->method);
-    if (x->started && !(x->solver.stop_time >= x->start_time))
-        return restored_none(x, "stop time", x->solver.stop_time);
-    return numbers(x, list, sizeof list / sizeof *list);
+/* Each number of a list inside of `base`, by itself. */
+static Status each(Instance *x, const Solver *s, const void *base, const Saved *list, size_t rows) {
+    static const double LEAST[] = {0, 0, 0, 0, -DBL_MAX}, LARGEST[] = {1, MOST, DBL_MAX, HUGE_VAL, DBL_MAX};
+    const System *system = s->system;
+    const Method *now = x->started ? OPTIONAL.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method]
+                                   : NULL;
+    const int n = system->n, ny = 2 * n;
+    const int many[] = {[ONE] = 1,
+                        [N] = n,
+                        [TWICE_N] = ny,
+                        [ROWS] = system->m,
+                        [CONTACTS] = system->contacts,
+                        [CONTACTS_N] = system->contacts * n,
+                        [FRICTIONS] = system->frictions,
+                        [FRICTIONS_N] = system->frictions * n,
+                        [INPUTS] = system->inputs,
+                        [LEVELS] = system->jumps,
+                        [PARAMETERS] = system->parameters,
+                        [WATCHED] = indicators_count(system),
+                        [DENSE] = now == NULL ? 0 : now->dense_arrays * ny};
+    for (const Saved *row = list; row < list + rows; row++) {
+        const void *where = (const char *)base + row->at;
+        if (row->many != ONE) memcpy(&where, where, sizeof where);
+        for (int j = 0; j < many[row->many]; j++) {
+            const double value = row->sort <= COUNT ? ((const int *)where)[j] : ((const double *)where)[j];
+            if (!(value >= LEAST[row->sort] && value <= LARGEST[row->sort]))
+                return restored_none(x, row->name, value);
+        }
+    }
+    return OK;
 }
 
-/* What the method `auto` remembers. */
-static Status choice(Instance *x, const Solver *s) {
-    const Choice *c = &s->state.now.choice;
-    const Ints list[] = {
-        {"stiffness mode", &c->implicit, 1, 1},  {"stiffness turn", &c->turn, 1, 1},
-        {"stiffness memory", &c->unseen, 1, MOST}, {"stiffness memory", &c->stiff, 1, MOST},
-        {"stiffness memory", &c->other, 1, MOST},  {"stiffness memory", &c->taken, 1, MOST},
-        {"stiffness memory", &c->brief, 1, MOST},
-        {"stiffness memory", &c->failures, 1, STIFFNESS_MOST_FAILURES},
-        {"stiffness memory", &c->retries, 1, STIFFNESS_MOST_RETRIES},
-    };
-    const Number sizes[] = {
-        {"stiffness memory", c->longest, 0, HUGE_VAL}, {"stiffness memory", c->span, 0, HUGE_VAL},
-        {"time of stiffness", c->time, -DBL_MAX, DBL_MAX}, {"h rho", c->product, 0, HUGE_VAL},
-        {"rho / sigma", c->ratio, 0, HUGE_VAL},
-    };
-    if ((c->implicit || c->turn) &&
-        (s->settings.method != AUTO || OPTIONAL.methods[RADAU5] == NULL))
-        return restored_none(x, "stiffness mode", c->implicit);
-    if (ints(x, list, sizeof list / sizeof *list) != OK) return FAILED;
-    return numbers(x, sizes, sizeof sizes / sizeof *sizes);
+/* What the numbers are to each other. */
+static Status together(Instance *x) {
+    const Solver *s = &x->solver;
+    if (x->running && !x->started) return restored_none(x, "mode", x->running);
+    if (x->warned < 0) return restored_none(x, "mode", x->warned); /* bits of what has been told */
+    if (!offered(x->given.method)) return restored_none(x, "given method", (double)x->given.method);
+    if (x->started && !offered(s->settings.method))
+        return restored_none(x, "method", (double)s->settings.method);
+    if (x->started && !(s->settings.tolerance > 0))
+        return restored_none(x, "solver.tolerance", s->settings.tolerance);
+    if (!(x->stop_time >= x->start_time)) return restored_none(x, "stop time", x->stop_time);
+    if (x->started && !(s->stop_time >= x->start_time))
+        return restored_none(x, "stop time", s->stop_time);
+    return OK;
 }
 
-/* Time, and the step ahead. */
-static Status times(Instance *x, const Solver *s) {
+static Status together_in_solver(Instance *x, const Solver *s) {
     const Numbers *now = &s->state.now;
-    const Ints flags[] = {
-        {"step count", &now->steps, 1, MOST},
-        {"step count", &now->tiny, 1, MOST},
-        {"count of impacts", &now->strikes, 1, MOST},
-        {"mode of the step ahead", &now->ahead, 1, 1},
-        {"mode of the step ahead", &now->between, 1,
-         now->ahead && x->started && !x->exchange},
-        {"mode of the step ahead", &now->fresh, 1, 1},
-        {"rank of the constraints", &now->dependent, 1, 1},
-        {"count of events", &now->event_count, 1, indicators_count(s->system)},
-    };
-    const Number list[] = {
-        {"time", now->t, -DBL_MAX, DBL_MAX},
-        {"natural rate", now->rate, 0, HUGE_VAL},
-        {"step", now->step, 0, HUGE_VAL},
-        {"communication step", now->span, 0, DBL_MAX},
-        {"next step", now->h_next, 0, HUGE_VAL},
-        {"error of the step", now->error_old, 0, HUGE_VAL},
-        {"integrator's time", now->t_integrator, -DBL_MAX, DBL_MAX},
-        {"integrator's time", now->t_old, -DBL_MAX, now->t_integrator},
-        {"time of the event", now->event_time, -DBL_MAX, DBL_MAX},
-        {"energy dissipated", now->lost, -DBL_MAX, DBL_MAX},
-        {"energy dissipated", now->lost_old, -DBL_MAX, DBL_MAX},
-        {"energy dissipated", now->lost_ahead, -DBL_MAX, DBL_MAX},
-        {"sum of local errors", now->local.sum[0], 0, DBL_MAX},
-        {"sum of local errors", now->local.sum[1], 0, DBL_MAX},
-        {"largest local error", now->local.most[0], 0, now->local.sum[0]},
-        {"largest local error", now->local.most[1], 0, now->local.sum[1]},
-        {"sum of local errors", now->local_old.sum[0], 0, DBL_MAX},
-        {"sum of local errors", now->local_old.sum[1], 0, DBL_MAX},
-        {"largest local error", now->local_old.most[0], 0, now->local_old.sum[0]},
-        {"largest local error", now->local_old.most[1], 0, now->local_old.sum[1]},
-    };
-    if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
-    if (numbers(x, list, sizeof list / sizeof *list) != OK) return FAILED;
+    const Choice *c = &now->choice;
+    if ((c->implicit || c->turn) && (s->settings.method != AUTO || OPTIONAL.methods[RADAU5] == NULL))
+        return restored_none(x, "stiffness mode", c->implicit);
+    if (c->failures > STIFFNESS_MOST_FAILURES || c->retries > STIFFNESS_MOST_RETRIES)
+        return restored_none(x, "stiffness memory", c->failures + c->retries);
+    if (now->between && !(now->ahead && x->started && !x->exchange))
+        return restored_none(x, "mode of the step ahead", now->between);
+    if (now->event_count > indicators_count(s->system))
+        return restored_none(x, "count of events", now->event_count);
+    if (!(now->t_old <= now->t_integrator)) return restored_none(x, "integrator's time", now->t_old);
     if (now->ahead && !(now->t <= now->t_integrator && now->t <= s->stop_time))
         return restored_none(x, "integrator's time", now->t_integrator);
     if (now->ahead && now->event_count > 0 &&
         !(now->event_time >= now->t_old && now->event_time <= now->t_integrator))
         return restored_none(x, "time of the event", now->event_time);
+    for (int k = 0; k < 2; k++)
+        if (!(now->local.most[k] <= now->local.sum[k] && now->local_old.most[k] <= now->local_old.sum[k]))
+            return restored_none(x, "largest local error", now->local.most[k]);
+    return OK;
+}
+
+/* The levels of jumps, and the ways in which indicators leave their ranges: 1 upwards, -1 downwards. */
+static Status ways(Instance *x, const Solver *s) {
+    const State *a = &s->state;
+    for (int k = 0; x->started && k < s->system->jumps; k++)
+        if (!(s->system->floors[k] ? a->level[k] - 0.5 == floor(a->level[k])
+                                   : fabs(a->level[k]) == 1 || a->level[k] == 0))
+            return restored_none(x, "levels of jumps", a->level[k]);
+    for (int k = 0; k < indicators_count(s->system); k++)
+        if (a->left[k] < -1 || a->left[k] > 1) return restored_none(x, "events", a->left[k]);
     return OK;
 }
 
 /* How frictions stand: a mode, a sign and, once it has been found, a unit vector. */
 static Status slides(Instance *x, const Solver *s) {
-    const State *a = &s->state;
     for (int k = 0; k < s->system->frictions; k++) {
-        const Slide *slide = &a->slide[k];
+        const Slide *slide = &s->state.slide[k];
         const double length = hypot(slide->direction[0], slide->direction[1]);
-        const Ints flags[] = {{"modes", &slide->sticks, 1, 1}};
-        const Number list[] = {
-            {"slip velocity of rounding", slide->noise, 0, DBL_MAX},
-            {"direction of slip", length, x->started ? 1 - 1e-9 : 0, 1 + 1e-9},
-        };
         if (x->started && fabs(slide->sign) != 1) return restored_none(x, "sign", slide->sign);
-        if (ints(x, flags, 1) != OK || numbers(x, list, 2) != OK) return FAILED;
-    }
-    return OK;
-}
-
-static Status arrays(Instance *x, const Solver *s) {
-    const State *a = &s->state;
-    const System *system = s->system;
-    const int n = system->n, contacts = system->contacts, inputs = system->inputs, ny = 2 * n;
-    const int watched = indicators_count(system);
-    const Integrator *i = &s->integrator;
-    const Method *now =
-        x->started ? OPTIONAL.methods[a->now.choice.implicit ? RADAU5 : s->settings.method] : NULL;
-    const Doubles list[] = {
-        {"coordinates", a->q, n, -DBL_MAX},
-        {"velocities", a->v, n, -DBL_MAX},
-        {"sides of jumps", a->level, system->jumps, -DBL_MAX},
-        {"levels", a->offset, system->m, -DBL_MAX},
-        {"scales", a->scale, ny, 0},
-        {"sizes", a->size, n, 0},
-        {"gaps", a->gap, contacts, 0},
-        {"levels of jumps", a->level, system->jumps, -DBL_MAX},
-        {"departures", a->departure_time, contacts, -DBL_MAX},
-        {"departures", a->departure_q, contacts * n, -DBL_MAX},
-        {"departures", a->departure_v, contacts * n, -DBL_MAX},
-        {"starts of slipping", a->slip_time, system->frictions, -DBL_MAX},
-        {"starts of slipping", a->slip_q, system->frictions * n, -DBL_MAX},
-        {"starts of slipping", a->slip_v, system->frictions * n, -DBL_MAX},
-        {"indicators", a->indicator, watched, -DBL_MAX},
-        {"step ahead", i->y, ny, -DBL_MAX},
-        {"step ahead", i->y_old, ny, -DBL_MAX},
-        {"step ahead", i->f, ny, -DBL_MAX},
-        {"step ahead", i->f_old, ny, -DBL_MAX},
-        {"step ahead", i->dense, now == NULL ? 0 : now->dense_arrays * ny, -DBL_MAX},
-        {"inputs", s->drive.value, inputs, -DBL_MAX},
-        {"inputs", s->drive.first, inputs, -DBL_MAX},
-        {"inputs", s->drive.second, inputs, -DBL_MAX},
-        {"inputs", x->expected, inputs, -DBL_MAX},
-        {"start values", x->q0, n, -DBL_MAX},
-        {"start values", x->v0, n, -DBL_MAX},
-        {"parameters", s->p, system->parameters, -DBL_MAX},
-    };
-    const Ints flags[] = {
-        {"rank of the constraints", a->basis, system->m, 1},
-        {"modes", a->closed, contacts, 1}, {"modes", a->armed, contacts, 1},
-        {"counts", a->count, contacts, MOST},
-        {"inputs", x->set, inputs, 1},     {"counts", a->slip_count, system->frictions, MOST},
-    };
-    for (int k = 0; x->started && k < system->jumps; k++)
-        if (!(system->floors[k] ? a->level[k] - 0.5 == floor(a->level[k])
-                                : fabs(a->level[k]) == 1 || a->level[k] == 0))
-            return restored_none(x, "levels of jumps", a->level[k]);
-    if (doubles(x, list, sizeof list / sizeof *list) != OK) return FAILED;
-    if (slides(x, s) != OK) return FAILED;
-    for (int k = 0; k < watched; k++) /* 1 upwards, -1 downwards */
-        if (a->left[k] < -1 || a->left[k] > 1) return restored_none(x, "events", a->left[k]);
-    return ints(x, flags, sizeof flags / sizeof *flags);
-}
-
-/* The points that rates are estimated from go back in time. */
-static Status pasts(Instance *x) {
-    for (int i = 0; i < x->solver.system->estimated_count; i++) {
-        const Past *past = &x->past[i];
-        if (past->count < 0 || past->count > RATES_KEPT || !(fabs(past->rate) <= DBL_MAX))
-            return restored_none(x, "past of an input", past->count);
-        for (int k = 0; k < past->count; k++)
-            if (!(fabs(past->u[k]) <= DBL_MAX && fabs(past->t[k]) <= DBL_MAX) ||
-                (k > 0 && !(past->t[k] < past->t[k - 1])))
-                return restored_none(x, "past of an input", past->t[k]);
+        if (slide->sticks < 0 || slide->sticks > 1) return restored_none(x, "modes", slide->sticks);
+        if (!(slide->noise >= 0 && slide->noise <= DBL_MAX))
+            return restored_none(x, "slip velocity of rounding", slide->noise);
+        if (!(length <= 1 + 1e-9 && (!x->started || length >= 1 - 1e-9)))
+            return restored_none(x, "direction of slip", length);
     }
     return OK;
 }
@@ -259,20 +254,15 @@ static Status bounds(Instance *x) {
 }
 
 Status restored_solver(Instance *x, const Solver *s) {
-    if (choice(x, s) != OK || times(x, s) != OK) return FAILED;
-    return arrays(x, s);
+    if (each(x, s, s, OF_SOLVER, sizeof OF_SOLVER / sizeof *OF_SOLVER) != OK) return FAILED;
+    if (together_in_solver(x, s) != OK || ways(x, s) != OK) return FAILED;
+    return slides(x, s);
 }
 
 Status instance_restored(Instance *x) {
-    const Ints flags[] = {
-        {"type", &x->exchange, 1, 1},
-        {"mode", &x->started, 1, 1},
-        {"mode", &x->running, 1, 1},
-        {"mode", &x->warned, 1, INT_MAX}, /* bits of what has been told */
-    };
-    if (ints(x, flags, sizeof flags / sizeof *flags) != OK) return FAILED;
-    if (x->running && !x->started) return restored_none(x, "mode", x->running);
-    if (settings(x) != OK || restored_solver(x, &x->solver) != OK) return FAILED;
-    if (pasts(x) != OK || bounds(x) != OK) return FAILED;
+    if (together(x) != OK) return FAILED;
+    if (each(x, &x->solver, x, OF_INSTANCE, sizeof OF_INSTANCE / sizeof *OF_INSTANCE) != OK) return FAILED;
+    if (restored_solver(x, &x->solver) != OK) return FAILED;
+    if (bounds(x) != OK || (PRESCRIBED != NULL && PRESCRIBED->restored(x) != OK)) return FAILED;
     return ERROR_BARS != NULL ? ERROR_BARS->restored(x) : OK;
 }

@@ -22,7 +22,8 @@
 
 static const double CONTRACTS = 1e-4; /* reduction of the error for which factors are kept */
 
-/* How far the positions are off: `error` is the largest |f - offset| relative to its own terms. */
+/* How far the positions are off: `error` is the largest |f - offset| relative to its own terms; infinite where
+ * a row has none, since no coordinate moves it here. */
 typedef struct {
     double error, largest;
     int rounding;
@@ -63,8 +64,8 @@ static Status no_arrival(Mechanism *b, Instant at, const Miss *miss, double befo
             comma = ", ";
         }
     why_append(b->why, " (missed by %.3g): %s", miss->largest,
-               miss->error > PROJECTION_LINEAR * before ? "the configuration is singular, or nearly so"
-                                             : "take smaller steps");
+               miss->error < PROJECTION_LINEAR * before ? "take smaller steps"
+                                             : "the configuration is singular, or nearly so");
     return FAILED;
 }
 

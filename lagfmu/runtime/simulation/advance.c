@@ -10,7 +10,6 @@
 #include <string.h>
 
 #include "indicators.h"
-#include "jumps.h"
 #include "flow.h"
 #include "optional.h"
 #include "magnitudes.h"
@@ -236,7 +235,7 @@ static Status meet(Solver *s) {
     }
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
-    jumps_pass(s, s->state.left + s->system->contacts);
+    if (s->system->jumps > 0) OPTIONAL.jumps->pass(s, s->state.left + s->system->contacts);
     return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.switch_modes(s, s->state.left);
 }
 
@@ -287,8 +286,8 @@ static Status complete_magnitudes(Solver *s, double span) {
 
 Status solver_follow(Solver *s) {
     const System *system = s->system;
-    if (!s->state.now.ahead)
-        jumps_settle(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
+    if (!s->state.now.ahead && system->jumps > 0)
+        OPTIONAL.jumps->settle(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (system->prescribed_count > 0) {
         if (system->contacts == 0)
             system_active(system, s->state.closed, s->active);

@@ -8,7 +8,6 @@
 
 #include <math.h>
 
-#include "jumps.h"
 #include "flow.h"
 #include "optional.h"
 
@@ -47,6 +46,6 @@ Range indicators_range(const Solver *s, int indicator) {
     const System *system = s->system;
     const int of_friction = indicator - indicators_first_of_frictions(system);
     if (of_friction >= 0) return OPTIONAL.slides->range(s, of_friction);
-    if (indicator >= system->contacts) return jumps_range(s, indicator - system->contacts);
+    if (indicator >= system->contacts) return OPTIONAL.jumps->range(s, indicator - system->contacts);
     return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator], 0};
 }

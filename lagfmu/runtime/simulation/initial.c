@@ -9,7 +9,6 @@
 
 #include "afar.h"
 #include "digits.h"
-#include "jumps.h"
 #include "flow.h"
 #include "magnitudes.h"
 #include "optional.h"
@@ -250,13 +249,13 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
                     Moved moved, void *context) {
     if (check_finite(s, q0, v0) == FAILED) return FAILED;
     clear(s, t);
-    jumps_settle(s, flow_instant(s, t), q0, v0, NULL, NULL);
+    const Start x = {s, flow_instant(s, t), q0, v0, rank, rank + s->system->n};
+    if (s->system->jumps > 0) OPTIONAL.jumps->settle(s, x.at, q0, v0, NULL, NULL);
     if (s->system->contacts > 0 && OPTIONAL.impact_check(s) != OK) return FAILED;
-    const Start x = {s, {t, s->u, s->p}, q0, v0, rank, rank + s->system->n};
     s->stepped.dependent = 1; /* it is not known yet */
     magnitudes_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;
-    jumps_settle(s, x.at, s->state.q, v0, NULL, NULL);
+    if (s->system->jumps > 0) OPTIONAL.jumps->settle(s, x.at, s->state.q, v0, NULL, NULL);
     if (find_velocities(&x) == FAILED) return FAILED;
     if (find_modes(&x) == FAILED) return FAILED;
     for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];

@@ -23,13 +23,12 @@ static void look_ahead(Solver *s, Instant at, const double *q, const double *v, 
 
 static int is_on(double h, int is_floor) { return is_floor ? h == floor(h) : h == 0; }
 
-void jumps_settle(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
-                  int *changed) {
+static void settle(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
+                   int *changed) {
     const System *system = s->system;
     double *h = s->work_jumps, *ahead = h + system->jumps;
     int any = 0;
     if (changed != NULL) *changed = 0;
-    if (system->jumps == 0) return;
     system->surfaces(at.t, q, at.u, at.p, h);
     for (int k = 0; k < system->jumps; k++) any |= is_on(h[k], system->floors[k]);
     if (any) look_ahead(s, at, q, v, vdot, ahead);
@@ -42,9 +41,8 @@ void jumps_settle(Solver *s, Instant at, const double *q, const double *v, const
     memcpy(s->u + system->inputs, s->state.level, (size_t)system->jumps * sizeof *s->u);
 }
 
-int jumps_stale(Solver *s, Instant at, const double *q) {
+static int stale(Solver *s, Instant at, const double *q) {
     const System *system = s->system;
-    if (system->jumps == 0) return 0;
     system->surfaces(at.t, q, at.u, at.p, s->work_jumps);
     for (int k = 0; k < system->jumps; k++)
         if (!is_on(s->work_jumps[k], system->floors[k]) &&
@@ -53,15 +51,17 @@ int jumps_stale(Solver *s, Instant at, const double *q) {
     return 0;
 }
 
-void jumps_pass(Solver *s, const int *way) {
+static void pass(Solver *s, const int *way) {
     for (int k = 0; k < s->system->jumps; k++) {
         double *level = &s->state.level[k];
         if (way[k] != 0) *level = s->system->floors[k] ? *level + way[k] : way[k];
     }
 }
 
-Range jumps_range(const Solver *s, int k) {
+static Range range(const Solver *s, int k) {
     const double level = s->state.level[k];
     if (s->system->floors[k]) return (Range){level - 0.5, level + 0.5, 0, 0};
     return (Range){level >= 0 ? 0 : -HUGE_VAL, level <= 0 ? 0 : HUGE_VAL, 0, 0};
 }
+
+const Jumps JUMPS = {settle, stale, pass, range};

@@ -13,19 +13,21 @@
 #include "indicators.h"
 #include "solver.h"
 
-/* The levels that belong to h at (at, q), state.level and those behind the inputs in s->u alike; on a surface
- * that of the side to which the motion goes with v and vdot (may be NULL).  `changed` (may be NULL): 1 if one
- * is not what it was. */
-void jumps_settle(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
-                  int *changed);
+/* Reached by OPTIONAL (optional.h) where there are jumps. */
+typedef struct {
+    /* The levels that belong to h at (at, q), state.level and those behind the inputs in s->u alike; on a
+     * surface that of the side to which the motion goes with v and vdot (may be NULL).  `changed` (may be
+     * NULL): 1 if one is not what it was. */
+    void (*settle)(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
+                   int *changed);
+    /* 1 if a level is not the one that belongs to h at (at, q), which is on no surface. */
+    int (*stale)(Solver *s, Instant at, const double *q);
+    /* The levels after surfaces were passed; way (jumps): 1 upwards, -1 downwards, 0 not passed. */
+    void (*pass)(Solver *s, const int *way);
+    /* The range of h in which the level of jump k holds. */
+    Range (*range)(const Solver *s, int k);
+} Jumps;
 
-/* 1 if a level is not the one that belongs to h at (at, q), which is on no surface. */
-int jumps_stale(Solver *s, Instant at, const double *q);
-
-/* The levels after surfaces were passed; way (jumps): 1 upwards, -1 downwards, 0 not passed. */
-void jumps_pass(Solver *s, const int *way);
-
-/* The range of h in which the level of jump k holds. */
-Range jumps_range(const Solver *s, int k);
+extern const Jumps JUMPS;
 
 #endif

@@ -130,72 +130,74 @@ static void observe_departures(const Solver *s, Observed *o) {
     }
 }
 
-/* Names of the values that are not finite, as the FMU's variables are named. */
-typedef struct {
-    Why *why;
-    double t;
-    int count;
-} Bad;
+/* What some values belong to: in this order two names each, the second "" where there is one. */
+typedef enum { OF_NONE, OF_COORDINATE, OF_STEPPED, OF_ROW, OF_ENTRY, OF_CONTACT, OF_SLIP, OF_FRICTION } Owner;
 
-static void check(Bad *bad, double value, const char *before, const char *a, const char *between,
-                  const char *b, const char *after) {
-    if (fabs(value) <= DBL_MAX) return;
-    if (bad->count++ == 0) {
-        Digits when = digits(bad->t);
-        fail(bad->why, "not finite at t = %s s: ", when.text);
-    } else {
-        why_append(bad->why, ", ");
+static void names(const Solver *s, const System *full, Owner of, int i, const char *name[2]) {
+    const System *own = s->system;
+    name[0] = name[1] = "";
+    switch (of) {
+        case OF_NONE: break;
+        case OF_COORDINATE: name[0] = full->coordinates[i]; break;
+        case OF_STEPPED: name[0] = own->coordinates[i]; break;
+        case OF_ROW: name[0] = full->rows[i].name; break;
+        case OF_ENTRY:
+            name[0] = full->rows[full->entry_row[i]].name;
+            name[1] = full->coordinates[full->entry_column[i]];
+            break;
+        case OF_CONTACT:
+            name[0] = own->rows[own->contact[i / full->n]].name;
+            name[1] = full->coordinates[i % full->n];
+            break;
+        case OF_SLIP: name[0] = own->rows[own->friction[i / 2].row[i % 2]].name; break;
+        case OF_FRICTION: name[0] = own->friction[i].name; break;
     }
-    why_append(bad->why, "%s%s%s%s%s", before, a, between, b, after);
 }
 
-static void check_motion(Bad *bad, const char *name, double q, double v, double vdot) {
-    check(bad, q, "", name, "", "", "");
-    check(bad, v, "der(", name, "", "", ")");
-    check(bad, vdot, "der(", name, "", "", ",2)");
-}
-
-static void check_frictions(Bad *bad, const Solver *s, const Observed *o) {
-    const System *system = s->system;
-    for (int i = 0; i < system->frictions; i++) {
-        const Friction *f = &system->friction[i];
-        for (int r = 0; r < f->rows; r++)
-            check(bad, o->slip[2 * i + r], "slip.", system->rows[f->row[r]].name, "", "", "");
-        check(bad, o->margin[i], "margin.", f->name, "", "", "");
-        check(bad, o->power[i], "power.", f->name, "", "", "");
-    }
-    if (system->frictions > 0) check(bad, s->state.now.lost, "", "energy.dissipated", "", "", "");
-}
-
+/* FAILED if a value is not finite; the cause names them as the FMU's variables are named. */
 static Status check_finite(Solver *s, const System *full, const Observed *o) {
-    Bad bad = {&s->why, s->state.now.t, 0};
-    for (int j = 0; j < full->n; j++) {
-        check_motion(&bad, full->coordinates[j], o->q[j], o->v[j], o->vdot[j]);
-        check(&bad, o->force[j], "Q.", full->coordinates[j], "", "", "");
-    }
-    for (int j = 0; s->system->embed != NULL && j < s->system->n; j++)
-        check_motion(&bad, s->system->coordinates[j], o->s[j], o->sdot[j], o->sddot[j]);
-    for (int k = 0; k < full->m; k++) {
-        check(&bad, o->lambda[k], "lambda.", full->rows[k].name, "", "", "");
-        check(&bad, o->residual[k], "residual.", full->rows[k].name, "", "", "");
-    }
-    for (int e = 0; e < full->entries; e++)
-        check(&bad, o->share[e], "Q.", full->rows[full->entry_row[e]].name, ".",
-              full->coordinates[full->entry_column[e]], "");
-    check(&bad, o->energy[0], "", "energy.kinetic", "", "", "");
-    check(&bad, o->energy[1], "", "energy.potential", "", "", "");
-    check(&bad, o->energy[0] + o->energy[1], "", "energy.total", "", "", "");
-    for (int c = 0; c < s->system->contacts; c++) {
-        const char *contact = s->system->rows[s->system->contact[c]].name;
-        for (int j = 0; j < full->n; j++) {
-            int i = c * full->n + j;
-            check(&bad, o->departure_q[i], "departure.", contact, ".", full->coordinates[j], "");
-            check(&bad, o->departure_v[i], "departure.", contact, ".velocity.",
-                  full->coordinates[j], "");
+    const System *own = s->system;
+    const int n = full->n, departed = own->contacts * n, stepped = own->embed != NULL ? own->n : 0;
+    const double total = o->energy[0] + o->energy[1];
+    const struct {
+        const double *values;
+        int count;
+        Owner of;
+        const char *format;
+    } list[] = {
+        {o->q, n, OF_COORDINATE, "%s"},
+        {o->v, n, OF_COORDINATE, "der(%s)"},
+        {o->vdot, n, OF_COORDINATE, "der(%s,2)"},
+        {o->force, n, OF_COORDINATE, "Q.%s"},
+        {o->s, stepped, OF_STEPPED, "%s"},
+        {o->sdot, stepped, OF_STEPPED, "der(%s)"},
+        {o->sddot, stepped, OF_STEPPED, "der(%s,2)"},
+        {o->lambda, full->m, OF_ROW, "lambda.%s"},
+        {o->residual, full->m, OF_ROW, "residual.%s"},
+        {o->share, full->entries, OF_ENTRY, "Q.%s.%s"},
+        {&o->energy[0], 1, OF_NONE, "energy.kinetic"},
+        {&o->energy[1], 1, OF_NONE, "energy.potential"},
+        {&total, 1, OF_NONE, "energy.total"},
+        {o->departure_q, departed, OF_CONTACT, "departure.%s.%s"},
+        {o->departure_v, departed, OF_CONTACT, "departure.%s.velocity.%s"},
+        {o->slip, 2 * own->frictions, OF_SLIP, "slip.%s"},
+        {o->margin, own->frictions, OF_FRICTION, "margin.%s"},
+        {o->power, own->frictions, OF_FRICTION, "power.%s"},
+        {&s->state.now.lost, own->frictions > 0, OF_NONE, "energy.dissipated"},
+    };
+    int bad = 0;
+    for (size_t k = 0; k < sizeof list / sizeof *list; k++)
+        for (int i = 0; i < list[k].count; i++) {
+            const char *name[2];
+            if (fabs(list[k].values[i]) <= DBL_MAX) continue;
+            names(s, full, list[k].of, i, name);
+            if (bad++ == 0)
+                (void)fail(&s->why, "not finite at t = %s s: ", digits(s->state.now.t).text);
+            else
+                why_append(&s->why, ", ");
+            why_append(&s->why, list[k].format, name[0], name[1]);
         }
-    }
-    check_frictions(&bad, s, o);
-    return bad.count == 0 ? OK : FAILED;
+    return bad == 0 ? OK : FAILED;
 }
 
 Status solver_observe(Solver *s, Observed *o) {

@@ -15,5 +15,6 @@ const Optional OPTIONAL = {
     .landing_lift = landing_lift,
     .switch_modes = switch_modes,
     .switch_released = switch_released,
+    .jumps = &JUMPS,
     .slides = &SLIDES,
 };

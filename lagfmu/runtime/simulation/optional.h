@@ -9,6 +9,7 @@
 #include "contacts.h"
 #include "events.h"
 #include "impact.h"
+#include "jumps.h"
 #include "landing.h"
 #include "rattle.h"
 #include "slides.h"
@@ -37,6 +38,8 @@ typedef struct {
     Status (*landing_lift)(Solver *s, const int *happened, const double *pull);
     Status (*switch_modes)(Solver *s, const int *happened);
     Status (*switch_released)(Solver *s, double span);
+    /* Of forces that jump; NULL where none do. */
+    const Jumps *jumps;
     /* What constraints that hold by friction need; NULL where there are none. */
     const Slides *slides;
 } Optional;

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ... import names
+from ...fmu.described import Trajectory
 from ...fmu.session import RefusalError, Session, plug
-from ...verification.simulate import Trajectory
 from .facts import Facts
 
 KINDS: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
@@ -101,7 +101,6 @@ def play(
     times: Sequence[float],
     tolerance: float | None = None,
     drive: Drive | None = None,
-    stop: float | None = None,
     late: bool = False,
 ) -> Run:
     """A run over the communication points `times` (from 0), or as far as the FMU goes; `late`: inputs are set
@@ -113,7 +112,7 @@ def play(
     fed = {i.name: known[i.name] for i in facts.inputs}
     reached, refusal = 0, None
     try:
-        player.begin(values, tolerance, stop)
+        player.begin(values, tolerance)
         for k, t in enumerate(times):
             if k:
                 player.step(t - player.time)

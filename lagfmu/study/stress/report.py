@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ...page.table import new_table
-from ...verification.pipeline import Case, Outcome
+from ...verification.pipeline import Case, Report
 from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Verdict
 
 FORMAT = 1
@@ -107,9 +107,9 @@ def remark(row: Verdict) -> str:
     return "; ".join(t for t in (nearest, row.detail) if t)
 
 
-def outcome(file: str, found: Stressed) -> Outcome:
+def report(file: str, found: Stressed) -> Report:
     """A case a probe: wrong fails, unfinished is skipped, a clear refusal is as good as right."""
-    return Outcome(file, found, [_case(r) for r in found.rows], data(found))
+    return Report(file, found, [_case(r) for r in found.rows], data(found))
 
 
 def _case(row: Verdict) -> Case:

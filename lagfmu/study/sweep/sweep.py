@@ -5,10 +5,8 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,17 +18,13 @@ from numpy.typing import NDArray
 from ... import names
 from ...errors import SettingError, SimulationError
 from ...fmu.archive import unpack, version
-from ...fmu.compiler import find_compiler
-from ...fmu.described import experiment_of, read_description
+from ...fmu.described import Trajectory, experiment_of, read_description
 from ...fmu.session import TYPES, Plan, plug
-from ...fmu.write import write
-from ...model.file import load
+from ...fmu.write import as_fmu
 from ...model.model import Model
 from ...model.scene import Scene
-from ...prepare.prepare import prepare
 from ...solver.state import tolerance_problem
 from ...verification.simulate import (
-    Trajectory,
     check_inputs,
     communication_points,
     missing,
@@ -90,7 +84,7 @@ def sweep(
     _require()
     path_out = None if out is None else Path(out)
     _check_options(workers, seed, tolerance, path_out, resume)
-    with _fmu(target, scene) as path:
+    with as_fmu(target, scene) as path:
         varied = _design(vary, sample, runs, seed, sampling, rows)
         times = _times(path, stop_time, step_size)
         study = _study(path, varied, keep, times, tolerance, inputs, command)
@@ -264,34 +258,6 @@ def _require() -> None:
             missing.append(name)
     if missing:
         raise SimulationError(f"a sweep needs {', '.join(missing)}: pip install 'lagfmu[study]'")
-
-
-@contextmanager
-def _fmu(target: Any, scene: Scene | str | None) -> Iterator[Path]:
-    """The FMU, built into a folder that goes again if the target is a model."""
-    if isinstance(target, Model):
-        model, chosen = target, scene if isinstance(scene, Scene) else Scene(target.name)
-    else:
-        path = Path(target)
-        if path.suffix != ".py":
-            if scene is not None:
-                raise SettingError(
-                    f"scene {scene!r} is for a model file: {str(path)!r} is one already"
-                )
-            yield path
-            return
-        file = load(path)
-        model = file.model
-        names = [s.name for s in file.scenes]
-        if isinstance(scene, Scene):
-            chosen = scene
-        elif scene is not None and scene not in names:
-            raise SettingError(f"{path}: no FMU is called {scene!r}; known: {', '.join(names)}")
-        else:
-            chosen = file.scenes[0 if scene is None else names.index(scene)]
-    kind = "native" if find_compiler() is not None else "python"
-    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        yield write(prepare(model, chosen), folder, target=kind)
 
 
 def _design(

@@ -11,7 +11,8 @@ import numpy as np
 from ... import names
 from ...errors import SimulationError
 from ...fmu.closed_forms import CarriedForm
-from ...verification.simulate import Trajectory, steps_of
+from ...fmu.described import Trajectory
+from ...verification.simulate import steps_of
 from .importer import Importer
 from .measure import wider
 from .reference import refer
@@ -36,10 +37,8 @@ class Case:
         return max(self.errors[n] + self.own[n] for n in names)
 
 
-def held_out(
-    importer: Importer, closed_forms: Sequence[CarriedForm], cases: int = CASES
-) -> list[Case]:
-    """The FMU as it was built, with its default settings, at `cases` other points.
+def held_out(importer: Importer, closed_forms: Sequence[CarriedForm]) -> list[Case]:
+    """The FMU as it was built, with its default settings, at other points.
 
     Errors are the larger ones of the FMU's communication step and of up to ten times that.
 
@@ -48,7 +47,7 @@ def held_out(
     built = Setting("", 0.0, 0.0, importer.step_size)
     scene = importer.observe(built)
     found = []
-    for k in range(cases):
+    for k in range(CASES):
         values = other_values(importer, scene, random.Random(k))
         reference = refer(importer, closed_forms, values, second_opinion=False)
         run = importer.observe(built, values)
@@ -62,10 +61,8 @@ def held_out(
     return found
 
 
-def other_values(
-    importer: Importer, scene: Trajectory, chance: random.Random, share: float = SHARE
-) -> dict[str, float]:
-    """Every parameter and start value, moved by up to `share`, within its bounds.
+def other_values(importer: Importer, scene: Trajectory, chance: random.Random) -> dict[str, float]:
+    """Every parameter and start value, moved by up to SHARE, within its bounds.
 
     Start values of zero stay, unless all are zero.  The FMU puts what misses the constraints back on
     them.  Values that it refuses, or at which other contacts are closed at the start, are drawn again.
@@ -73,7 +70,7 @@ def other_values(
     reason = "other contacts are closed at the start"
     built = Setting("", 0.0, 0.0, importer.step_size)
     for _ in range(TRIES):
-        values = _drawn(importer, scene, chance, share)
+        values = _drawn(importer, scene, chance)
         try:
             begun = importer.observe(built, values, stop=importer.step_size)
         except SimulationError as error:
@@ -84,13 +81,11 @@ def other_values(
             return values
     raise SimulationError(
         f"{importer.description.modelName}: no other start values or parameters were found within "
-        f"{share:.0%} of the scene's that the FMU starts with ({reason})"
+        f"{SHARE:.0%} of the scene's that the FMU starts with ({reason})"
     )
 
 
-def _drawn(
-    importer: Importer, scene: Trajectory, chance: random.Random, share: float
-) -> dict[str, float]:
+def _drawn(importer: Importer, scene: Trajectory, chance: random.Random) -> dict[str, float]:
     values: dict[str, float] = {}
     starts = [
         v
@@ -102,9 +97,9 @@ def _drawn(
         if v.type != "Real" or v.start is None or names.read(v.name).head == names.SOLVER:
             continue
         value = float(v.start)
-        moved = value * (1 + share * chance.uniform(-1, 1))
+        moved = value * (1 + SHARE * chance.uniform(-1, 1))
         if v in starts and still:
-            moved = share * chance.uniform(-1, 1) * float(np.abs(scene[v.name]).max())
+            moved = SHARE * chance.uniform(-1, 1) * float(np.abs(scene[v.name]).max())
         elif v not in starts and v.causality != "parameter":
             continue
         low = -np.inf if v.min is None else float(v.min)

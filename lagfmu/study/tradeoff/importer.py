@@ -23,10 +23,10 @@ from fmpy.fmi1 import FMICallException
 
 from ...errors import SimulationError, VerificationError
 from ...fmu.archive import unpack
-from ...fmu.described import experiment_of, is_python, read_description
+from ...fmu.described import Trajectory, experiment_of, is_python, read_description
 from ...fmu.session import RefusalError, Session, plug, reason
 from ...names import TOLERANCE
-from ...verification.simulate import Trajectory, communication_points
+from ...verification.simulate import communication_points
 from .setting import Setting
 
 KINDS = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
-from importlib.resources import files
-
-import jinja2
 from markupsafe import Markup
 
 from ...model.goal import HELD_OUT_MARGIN, MARGIN
+from ...page.template import template
 from .choose import Choice
 from .curve import curve
 from .report import digits
@@ -19,7 +16,7 @@ def section(choice: Choice) -> str:
     """HTML: what was asked, chosen and why, the held-out cases, the measured curve."""
     measured, goal = choice.survey, choice.goal
     scale = 1e3 / measured.simulated
-    return _template().render(
+    return template("page/choice.html.j2").render(
         goal=goal,
         choice=choice,
         option=choice.option,
@@ -65,12 +62,3 @@ def _row(choice: Choice, option: Option, scale: float) -> tuple[str, ...]:
         f"{digits(scale * low)}–{digits(scale * high)}",
         "chosen" if option == choice.option else "holds" if holds else "",
     )
-
-
-@cache
-def _template() -> jinja2.Template:
-    text = files("lagfmu").joinpath("page/choice.html.j2").read_text(encoding="utf-8")
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    return environment.from_string(text)

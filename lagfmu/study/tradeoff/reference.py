@@ -25,11 +25,10 @@ from numpy.typing import NDArray
 from ... import names
 from ...errors import SimulationError
 from ...fmu.closed_forms import CarriedForm
-from ...fmu.described import numbers_of
+from ...fmu.described import Trajectory, numbers_of
 from ...model.closed_form import output
 from ...model.elements import Expr
 from ...verification.evaluate import evaluate
-from ...verification.simulate import Trajectory
 from ...verification.verify import applies
 from .importer import Importer
 from .quantities import Quantity, magnitudes, quantities

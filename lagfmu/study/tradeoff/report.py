@@ -11,7 +11,7 @@ from typing import Any
 from rich.table import Table
 
 from ...page.table import new_table
-from ...verification.pipeline import Case, Outcome
+from ...verification.pipeline import Case, Report
 from .measure import Tradeoff, Weighed
 from .quantities import EVENT, FORCE, MOTION, MULTIPLIER, OWN
 
@@ -90,14 +90,12 @@ def remarks(found: Tradeoff) -> list[str]:
     return lines + list(found.cut)
 
 
-def cheapest(
-    found: Tradeoff, goal: float, communication: float | None = None, group: str | None = None
-) -> Weighed | None:
-    """The fastest row whose error in the group (lambda, if it has one) is at most `goal`."""
+def cheapest(found: Tradeoff, goal: float, communication: float | None = None) -> Weighed | None:
+    """The fastest row whose error (of lambda, if there is one) is at most `goal`."""
     good = [
         r
         for r in found.rows
-        if found.worst(r, group or found.headline) <= goal
+        if found.worst(r, found.headline) <= goal
         and (communication is None or r.setting.communication == communication)
     ]
     return min(good, key=lambda r: r.median, default=None)
@@ -124,14 +122,14 @@ def summary(all_found: Sequence[Tradeoff]) -> Table:
     return drawn
 
 
-def outcome(file: str, found: Tradeoff) -> Outcome:
+def report(file: str, found: Tradeoff) -> Report:
     """A case a setting, which fails if a closed form does not hold at its tolerance; a method that the FMU
     refuses is skipped."""
     cases = [
         Case(str(r.setting), found.name, "; ".join(r.broken), "", r.median) for r in found.rows
     ]
     cases += [Case(m, found.name, "", f"refused: {why}") for m, why in found.refused.items()]
-    return Outcome(file, found, cases, data(found))
+    return Report(file, found, cases, data(found))
 
 
 def data(found: Tradeoff) -> dict[str, Any]:

@@ -1,0 +1,27 @@
+/* prescribed.h -- motions that the importer prescribes: u, der(u), der(u,2), which stand together in u, and
+ * behind them a third derivative where the rates are estimated from values.
+ *
+ * All of it is reached by one pointer, NULL in an FMU without them. */
+#ifndef LAGFMU_PRESCRIBED_H
+#define LAGFMU_PRESCRIBED_H
+
+#include "instance.h"
+
+typedef struct {
+    /* 1: a motion was set to another place or other rates than it went by. */
+    int (*turned)(const Instance *x);
+    /* Where the input k stands in its motion: 0, 1 or 2 for u, der(u), der(u,2), 3 for a third derivative; -1
+     * for other inputs. */
+    int (*order)(const Instance *x, int k);
+    /* The derivative with respect to time of an input that stands at `place` in its motion. */
+    double (*rate)(const Instance *x, int k, int place);
+    /* Estimates rates from values; tells of motions whose rates are not connected. */
+    void (*begin_step)(Instance *x);
+    /* FAILED: what was read is no past of a motion. */
+    Status (*restored)(Instance *x);
+} Prescribed;
+
+extern const Prescribed MOTIONS;
+extern const Prescribed *const PRESCRIBED; /* of variables.c: &MOTIONS, or NULL */
+
+#endif
