@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from lagfmu import ClosedForm, Holonomic, Model, Parameter, Scene, output, verify
 from lagfmu.errors import ModelError, VerificationError
 from lagfmu.fmu.closed_forms import pack_closed_forms, unpack_closed_forms
+from lagfmu.fmu.described import file_stem
 from lagfmu.fmu.formula import LONGEST_SUM, read_formula, text_of
 from lagfmu.prepare.prepare import prepare
 from lagfmu.study.stress.facts import facts_of
-from lagfmu.verification.simulate import file_stem
 from lagfmu.verification.verify import RECORD
 
 x, y = sp.symbols("x y", real=True)
