@@ -311,6 +311,17 @@ def test_forces_with_a_curl_have_no_potential():
     assert sp.expand(eom.potential - k * (qx**2 / 2 + qx * qy)) == 0
 
 
+def test_a_potential_without_a_formula_is_not_reported():
+    """-k exp(sin x) has an integral, but none that can be written down."""
+    eom = equations(
+        kinetic_energy=m * x.diff() ** 2 / 2,
+        coordinates={x: "rad"},
+        forces={x: -k * sp.exp(sin(x))},
+        units={m: "kg*m^2", k: "N*m"},
+    )
+    assert eom.potential is None
+
+
 def test_a_force_that_depends_on_the_velocity_stores_nothing():
     """-k x - c x' has the potential k x^2/2, the damper none."""
     eom = equations(

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from instance import instance
-from sympy import exp, sqrt, symbols
+from sympy import cos, exp, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Model, Parameter, Scene, build_fmu
@@ -45,6 +45,12 @@ def bump():
     """A hill of 1 cm, as wide, on a plain."""
     model = Contact("road", y - H * exp(-((x / w) ** 2)), restitution=1)
     return flight("Bump", model, [Parameter(H, 0.01, "m"), Parameter(w, 0.01, "m")])
+
+
+def hills():
+    """A row of hills of 2 cm, half a metre from each other."""
+    model = Contact("road", y + H * cos(w * x), restitution=1)
+    return flight("Hills", model, [Parameter(H, 0.01, "m"), Parameter(w, 4 * np.pi, "rad/m")])
 
 
 def table():
@@ -101,6 +107,16 @@ def test_a_narrow_bump_is_not_tunnelled(own, speed):
         one.step(0.6 / speed)
         found = np.array([one.get("der(x)"), one.get("der(y)")])
         np.testing.assert_allclose(found, mirrored, rtol=1e-6)
+
+
+def test_of_many_hills_the_first_is_hit(own):
+    """A flight that comes down by 5 mm a hill would pass through four of them, one after another: it stays on
+    the road or above it at each point."""
+    with instance(own(hills)) as one:
+        one.start({"y": 0.05, "der(x)": 10.0, "der(y)": -0.1})
+        for _ in range(350):
+            one.step(0.002)
+            assert one.get("residual.road") > -1e-9
 
 
 @pytest.mark.parametrize("depth", [1e-3, 1e-6, 1e-8])

@@ -212,3 +212,34 @@ def test_a_skate_that_slips_sideways_is_set_straight(library):
     assert turning == 0.3
     one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
     assert not event.value
+
+
+@pytest.mark.parametrize("e", [0.3, 1.0])
+def test_a_bounce_returns_its_part_of_the_speed_at_the_floor(library, e):
+    """An importer's step ends d below the floor with the speed s, which was sqrt(s^2 - 2 g d) at y = 0: the
+    ball goes up from there with e times that."""
+    one = continuous(library("BouncingBall"), e=e)
+    depth, speed = 1e-5, 2.0
+    one.states((-depth, -speed))
+    one.does("EnterEventMode")
+    assert one.events().values
+    height, rebound = one.array("GetContinuousStates", 2)
+    assert height == pytest.approx(0, abs=1e-12)
+    assert rebound == pytest.approx(e * np.sqrt(speed**2 - 2 * one.get("g") * depth), rel=1e-12)
+
+
+def test_what_an_importer_has_not_seen_is_said(library, of):
+    """At the end of its step a ball has gone through the floor, or a surface pulls: an event is asked for,
+    whether or not the importer has looked at the indicators; above, and on the surface, none is."""
+    event, end = c_int(), c_int()
+    one = continuous(of(ball))
+    for height, speed, expected in ((0.3, -1.0, 0), (RADIUS - 1e-6, -1.0, 1)):
+        one.states((0.5, 0.0, height, speed, 0.3, 0.0))
+        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
+        assert event.value == expected
+    one = continuous(library("Hemisphere"))
+    r, _, theta, _ = one.array("GetContinuousStates", 4)
+    for rate, expected in ((0.1, 0), (50.0, 1)):
+        one.states((r, 0.0, theta, rate))
+        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
+        assert event.value == expected

@@ -392,3 +392,16 @@ def test_a_power_that_is_no_number_is_refused(rubbing: Build) -> None:
             stop_time=2e-150,
             step_size=1e-150,
         )
+
+
+@pytest.mark.parametrize("mass", [1e-300, 1e300])
+def test_no_unit_of_mass_moves_the_cone(mass: float) -> None:
+    """A rod of any mass slips at the same time, under lambda in proportion to its mass: the square of 1e-300
+    is 0 and that of 1e300 infinite, but no friction sticks outside of its cone for that."""
+    file = load(MODELS / "falling_rod.py")
+    run, other = (
+        simulate(file.model, 0.7, 0.07, start_values={"m": m}, scene=file.scenes[0])
+        for m in (1.0, mass)
+    )
+    assert other["sticks.grip"].tolist() == run["sticks.grip"].tolist()
+    assert (other["margin.grip"] / mass).tolist() == pytest.approx(run["margin.grip"].tolist())

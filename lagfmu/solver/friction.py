@@ -19,6 +19,7 @@ Where it is not positive there is no acceleration or there are several (Painleve
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
@@ -184,7 +185,7 @@ def motion_with_friction(
         for i in stuck:
             normal[i] = abs(now.load[i] + now.C[i] @ lam)
             held = now.static[i] * abs(now.load[i] + now.C[i] @ best)
-            force = np.linalg.norm(best[list(system.frictions[i].rows)])
+            force = math.hypot(*best[list(system.frictions[i].rows)])
             reserve[i] = (held - force) / (held + force) if held + force > 0 else 0.0
     tangential = np.zeros((len(at.slides), 2))
     for i, f in enumerate(system.frictions):

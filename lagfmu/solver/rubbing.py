@@ -11,6 +11,7 @@ keeps it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -95,7 +96,7 @@ def _swept(now: Struck, x: _Rows, coefficients: Law) -> Impulse | None:
                 continue
             radius = coefficients.kinetic[i] * max(float(coefficients.C[i] @ Lambda), 0.0)
             z[group] -= (x.A[group] @ z + b[group]) / most
-            length = float(np.linalg.norm(z[group]))
+            length = math.hypot(*z[group])
             if length > radius:
                 z[group] *= radius / length
         change = float(np.abs(z - before).max())
