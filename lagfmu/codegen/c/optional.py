@@ -20,7 +20,9 @@ AT_CONTACTS = {
 BESIDE = ("after_step", "at_trial", "at_event", "inside")  # of companion.c
 COMPANION = ("bars.c", "companion.c")  # behind ERROR_BARS of variables.c
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
-FRICTION = ("friction.c", "painleve.c", "rubbing.c", "share.c", "slides.c")  # behind SLIDES
+FRICTION = (  # behind SLIDES
+    *("friction.c", "painleve.c", "rest.c", "rubbing.c", "share.c", "slides.c", "slipping.c"),
+)
 NO_RUNGS = """
 #include "dependent.h"
 

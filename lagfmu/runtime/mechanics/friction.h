@@ -3,7 +3,7 @@
  *   sticks   G_t v = nu_t ,  |lambda_t| <= mu_s N
  *   slips    lambda_t = -mu_k N s/|s| ,  s = G_t v - nu_t      (Pfeiffer & Glocker 1996, ch. 5)
  *
- * Which of them stick is decided in slides.c. */
+ * Which of them stick is decided in rest.c. */
 #ifndef LAGFMU_FRICTION_H
 #define LAGFMU_FRICTION_H
 

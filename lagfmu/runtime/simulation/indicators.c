@@ -3,7 +3,7 @@
  *   contact, closed   lambda >= 0
  *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch
  *   jump              h on the side of its level
- *   friction          see slides.c */
+ *   friction          see slipping.c */
 #include "indicators.h"
 
 #include <math.h>

@@ -1,429 +1,12 @@
-/* slides.c -- the modes of frictions.
- *
- * All frictions that stand at s = 0 are settled together: the worst slips first; where that goes wrong,
- * every combination is tried, most sticking first.  For one row the direction is a choice of two; for two
- * rows a root on the circle, the one nearest to "against lambda_t".
- *
- * Where sliding one way is Painleve's paradox, a body at rest may have several accelerations: it sticks, or
- * its contact opens (Genot & Brogliato 1999).  Both are looked at wherever the one or the other begins. */
+/* slides.c -- the modes of frictions: at the start, and at events. */
 #include "slides.h"
 
 #include <string.h>
 
-#include "digits.h"
 #include "flow.h"
-#include "optional.h"
+#include "rest.h"
+#include "slipping.h"
 #include "thresholds.h"
-
-enum { HALVINGS = 60 };
-static const double PI = 3.14159265358979323846;
-
-/* Frictions at s = 0, settled together; contacts as in `active`. */
-typedef struct {
-    Solver *s;
-    Instant at;
-    const int *active;
-    Slide *slides;        /* trial modes, those that b->friction looks at meanwhile */
-    int *resting, *sticking, *begins;
-    double *guess;        /* (2 frictions) directions in which each would begin to slip */
-} Rest;
-
-static Status motion(Rest *x) {
-    Solver *s = x->s;
-    return mechanism_motion(&s->stepped, x->at, s->state.q, s->state.v, x->active);
-}
-
-static void set_noise(Solver *s, const double *speed, Slide *slides) {
-    const Mechanism *b = &s->stepped;
-    for (int i = 0; i < s->system->frictions; i++) {
-        slides[i].noise = 0;
-        for (int r = 0; r < s->system->friction[i].rows; r++) {
-            const int k = s->system->friction[i].row[r];
-            slides[i].noise += SLIDES_SLACK * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
-        }
-    }
-}
-
-/* The noise of the motion as it is, of the G that was evaluated last. */
-static void renew_noise(Solver *s, Slide *slides) {
-    double *speed = s->work_contacts;
-    for (int j = 0; j < s->system->n; j++)
-        speed[j] = fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
-    set_noise(s, speed, slides);
-}
-
-/* Slipping along v's slip velocity, where that is not rounding. */
-static void slide_along(const Mechanism *b, int i, const double *v, Slide *slide) {
-    double slip[2];
-    friction_slip(b, i, v, slip);
-    const double length = hypot(slip[0], slip[1]);
-    slide->sticks = 0;
-    if (!(length > slide->noise)) return;
-    slide->direction[0] = slip[0] / length;
-    slide->direction[1] = slip[1] / length;
-}
-
-static double largest(int count, const double *x) {
-    double most = 0;
-    for (int i = 0; i < count; i++) most = fmax(most, fabs(x[i]));
-    return most;
-}
-
-/* The signs of the normal forces of what slips on bilateral constraints. */
-static Status find_signs(Rest *x) {
-    const Mechanism *b = &x->s->stepped;
-    const System *s = b->system;
-    int last = 0;
-    for (int round = 0; round <= s->frictions; round++) {
-        int wrong = 0;
-        if (motion(x) != OK) return FAILED;
-        const double zero = -SLIDES_SLACK * largest(s->m, b->lambda);
-        for (int i = 0; i < s->frictions; i++) {
-            if (x->slides[i].sticks || s->friction[i].gated) continue;
-            if (!(b->friction->normal[i] < zero)) continue;
-            x->slides[i].sign = -x->slides[i].sign;
-            wrong = 1;
-            last = i;
-        }
-        if (!wrong) return OK;
-    }
-    return friction_paradox(b, x->at.t, &last, 1, -1);
-}
-
-/* Opposite to lambda_t, as it is. */
-static void aim(Rest *x, int i) {
-    const double *force = x->s->stepped.friction->tangential + 2 * i;
-    const double length = hypot(force[0], force[1]);
-    for (int r = 0; r < 2; r++)
-        x->guess[2 * i + r] = length > 0 ? -force[r] / length : x->slides[i].direction[r];
-}
-
-/* s' = G_t vdot - gamma_t of friction i, and what of it is rounding. */
-static Status find_rate(Rest *x, int i, double rate[2], double *floor) {
-    Mechanism *b = &x->s->stepped;
-    const System *s = b->system;
-    double *forces = x->s->work_contacts, *reach = forces + s->n;
-    if (motion(x) != OK) return FAILED;
-    for (int j = 0; j < s->n; j++) {
-        forces[j] = fabs(b->F[j]);
-        reach[j] = fabs(b->vdot[j]);
-    }
-    for (int e = 0; e < s->entries; e++)
-        forces[s->entry_column[e]] += fabs(b->G[e] * b->lambda[s->entry_row[e]]);
-    for (int e = 0; e < s->masses; e++) {
-        const int j = s->mass_row[e];
-        if (s->mass_column[e] == j && b->M[e] > 0) reach[j] = fmax(reach[j], forces[j] / b->M[e]);
-    }
-    rate[1] = *floor = 0;
-    for (int r = 0; r < s->friction[i].rows; r++) {
-        const int k = s->friction[i].row[r];
-        rate[r] = mechanism_row(b, k, b->vdot) - b->gamma[k];
-        *floor += SLIDES_BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
-    }
-    return OK;
-}
-
-/* s' across and along the direction at the angle. */
-static Status look_along(Rest *x, int i, double angle, double *across, double *along,
-                         double *floor) {
-    double rate[2];
-    double *e = x->slides[i].direction;
-    e[0] = cos(angle);
-    e[1] = sin(angle);
-    if (find_rate(x, i, rate, floor) != OK) return FAILED;
-    *across = e[0] * rate[1] - e[1] * rate[0];
-    *along = e[0] * rate[0] + e[1] * rate[1];
-    return OK;
-}
-
-/* The root of s' across the direction, between two angles. */
-static Status close_in(Rest *x, int i, double low, double high, double f_low, double *angle) {
-    for (int round = 0; round < HALVINGS; round++) {
-        double middle = (low + high) / 2, f, along, floor;
-        if (look_along(x, i, middle, &f, &along, &floor) != OK) return FAILED;
-        if (f_low * f > 0) {
-            low = middle;
-            f_low = f;
-        } else {
-            high = middle;
-        }
-    }
-    *angle = low;
-    return OK;
-}
-
-/* A direction of two rows that agrees with its acceleration, the nearest to the present one. */
-static Status turn_on_circle(Rest *x, int i, int *found) {
-    const double begin = atan2(x->slides[i].direction[1], x->slides[i].direction[0]);
-    const double step = 2 * PI / SLIDES_ANGLES;
-    double across, along, floor;
-    if (look_along(x, i, begin, &across, &along, &floor) != OK) return FAILED;
-    *found = fabs(across) <= floor && along >= -floor;
-    for (int k = 0; k <= SLIDES_ANGLES / 2 && !*found; k++)
-        for (int side = 1; side >= -1 && !*found; side -= 2) {
-            const double low = begin + side * k * step, high = begin + side * (k + 1) * step;
-            double f_low, f_high, angle;
-            if (look_along(x, i, low, &f_low, &along, &floor) != OK) return FAILED;
-            if (look_along(x, i, high, &f_high, &along, &floor) != OK) return FAILED;
-            if (f_low * f_high > 0) continue;
-            if (close_in(x, i, low, high, f_low, &angle) != OK) return FAILED;
-            if (look_along(x, i, angle, &across, &along, &floor) != OK) return FAILED;
-            *found = along >= -floor;
-        }
-    return OK;
-}
-
-/* A direction that agrees with the acceleration; found = 0 if there is none. */
-static Status steer(Rest *x, int i, int *found) {
-    double rate[2], floor;
-    double *e = x->slides[i].direction;
-    if (x->s->system->friction[i].rows == 2) return turn_on_circle(x, i, found);
-    for (int way = 0; way < 2; way++) {
-        if (find_rate(x, i, rate, &floor) != OK) return FAILED;
-        *found = rate[0] * e[0] >= -floor;
-        if (*found) return OK;
-        if (way == 0) e[0] = -e[0];
-    }
-    return OK;
-}
-
-/* The resting ones stick as in x->sticking, the others slip as in x->guess; how many. */
-static int set_modes(Rest *x) {
-    int slipping = 0;
-    for (int i = 0; i < x->s->system->frictions; i++) {
-        if (!x->resting[i]) continue;
-        x->slides[i].sticks = x->sticking[i];
-        if (x->sticking[i]) continue;
-        slipping += 1;
-        x->slides[i].direction[0] = x->guess[2 * i];
-        x->slides[i].direction[1] = x->guess[2 * i + 1];
-    }
-    return slipping;
-}
-
-/* The resting ones stick as in x->sticking, the others slip, each in a direction of its own acceleration.
- * If found, the latest motion is that of these modes. */
-static int try_modes(Rest *x) {
-    const int count = x->s->system->frictions, slipping = set_modes(x);
-    for (int round = 0; round < SLIDES_ROUNDS; round++) {
-        int turned = 0;
-        if (find_signs(x) != OK) return 0;
-        for (int i = 0; i < count; i++) {
-            const double e0 = x->slides[i].direction[0], e1 = x->slides[i].direction[1];
-            int found = 0;
-            if (!x->resting[i] || x->sticking[i]) continue;
-            if (steer(x, i, &found) != OK || !found) return 0;
-            turned |= e0 != x->slides[i].direction[0] || e1 != x->slides[i].direction[1];
-        }
-        if (!turned || slipping == 1) return find_signs(x) == OK;
-    }
-    return 0;
-}
-
-/* The friction that sticks furthest outside of its cone; -1: none does. */
-static int furthest_out(const Rest *x) {
-    const double *reserve = x->s->stepped.friction->reserve;
-    int worst = -1;
-    for (int i = 0; i < x->s->system->frictions; i++)
-        if (x->resting[i] && x->sticking[i] && reserve[i] < -SLIDES_SLACK &&
-            (worst < 0 || reserve[i] < reserve[worst]))
-            worst = i;
-    return worst;
-}
-
-static int bits(unsigned mask) {
-    int count = 0;
-    for (; mask != 0; mask &= mask - 1) count++;
-    return count;
-}
-
-/* Every combination, those with most sticking first, each direction of slip both ways. */
-static int try_all(Rest *x) {
-    const int frictions = x->s->system->frictions;
-    int which[SLIDES_MOST], count = 0;
-    double straight[2 * SLIDES_MOST];
-    for (int i = 0; i < frictions && count < SLIDES_MOST; i++)
-        if (x->resting[i]) which[count++] = i;
-    for (int i = 0; i < count; i++) memcpy(straight + 2 * i, x->guess + 2 * which[i], 2 * sizeof *straight);
-    for (int slipping = 0; slipping <= count; slipping++)
-        for (unsigned mask = 0; mask < 1u << count; mask++) {
-            if (bits(mask) != slipping) continue;
-            for (unsigned back = 0; back < 1u << count; back++) {
-                if (back & ~mask) continue;
-                for (int i = 0; i < frictions; i++) x->sticking[i] = x->resting[i];
-                for (int i = 0; i < count; i++) {
-                    const double sense = back >> i & 1u ? -1 : 1;
-                    if (mask >> i & 1u) x->sticking[which[i]] = 0;
-                    x->guess[2 * which[i]] = sense * straight[2 * i];
-                    x->guess[2 * which[i] + 1] = sense * straight[2 * i + 1];
-                }
-                if (try_modes(x) && furthest_out(x) < 0) return 1;
-            }
-        }
-    return 0;
-}
-
-static Status no_modes(Rest *x) {
-    int *which = x->sticking, count = 0;
-    for (int i = 0; i < x->s->system->frictions; i++)
-        if (x->resting[i]) which[count++] = i;
-    return friction_paradox(&x->s->stepped, x->at.t, which, count, 0);
-}
-
-static Status stick(Rest *x) {
-    for (int i = 0; i < x->s->system->frictions; i++)
-        if (x->resting[i]) x->slides[i].sticks = 1;
-    return motion(x);
-}
-
-/* Not all can stick, since what drives the bodies accelerates some of them. */
-static Status settle_driven(Rest *x) {
-    for (int i = 0; i < x->s->system->frictions; i++)
-        memcpy(x->guess + 2 * i, x->slides[i].direction, sizeof x->slides[i].direction);
-    return try_all(x) ? OK : stick(x);
-}
-
-static Status settle_resting(Rest *x) {
-    const int count = x->s->system->frictions;
-    int begins = 0;
-    if (stick(x) != OK) return settle_driven(x);
-    for (int i = 0; i < count; i++) {
-        if (x->resting[i]) aim(x, i);
-        x->sticking[i] = x->resting[i] && !x->begins[i];
-        if (x->begins[i]) begins = 1;
-    }
-    if (begins) { /* beyond its cone it slips against lambda_t, or not at all */
-        set_modes(x);
-        if (find_signs(x) != OK) return FAILED;
-    }
-    while (try_modes(x)) { /* the worst slips first */
-        const int worst = furthest_out(x);
-        if (worst < 0) return OK;
-        aim(x, worst);
-        x->sticking[worst] = 0;
-    }
-    return try_all(x) ? OK : no_modes(x);
-}
-
-/* The frictions' modes for given contacts. */
-static Status choose(Rest *x, const int *ended) {
-    Solver *s = x->s;
-    Mechanism *b = &s->stepped;
-    int any = 0;
-    (void)b->sliding->acting(b, x->active); /* what is loaded */
-    if (mechanism_evaluate(b, x->at, s->state.q, s->state.v) != OK) return FAILED;
-    for (int i = 0; i < s->system->frictions; i++) {
-        double slip[2];
-        Slide *slide = &x->slides[i];
-        friction_slip(b, i, s->state.v, slip);
-        const double length = hypot(slip[0], slip[1]);
-        const int still = length <= slide->noise || ((slide->sticks || (ended != NULL && ended[i])) &&
-                                                     length <= SLIDES_JUMP * slide->noise);
-        x->resting[i] = b->friction->loaded[i] && still;
-        any |= x->resting[i];
-        if (!x->resting[i]) slide_along(b, i, s->state.v, slide);
-    }
-    return any ? settle_resting(x) : find_signs(x);
-}
-
-/* The trial modes of contacts are complementary as they are. */
-static int fits(Rest *x, int *trial, const int *touching, const int *leaving) {
-    Solver *s = x->s;
-    const size_t bytes = (size_t)s->system->contacts * sizeof *trial;
-    int *settled = trial + s->system->contacts;
-    memcpy(settled, trial, bytes);
-    return OPTIONAL.contacts_modes(s, x->at, s->state.q, s->state.v, settled, touching, leaving) == OK &&
-           memcmp(settled, trial, bytes) == 0;
-}
-
-/* The contacts that press friction i and touch become as `shut`; 0 if there are none, or one is leaving. */
-static int turn_contacts(const System *s, int i, int shut, int *closed, const int *touching,
-                         const int *leaving) {
-    const Friction *law = &s->friction[i];
-    int any = 0;
-    for (int c = 0; c < s->contacts; c++)
-        for (int k = law->first; k < law->first + law->normals; k++) {
-            if (s->press[k] != s->contact[c] || !touching[c]) continue;
-            if (leaving != NULL && leaving[c]) return 0;
-            closed[c] = shut;
-            any = 1;
-        }
-    return any;
-}
-
-/* FAILED if a friction at rest that begins to stick might as well let its contact open, or one whose contact
- * is open might as well stick. */
-static Status check_rest(Rest *x, const int *closed, const int *touching, const int *leaving) {
-    Solver *s = x->s;
-    const System *system = s->system;
-    struct Frictions *f = s->stepped.friction;
-    int *trial = s->iwork_slides + 4 * system->frictions, any = 0;
-    for (int i = 0; i < system->frictions; i++) {
-        const Slide held = x->slides[i];
-        const int on = f->loaded[i];
-        double slip[2];
-        friction_slip(&s->stepped, i, s->state.v, slip);
-        const int still = hypot(slip[0], slip[1]) <= held.noise;
-        if (!system->friction[i].gated || (on ? s->state.slide[i].sticks || !held.sticks : !still))
-            continue;
-        memcpy(trial, closed, (size_t)system->contacts * sizeof *trial);
-        if (!turn_contacts(system, i, !on, trial, touching, leaving)) continue;
-        x->slides[i].sticks = !on;
-        const int other = fits(x, trial, touching, leaving) && (on || f->reserve[i] >= 0);
-        x->slides[i] = held;
-        if (other)
-            return fail(&s->why,
-                        "friction '%s': at rest it has several accelerations at t = %s s: it sticks, or "
-                        "its contact opens (Painleve's paradox: in one direction of slip the normal "
-                        "force would drive itself): use a smaller coefficient of friction, or let the "
-                        "bodies deform (a spring in the contact)",
-                        system->friction[i].name, digits(x->at.t).text);
-        (void)s->stepped.sliding->acting(&s->stepped, x->active); /* what is loaded */
-        any = 1;
-    }
-    return any ? motion(x) : OK;
-}
-
-/* The modes of frictions and contacts together, from those in x->slides and `closed`. */
-static Status settle(Rest *x, int *closed, const int *ended, const int *touching,
-                     const int *leaving) {
-    Solver *s = x->s;
-    const size_t bytes = (size_t)s->system->contacts * sizeof *closed;
-    int *active = s->active, *before = s->iwork_slides + 4 * s->system->frictions;
-    x->active = active;
-    for (int round = 0; round < SLIDES_ROUNDS; round++) {
-        system_active(s->system, closed, active);
-        if (choose(x, ended) != OK) return FAILED;
-        memcpy(before, closed, bytes);
-        if (s->system->contacts == 0) return OK;
-        if (OPTIONAL.contacts_modes(s, x->at, s->state.q, s->state.v, closed, touching, leaving) != OK)
-            return FAILED;
-        if (memcmp(before, closed, bytes) == 0) return check_rest(x, closed, touching, leaving);
-    }
-    return fail(&s->why,
-                "no combination of sticking, slipping and open contacts satisfies their laws at t = %s "
-                "s: the sliding problem has no solution, or several (Painleve)",
-                digits(x->at.t).text);
-}
-
-static Rest rest(Solver *s, Instant at) {
-    const int count = s->system->frictions;
-    int *work = s->iwork_slides;
-    Rest x = {s, at, NULL, s->trial_slides, work, work + count, work + 2 * count, s->work_slides};
-    memset(work, 0, (size_t)(3 * count) * sizeof *work);
-    memcpy(x.slides, s->state.slide, (size_t)count * sizeof *x.slides);
-    s->stepped.friction->slide = x.slides;
-    return x;
-}
-
-/* Back to the state's own modes, which are now those of x if `settled`. */
-static Status finish(Rest *x, Status settled) {
-    Solver *s = x->s;
-    if (settled == OK)
-        memcpy(s->state.slide, x->slides, (size_t)s->system->frictions * sizeof *x->slides);
-    s->stepped.friction->slide = s->state.slide;
-    return settled;
-}
 
 static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     const System *system = s->system;
@@ -439,10 +22,10 @@ static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     }
     for (int i = 0; i < system->frictions; i++)
         s->state.slide[i] = (Slide){0, 1, {1, 0}, 0};
-    set_noise(s, speed, s->state.slide);
-    for (int i = 0; i < system->frictions; i++) slide_along(b, i, s->state.v, &s->state.slide[i]);
-    Rest x = rest(s, at);
-    if (finish(&x, settle(&x, closed, NULL, touching, NULL)) != OK) return FAILED;
+    rest_set_noise(s, speed, s->state.slide);
+    for (int i = 0; i < system->frictions; i++) rest_slide_along(b, i, s->state.v, &s->state.slide[i]);
+    Rest x = rest_of(s, at);
+    if (rest_finish(&x, rest_settle(&x, closed, NULL, touching, NULL)) != OK) return FAILED;
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     for (int k = 0; k < system->m; k++)
         if (system->rows[k].friction != 0) s->state.offset[k] = b->f[k];
@@ -494,15 +77,15 @@ static Status change(Solver *s, Instant at, const int *left, const double *arriv
     Mechanism *b = &s->stepped;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     if (arriving != NULL && lose(s, arriving) != OK) return FAILED;
-    Rest x = rest(s, at);
+    Rest x = rest_of(s, at);
     int *ended = s->iwork_slides + 3 * system->frictions;
-    renew_noise(s, x.slides);
+    rest_renew_noise(s, x.slides);
     for (int i = 0; i < system->frictions; i++) {
         x.begins[i] = left[2 * i] && s->state.slide[i].sticks;
         ended[i] = left[2 * i] && !s->state.slide[i].sticks;
         if (left[2 * i + 1]) x.slides[i].sign = -x.slides[i].sign; /* the normal force turns over */
     }
-    const Status settled = settle(&x, closed, ended, touching, leaving);
+    const Status settled = rest_settle(&x, closed, ended, touching, leaving);
     b->friction->slide = s->state.slide;
     if (settled != OK) return FAILED;
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
@@ -513,7 +96,7 @@ static Status change(Solver *s, Instant at, const int *left, const double *arriv
             s->state.offset[law->row[r]] = b->f[law->row[r]];
         if (b->friction->loaded[i] && stuck && !sticks) note_slipping(s, i);
     }
-    return finish(&x, OK);
+    return rest_finish(&x, OK);
 }
 
 static Status renew(Solver *s) {
@@ -523,119 +106,22 @@ static Status renew(Solver *s) {
     if (!any || s->system->inputs == 0) return OK;
     const Instant at = flow_instant(s, s->state.now.t);
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
-    renew_noise(s, s->state.slide); /* at the start nothing may have been at work */
+    rest_renew_noise(s, s->state.slide); /* at the start nothing may have been at work */
     for (int i = 0; i < s->system->frictions; i++) {
         double slip[2];
         friction_slip(b, i, s->state.v, slip);
         if (!s->state.slide[i].sticks) continue;
         if (hypot(slip[0], slip[1]) <= SLIDES_JUMP * s->state.slide[i].noise) continue;
-        slide_along(b, i, s->state.v, &s->state.slide[i]);
+        rest_slide_along(b, i, s->state.v, &s->state.slide[i]);
         note_slipping(s, i);
     }
     return OK;
 }
 
-static void indicators(const Solver *s, double *values) {
-    const struct Frictions *f = s->stepped.friction;
-    for (int i = 0; i < s->system->frictions; i++) {
-        const Slide *slide = &f->slide[i];
-        double *value = values + 2 * i;
-        value[0] = value[1] = 1;
-        if (!f->loaded[i]) continue;
-        value[0] = slide->sticks ? f->reserve[i]
-                                 : f->slip[2 * i] * slide->direction[0] +
-                                       f->slip[2 * i + 1] * slide->direction[1];
-        if (!slide->sticks && !s->system->friction[i].gated) value[1] = f->normal[i];
-    }
-}
-
-static Range range(const Solver *s, int which) {
-    const Slide *slide = &s->state.slide[which / 2];
-    if (which % 2 == 1) return (Range){0, HUGE_VAL, 0, 0};
-    return (Range){0, HUGE_VAL, slide->sticks ? SLIDES_SLACK : slide->noise, 1};
-}
-
-static int turns(const Solver *s) {
-    for (int i = 0; i < s->system->frictions; i++)
-        if (s->system->friction[i].rows > 1 && !s->state.slide[i].sticks) return 1;
-    return 0;
-}
-
-static Status turn(Solver *s, double t, const double *y) {
-    Mechanism *b = &s->stepped;
-    if (!turns(s)) return OK;
-    const double *v = y + s->system->n;
-    if (mechanism_evaluate(b, flow_instant(s, t), y, v) != OK) return FAILED;
-    for (int i = 0; i < s->system->frictions; i++) {
-        double slip[2], e[2];
-        if (s->state.slide[i].sticks) continue;
-        friction_slip(b, i, v, slip);
-        friction_heading(&s->state.slide[i], slip, e);
-        memcpy(s->state.slide[i].direction, e, sizeof e);
-    }
-    return OK;
-}
-
-/* Gauss's rule of order 10. */
-static const double NODES[] = {-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
-                               0.9061798459386640};
-static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
-                                 0.4786286704993665, 0.2369268850561891};
-
-/* The motion at a state that may lie off the constraints. */
-static Status move_near(Solver *s, double t, const double *y) {
-    return mechanism_motion_near(&s->stepped, flow_instant(s, t), y, y + s->system->n, s->active,
-                                 s->state.offset, s->state.size);
-}
-
-static Status work(Solver *s, double t0, double t1, double *lost) {
-    const struct Frictions *f = s->stepped.friction;
-    const Integrator *integrator = &s->integrator;
-    double *y = s->work_slides + 2 * s->system->frictions;
-    int slipping = 0;
-    *lost = 0;
-    for (int i = 0; i < s->system->frictions; i++) slipping |= !s->state.slide[i].sticks;
-    if (!slipping || !(t1 > t0)) return OK;
-    for (int k = 0; k < 5; k++) {
-        const double t = t0 + (t1 - t0) * (1 + NODES[k]) / 2;
-        integrator->method->dense(integrator, t, y);
-        if (move_near(s, t, y) != OK) return FAILED;
-        for (int i = 0; i < 2 * s->system->frictions; i++)
-            if (!f->slide[i / 2].sticks)
-                *lost -= WEIGHTS[k] * (t1 - t0) / 2 * f->tangential[i] * f->slip[i];
-    }
-    return OK;
-}
-
-static Status rate(Solver *s, double t, const double *y, double *vdot) {
-    const size_t bytes = (size_t)s->system->n * sizeof *vdot;
-    if (move_near(s, t, y) != OK) return FAILED;
-    memcpy(vdot, s->stepped.vdot, bytes);
-    return OK;
-}
-
-static Status jacobian(Solver *s, double t, const double *y, double *J, double *dfdt) {
-    const double part = 1.4901161193847656e-8; /* 2^-26: half of a double's digits */
-    const int n = s->system->n, ny = 2 * n;
-    double *moved = s->work_slides + 2 * s->system->frictions, *at = moved + ny, *there = at + n;
-    if (rate(s, t, y, at) != OK) return FAILED;
-    memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
-    memset(dfdt, 0, (size_t)n * sizeof *dfdt);
-    memcpy(moved, y, (size_t)ny * sizeof *y);
-    for (int j = 0; j < ny; j++) {
-        const double natural = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
-        const double step = part * fmax(fabs(y[j]), natural);
-        if (j >= n) J[(j - n) * ny + j] = 1;
-        if (!(step > 0)) continue;
-        moved[j] = y[j] + step;
-        if (rate(s, t, moved, there) != OK) return FAILED;
-        for (int i = 0; i < n; i++) J[(n + i) * ny + j] = (there[i] - at[i]) / (moved[j] - y[j]);
-        moved[j] = y[j];
-    }
-    const double step = part / s->state.now.rate;
-    if (rate(s, t + step, y, there) != OK) return FAILED;
-    for (int i = 0; i < n; i++) dfdt[n + i] = (there[i] - at[i]) / step;
-    return OK;
-}
-
-const Slides SLIDES = {&SLIDING, rubbing_doubles, rubbing_ints, begin, change, renew, indicators, range, turns, turn, work, jacobian, rubbing};
+const Slides SLIDES = {
+    .sliding = &SLIDING, .doubles = rubbing_doubles, .ints = rubbing_ints,
+    .begin = begin, .change = change, .renew = renew,
+    .indicators = slipping_indicators, .range = slipping_range,
+    .turns = slipping_turns, .turn = slipping_turn,
+    .work = slipping_work, .jacobian = slipping_jacobian, .rub = rubbing,
+};

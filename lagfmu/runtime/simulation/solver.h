@@ -37,7 +37,7 @@ typedef struct {
     double *work_clearance;    /* of clearance.c */
     double *work_rub;          /* of rubbing.c */
     int *iwork_rub;
-    Slide *trial_slides;       /* (frictions) of slides.c, with */
+    Slide *trial_slides;       /* (frictions) of rest.c, with */
     double *work_slides;       /* (2 frictions + 5 n) */
     int *iwork_slides;         /* (4 frictions + 2 contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and switch.c */

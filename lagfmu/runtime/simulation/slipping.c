@@ -1,0 +1,111 @@
+/* slipping.c -- while a friction slips: the way it goes, the work that it takes, and when it stops. */
+#include "slipping.h"
+
+#include <string.h>
+
+#include "flow.h"
+#include "friction.h"
+#include "thresholds.h"
+
+void slipping_indicators(const Solver *s, double *values) {
+    const struct Frictions *f = s->stepped.friction;
+    for (int i = 0; i < s->system->frictions; i++) {
+        const Slide *slide = &f->slide[i];
+        double *value = values + 2 * i;
+        value[0] = value[1] = 1;
+        if (!f->loaded[i]) continue;
+        value[0] = slide->sticks ? f->reserve[i]
+                                 : f->slip[2 * i] * slide->direction[0] +
+                                       f->slip[2 * i + 1] * slide->direction[1];
+        if (!slide->sticks && !s->system->friction[i].gated) value[1] = f->normal[i];
+    }
+}
+
+Range slipping_range(const Solver *s, int which) {
+    const Slide *slide = &s->state.slide[which / 2];
+    if (which % 2 == 1) return (Range){0, HUGE_VAL, 0, 0};
+    return (Range){0, HUGE_VAL, slide->sticks ? SLIDES_SLACK : slide->noise, 1};
+}
+
+int slipping_turns(const Solver *s) {
+    for (int i = 0; i < s->system->frictions; i++)
+        if (s->system->friction[i].rows > 1 && !s->state.slide[i].sticks) return 1;
+    return 0;
+}
+
+Status slipping_turn(Solver *s, double t, const double *y) {
+    Mechanism *b = &s->stepped;
+    if (!slipping_turns(s)) return OK;
+    const double *v = y + s->system->n;
+    if (mechanism_evaluate(b, flow_instant(s, t), y, v) != OK) return FAILED;
+    for (int i = 0; i < s->system->frictions; i++) {
+        double slip[2], e[2];
+        if (s->state.slide[i].sticks) continue;
+        friction_slip(b, i, v, slip);
+        friction_heading(&s->state.slide[i], slip, e);
+        memcpy(s->state.slide[i].direction, e, sizeof e);
+    }
+    return OK;
+}
+
+/* Gauss's rule of order 10. */
+static const double NODES[] = {-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
+                               0.9061798459386640};
+static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
+                                 0.4786286704993665, 0.2369268850561891};
+
+/* The motion at a state that may lie off the constraints. */
+static Status move_near(Solver *s, double t, const double *y) {
+    return mechanism_motion_near(&s->stepped, flow_instant(s, t), y, y + s->system->n, s->active,
+                                 s->state.offset, s->state.size);
+}
+
+Status slipping_work(Solver *s, double t0, double t1, double *lost) {
+    const struct Frictions *f = s->stepped.friction;
+    const Integrator *integrator = &s->integrator;
+    double *y = s->work_slides + 2 * s->system->frictions;
+    int slipping = 0;
+    *lost = 0;
+    for (int i = 0; i < s->system->frictions; i++) slipping |= !s->state.slide[i].sticks;
+    if (!slipping || !(t1 > t0)) return OK;
+    for (int k = 0; k < 5; k++) {
+        const double t = t0 + (t1 - t0) * (1 + NODES[k]) / 2;
+        integrator->method->dense(integrator, t, y);
+        if (move_near(s, t, y) != OK) return FAILED;
+        for (int i = 0; i < 2 * s->system->frictions; i++)
+            if (!f->slide[i / 2].sticks)
+                *lost -= WEIGHTS[k] * (t1 - t0) / 2 * f->tangential[i] * f->slip[i];
+    }
+    return OK;
+}
+
+static Status rate(Solver *s, double t, const double *y, double *vdot) {
+    const size_t bytes = (size_t)s->system->n * sizeof *vdot;
+    if (move_near(s, t, y) != OK) return FAILED;
+    memcpy(vdot, s->stepped.vdot, bytes);
+    return OK;
+}
+
+Status slipping_jacobian(Solver *s, double t, const double *y, double *J, double *dfdt) {
+    const double part = 1.4901161193847656e-8; /* 2^-26: half of a double's digits */
+    const int n = s->system->n, ny = 2 * n;
+    double *moved = s->work_slides + 2 * s->system->frictions, *at = moved + ny, *there = at + n;
+    if (rate(s, t, y, at) != OK) return FAILED;
+    memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
+    memset(dfdt, 0, (size_t)n * sizeof *dfdt);
+    memcpy(moved, y, (size_t)ny * sizeof *y);
+    for (int j = 0; j < ny; j++) {
+        const double natural = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
+        const double step = part * fmax(fabs(y[j]), natural);
+        if (j >= n) J[(j - n) * ny + j] = 1;
+        if (!(step > 0)) continue;
+        moved[j] = y[j] + step;
+        if (rate(s, t, moved, there) != OK) return FAILED;
+        for (int i = 0; i < n; i++) J[(n + i) * ny + j] = (there[i] - at[i]) / (moved[j] - y[j]);
+        moved[j] = y[j];
+    }
+    const double step = part / s->state.now.rate;
+    if (rate(s, t + step, y, there) != OK) return FAILED;
+    for (int i = 0; i < n; i++) dfdt[n + i] = (there[i] - at[i]) / step;
+    return OK;
+}
