@@ -74,7 +74,12 @@ def table(
             p = prepared(name)
             text = variables_source(p.table, p.form, p.scene, p.system)
             model = model_source(p.form)
-            library = compile_library(folder, ("interval.c",), model + text, [f"-I{folder}"])
+            motions = (
+                "const Prescribed MOTIONS;\n"  # of prescribed.c: only the tables are looked at
+            )
+            library = compile_library(
+                folder, ("interval.c",), model + text + motions, [f"-I{folder}"]
+            )
             count = ctypes.c_int.in_dll(library, "VARIABLE_COUNT").value
             rows = (CVariable * count).in_dll(library, "VARIABLES")
             made[name] = (p, library, list(rows))

@@ -235,16 +235,16 @@ def test_between_the_two_departures_the_bars_are_infinite(barred):
 
 
 def test_a_companion_that_cannot_follow_is_told_and_the_run_goes_on(barred, target):
-    """A double pendulum at a tolerance of 0.5: fifty is none at all, and the log says so once."""
+    """A double pendulum at a tolerance of 0.1: ten is none at all, and the log says so once."""
     with instance(barred("DoublePendulum")) as one:
-        one.start(tolerance=0.5)
+        one.start(tolerance=0.1)
         for _ in range(8):
             one.step(0.5)
         assert one.get("error.x1") == INFINITE
         assert all(abs(one.get(n)) < 1e3 for n in ("x1", "y2", "lambda.upper"))
         told = [text for status, _, text in one.log if status == 1 and "error bars" in text]
         assert len(told) == 1
-        assert "tolerance 50.0 cannot follow" in told[0]
+        assert "tolerance 10.0 cannot follow" in told[0]
 
 
 def test_an_fmu_with_error_bars_is_for_co_simulation(barred, target, tmp_path):
@@ -343,10 +343,10 @@ def test_bars_of_many_runs_are_kept_as_any_output(barred, target, tmp_path):
     assert found[bar_of(of)].attrs["units"] == found[of].attrs["units"]
     said = CliRunner().invoke(
         app,
-        ["sweep", str(barred("DoublePendulum")), "--vary", "solver.tolerance=0.5,1e-6", "--stop-time", "4",
+        ["sweep", str(barred("DoublePendulum")), "--vary", "solver.tolerance=0.1,1e-6", "--stop-time", "4",
          "--step-size", "0.5", "--keep", "error.x1:max", "--plot", str(tmp_path / "bars.svg")],
     ).output  # fmt: skip
-    assert "0.5 infinite" in " ".join(said.split()), said
+    assert "0.1 infinite" in " ".join(said.split()), said
 
 
 def test_a_run_whose_fixed_step_is_halved_warns(prepared):

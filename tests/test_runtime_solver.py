@@ -882,7 +882,7 @@ def test_what_the_legs_of_a_table_carry_depends_on_no_order(case, bench):
     across, along = symbols("a0:5", real=True), symbols("b0:5", real=True)
     z, roll, pitch = dynamicsymbols("z roll pitch")
     model = Model(
-        name="Table",
+        name="Legs",
         lagrangian=m * (z.diff() ** 2 + 4 * arm**2 * (roll.diff() ** 2 + pitch.diff() ** 2)) / 2,
         forces={z: -push, roll: lift * arm, pitch: s * arm},
         coordinates={z: "m", roll: "rad", pitch: "rad"},

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import lagfmu
 from lagfmu import Conserved, Result, output
 from lagfmu.cli.app import app
+from lagfmu.cli.terminal import console
 from lagfmu.fmu.closed_forms import carried
 from lagfmu.model.file import load
 from lagfmu.page.wrapped import wrapped
@@ -50,11 +51,14 @@ def test_an_equation_is_broken_before_its_operators() -> None:
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])
-def test_no_line_that_show_prints_is_longer_than_the_terminal_is_wide(width: int) -> None:
+def test_no_line_that_show_prints_is_longer_than_the_terminal_is_wide(
+    width: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The kinetic energy of eight bobs and the accelerations of their links are 120 to 160 letters long; what
     is printed is the same at every width, to the last word."""
     words = ["show", str(MODELS / "chain.py"), "-p", "n=8"]
-    said = CliRunner().invoke(app, words, env={"COLUMNS": str(width)})
+    monkeypatch.setattr(console, "width", width)
+    said = CliRunner().invoke(app, words)
     assert said.exit_code == 0
     lines = said.output.splitlines()
     assert max(cell_len(line.rstrip()) for line in lines) <= width
