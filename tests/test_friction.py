@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -405,3 +406,17 @@ def test_no_unit_of_mass_moves_the_cone(mass: float) -> None:
     )
     assert other["sticks.grip"].tolist() == run["sticks.grip"].tolist()
     assert (other["margin.grip"] / mass).tolist() == pytest.approx(run["margin.grip"].tolist())
+
+
+@pytest.mark.parametrize("gravity", [1e-300, 1e-150, 1e150])
+def test_what_slipping_has_cost_scales_with_gravity(gravity: float) -> None:
+    """Energy goes as m g l, in times of sqrt(l/g): the share that friction has taken when the rod has fallen
+    is the same on any planet. lambda_t . s of 1e-300 m/s^2 is below the smallest double; its work is not."""
+    file = load(MODELS / "falling_rod.py")
+    shares = []
+    for g in (9.81, gravity):
+        time = 0.7 * math.sqrt(9.81 / g)
+        run = simulate(file.model, time, time / 10, start_values={"g": g}, scene=file.scenes[0])
+        shares.append(run["energy.dissipated"][-1] / g)
+    assert shares[0] > 0
+    assert shares[1] == pytest.approx(shares[0], rel=1e-6)

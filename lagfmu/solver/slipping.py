@@ -25,15 +25,19 @@ def is_slipping(flow: Flow) -> bool:
 
 
 def dissipated(flow: Flow, dense: Any, t0: float, t1: float) -> float:
-    """- int sum lambda_t . s dt [J] over a part of a step (Gauss's rule of order 10)."""
+    """- int sum lambda_t . s dt [J] over a part of a step (Gauss's rule of order 10).
+
+    lambda_t dt is a momentum: lambda_t . s of g = 1e-300 m/s^2 is below the smallest double.
+    """
     if not t1 > t0 or not is_slipping(flow):
         return 0.0
-    work = 0.0
+    work, half = 0.0, (t1 - t0) / 2
     for node, weight in zip(NODES, WEIGHTS, strict=True):
-        t = t0 + (t1 - t0) * (1 + node) / 2
+        t = t0 + half * (1 + node)
         q, v = flow.split(dense(t))
-        work += weight * float(power(flow.near(t, q, v)).sum())
-    return -work * (t1 - t0) / 2
+        press = flow.near(t, q, v).press
+        work += float((weight * half * press.tangential * press.slip).sum())
+    return -work
 
 
 def power(now: Motion) -> Vector:
