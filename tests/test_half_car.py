@@ -8,8 +8,11 @@ import pytest
 from conftest import MODELS
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import simulate
+from lagfmu import Holonomic, Input, Model, Parameter, build_fmu, simulate
+from lagfmu.fmu.compiler import find_compiler
 from lagfmu.model.file import load
 
 M, J, m, g, a, b, k, c, v = 1200.0, 1500.0, 80.0, 9.81, 1.2, 1.5, 4e4, 3e3, 14.0
@@ -111,3 +114,28 @@ def test_driven_it_goes_where_it_is_driven(native_fmu):
     held = np.array([(0.0, 2.0, 0.0, 0.0), (0.8, 2.0, 0.0, 0.0)], [(n, float) for n in names])
     found = in_model_exchange(native_fmu("HalfCar"), input=held)
     np.testing.assert_array_equal(found["way"], 2.0)
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+def test_a_force_that_is_driven_holds_up_no_motion(tmp_path):
+    """A block that u carries at 3 m/s and F pushes sideways, in model exchange: F = 2 N alone is connected,
+    u goes on by its rate, and y'' = F/m."""
+    x, y, u, F = dynamicsymbols("x y u F")
+    m = symbols("m", positive=True)
+    model = Model(
+        name="Carried",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        forces={y: F},
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("belt", x - u)],
+        parameters=[Parameter(m, 2.0, "kg")],
+        inputs=[Input(u, "m", rate=3.0), Input(F, "N")],
+        start={x: 0.0, x.diff(): 3.0},
+    )
+    path = build_fmu(model, tmp_path, target="native", check=False)
+    pushed = np.array([(0.0, 2.0), (0.8, 2.0)], [("time", float), ("F", float)])
+    found = fmpy.simulate_fmu(
+        str(path), fmi_type="ModelExchange", stop_time=0.8, input=pushed, output=["x", "y"]
+    )
+    np.testing.assert_allclose(found["x"], 3.0 * found["time"], atol=1e-9)
+    np.testing.assert_allclose(found["y"], found["time"] ** 2 / 2, atol=1e-4)

@@ -32,14 +32,15 @@ void exchange_begin(Instance *x) {
 
 void exchange_set_time(Instance *x, double t) {
     Solver *s = &x->solver;
-    int driven = 0; /* an importer that drives inputs sets their values at each time itself */
-    for (int k = 0; k < s->system->inputs; k++) driven |= x->set[k];
+    const System *system = s->system;
     if (s->state.now.t != t) x->observed = x->evaluated = 0;
-    s->state.now.t = t;
-    if (driven)
-        s->drive.since = t;
-    else
-        instance_move_inputs(x, t);
+    if (system->prescribed_count > 0) drive_at(system, &s->drive, t, x->expected);
+    for (int i = 0; i < system->prescribed_count; i++) { /* what the importer drives it sets at each time */
+        const int k = system->prescribed[i];
+        if (x->set[k] || x->set[k + 1] || x->set[k + 2]) continue;
+        memcpy(s->drive.value + k, x->expected + k, 3 * sizeof *x->expected);
+    }
+    s->state.now.t = s->drive.since = t;
 }
 
 Status exchange_get_states(Instance *x, double *states) {

@@ -358,7 +358,8 @@ static void warn_of_tables(Instance *x) {
     }
 }
 
-void instance_move_inputs(Instance *x, double t) {
+/* The inputs go on to the time t by their derivatives, where they stay until they are set again. */
+static void move_inputs(Instance *x, double t) {
     const System *s = x->solver.system;
     Drive *drive = &x->solver.drive;
     if (s->inputs == 0) return;
@@ -457,7 +458,7 @@ Status instance_step(Instance *x, double t_end) {
         return FAILED;
     }
     if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
-    instance_move_inputs(x, t_end);
+    move_inputs(x, t_end);
     memset(x->set, 0, (size_t)s->system->inputs * sizeof *x->set);
     if (s->system->lookup_count > 0) warn_of_tables(x);
     if (s->system->contacts + s->system->frictions > 0) report_events(x);

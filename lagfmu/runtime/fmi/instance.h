@@ -81,9 +81,6 @@ Status instance_observe(Instance *x);
 /* To t_end [s].  FAILED: everything is as it was before. */
 Status instance_step(Instance *x, double t_end);
 
-/* The inputs go on to the time t by their derivatives, where they stay until they are set again. */
-void instance_move_inputs(Instance *x, double t);
-
 /* How everything changes along a direction of time, stepped coordinates (n), velocities (n) and inputs;
  * then how one variable changes with it.  FAILED: it cannot be said, the cause is in x->solver.why. */
 Status instance_differentiate(Instance *x, Direction d);
