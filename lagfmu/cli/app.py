@@ -464,8 +464,8 @@ def tradeoff(
 ) -> None:
     """Measure error against wall time over methods, tolerances and communication steps.
 
-    Exit codes: 0 closed forms hold at every tolerance, 1 one does not, 2 wrong usage, 3 an FMU could not be
-    built or run.
+    A closed form that is missed at a tolerance is marked in the table.  Exit codes: 0 measured, 2 wrong
+    usage, 3 an FMU could not be built or run.
     """
     with plainly():
         done = compare(

@@ -37,7 +37,7 @@ def table(found: Tradeoff, communication: float) -> Table:
         method = row.setting.method
         scale = 1e3 / found.simulated
         drawn.add_row(
-            "●" if row in chosen else "",
+            ("●" if row in chosen else "") + ("✗" if row.broken else ""),
             method,
             row.setting.dial,
             *(_error(found, row, g) for g in found.groups),
@@ -87,6 +87,7 @@ def remarks(found: Tradeoff) -> list[str]:
             "(median over the settings); what lies closer together is not told apart"
         )
     lines += [f"{method} is refused: {why}" for method, why in found.refused.items()]
+    lines += [f"✗ {r.setting}: {'; '.join(r.broken)}" for r in found.rows if r.broken]
     return lines + list(found.cut)
 
 
@@ -123,11 +124,14 @@ def summary(all_found: Sequence[Tradeoff]) -> Table:
 
 
 def report(file: str, found: Tradeoff) -> Report:
-    """A case a setting, which fails if a closed form does not hold at its tolerance; a method that the FMU
-    refuses is skipped."""
-    cases = [
-        Case(str(r.setting), found.name, "; ".join(r.broken), "", r.median) for r in found.rows
-    ]
+    """A case a setting that was measured, none of which fails: a trade-off measures and does not judge.
+
+    A method that the FMU refuses is skipped; an FMU that runs with no setting at all could not be run.
+    """
+    if not found.rows:
+        reasons = "; ".join([*found.refused.values(), *found.cut])
+        return Report(file, error=f"no setting could be measured: {reasons}")
+    cases = [Case(str(r.setting), found.name, seconds=r.median) for r in found.rows]
     cases += [Case(m, found.name, "", f"refused: {why}") for m, why in found.refused.items()]
     return Report(file, found, cases, data(found))
 
