@@ -158,7 +158,7 @@ def test_the_points_come_from_a_file(tmp_path):
         (([0, math.nan], [0, 1]), "x[1] = nan, expected finite"),
         (([0, 1], [0, math.inf]), "y[1] = inf, expected finite"),
         (([0, 1], "ab"), "y = 'ab', expected a list of numbers"),
-        (([0, 1], [0, 1], "m", "mm"), "1 mm = 0.001 m"),
+        (([0, 1], [0, 1], "m", "degC"), "an offset or logarithmic scale"),
         (([0, 1], [0, 1], "m", "m", "free"), "ends = 'free', expected one of 'natural'"),
         (([0, 1, 2], [0, 1, 2], "m", "m", "periodic"), "begins with 0.0 and ends with 2.0"),
         (([0, 1, 2], [0, 1, 2], "m", "m", "not-a-knot"), "at least 4"),

@@ -121,16 +121,22 @@ def _generation_date() -> dict[str, str]:
 
 def _units(root: Element, table: VariableTable) -> None:
     units: dict[str, Unit] = {}
+    shown: dict[str, dict[str, float]] = {}
     for v in table.variables:
-        if v.unit is not None:
-            units.setdefault(v.unit.name, v.unit)
+        if v.unit is None:
+            continue
+        units.setdefault(v.unit.name, v.unit)
+        names = shown.setdefault(v.unit.name, {})
+        if v.unit.name in DISPLAYED:
+            names.setdefault(DISPLAYED[v.unit.name][1], 180 / math.pi)
+        if v.display is not None:
+            names.setdefault(v.display.name, v.display.from_si(1.0))
     definitions = SubElement(root, "UnitDefinitions")
     for name, unit in sorted(units.items()):
         element = SubElement(definitions, "Unit", {"name": name})
         SubElement(element, "BaseUnit", {k: str(e) for k, e in unit.base.items()})
-        if name in DISPLAYED:
-            shown = {"name": DISPLAYED[name][1], "factor": number(180 / math.pi)}
-            SubElement(element, "DisplayUnit", shown)
+        for display, factor in shown[name].items():
+            SubElement(element, "DisplayUnit", {"name": display, "factor": number(factor)})
 
 
 def _types(root: Element, table: VariableTable) -> None:
@@ -181,6 +187,8 @@ def _variable(
         typed["declaredType"] = DISPLAYED[v.unit.name][0]
     if v.unit is not None:
         typed["unit"] = v.unit.name
+    if v.display is not None:
+        typed["displayUnit"] = v.display.name
     if v.minimum is not None or v.positive:
         typed["min"] = number(v.minimum or 0.0)
     elif v.kind == "Integer":

@@ -27,10 +27,12 @@ from ..model.units import (
     ONE,
     POWER,
     SECOND,
+    DisplayUnit,
     Unit,
     dimension_of,
     generalized_force_unit,
     multiplier_unit,
+    parse_scaled,
     parse_unit,
 )
 from ..names import Subject, derivative
@@ -237,11 +239,22 @@ class _Builder:
         ]
         if self.scene.error_bars:
             variables += self.error_bars(variables)
+        variables = [dataclasses.replace(v, display=self.displayed(v)) for v in variables]
         n = len(self.state_names) // 2
         q = self.state_names[:n]
         derivatives = [derivative(c, k) for c in q for k in (1, 2)]
         states = [derivative(c, k) for c in q for k in (0, 1)]
         return VariableTable(tuple(variables), tuple(states), tuple(derivatives))
+
+    def displayed(self, v: Variable) -> DisplayUnit | None:
+        """The unit in which the model gives what the variable is of."""
+        text = self.model.display_units.get(v.of.coordinate)
+        if text is None or v.unit is None:
+            return None
+        shown: DisplayUnit | None = parse_scaled(text, v.name)
+        for _ in range(v.of.order):
+            shown = None if shown is None else shown.per_second()
+        return shown if shown is not None and shown.unit.same_dimension(v.unit) else None
 
     def parameters(self) -> list[Variable]:
         return [

@@ -10,7 +10,7 @@ from functools import cached_property
 
 from .. import names
 from ..methods import described
-from ..model.units import ONE, Unit
+from ..model.units import ONE, DisplayUnit, Unit
 from ..names import Subject
 
 Value = float | int | bool | str
@@ -26,7 +26,8 @@ class Variable:
     solver, or output (nothing).  `depends` are the inputs and states that it is computed from at a
     communication point, `depends_initially` the inputs and exact start values at the start.  `positive`:
     zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's `start` says
-    it; otherwise it is 0 because nobody did.
+    it; otherwise it is 0 because nobody did.  `display`: the unit in which the model gives it, a multiple of
+    `unit`.
     """
 
     of: Subject
@@ -38,6 +39,7 @@ class Variable:
     description: str
     start: Value | None = None
     unit: Unit | None = None
+    display: DisplayUnit | None = None
     derivative_of: str | None = None
     minimum: float | None = None
     maximum: float | None = None

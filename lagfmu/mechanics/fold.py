@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import sympy as sp
 
-from ..errors import ModelError
+from ..errors import ModelError, UnitError
 from ..model.elements import Expr
 from ..model.model import Contact, Model, Parameter, name_of
 from ..model.scene import Scene
 from ..model.selection import select
+from ..model.units import Unit, parse_quantity
 from .equations import TIME, EquationsOfMotion
 from .form import Form
 
@@ -24,7 +25,8 @@ def numbers_of(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> dic
         name, given, number = (part.strip() for part in text.partition("="))
         for found in select([name], list(parameters), "fixed parameter", problems):
             p = parameters[found]
-            value = _value(p, number, problems) if given else float(p.value)
+            unit = eom.units[found]
+            value = _value(p, unit, number, problems) if given else float(p.value)
             if value is not None:
                 values[p.symbol] = value
     inputs = {name_of(i.symbol): i for i in eom.model.inputs}
@@ -39,12 +41,12 @@ def numbers_of(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> dic
     return {symbol: _number(value) for symbol, value in values.items()}
 
 
-def _value(p: Parameter, text: str, problems: list[str]) -> float | None:
+def _value(p: Parameter, unit: Unit, text: str, problems: list[str]) -> float | None:
     name = name_of(p.symbol)
     try:
-        value = float(text)
-    except ValueError:
-        problems.append(f"fixed parameter {name!r} = {text!r} is no number")
+        value = parse_quantity(text, unit, f"fixed parameter {name!r}")
+    except UnitError as error:
+        problems.append(str(error))
         return None
     low = float("-inf") if p.min is None else p.min
     high = float("inf") if p.max is None else p.max

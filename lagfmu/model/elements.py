@@ -21,7 +21,7 @@ NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 class Parameter:
     """A constant of the model, settable before initialization.
 
-    `value` is in coherent SI `unit`; `min` and `max` are the bounds that the equations make sense in.
+    `value` and its bounds `min` and `max` are in `unit`, which may be a multiple of an SI unit (g, mm, deg).
     """
 
     symbol: Expr
@@ -162,6 +162,7 @@ class ModelFields:
     license: str = ""
     copyright: str = ""
     picture: Sequence[Any] = ()  # of the shapes in picture.py
+    display_units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def energy_expression(self) -> Expr:

@@ -32,6 +32,7 @@ from .elements import (
 from .frictions import split
 from .kinds import check_containers
 from .reactions import reaction_units
+from .scaled import in_si
 from .spline import Spline
 from .units import Unit
 
@@ -59,9 +60,11 @@ class Model(ModelFields, Displayed):
     Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is
     given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
-    numbers in SI.  `descriptions` may explain coordinates.  `outputs` are quantities besides those
-    that every FMU reports, `picture` how it looks.  A `Friction` is written among `constraints` and kept in
-    `frictions`.  `author`, `version`, `license` and `copyright` are told to importers.
+    numbers in that unit.  A unit may be a multiple of an SI unit (g, mm, deg): the model keeps every number
+    in SI, and in `display_units` the unit in which importers show it.  `descriptions` may explain
+    coordinates.  `outputs` are quantities besides those that every FMU reports, `picture` how it looks.  A
+    `Friction` is written among `constraints` and kept in `frictions`.  `author`, `version`, `license` and
+    `copyright` are told to importers.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -72,13 +75,15 @@ class Model(ModelFields, Displayed):
         problems = check_containers(self)
         if problems:
             raise ModelError(str(self.name), problems)
-        for name in ("coordinates", "forces", "start", "descriptions"):
+        for name in ("coordinates", "forces", "start", "descriptions", "display_units"):
             object.__setattr__(self, name, dict(getattr(self, name)))
         for name in ("constraints", "parameters", "inputs", "outputs", "picture"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         constraints, frictions = split(self.constraints)
         object.__setattr__(self, "constraints", constraints)
         object.__setattr__(self, "frictions", (*self.frictions, *frictions))
+        for name, value in in_si(self).items():
+            object.__setattr__(self, name, value)
         problems = problems_of(self)
         if problems:
             raise ModelError(str(self.name), problems)

@@ -26,7 +26,7 @@ from scipy.interpolate import CubicSpline
 from ..errors import LagfmuWarning, TableError, UnitError
 from ..solver.cubic import Cubic
 from .elements import NAME, Expr
-from .units import parse_unit
+from .units import DisplayUnit, parse_scaled
 
 FEWEST = {"natural": 2, "clamped": 2, "not-a-knot": 4, "periodic": 3}
 HIGHEST = 3  # order of the derivative that is constant between knots
@@ -58,10 +58,10 @@ class SplineBase(sp.Function):  # type: ignore[misc]  # the name by which SymPy'
 class Spline:
     """A cubic spline through points; `road(x)` is its value at a SymPy expression.
 
-    `x` [x_unit] ascends, `y` [y_unit] are the values there.  `ends`: 'natural' (no curvature), 'clamped'
-    (no slope), 'not-a-knot' or 'periodic' (y repeats, last value = first).  Outside of the table a
-    straight line goes on; unless the ends are natural or periodic its curvature begins with a jump, of
-    which a LagfmuWarning tells.  Raises TableError with every problem at once.
+    `x` [x_unit] ascends, `y` [y_unit] are the values there; both are kept in SI.  `ends`: 'natural' (no
+    curvature), 'clamped' (no slope), 'not-a-knot' or 'periodic' (y repeats, last value = first).  Outside of
+    the table a straight line goes on; unless the ends are natural or periodic its curvature begins with a
+    jump, of which a LagfmuWarning tells.  Raises TableError with every problem at once.
     """
 
     def __init__(
@@ -75,10 +75,10 @@ class Spline:
     ) -> None:
         problems = [*_of_name(name), *_of_ends(ends)]
         xs, ys = _numbers("x", x, problems), _numbers("y", y, problems)
-        units = []
+        units: list[DisplayUnit] = []
         for what, text in (("x_unit", x_unit), ("y_unit", y_unit)):
             try:
-                units.append(parse_unit(text, f"{what} of spline {name!r}"))
+                units.append(parse_scaled(text, f"{what} of spline {name!r}"))
             except UnitError as error:
                 problems.append(str(error))
         if not problems:
@@ -86,8 +86,8 @@ class Spline:
         if problems:
             raise TableError(name, problems)
         self.name, self.ends = name, ends
-        self.x, self.y = tuple(xs), tuple(ys)
-        self.x_unit, self.y_unit = units
+        self.x, self.y = (tuple(map(u.to_si, z)) for u, z in zip(units, (xs, ys), strict=True))
+        self.x_unit, self.y_unit = (u.unit for u in units)
         self.table = _table(self.x, self.y, ends)
         self._functions: dict[int, Any] = {}
         if ends in ("clamped", "not-a-knot"):

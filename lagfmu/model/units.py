@@ -148,10 +148,58 @@ def for_reading(name: str | None) -> str:
     return name.replace(".", "·")
 
 
+@dataclass(frozen=True)
+class DisplayUnit:
+    """A unit in which values are given or shown, of `size` in the coherent SI unit `unit`: 1 g = 0.001 kg.
+
+    `coherent`: it is but another spelling of `unit`.
+    """
+
+    name: str
+    unit: Unit
+    size: float
+    coherent: bool = False
+
+    def to_si(self, value: float) -> float:
+        """A value given in this unit, in coherent SI: 200 g is 0.2 kg, to the last digit."""
+        parts = 1 / self.size
+        return value / parts if parts > 1 and parts.is_integer() else value * self.size
+
+    def from_si(self, value: float) -> float:
+        """A value in coherent SI as it is shown."""
+        parts = 1 / self.size
+        return value * parts if parts > 1 and parts.is_integer() else value / self.size
+
+    def per_second(self) -> DisplayUnit | None:
+        """Of a rate; None where the name would have two fractions."""
+        if "/" in self.name:
+            return None
+        return DisplayUnit(f"{self.name}/s", self.unit.per_second(), self.size)
+
+
 def parse_unit(text: str, what: str) -> Unit:
-    """Read a unit such as 'm/s2', 'm/s^2', 'N m' or '1'; `what` names its owner in messages."""
+    """Read a coherent SI unit such as 'm/s2', 'm/s^2', 'N m' or '1'; `what` names its owner in messages.
+
+    Raises UnitError for what is no unit, and for one that is not coherent (g, mm, deg, rpm).
+    """
+    read = parse_scaled(text, what)
+    if not read.coherent:
+        size = "1" if math.isclose(read.size, 1.0) else f"{read.size:.6g}"
+        amount = size if read.unit == ONE else f"{size} {read.unit.name}"
+        raise UnitError(
+            f"{what} is given in {text!r} (1 {read.name} = {amount}); equations are evaluated in coherent "
+            f"SI units: give the value in {read.unit.name!r}"
+        )
+    return read.unit
+
+
+def parse_scaled(text: str, what: str) -> DisplayUnit:
+    """Read any unit that is a multiple of a coherent one: 'g', 'mm', 'deg', 'rpm', 'kN/mm'.
+
+    Raises UnitError for what is no unit, an offset scale (degC) and a logarithmic one (dB).
+    """
     given = f"{what} is given in {text!r}"
-    expected = f"a coherent SI unit such as {_EXAMPLES} was expected"
+    expected = f"a unit such as {_EXAMPLES} was expected"
     if not isinstance(text, str):
         raise UnitError(f"{given}; {expected}: write the unit as text")
     marked = re.sub(r"(?<!\d)\.|\.(?!\d)|[·⋅]", "*", text.strip().replace("**", "^"))
@@ -171,24 +219,45 @@ def parse_unit(text: str, what: str) -> Unit:
         raise UnitError(f"{given}, which is not a unit; {expected}: write the product as 'N.m'")
     if any(power.denominator != 1 for power in powers.values()):
         raise UnitError(f"{given}, with a fractional exponent; {expected}: use whole exponents")
-    scale, coherent, scaled, offset = 1.0, ONE, False, False
+    scale, coherent, multiple, offset = 1.0, ONE, False, False
     for name, power in powers.items():
         if name in _NAMES:
             coherent *= _unit({_NAMES[name]: power})
             continue
-        scaled = True
+        multiple = True
         size, base = _base_units(name)
         offset = offset or _REGISTRY.Quantity(0.0, name).to_base_units().magnitude != 0
         scale *= size**power
         coherent *= _named(_unit(base)) ** power
-    remedy = f"equations are evaluated in coherent SI units: give the value in {coherent.name!r}"
     if offset:
-        raise UnitError(f"{given}, an offset or logarithmic scale; {remedy}")
-    if scaled:
-        value = "1" if math.isclose(scale, 1.0) else f"{scale:.6g}"
-        size_text = value if coherent == ONE else f"{value} {coherent.name}"
-        raise UnitError(f"{given} (1 {text.strip()} = {size_text}); {remedy}")
-    return coherent
+        raise UnitError(
+            f"{given}, an offset or logarithmic scale; equations are evaluated in coherent SI units: "
+            f"give the value in {coherent.name!r}"
+        )
+    return DisplayUnit(" ".join(text.split()), coherent, scale, not multiple)
+
+
+QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d.].*)?\Z")
+
+
+def parse_quantity(text: str, unit: Unit, what: str) -> float:
+    """'0.2' in coherent SI, or '200 g' with a unit of its own, as a number in SI.
+
+    Raises UnitError for what is neither, and for a unit of another dimension than `unit`.
+    """
+    found = QUANTITY.match(text)
+    if found is None:
+        raise UnitError(
+            f"{what} = {text!r} is no number, expected one in {unit.name}, or with a unit"
+        )
+    if found[2] is None:
+        return float(found[1])
+    read = parse_scaled(found[2], what)
+    if not read.unit.same_dimension(unit):
+        raise UnitError(
+            f"{what} = {text!r} has unit {_shown(read.unit)}, expected {_shown(unit)}: correct the unit"
+        )
+    return read.to_si(float(found[1]))
 
 
 def _named(unit: Unit) -> Unit:

@@ -140,10 +140,17 @@ def shown(unit: Unit | None) -> str:
     return for_reading(None if unit is None else unit.name)
 
 
+def as_given(v: Variable) -> str:
+    """' (200 g)' behind a start value of 0.2 kg that the model gives in grams; nothing for another."""
+    if v.display is None or not isinstance(v.start, float):
+        return ""
+    return f" ({v.display.from_si(v.start):.15g} {v.display.name})"
+
+
 def _grouped(variables: Sequence[Variable]) -> list[tuple[str, str, list[Line]]]:
     rows: dict[str, list[Line]] = {title: [] for title, _ in GROUPS}
     for v in variables:
-        start = "" if v.start is None else str(v.start)
+        start = "" if v.start is None else f"{v.start}{as_given(v)}"
         row = Line(v.name, v.causality, v.kind, shown(v.unit), start, v.description)
         rows[_group(v)].append(row)
     return [(title, remark, rows[title]) for title, remark in GROUPS if rows[title]]

@@ -16,7 +16,7 @@ from ..model.model import Contact, Nonholonomic, name_of
 from ..names import FORCE, MULTIPLIER, OWN
 from ..prepare.prepare import Derived, Prepared
 from ..solver.precedence import OMITTED
-from .documentation import shown
+from .documentation import as_given, shown
 from .savings import Savings, savings
 from .typeset import Notation, typeset
 from .wrapped import wrapped
@@ -100,7 +100,10 @@ def _given(prepared: Prepared | Derived, console: Console) -> None:
             table.add_column(column, overflow="fold", no_wrap=column not in ("name", "description"))
         for v in rows:
             table.add_row(
-                Text(v.name), f"{v.start:.15g}", shown(v.unit) or "1", Text(v.description)
+                Text(v.name),
+                f"{v.start:.15g}",
+                f"{shown(v.unit) or '1'}{as_given(v)}",
+                Text(v.description),
             )
         console.print(table)
 
