@@ -7,6 +7,10 @@ import math
 import pytest
 from fmpy.fmi1 import FMICallException
 from instance import instance
+from sympy import cos, sin, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Friction, Input, Model, Nonholonomic, Parameter, build_fmu, multiplier
 
 pytestmark = pytest.mark.python_cases(4)
 
@@ -105,3 +109,74 @@ def test_a_mass_that_has_lost_its_digits_is_refused(fmu):
     text = refusal(fmu("BouncingBall"), {"m": 5e-324})
     assert "the mass of y is 5e-324" in text
     assert "at least 2.23e-308" in text
+
+
+def box() -> Model:
+    """1 kg on two feet, which together hold mu m g = 3.924 N; pushed at its centre."""
+    x, z, theta, F = dynamicsymbols("x z theta F")
+    m, G, mu, h, a, J = symbols("m g mu h a J", positive=True)
+    return Model(
+        name="Box",
+        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 + J * theta.diff() ** 2 / 2 - m * G * z,
+        coordinates={x: "m", z: "m", theta: "rad"},
+        forces={x: F},
+        inputs=[Input(F, "N", 2.0)],
+        constraints=[
+            Contact("left", z - h * cos(theta) - a * sin(theta)),
+            Contact("right", z - h * cos(theta) + a * sin(theta)),
+            Nonholonomic("rub", x.diff() + h * cos(theta) * theta.diff()),
+            Friction("grip", ["rub"], multiplier("left") + multiplier("right"), static=mu),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(G, g, "m/s^2"),
+            Parameter(mu, 0.4, "1"),
+            Parameter(h, 0.4, "m"),
+            Parameter(a, 0.3, "m"),
+            Parameter(J, 0.05, "kg.m^2"),
+        ],
+        start={z: 0.4},
+    )
+
+
+@pytest.mark.parametrize("method", ["auto", "rk4"])
+def test_what_rests_has_no_natural_time(method, tmp_path):
+    """Held by friction under F = 2 N + 10 N/s (t - 0.1 s) it takes one step, however long; it slides from
+    F = mu m g on, at t = 0.2924 s, with x' = 5 m/s^3 (t - 0.2924 s)^2."""
+    path = build_fmu(box(), tmp_path, target="native", check=False)
+    with instance(path) as one:
+        one.start({"solver.method": method} if method != "auto" else {})
+        one.step(0.1)
+        before = one.get("solver.steps")
+        one.set("F", 2.0)
+        one.fmu.setRealInputDerivatives([one.variables["F"].valueReference], [1], [10.0])
+        one.step(0.11)
+        if method == "auto":
+            assert one.get("solver.steps") - before == 1
+        assert one.get("sticks.grip")
+        assert one.get("lambda.rub") == pytest.approx(-3.1, abs=1e-12)
+        one.step(0.11)
+        assert one.get("slipping.grip.time") == pytest.approx(0.2924, abs=1e-13)
+        assert one.get("der(x)") == pytest.approx(5 * 0.0276**2, abs=1e-12)
+
+
+def test_headway_is_judged_by_the_motion_as_it_is(tmp_path):
+    """A mass that creeps at 1e-7 m/s has a natural time of 1e7 s; a spring k x^3 / L^2 on which it is then
+    pushed makes that 30 ms, and a second of it is no lack of headway: the energy of the push is kept."""
+    x, F = dynamicsymbols("x F")
+    m, k, L = symbols("m k L", positive=True)
+    model = Model(
+        name="Creeps",
+        lagrangian=m * x.diff() ** 2 / 2 - k * x**4 / L**2 / 4,
+        coordinates={x: "m"},
+        forces={x: F},
+        inputs=[Input(F, "N")],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1e3, "N/m"), Parameter(L, 1.0, "m")],
+        start={x.diff(): 1e-7},
+    )
+    with instance(build_fmu(model, tmp_path, target="native", check=False)) as one:
+        one.start({"solver.maximum_steps": 50}, tolerance=1e-10)
+        one.set("F", 1e3)
+        one.step(1.0)
+        assert one.get("solver.steps") > 100
+        assert one.get("energy.total") == pytest.approx(1e3 * one.get("x"), rel=1e-7)

@@ -129,8 +129,9 @@ def complete(at: Instant, settings: Settings, state: State, span: float) -> Stat
     rate = state.rate
     if rate == 0:
         pull = np.abs(now.vdot)
-        resting = not v.any() and bool((pull <= LOST * back).all())
-        rate = max(_rate(system, known, np.abs(v), back if resting else pull, found), natural)
+        if not v.any() and bool((pull <= LOST * np.maximum(felt, back)).all()):  # it rests
+            pull = np.where(back > LOST / DISPLACED * felt, back, 0.0)
+        rate = max(_rate(system, known, np.abs(v), pull, found), natural)
     rate = rate or _rate(system, size, np.abs(v), felt, found) or (1 / span if span > 0 else 0.0)
     floor = max(1e-8, 10 * EPS / settings.tolerance)
     speed_scale = floor * size * np.where(own > 0, own, rate)

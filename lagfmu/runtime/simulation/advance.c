@@ -245,13 +245,14 @@ static Status check_headway(Solver *s, double t_end, double begun, int first) {
     const Integrator *i = &s->integrator;
     const double t = now->event_count > 0 ? now->event_time : i->t;
     const double done = now->steps - first, gone = t - begun, most = s->settings.maximum_steps;
-    if ((t - i->t_old) * now->rate < HEADWAY) now->tiny += 1;
+    const double h = t - i->t_old, pace = h * now->rate < HEADWAY ? magnitudes_pace(s) : now->rate;
+    if (h * pace < HEADWAY) now->tiny += 1;
     if (most > 0 && now->tiny > most)
         return fail(&s->why,
                     "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
                     "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
                     "motion's natural time: is there a force that jumps to and fro?",
-                    t_end, t, most, HEADWAY / now->rate, HEADWAY);
+                    t_end, t, most, HEADWAY / pace, HEADWAY);
     if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone)
         return fail(&s->why,
                     "the communication step to t = %.17g s would need about %.0e internal "
@@ -318,7 +319,7 @@ Status solver_advance(Solver *s, double t_end) {
         int met;
         if (travel(s, t_end, begun, first, &met) != OK) return FAILED;
         if (!met) continue;
-        if (events == 0 || now->t - since >= AT_ONCE / now->rate) {
+        if (events == 0 || now->t - since >= AT_ONCE / magnitudes_pace(s)) {
             since = now->t;
             events = 0;
         }

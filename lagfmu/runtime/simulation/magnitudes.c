@@ -129,10 +129,20 @@ static void find_felt(const Mechanism *b, double *felt) {
 }
 
 /* |v| / size and sqrt(pull / size) of one coordinate, the larger; an angle's speed by 1 rad. */
-static double rate_of(const Solver *s, int j, double pull) {
+static double rate_of(const Solver *s, int j, double v, double pull) {
     const double size = s->state.size[j];
     const double unit = s->system->dimension[j] == s->system->angles ? 1 : size;
-    return size > 0 ? larger(fabs(s->state.v[j]) / unit, sqrt(fabs(pull) / size)) : 0;
+    return size > 0 ? larger(fabs(v) / unit, sqrt(fabs(pull) / size)) : 0;
+}
+
+double magnitudes_pace(const Solver *s) {
+    const Integrator *i = &s->integrator;
+    const int n = s->system->n;
+    const double *v = i->y + n, *before = i->y_old + n;
+    double pace = s->state.now.rate;
+    for (int j = 0; j < n; j++)
+        pace = larger(pace, rate_of(s, j, v[j], (v[j] - before[j]) / (i->t - i->t_old)));
+    return pace;
 }
 
 /* The largest magnitude of x (n) among the coordinates of the dimension of j. */
@@ -165,7 +175,7 @@ void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *s
 static double slowest_rate(const Solver *s) {
     double slowest = 0;
     for (int j = 0; j < s->system->n; j++) {
-        const double rate = rate_of(s, j, 0);
+        const double rate = rate_of(s, j, s->state.v[j], 0);
         if (rate > 0 && !(slowest > 0 && slowest <= rate)) slowest = rate;
     }
     return slowest;
@@ -180,7 +190,7 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
     magnitudes_extents(system, s->p, least);
     for (int j = 0; j < system->n; j++)
         if (least[j] > 0 || system->dimension[j] == system->angles)
-            steady = larger(steady, rate_of(s, j, felt[j]));
+            steady = larger(steady, rate_of(s, j, s->state.v[j], felt[j]));
     for (int j = 0; j < system->n; j++) {
         own[j] = 0;
         if (s->state.size[j] > 0) continue;
@@ -226,19 +236,22 @@ static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
 }
 
 /* 1 if nothing moves and the accelerations are what rounding leaves of forces that cancel. */
-static int is_resting(const Solver *s, const double *back) {
+static int is_resting(const Solver *s, const double *felt, const double *back) {
     for (int j = 0; j < s->system->n; j++)
-        if (s->state.v[j] != 0 || !(fabs(s->stepped.vdot[j]) <= LOST * back[j])) return 0;
+        if (s->state.v[j] != 0 || !(fabs(s->stepped.vdot[j]) <= LOST * larger(felt[j], back[j])))
+            return 0;
     return 1;
 }
 
+/* What comes back is more than the rounding of a displacement; what nothing brings back is held fast. */
 static double find_rate(const Solver *s, double span, const double *felt, const double *back,
                         double natural) {
-    const double *pull = is_resting(s, back) ? back : s->stepped.vdot;
+    const int resting = is_resting(s, felt, back);
     double rate = natural, forced = 0;
     for (int j = 0; j < s->system->n; j++) {
-        rate = larger(rate, rate_of(s, j, pull[j]));
-        forced = larger(forced, rate_of(s, j, felt[j]));
+        const double returns = back[j] > LOST / DISPLACED * felt[j] ? back[j] : 0;
+        rate = larger(rate, rate_of(s, j, s->state.v[j], resting ? returns : s->stepped.vdot[j]));
+        forced = larger(forced, rate_of(s, j, s->state.v[j], felt[j]));
     }
     if (!(rate > 0)) rate = forced;
     return rate > 0 ? rate : span > 0 ? 1 / span : 0;

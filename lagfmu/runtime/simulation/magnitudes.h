@@ -29,4 +29,8 @@ int magnitudes_incomplete(const Solver *s);
  * is not finite. */
 Status magnitudes_complete(Solver *s, Instant at, double span);
 
+/* The motion's rate [1/s] in the step just taken, which inputs may have made another one than at the start;
+ * never less than that. */
+double magnitudes_pace(const Solver *s);
+
 #endif
