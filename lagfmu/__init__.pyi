@@ -18,7 +18,7 @@ from .model.model import (
     Output,
     Parameter,
 )
-from .model.picture import Arrow, Disk, Ground, Line, Path, Rod, Spring
+from .model.picture import Arrow, Disk, Ground, Line, Rod, Spring, Track
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
@@ -45,12 +45,12 @@ __all__ = [
     "Nonholonomic",
     "Output",
     "Parameter",
-    "Path",
     "Result",
     "Rod",
     "Scene",
     "Spline",
     "Spring",
+    "Track",
     "Verification",
     "VerificationError",
     "build_fmu",

@@ -34,7 +34,11 @@ MENU = (
     Method("radau5", 4, "stiff", evaluations=20),
     Method("rattle", 5, "fixed step", fixed_step=True, native_only=True, evaluations=21),
 )
-GONE = {"dopri5": "dop853"}  # method that was offered once -> the one to take instead
+INSTEAD = {  # SciPy's names, and a method that was offered once -> the one to take
+    **dict.fromkeys(("dopri5", "RK23", "RK45", "DOP853"), "dop853"),
+    **dict.fromkeys(("Radau", "BDF"), "radau5"),
+    "LSODA": "auto",
+}
 METHODS = tuple(m.name for m in MENU)
 NUMBERS = {m.name: m.number for m in MENU}
 IN_PYTHON = tuple(m.name for m in MENU if not m.native_only)
@@ -58,6 +62,6 @@ def described(methods: Collection[str]) -> str:
 
 def unknown(method: object, offered: Collection[str] = METHODS) -> str:
     """What to say of a method that is none of those `offered`."""
-    if method in GONE:
-        return f"{method} is gone: take {GONE[str(method)]}"
-    return f"method {method!r} is unknown, expected one of {', '.join(offered)}"
+    text = f"method {method!r} is unknown, expected one of {', '.join(offered)}"
+    instead = INSTEAD.get(str(method))
+    return text if instead is None or instead not in offered else f"{text}: take {instead}"

@@ -16,8 +16,8 @@ from lagfmu import (
     Ground,
     Model,
     Parameter,
-    Path,
     Scene,
+    Track,
     departure,
     initial,
     output,
@@ -46,7 +46,7 @@ model = Model(
     descriptions={r: "distance from the centre", theta: "angle from the vertical"},
     picture=[
         Ground((-2 * a, 0), (2 * a, 0)),
-        Path((a * sin(turn), a * cos(turn)), turn, -pi / 2, pi / 2),
+        Track((a * sin(turn), a * cos(turn)), turn, -pi / 2, pi / 2),
         Disk((r * sin(theta), r * cos(theta)), trace=True),
         Arrow("surface", at=(r * sin(theta), r * cos(theta))),
     ],

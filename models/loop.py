@@ -17,8 +17,8 @@ from lagfmu import (
     Disk,
     Model,
     Parameter,
-    Path,
     Scene,
+    Track,
     departure,
     initial,
     output,
@@ -48,7 +48,7 @@ model = Model(
     description="Particle that runs up the inside of a vertical loop and falls off it",
     descriptions={x: "to the right of the centre", y: "above the centre"},
     picture=[
-        Path((a * sin(turn), a * cos(turn)), turn, 0, 2 * pi),
+        Track((a * sin(turn), a * cos(turn)), turn, 0, 2 * pi),
         Disk((x, y), trace=True),
         Arrow("loop", at=(x, y)),
     ],

@@ -26,9 +26,9 @@ from lagfmu import (
     Rod,
     Scene,
     Spline,
+    Track,
     output,
 )
-from lagfmu import Path as Curve
 from lagfmu.cli import film
 from lagfmu.errors import BuildError, ModelError
 from lagfmu.live.playable import playable as playable_of
@@ -148,7 +148,7 @@ def test_fixed_numbers_are_put_in_and_what_is_not_reported_is_left_out() -> None
 def test_a_picture_may_show_what_the_fmu_reports() -> None:
     """output(name) stands for a variable of the FMU; a curve runs over a symbol of its own."""
     s = sp.symbols("s")
-    shapes = [Curve((s, s**2), s, -1, output("energy.total")), Rod((0, 0), (output("tension"), 0))]
+    shapes = [Track((s, s**2), s, -1, output("energy.total")), Rod((0, 0), (output("tension"), 0))]
     picture = picture_of(prepare(pendulum(picture=shapes), Scene("P")))
     assert picture is not None
     assert picture["shapes"][0]["range"] == [-1.0, "energy.total"]

@@ -533,3 +533,13 @@ def test_reals_alone_tell_the_same(tmp_path, fmu, target):
     assert reals["contact.surface"][[0, -1]].tolist() == [1.0, 0.0]
     assert reals["departure.surface.count"][-1] == 1.0
     assert verify(path).passed
+
+
+@pytest.mark.parametrize(
+    ("given", "instead"),
+    [("RK45", "dop853"), ("DOP853", "dop853"), ("Radau", "radau5"), ("LSODA", "auto")],
+)
+def test_scipys_names_of_methods_lead_to_ours(given: str, instead: str) -> None:
+    """Whoever knows SciPy's integrators is told which of the menu does their work."""
+    with pytest.raises(ModelError, match=rf"method '{given}' is unknown.*: take {instead}"):
+        Scene("A", method=given)

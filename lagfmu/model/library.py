@@ -18,7 +18,7 @@ TEMPLATE = '''"""A bead on a parabola z = k x^2.  Change it into your own system
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Arrow, Conserved, Disk, Holonomic, Model, Parameter, Path, Scene, output
+from lagfmu import Arrow, Conserved, Disk, Holonomic, Model, Parameter, Scene, Track, output
 
 x, z = dynamicsymbols("x z")  # coordinates; x.diff() is a velocity
 m, g, k = symbols("m g k", positive=True)  # parameters
@@ -44,7 +44,7 @@ model = Model(
     start={{x: 0.5, z: 0.5}},  # coordinates and velocities; what is left out is 0, or follows from them
     # How it looks [m], to the right and up; others: Line, Rod, Spring, Ground (docs/live.md).
     picture=[
-        Path((s, k * s**2), s, -0.7, 0.7),
+        Track((s, k * s**2), s, -0.7, 0.7),
         Disk((x, z)),
         Arrow("wire", at=(x, z)),  # the force of this constraint
     ],

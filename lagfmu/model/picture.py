@@ -71,7 +71,7 @@ class Ground:
 
 
 @dataclass(frozen=True)
-class Path:
+class Track:
     """A curve: the point, for the symbol `over` from `first` to `last`."""
 
     point: Point
@@ -93,8 +93,8 @@ class Arrow:
     along: Point | None = None
 
 
-Shape = Line | Rod | Spring | Disk | Ground | Path | Arrow
-SHAPES = (Line, Rod, Spring, Disk, Ground, Path, Arrow)
+Shape = Line | Rod | Spring | Disk | Ground | Track | Arrow
+SHAPES = (Line, Rod, Spring, Disk, Ground, Track, Arrow)
 
 
 def points_of(shape: Shape) -> list[Point]:
@@ -105,7 +105,7 @@ def points_of(shape: Shape) -> list[Point]:
         return [shape.start, shape.end]
     if isinstance(shape, Disk):
         return [shape.center]
-    if isinstance(shape, Path):
+    if isinstance(shape, Track):
         return [shape.point]
     return [shape.at] if shape.along is None else [shape.at, shape.along]
 
@@ -175,7 +175,7 @@ def expressions_of(shape: Shape) -> Iterator[Expr]:
         yield from (sp.sympify(x) for x in (shape.radius, shape.angle) if x is not None)
     if isinstance(shape, Line) and shape.length is not None:
         yield sp.sympify(shape.length)
-    if isinstance(shape, Path):
+    if isinstance(shape, Track):
         yield from (sp.sympify(x) for x in (shape.first, shape.last))
 
 
@@ -185,7 +185,7 @@ def _unknown(model: ModelFields, shape: Shape) -> Iterator[str]:
     known: set[Any] = {*model.coordinates, *extra, dynamicsymbols._t}
     known |= {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs}
     own = {o.name for o in model.outputs}
-    if isinstance(shape, Path):
+    if isinstance(shape, Track):
         known.add(shape.over)
     for expression in expressions_of(shape):
         for symbol in expression.free_symbols | expression.atoms(AppliedUndef):

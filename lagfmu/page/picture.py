@@ -20,7 +20,7 @@ from ..mechanics.equations import TIME
 from ..model.closed_form import in_variables
 from ..model.elements import Expr
 from ..model.model import Model, Nonholonomic
-from ..model.picture import Arrow, Disk, Ground, Line, Path, Point, Rod, Shape, Spring, points_of
+from ..model.picture import Arrow, Disk, Ground, Line, Point, Rod, Shape, Spring, Track, points_of
 from ..model.reactions import multiplier
 from ..model.spline import SplineBase
 from ..prepare.prepare import Prepared
@@ -107,7 +107,7 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
     if isinstance(shape, Spring):
         ends = [point(shape.start), point(shape.end)]
         return {"kind": "spring", "points": ends, "coils": int(shape.coils)}
-    if isinstance(shape, Path):
+    if isinstance(shape, Track):
         reach = [expression(shape.first), expression(shape.last)]
         return {
             "kind": "path",
