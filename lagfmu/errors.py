@@ -11,6 +11,14 @@ class LagfmuError(Exception):
     """Base of every error that lagfmu raises on purpose."""
 
 
+class UsageError(LagfmuError):
+    """A request that cannot be meant: an option, a name or a value."""
+
+
+class UserInterruptError(LagfmuError):
+    """Work that was ended by Ctrl-C; the message says what is kept of it."""
+
+
 class ModelError(LagfmuError):
     """A model that cannot be accepted; `problems` lists everything that is wrong with it at once."""
 
@@ -20,6 +28,10 @@ class ModelError(LagfmuError):
         lines = "\n".join(f"  - {problem}" for problem in self.problems)
         count = "1 problem" if len(self.problems) == 1 else f"{len(self.problems)} problems"
         super().__init__(f"model {name!r} has {count}:\n{lines}")
+
+
+class RequestError(UsageError, ModelError):
+    """Something asked of a model that it does not have: an output, a method, an argument of its family."""
 
 
 class CannotStartError(ModelError):
@@ -74,5 +86,5 @@ class SimulationError(LagfmuError):
     """A simulation that cannot go on; the message names the physical or numerical cause."""
 
 
-class SettingError(SimulationError):
+class SettingError(UsageError, SimulationError):
     """A name that the FMU does not have, or a value that it does not take."""

@@ -710,7 +710,7 @@ def test_a_temporary_folder_that_cannot_be_written_is_told(tmp_path):
         text=True,
         check=False,
     )
-    assert done.returncode == 1
+    assert done.returncode == 3
     says(done.stderr, "No space left on device", "TMPDIR")
     assert "Traceback" not in done.stderr
 

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from lagfmu.cli.app import app
+from lagfmu.cli.app import COMMANDS, app
+from lagfmu.verification.pipeline import EXIT_CODES, NOT_RUN, WRONG_USAGE
 from lagfmu.verification.plot import panels
 
 REPOSITORY = Path(__file__).parent.parent
@@ -68,7 +69,7 @@ def test_build_takes_one_scene_and_may_skip_the_check(small, tmp_path):
     text = lagfmu("build", small, "-o", tmp_path, "--scene", "LinkMinimal", "--no-check")
     assert "pass" not in text
     assert [p.name for p in (tmp_path / "python").iterdir()] == ["LinkMinimal.fmu"]
-    text = lagfmu("build", small, "-o", tmp_path, "--scene", "Chain", code=1)
+    text = lagfmu("build", small, "-o", tmp_path, "--scene", "Chain", code=2)
     assert "no FMU is called 'Chain'; known: Link, LinkMinimal" in text
 
 
@@ -124,7 +125,7 @@ def test_show_prints_the_equations_of_a_model_that_cannot_start(tmp_path):
     the message says that the motion starts at 0."""
     file = tmp_path / "crane.py"
     file.write_text(CRANE)
-    text = lagfmu("show", file, code=1)
+    text = lagfmu("show", file, code=3)
     assert "m y\u0308 + m g = 2 y λ_rope" in text
     assert "no configuration was found that satisfies it" in text
     assert "the prescribed motion 'L' starts at 0 m" in text
@@ -135,7 +136,7 @@ def test_show_prints_the_equations_of_a_model_that_cannot_start(tmp_path):
 def test_show_takes_one_scene():
     """--scene PendulumAngle; an unknown one is named."""
     assert "PendulumAngle" in lagfmu("show", MODELS / "pendulum.py", "--scene", "PendulumAngle")
-    text = lagfmu("show", MODELS / "pendulum.py", "--scene", "Nothing", code=1)
+    text = lagfmu("show", MODELS / "pendulum.py", "--scene", "Nothing", code=2)
     assert "'Nothing'" in text
     assert "PendulumCartesian, PendulumAngle, PendulumNullspace" in text
 
@@ -199,7 +200,7 @@ def test_simulate_takes_a_model_file_too(small, tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
     with table.open() as file:
         assert float(list(csv.DictReader(file))[-1]["x"]) == pytest.approx(-9.81 * 0.01 / 2)
-    text = lagfmu("simulate", small, "--scene", "Chain", code=1)
+    text = lagfmu("simulate", small, "--scene", "Chain", code=2)
     assert "'Chain'" in text
     assert "Link, LinkMinimal" in text
 
@@ -207,26 +208,60 @@ def test_simulate_takes_a_model_file_too(small, tmp_path):
 def test_figures_that_cannot_be_made_are_one_message(small, tmp_path):
     """An unknown variable, an unknown format, a place that cannot be written."""
     (tmp_path / "file").write_text("")
-    for options, parts in (
-        (("--plot", tmp_path / "a.svg", "-v", "lambda.rod"), ("lambda.rod", "lambda.link")),
-        (("--plot", tmp_path / "a.doc"), ("a.doc",)),
-        (("--plot", tmp_path / "file" / "a.svg"), ("a.svg",)),
-        (("--csv", tmp_path / "file" / "a.csv"), ("a.csv",)),
+    for code, options, parts in (
+        (2, ("--plot", tmp_path / "a.svg", "-v", "lambda.rod"), ("lambda.rod", "lambda.link")),
+        (2, ("--plot", tmp_path / "a.doc"), ("a.doc",)),
+        (3, ("--plot", tmp_path / "file" / "a.svg"), ("a.svg",)),
+        (3, ("--csv", tmp_path / "file" / "a.csv"), ("a.csv",)),
     ):
-        text = lagfmu("simulate", small, *options, code=1)
+        text = lagfmu("simulate", small, *options, code=code)
         assert "error:" in text
         for part in parts:
             assert part in text
 
 
-@pytest.mark.parametrize("command", ["build", "show", "verify", "simulate"])
-def test_files_that_are_no_good_are_one_message(command, tmp_path):
-    """Missing, or with nothing in it; never a traceback."""
-    none = lagfmu(command, tmp_path / "none.py", code=3 if command == "verify" else 1)
-    assert "no such file" in none
+VARIED = ("--vary", "m=1,2")
+MEANT_WRONG = {  # each command with what cannot be meant
+    "build": ("MODEL", "--outputs", "nothing"),
+    "new": ("bead.py", "--from", "nothing"),
+    "show": ("MODEL", "--method", "nothing"),
+    "verify": ("MODEL", "--rtol", "much"),
+    "reference": ("FMU", "--step-size", "0"),
+    "simulate": ("MODEL", "-v", "nothing"),
+    "page": ("MODEL", "-p", "n=1"),
+    "tradeoff": ("MODEL", "--method", "nothing"),
+    "stress": ("MODEL", "--scene", "Nothing"),
+    "sweep": ("MODEL", "--vary", "nothing=1,2"),
+}
+CANNOT_BE_READ = {  # and with a file that is not there, or is none
+    name: (("below/a/file",) if name == "new" else ("FILE", *(VARIED if name == "sweep" else ())))
+    for name in MEANT_WRONG
+}
+
+
+@pytest.mark.parametrize("command", [c.__name__ for c in COMMANDS])
+def test_every_command_ends_by_one_table(command, small, python_fmu, tmp_path, monkeypatch):
+    """What cannot be meant ends with 2, what cannot be read or written with 3; one message, no traceback."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "below").write_text("")
+    known = {"MODEL": str(small), "FMU": str(python_fmu("Hemisphere"))}
+    arguments = [known.get(a, a) for a in MEANT_WRONG[command]]
+    assert "error:" in lagfmu(command, *arguments, code=WRONG_USAGE)
     (tmp_path / "empty.py").write_text("")
-    text = lagfmu(command, tmp_path / "empty.py", code=3 if command == "verify" else 1)
-    assert "empty.py" in text
+    for file in ("none.py", "empty.py", "none.fmu", "below"):
+        arguments = [file if a == "FILE" else a for a in CANNOT_BE_READ[command]]
+        text = lagfmu(command, *arguments, code=NOT_RUN)
+        assert "error:" in text
+        assert file in text or command == "new"
+
+
+def test_the_exit_codes_stand_in_the_docs_and_in_the_help():
+    """docs/verification.md and `lagfmu --help` say of each code what the program means by it."""
+    page = (REPOSITORY / "docs" / "verification.md").read_text(encoding="utf-8")
+    told = dict(re.findall(r"^\| (\d+) \| (.+) \|$", page, re.MULTILINE))
+    assert told == {str(code): text for code, text in EXIT_CODES.items()}
+    text = lagfmu("--help")
+    assert all(f"{code} {meaning}" in text for code, meaning in EXIT_CODES.items())
 
 
 def test_warnings_are_one_line_each(tmp_path):
@@ -247,7 +282,7 @@ def test_a_failed_build_says_what_is_wrong_and_leaves_no_folder(tmp_path):
     file.write_text(
         SMALL.replace("WRONG", "1").replace('"m/s^2"', '"m/s"').replace("1.0, ", "-1, ")
     )
-    text = lagfmu("build", file, "--out", tmp_path / "dist", code=1)
+    text = lagfmu("build", file, "--out", tmp_path / "dist", code=3)
     assert "declared positive" in text
     assert not (tmp_path / "dist").exists()
 
@@ -265,14 +300,18 @@ def test_the_version_is_that_of_the_package():
     assert lagfmu("--version") == f"lagfmu {importlib.metadata.version('lagfmu')}"
 
 
-def test_the_version_is_told_without_waiting():
-    """Neither SymPy nor SciPy is imported for a number that a script asks for."""
+@pytest.mark.parametrize("words", [["--version"], ["--help"], ["sweep", "--help"]])
+def test_help_and_version_are_told_without_waiting(words):
+    """Nothing that calculates is imported for what can be said without it."""
     code = (
-        "import sys\nfrom lagfmu.cli import main\nsys.argv = ['lagfmu', '--version']\nmain()\n"
-        "assert not {'sympy', 'scipy', 'pint'} & sys.modules.keys()\n"
+        f"import sys\nfrom lagfmu.cli import main\nsys.argv = {['lagfmu', *words]!r}\n"
+        "try: main()\nexcept SystemExit as end: assert end.code == 0\n"
+        "heavy = {'sympy', 'numpy', 'scipy', 'pint', 'fmpy', 'matplotlib', 'xarray'}\n"
+        "assert not heavy & sys.modules.keys(), heavy & sys.modules.keys()\n"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout == f"lagfmu {importlib.metadata.version('lagfmu')}\n"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout
 
 
 @pytest.mark.parametrize("interrupted", ["lagfmu.cli.app", "lagfmu.prepare.prepare"])
@@ -301,7 +340,7 @@ def test_types_are_told_to_users_type_checkers():
 def test_a_folder_is_no_model_file(tmp_path):
     """`lagfmu build .` names the Python files that stand in the folder."""
     (tmp_path / "bead.py").write_text("")
-    text = lagfmu("build", tmp_path, code=1)
+    text = lagfmu("build", tmp_path, code=3)
     assert "this is a folder, expected a Python file" in text
     assert "bead.py" in text
 
@@ -324,7 +363,7 @@ def test_a_narrowed_scene_never_replaces_the_full_fmu(small, tmp_path):
     narrow = ("build", small, "-o", out, "--no-check", "--scene", "Link", "--outputs", "x")
     lagfmu("build", small, "-o", out, "--no-check", "--scene", "Link")
     full = (out / "python" / "Link.fmu").read_bytes()
-    text = lagfmu(*narrow, code=1)
+    text = lagfmu(*narrow, code=2)
     assert "Link.fmu is there and shows more than this scene" in text
     assert "--name" in text
     assert (out / "python" / "Link.fmu").read_bytes() == full
@@ -340,7 +379,7 @@ def test_simulate_prints_what_is_asked_for_inputs_too():
     text = lagfmu("simulate", cart, *short, "-v", "F", "-v", "s")
     assert "F 2.5 N" in text
     assert "lambda.rod" not in text
-    text = lagfmu("simulate", cart, *short, "-v", "lambda.rode", code=1)
+    text = lagfmu("simulate", cart, *short, "-v", "lambda.rode", code=2)
     assert "did you mean 'lambda.rod'?" in text
 
 

@@ -81,7 +81,7 @@ def test_what_cannot_be_filmed_is_told(
     monkeypatch.setattr(film.shutil, "which", lambda name: None)
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
     told = animate(fmu, tmp_path / "film.mp4")
-    assert told.exit_code == 1
+    assert told.exit_code == 3
     assert "lagfmu[video]" in told.stderr
     plain = tmp_path / "plain.py"
     text = (Path(__file__).parent.parent / "models" / "bouncing_ball.py").read_text(

@@ -355,10 +355,10 @@ def test_the_command_builds_and_verifies_a_native_fmu(tmp_path):
     assert run.exit_code == 0, run.output
     assert (tmp_path / "native" / "PendulumAngle.fmu").exists()
     wrong = CliRunner().invoke(app, [*arguments, "--platforms", "host", "--out", str(tmp_path)])
-    assert wrong.exit_code == 1
+    assert wrong.exit_code == 2
     assert "--target native" in wrong.output
     unknown = CliRunner().invoke(app, [*arguments, *native[:2], "--platforms", "amiga"])
-    assert unknown.exit_code == 1
+    assert unknown.exit_code == 2
     assert "'amiga' is unknown" in unknown.output
 
 

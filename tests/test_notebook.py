@@ -118,7 +118,7 @@ def test_a_new_model_builds_as_it_is(tmp_path, monkeypatch, words):
     assert done.exit_code == 0, done.output
     assert lagfmu.verify("bead.py").passed
     again = CliRunner().invoke(app, ["new", *words])
-    assert again.exit_code == 1
+    assert again.exit_code == 2
     assert "is there already" in again.output
 
 
@@ -126,5 +126,5 @@ def test_the_models_come_with_the_package():
     """All of them; a name that is none is told with those that are."""
     assert known() == sorted(p.stem for p in MODELS.glob("*.py"))
     done = CliRunner().invoke(app, ["new", "x.py", "--from", "hemispher"])
-    assert done.exit_code == 1
+    assert done.exit_code == 2
     assert "hemisphere" in done.output

@@ -71,7 +71,7 @@ def test_a_python_fmu_has_no_sources_to_compile(
     """The message says what to do."""
     fmu = str(python_fmu("Hemisphere"))
     result = CliRunner().invoke(app, ["page", fmu, "--out", str(tmp_path / "p.html")])
-    assert result.exit_code == 1
+    assert result.exit_code == 3
     assert "--target native" in result.stderr
     assert not (tmp_path / "p.html").exists()
 
@@ -90,7 +90,7 @@ def test_a_page_shows_what_is_asked_for(native_fmu: Callable[[str], Path], tmp_p
     assert "energy.total" not in columns
     fmu = str(native_fmu("Hemisphere"))
     result = CliRunner().invoke(app, ["page", fmu, *words, "--out", str(out)])
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "--outputs and --add-output" in result.stderr
 
 
@@ -104,7 +104,7 @@ def test_a_start_off_the_constraints_gets_no_page(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     result = CliRunner().invoke(app, ["page", str(file), "--out", str(out)])
-    assert result.exit_code == 1
+    assert result.exit_code == 3
     assert "misses the constraints ('rod' by 1.85 m²)" in result.stderr
     assert not out.exists()
 
@@ -116,7 +116,7 @@ def test_without_zig_the_message_says_what_to_do(
     monkeypatch.setattr("lagfmu.live.wasm.find_compiler", lambda: None)
     fmu = str(native_fmu("Hemisphere"))
     result = CliRunner().invoke(app, ["page", fmu, "--out", str(tmp_path / "p.html")])
-    assert result.exit_code == 1
+    assert result.exit_code == 3
     assert "pip install lagfmu[native]" in result.stderr
 
 

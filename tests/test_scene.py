@@ -488,7 +488,7 @@ def test_one_name_for_several_fmus_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(
         app, ["build", str(MODELS / "pendulum.py"), "--name", "P", "--out", str(tmp_path)]
     )
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "choose one of them with --scene" in " ".join(result.output.split())
 
 

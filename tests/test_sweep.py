@@ -210,7 +210,7 @@ def test_ctrl_c_says_where_the_rest_is_and_how_to_go_on(hemisphere, tmp_path):
         time.sleep(0.02)
     client.send_signal(signal.SIGINT)
     said = " ".join(client.communicate(timeout=60)[0].split())
-    assert client.returncode == 1
+    assert client.returncode == 130
     assert "interrupted: what is finished is in" in said
     assert "go on with the same command and --resume" in said
     done = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=300)

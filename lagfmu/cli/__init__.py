@@ -3,12 +3,11 @@
 import sys
 
 from ..fmu.archive import version
-
-INTERRUPTED = 130  # the exit status that shells know for Ctrl-C
+from ..verification.pipeline import INTERRUPTED
 
 
 def main() -> None:
-    """The `lagfmu` command, also as `python -m lagfmu`.  Asked for its version it waits for no SymPy."""
+    """The `lagfmu` command, also as `python -m lagfmu`."""
     if sys.argv[1:] == ["--version"]:
         say_version()
         return
@@ -16,7 +15,7 @@ def main() -> None:
         from .app import app
 
         app()
-    except KeyboardInterrupt:  # while SymPy is still being loaded; later the command ends likewise
+    except KeyboardInterrupt:  # while it is still being loaded; later the command ends likewise
         sys.exit(INTERRUPTED)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BuildError
+from ..errors import BuildError, UsageError
 from ..fmu.described import Trajectory
 from ..fmu.write import write_whole
 from ..live.playable import Told
@@ -32,11 +32,11 @@ Array = NDArray[np.float64]
 def film(told: Told, run: Trajectory, given: Mapping[str, Any], out: Path, title: str) -> Path:
     """Write the film of a run, in its own time if it is no longer than 12 s, else faster.
 
-    Raises BuildError for another ending, a model without a picture, or without ffmpeg for .mp4.
+    Raises UsageError for another ending, BuildError without a picture, or for .mp4 without ffmpeg.
     """
     ending = out.suffix.lower()
     if ending not in ENDINGS:
-        raise BuildError(f"--animate {str(out)!r}: expected a file {', '.join(ENDINGS)}")
+        raise UsageError(f"--animate {str(out)!r}: expected a file {', '.join(ENDINGS)}")
     if told.picture is None:
         raise BuildError(
             f"{title} has no picture to animate: give the model picture=[Line(...), Disk(...), ...]"

@@ -1,20 +1,29 @@
-"""Options that several commands have: of a run, and what a scene needs, with the scene that they make."""
+"""Options that several commands have: of files, of a run, and what a scene needs."""
 
 from __future__ import annotations
 
+import enum
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from ..errors import LagfmuError
-from ..model.scene import Scene
+from ..errors import UsageError
+from ..names import METHOD
 
 Names = list[str] | None
+
+
+class Target(enum.StrEnum):
+    """What an FMU is made of."""
+
+    python = "python"
+    native = "native"
+
+
 OUTPUTS = (
     "Only these variables as outputs, e.g. lambda.surface,Q.* or 'der(x)'; all else is pruned."
 )
@@ -90,6 +99,14 @@ Name = Annotated[
     typer.Option(help="Another name for the FMU.", rich_help_panel="What the scene needs"),
 ]
 
+ModelPath = Annotated[Path, typer.Argument(help="A Python file that defines a Model.")]
+FmuPath = Annotated[Path, typer.Argument(help="An FMU built by lagfmu.")]
+Settings = Annotated[
+    Names,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter or start value; repeatable."),
+]
+JsonFile = Annotated[Path | None, typer.Option(help="Write everything as JSON.")]
+JunitFile = Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")]
 Tolerance = Annotated[
     float | None, typer.Option(help="Relative tolerance: speed against accuracy.")
 ]
@@ -147,32 +164,17 @@ def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     return with_options
 
 
-def narrowed(scenes: Sequence[Scene], needs: Needs) -> list[Scene]:
-    """The scenes with what was said on the command line; what was not said stays.
-
-    Raises LagfmuError if one name is given to several, and ModelError for a scene that cannot be.
-    """
-    name = needs.get("name")
-    if name is not None and len(scenes) > 1:
-        raise LagfmuError(
-            f"--name {name}: the file has {len(scenes)} FMUs, choose one of them with --scene: "
-            f"{', '.join(s.name for s in scenes)}"
-        )
-    said = {k: v for k, v in needs.items() if v is not None}
-    said |= {k: _split(said[k]) for k in LISTS if k in said}
-    return [replace(s, **said) for s in scenes]
-
-
-def _split(texts: Sequence[str]) -> tuple[str, ...]:
-    """NAME,NAME as names; a comma within parentheses belongs to the name, as in der(x,2)."""
-    found: list[str] = []
-    for text in texts:
-        depth, word = 0, ""
-        for letter in f"{text},":
-            depth += (letter == "(") - (letter == ")")
-            if letter == "," and depth <= 0:
-                found.append(word.strip())
-                word = ""
-            else:
-                word += letter
-    return tuple(w for w in found if w)
+def assignments(texts: Names) -> dict[str, Any]:
+    """NAME=VALUE texts as a dict of numbers; the value of solver.method stays text.  Raises UsageError."""
+    values: dict[str, Any] = {}
+    for text in texts or []:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not sign or not name:
+            raise UsageError(f"--set {text!r}: expected NAME=VALUE, e.g. --set theta=0.5")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            if name != METHOD:
+                raise UsageError(f"--set {text!r}: {value!r} is no number") from None
+            values[name] = value
+    return values

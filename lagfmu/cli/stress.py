@@ -20,7 +20,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from ..errors import BuildError, TemporaryFolderError
+from ..errors import BuildError, TemporaryFolderError, UsageError
 from ..fmu.write import write, write_whole
 from ..model.file import ModelFile
 from ..model.model import Model
@@ -32,11 +32,11 @@ from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import NO_ROOM, UNFINISHED, WRONG, Verdict
 from ..study.stress.report import MEANING, Stressed, data, report, summary, table
 from ..study.stress.summary import as_summary
-from ..verification.pipeline import Report, UsageError, text_of
+from ..verification.pipeline import Report, text_of
+from .commands.stress import LIMIT
 from .tradeoff import progress
 from .works import studied
 
-LIMIT = 60.0  # [s] for one probe
 START = 120.0  # [s] for the process to begin with the first one
 WIDTH = 110  # of tables that go into a file
 

@@ -14,8 +14,8 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from ..errors import LagfmuError, SettingError, TemporaryFolderError
-from ..verification.pipeline import WRONG_USAGE, UsageError
+from ..errors import LagfmuError, TemporaryFolderError, UserInterruptError
+from ..verification.pipeline import code_of
 
 console = Console(emoji=False)  # "0.2:x:3" is what the user wrote
 errors = Console(stderr=True, emoji=False)
@@ -60,23 +60,25 @@ def prepare_streams() -> None:
             reconfigure(errors="lagfmu.spelled")
 
 
+def say_error(text: str) -> None:
+    """One message on stderr."""
+    errors.print(f"[bold red]error:[/] {escape(text)}", highlight=False, soft_wrap=True)
+
+
 @contextlib.contextmanager
 def plainly() -> Iterator[None]:
-    """Warnings and errors as one message each; exit status 1 after an error, 2 after wrong usage."""
+    """Warnings and errors as one message each; an error ends the command with its exit code."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             yield
-        except LagfmuError as error:
-            errors.print(
-                f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
-            )
-            misused = isinstance(error, (UsageError, SettingError))
-            raise typer.Exit(WRONG_USAGE if misused else 1) from None
-        except OSError as error:
-            text = escape(str(TemporaryFolderError(error)))
-            errors.print(f"[bold red]error:[/] {text}", highlight=False, soft_wrap=True)
-            raise typer.Exit(1) from None
+        except (LagfmuError, OSError) as raised:
+            error = raised if isinstance(raised, LagfmuError) else TemporaryFolderError(raised)
+            if isinstance(error, UserInterruptError):
+                errors.print(escape(str(error)), highlight=False, soft_wrap=True)
+            else:
+                say_error(str(error))
+            raise typer.Exit(code_of(error)) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
                 errors.print(

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
+from ..errors import UsageError
 from ..fmu.compiler import find_compiler
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
@@ -27,7 +28,7 @@ from ..study.tradeoff.figure import draw
 from ..study.tradeoff.importer import Importer
 from ..study.tradeoff.measure import Plan, Tick, Tradeoff, default_plan, measure, quick_plan
 from ..study.tradeoff.report import as_csv, data, digits, remarks, report, summary, table
-from ..verification.pipeline import Report, UsageError, text_of
+from ..verification.pipeline import Report, text_of
 from .works import studied
 
 

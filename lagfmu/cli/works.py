@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from ..errors import LagfmuError
+from ..errors import LagfmuError, UsageError
 from ..model.file import ModelFile, load
 from ..model.scene import Scene
-from ..verification.pipeline import Report, UsageError
+from ..verification.pipeline import Report, refused
 
 Make = Callable[[], Path]
 
@@ -30,7 +30,7 @@ def studied(
             try:
                 done.append(study(name, make()))
             except LagfmuError as error:
-                done.append(Report(name, error=str(error)))
+                done.append(refused(name, error))
     if not done:
         raise UsageError(f"no FMU is called {', '.join(scenes) or 'anything'}")
     return done

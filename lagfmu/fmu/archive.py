@@ -10,8 +10,6 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-import fmpy
-
 from ..errors import TemporaryFolderError
 
 
@@ -38,6 +36,8 @@ def pack(contents: Mapping[str, bytes]) -> bytes:
 
 def unpack(fmu: Path) -> str:
     """A temporary folder with the files of an FMU, which the caller removes.  Raises TemporaryFolderError."""
+    import fmpy
+
     folder = ""
     try:
         folder = tempfile.mkdtemp(prefix="lagfmu_")

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from ..errors import BuildError, TemporaryFolderError
+from ..errors import BuildError, TemporaryFolderError, UsageError
 
 HOST, ALL = "host", "all"
 TIMEOUT = 600  # seconds for one call of the compiler
@@ -132,7 +132,7 @@ def host() -> Platform:
 
 
 def chosen(names: Iterable[str]) -> tuple[Platform, ...]:
-    """Platforms by name; `host` and `all` are names too.  Raises BuildError for unknown ones."""
+    """Platforms by name; `host` and `all` are names too.  Raises UsageError for unknown ones."""
     wanted: set[str] = set()
     for name in names:
         if name == ALL:
@@ -142,11 +142,11 @@ def chosen(names: Iterable[str]) -> tuple[Platform, ...]:
         elif name in NAMES:
             wanted.add(name)
         else:
-            raise BuildError(
+            raise UsageError(
                 f"platform {name!r} is unknown, expected {ALL}, {HOST} or some of {', '.join(NAMES)}"
             )
     if not wanted:
-        raise BuildError("no platform was chosen")
+        raise UsageError("no platform was chosen")
     return tuple(p for p in PLATFORMS if p.folder in wanted)
 
 

@@ -32,8 +32,10 @@ def experiment_of(
 ) -> Experiment:
     """The default experiment, with another stop time or communication step where they are given."""
     said = description.defaultExperiment
-    stop = stop_time or float(getattr(said, "stopTime", None) or 1.0)
-    step = step_size or float(getattr(said, "stepSize", None) or stop / 500)
+    stop = float(getattr(said, "stopTime", None) or 1.0) if stop_time is None else stop_time
+    step = step_size
+    if step is None:
+        step = float(getattr(said, "stepSize", None) or stop / 500)
     return Experiment(stop, step, float(getattr(said, "tolerance", None) or 1e-8))
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..errors import BuildError, SettingError
+from ..errors import BuildError, SettingError, UsageError
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import load
 from ..model.model import Model
@@ -46,7 +46,7 @@ def write(
     ModelError if one in the model's `start` moves by more than 1e-6 of its coordinate's size.
     """
     if target not in TARGETS:
-        raise BuildError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
+        raise UsageError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
     moved, missed = prepared.structure.start.moved, prepared.structure.missed
     check_given(prepared.model.name, moved, missed)
     tell(moved)

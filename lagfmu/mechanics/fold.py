@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from ..errors import ModelError, UnitError
+from ..errors import RequestError, UnitError
 from ..model.elements import Expr
 from ..model.model import Contact, Model, Parameter, name_of
 from ..model.scene import Scene
@@ -67,7 +67,7 @@ def _number(value: float) -> Expr:
 
 
 def folded(eom: EquationsOfMotion, numbers: Mapping[Expr, Expr]) -> EquationsOfMotion:
-    """The equations with the numbers put in.  Raises ModelError if they divide by zero."""
+    """The equations with the numbers put in.  Raises RequestError if they divide by zero."""
     if not numbers:
         return eom
 
@@ -81,7 +81,7 @@ def folded(eom: EquationsOfMotion, numbers: Mapping[Expr, Expr]) -> EquationsOfM
     flat = made.solved + [o.expression for o in made.outputs if o.otherwise is None]
     if any(e.has(sp.zoo, sp.oo, sp.nan) for e in flat):
         given = ", ".join(f"{s} = {float(n)!r}" for s, n in numbers.items())
-        raise ModelError(
+        raise RequestError(
             eom.model.name, [f"the equations divide by zero with the fixed values {given}"]
         )
     return made

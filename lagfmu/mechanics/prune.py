@@ -16,7 +16,7 @@ from typing import Any
 import sympy as sp
 
 from .. import names
-from ..errors import ModelError
+from ..errors import RequestError
 from ..model.elements import Expr
 from ..model.model import Constraint, Contact, Holonomic, Output
 from ..model.scene import Scene
@@ -50,7 +50,7 @@ def held(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> Equations
 def needed(form: Form, outputs: Collection[str]) -> tuple[Indices, Indices]:
     """Coordinates and constraint rows on which the outputs depend, by position.
 
-    Raises ModelError if there are none.
+    Raises RequestError if there are none.
     """
     eom, of = form.equations, subjects(form)
     coordinates: set[int] = set()
@@ -73,7 +73,7 @@ def needed(form: Form, outputs: Collection[str]) -> tuple[Indices, Indices]:
         }
         grown = (len(coordinates), len(rows)) != before
     if not coordinates:
-        raise ModelError(
+        raise RequestError(
             eom.model.name,
             ["the outputs of the scene depend on no coordinate: name one of the motion"],
         )

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any
 
+from ..errors import ModelError, RequestError
 from .model import Model
 
 FUNCTION = "family"
@@ -21,30 +22,29 @@ TRUE, FALSE = ("true", "yes", "1"), ("false", "no", "0")
 
 
 def made(
-    module: ModuleType, given: Sequence[str], raised: Callable[[BaseException], str]
-) -> tuple[dict[str, Any], list[str]]:
-    """What the module's family makes of NAME=VALUE texts, `model`, `scenes`, `closed_forms`; and problems.
+    file: str, module: ModuleType, given: Sequence[str], raised: Callable[[BaseException], str]
+) -> dict[str, Any]:
+    """What the family of a file's module makes of NAME=VALUE texts: `model`, `scenes`, `closed_forms`.
 
-    `raised` says in words what an exception of the function was.
+    `raised` says in words what an exception of the function was.  Raises RequestError for arguments that the
+    function does not take, ModelError for what it returns or raises.
     """
     function = getattr(module, FUNCTION, None)
     if not inspect.isfunction(function):
-        return {}, [
-            f"-p {' -p '.join(given)}: the file has no function '{FUNCTION}', expected {HINT}"
-        ]
+        missing = f"-p {' -p '.join(given)}: the file has no function '{FUNCTION}', expected {HINT}"
+        raise RequestError(file, [missing])
     arguments, problems = _arguments(inspect.signature(function), given)
     if problems:
-        return {}, problems
+        raise RequestError(file, problems)
     try:
         found = function(**arguments)
     except (Exception, SystemExit) as error:
-        return {}, [raised(error)]
+        raise ModelError(file, [raised(error)]) from error
     parts = found if isinstance(found, tuple) else (found,)
     if not 1 <= len(parts) <= 3 or not isinstance(parts[0], Model):
-        return {}, [
-            f"{FUNCTION}() returns {found!r}, expected a Model, or {HINT.split('return ')[1]}"
-        ]
-    return dict(zip(("model", "scenes", "closed_forms"), parts, strict=False)), []
+        expected = f"expected a Model, or {HINT.split('return ')[1]}"
+        raise ModelError(file, [f"{FUNCTION}() returns {found!r}, {expected}"])
+    return dict(zip(("model", "scenes", "closed_forms"), parts, strict=False))
 
 
 def _arguments(

@@ -61,9 +61,7 @@ def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFi
     if wrong:
         raise ModelError(str(file), wrong)
     if arguments:
-        found, problems = made(module, arguments, lambda error: _where(error, file.absolute()))
-        if problems:
-            raise ModelError(str(file), problems)
+        found = made(str(file), module, arguments, lambda error: _where(error, file.absolute()))
         return _taken(file, found["model"], found)
     models = {id(v): (k, v) for k, v in vars(module).items() if isinstance(v, Model)}
     if len(models) != 1:

@@ -18,7 +18,7 @@ from typing import Any
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
-from ..errors import ModelError
+from ..errors import RequestError
 from ..names import derivative
 from .elements import Expr, Input, Output, name_of
 from .model import Model
@@ -49,11 +49,11 @@ FUNCTIONS: dict[str, Any] = {
 
 
 def with_outputs(model: Model, texts: Sequence[str]) -> Model:
-    """The model with the outputs that the texts describe.  Raises ModelError with every problem."""
+    """The model with the outputs that the texts describe.  Raises RequestError with every problem."""
     problems: list[str] = []
     added = [_output(text, model, problems) for text in texts]
     if problems:
-        raise ModelError(model.name, problems)
+        raise RequestError(model.name, problems)
     own = (*model.outputs, *(o for o in added if o is not None))
     return replace(model, outputs=own) if texts else model
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from ..errors import BuildError
+from ..errors import UsageError
 
 MARGIN = 5.0  # the choice is this much better on the scene than what was asked
 HELD_OUT_MARGIN = 2.0  # and still this much on other start values and parameters
@@ -62,7 +62,7 @@ class Goal:
 
 
 def parse(text: str) -> Goal:
-    """'1e-6' or '1e-6:NAME,NAME'.  Raises BuildError if it is neither."""
+    """'1e-6' or '1e-6:NAME,NAME'.  Raises UsageError if it is neither."""
     number, colon, names = text.partition(":")
     wanted = tuple(n.strip() for n in names.split(",") if n.strip())
     try:
@@ -70,7 +70,7 @@ def parse(text: str) -> Goal:
     except ValueError:
         accuracy = float("nan")
     if not FINEST <= accuracy <= LOOSEST or (colon and not wanted):
-        raise BuildError(
+        raise UsageError(
             f"--accuracy {text!r}: expected a relative error from {FINEST:g} to {LOOSEST:g}, and after "
             "a colon the outputs that it is asked of, e.g. 1e-6 or 1e-6:lambda.surface,Q.*"
         )

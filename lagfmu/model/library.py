@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from ..errors import LagfmuError
+from ..errors import LagfmuError, UsageError
 
 TEMPLATE = '''"""A bead on a parabola z = k x^2.  Change it into your own system, then:
 
@@ -71,14 +71,14 @@ def known() -> list[str]:
 def new(path: Path, source: str | None = None) -> Path:
     """Write a model file to start from: the commented template, or a copy of the model `source`.
 
-    Raises LagfmuError if there is a file already, or no such model.
+    Raises UsageError if there is a file already, or no such model; LagfmuError if it cannot be written.
     """
     if path.suffix != ".py":
         path = path.with_name(f"{path.name}.py")
     if source is not None and source not in known():
-        raise LagfmuError(f"there is no model {source!r}, expected one of {', '.join(known())}")
+        raise UsageError(f"there is no model {source!r}, expected one of {', '.join(known())}")
     if path.exists():
-        raise LagfmuError(f"{str(path)!r} is there already: choose another name")
+        raise UsageError(f"{str(path)!r} is there already: choose another name")
     if source is not None:
         text = (folder() / f"{source}.py").read_text(encoding="utf-8")
     else:

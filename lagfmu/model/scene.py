@@ -10,7 +10,7 @@ import keyword
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..errors import ModelError
+from ..errors import RequestError
 from ..methods import METHODS, integrators, unknown
 from ..solver.state import DEFAULT_TOLERANCE, tolerance_problem
 from .elements import NAME, is_number
@@ -50,7 +50,7 @@ class Scene:
     `derivatives`: whether a native FMU offers directional derivatives; None: unless `outputs` are
     named.
 
-    Raises ModelError with every problem at once.
+    Raises RequestError with every problem at once.
     """
 
     name: str
@@ -105,7 +105,7 @@ class Scene:
             whole = self.complete and chosen == METHODS
             object.__setattr__(self, "methods", None if whole else chosen)
         if problems:
-            raise ModelError(self.name, problems)
+            raise RequestError(self.name, problems)
 
     def _listed(self, what: str) -> list[str]:
         """A list of names is kept as a tuple; a bare text would be taken letter by letter."""

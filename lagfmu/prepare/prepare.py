@@ -7,7 +7,7 @@ from typing import Any
 
 from .. import names
 from ..codegen.py.equations import compile_system, lower, source
-from ..errors import CannotStartError, DerivationError, ModelError
+from ..errors import CannotStartError, DerivationError, ModelError, RequestError
 from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import fold, prune
@@ -88,7 +88,8 @@ class Prepared:
 def prepare(
     model: Model, scene: Scene | None = None, derived: EquationsOfMotion | None = None
 ) -> Prepared:
-    """Derive, prune, reduce, lower and examine.  Raises ModelError or DerivationError.
+    """Derive, prune, reduce, lower and examine.  Raises ModelError (RequestError for what the
+    scene asks for and the model does not have) or DerivationError.
 
     `derived`: the equations of the model, where they are known from another scene.
     """
@@ -96,7 +97,7 @@ def prepare(
     problems: list[str] = []
     model = stuck(model, scene.frictions, problems)
     if problems:
-        raise ModelError(scene.name, problems)
+        raise RequestError(scene.name, problems)
     if derived is None or derived.model is not model:
         derived = with_jumps(derive(model))
     equations = prune.held(derived, scene, problems)
@@ -104,7 +105,7 @@ def prepare(
     laid = Laid()
     scene, form, outputs = _asked(equations, scene, problems, laid)
     if problems:
-        raise ModelError(scene.name, problems)
+        raise RequestError(scene.name, problems)
     if equations is not derived:
         may_open = {c.name for c in equations.constraints if isinstance(c, Contact)}
         every = Form(derived)

@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from ..errors import BuildError
+from ..errors import BuildError, UsageError
 
 STYLE: dict[str, Any] = {
     "svg.hashsalt": "lagfmu",
@@ -30,11 +30,14 @@ class Drawn(Figure):
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write it, the same bytes each time; the ending says the format.  Raises BuildError."""
+    """Write it, the same bytes each time; the ending says the format.  Raises BuildError; UsageError for
+    another ending."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         metadata = {"Date": None} if path.suffix == ".svg" else {}
         figure.savefig(path, metadata=metadata, dpi=150)
-    except (OSError, ValueError) as error:
+    except ValueError as error:
+        raise UsageError(f"cannot write the figure {str(path)!r}: {error}") from None
+    except OSError as error:
         raise BuildError(f"cannot write the figure {str(path)!r}: {error}") from None
     return path

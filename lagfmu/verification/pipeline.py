@@ -8,16 +8,26 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
+from ..errors import LagfmuError, UsageError, UserInterruptError
 
-from ..errors import LagfmuError
-
-HOLDS, FAILS, WRONG_USAGE, NOT_RUN = 0, 1, 2, 3  # exit codes
+HOLDS, FAILS, WRONG_USAGE, NOT_RUN, INTERRUPTED = 0, 1, 2, 3, 130
+EXIT_CODES = {  # of every command
+    HOLDS: "done; where something was judged, all of it holds",
+    FAILS: "a statement fails, or a probe is wrong",
+    WRONG_USAGE: "wrong usage: an option, a name that is not known, a value that is not taken, a table that "
+    "cannot be read",
+    NOT_RUN: "a file cannot be read or written, a model cannot be built, an FMU cannot be run; the others "
+    "were",
+    INTERRUPTED: "interrupted (Ctrl-C)",
+}
 VERDICTS = ("pass", "fail", "wrong usage", "not run")
 
 
-class UsageError(LagfmuError):
-    """A command that cannot be meant."""
+def code_of(error: LagfmuError) -> int:
+    """The exit code of a command that this error ends."""
+    if isinstance(error, UserInterruptError):
+        return INTERRUPTED
+    return WRONG_USAGE if isinstance(error, UsageError) else NOT_RUN
 
 
 @dataclass(frozen=True)
@@ -53,6 +63,11 @@ class Report:
         return FAILS if not known or any(c.failure for c in known) else HOLDS
 
 
+def refused(file: str, error: LagfmuError) -> Report:
+    """Of an FMU that could not be run, or of a file of which none could be made."""
+    return Report(file, error=str(error), misused=isinstance(error, UsageError))
+
+
 def exit_code(reports: Sequence[Report]) -> int:
     """The largest of all."""
     return max((r.code for r in reports), default=HOLDS)
@@ -83,6 +98,8 @@ def _plain(value: Any) -> Any:
 
 def as_junit(command: str, reports: Sequence[Report]) -> bytes:
     """JUnit's XML: of what nothing is known is skipped, an FMU that could not be run is an error."""
+    from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
+
     document = JUnitXml(command)
     for s in reports:
         suite = TestSuite(s.file)

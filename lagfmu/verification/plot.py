@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import names
-from ..errors import BuildError
+from ..errors import SettingError
 from ..fmu.described import Trajectory
 from ..model.units import for_reading
 
@@ -36,7 +36,7 @@ def plot(
 ) -> Path:
     """Write a figure (the ending of `out` says the format), one panel a unit.
 
-    Raises BuildError if a name is unknown or the file cannot be written.
+    Raises SettingError if a name is unknown or the file cannot be written.
     """
     from .figure import save
 
@@ -50,7 +50,7 @@ def plot(
 def figure_of(
     result: Trajectory, units: Mapping[str, str], names: Sequence[str] = (), title: str = ""
 ) -> Any:
-    """The same as a matplotlib Figure.  Raises BuildError if a name is unknown."""
+    """The same as a matplotlib Figure.  Raises SettingError if a name is unknown."""
     with panels(result, units, _chosen(result, names)) as (figure, _):
         if title:
             figure.suptitle(title, fontsize=12)
@@ -62,7 +62,7 @@ def _chosen(result: Trajectory, names: Sequence[str]) -> list[str]:
     chosen = list(names) or default_names(known)
     unknown = [n for n in chosen if n not in known]
     if unknown or not chosen:
-        raise BuildError(
+        raise SettingError(
             f"cannot plot {', '.join(unknown) or 'nothing'}: expected names among {', '.join(known)}"
         )
     return chosen

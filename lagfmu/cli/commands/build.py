@@ -1,0 +1,146 @@
+"""`lagfmu build`: the FMUs of a model file, verified."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from ...errors import UsageError, VerificationError
+from ...fmu.compiler import HOST, NAMES
+from ...verification.pipeline import FAILS
+from ..options import (
+    NARROWING,
+    OPTIONS,
+    AddOutput,
+    Arguments,
+    ModelPath,
+    Needs,
+    Target,
+    takes,
+)
+from ..terminal import console, plainly
+
+if TYPE_CHECKING:
+    from ...interface.variables import VariableTable
+
+
+@takes(*OPTIONS)
+def build(
+    model: ModelPath,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist"),
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
+    ] = None,
+    arguments: Arguments = None,
+    check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
+    reference: Annotated[
+        bool, typer.Option("--reference", help="Put reference results inside (FMI-LS-REF).")
+    ] = False,
+    target: Annotated[
+        Target, typer.Option(help="python: needs Python where it runs. native: compiled C.")
+    ] = Target.python,
+    platforms: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--platforms",
+            metavar="all|host|NAME...",
+            help=f"Where a native FMU can run: host, all, or some of {', '.join(NAMES)}; repeatable.",
+        ),
+    ] = None,
+    accuracy: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ERROR[:OUTPUT,...]",
+            help="Measure, and build with the cheapest solver settings and formulation that hold this "
+            "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
+        ),
+    ] = None,
+    page_: Annotated[
+        bool,
+        typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
+    ] = False,
+    *,
+    needs: Needs,
+    add_output: AddOutput = None,
+) -> None:
+    """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
+    from ...api import package
+    from ...model.goal import parse
+    from ...prepare.prepare import prepare
+    from ...study.tradeoff.page import section
+    from ..finish import print_verdicts
+    from ..scenes import chosen, loaded, narrowed
+    from ..tradeoff import chosen_for
+
+    failed = False
+    kind = target.value
+    places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
+    with plainly():
+        if platforms and target is Target.python:
+            raise UsageError(
+                "--platforms is for --target native: a python FMU has no binaries of ours"
+            )
+        file = loaded(model, add_output, arguments)
+        for s in narrowed(chosen(file, scene), {**needs, "accuracy": accuracy}):
+            choice = ""
+            if s.accuracy is not None:
+                measured = chosen_for(file, s, parse(s.accuracy), kind, console)
+                s, choice = measured.scene, section(measured)
+            with console.status(
+                f"building {'and verifying ' if check else ''}{s.name}{_first_time(target, places)}"
+            ):
+                prepared = prepare(file.model, s)
+                less = any(needs[n] is not None for n in NARROWING)
+                if less and needs["name"] is None:
+                    _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
+                built = package(
+                    prepared,
+                    out / kind,
+                    file.closed_forms,
+                    kind,
+                    places,
+                    choice,
+                    check,
+                    reference,
+                    page_,
+                )
+            path, found = built.path, built.verification
+            console.print(
+                f"[green]built[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
+                soft_wrap=True,
+            )
+            if found is not None:
+                print_verdicts(found)
+                failed |= not found.passed
+    if failed:
+        raise typer.Exit(FAILS)
+
+
+def _keep_the_full_one(path: Path, table: VariableTable) -> None:
+    """Refuse to replace an FMU by one of the same name that shows less."""
+    from ...fmu.described import read_description
+
+    if not path.is_file():
+        return
+    with contextlib.suppress(VerificationError):  # what is no FMU may be replaced
+        shown = {v.name for v in read_description(path).modelVariables}
+        lost = sorted(shown - {v.name for v in table.variables})
+        if lost:
+            more = f", and {len(lost) - 3} more" if len(lost) > 3 else ""
+            raise UsageError(
+                f"{path} is there and shows more than this scene ({', '.join(lost[:3])}{more}): give "
+                "this one a name of its own with --name, or another folder with --out"
+            )
+
+
+def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
+    """A word of patience where the runtime has to be compiled first."""
+    from ...fmu.native import takes_long
+
+    if target is Target.native and takes_long(platforms):
+        return " (the runtime is compiled first: for Windows the C library too, about a minute)"
+    return ""

@@ -1,0 +1,159 @@
+"""`lagfmu simulate`: one run; the last values, a table, a figure, a film."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from ...errors import SettingError, UsageError
+from ..options import (
+    AddOutput,
+    Arguments,
+    ErrorBars,
+    InputFile,
+    Settings,
+    StepSize,
+    StopTime,
+    Tolerance,
+    assignments,
+)
+from ..terminal import console, plainly
+
+if TYPE_CHECKING:
+    from ...verification.result import Result
+
+
+def simulate(
+    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    set_: Settings = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Tolerance = None,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    arguments: Arguments = None,
+    plot_: Annotated[
+        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
+    ] = None,
+    variable: Annotated[
+        list[str] | None,
+        typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
+    ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
+    animate: Annotated[
+        Path | None,
+        typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
+    ] = None,
+    inputs: InputFile = None,
+    error_bars: ErrorBars = None,
+    add_output: AddOutput = None,
+) -> None:
+    """Simulate an FMU or a model; print the last values, plot or save the rest.
+
+    With a figure, a table or a film only multipliers, coordinates and times of events are printed; -v names
+    others.
+    """
+    from ...fmu.described import read_description
+    from ...live.playable import told_by
+    from ...prepare.prepare import prepare
+    from ...verification.reference import read_table
+    from ...verification.simulate import simulate as simulated
+    from ..film import film
+    from ..scenes import chosen, loaded, narrowed
+
+    with plainly():
+        source: Any = target
+        if target.suffix == ".py":
+            file = loaded(target, add_output, arguments)
+            scenes = chosen(file, None if scene is None else [scene])
+            source = prepare(file.model, narrowed(scenes, {"error_bars": error_bars})[0])
+            name = source.scene.name
+            variables = source.table.variables
+        elif arguments:
+            raise UsageError(f"-p {arguments[0]} is for a model file: an FMU is one of its family")
+        elif add_output:
+            raise UsageError(
+                "--add-output is for a model file: an FMU has the outputs it was built with"
+            )
+        else:
+            description = read_description(target)
+            name, variables = description.modelName, description.modelVariables
+        known = {v.name: v.causality for v in variables if v.causality != "parameter"}
+        besides = _besides(variable or (), known)
+        given = assignments(set_)
+        with console.status(f"simulating {name}"):
+            signals = None if inputs is None else read_table(inputs)
+            result = simulated(
+                source,
+                stop_time,
+                step_size,
+                tolerance,
+                given,
+                signals,
+                besides=besides,
+                error_bars=bool(error_bars),
+            )
+        written = any(f is not None for f in (csv, plot_, animate))
+        _print_last(name, result, variable or (_first_of(result) if written else ()))
+        if csv is not None:
+            _save(csv, result)
+            console.print(f"[green]wrote[/] {escape(str(csv))}", soft_wrap=True)
+        if plot_ is not None:
+            console.print(
+                f"[green]wrote[/] {escape(str(result.plot(*(variable or ()), out=plot_)))}",
+                soft_wrap=True,
+            )
+        if animate is not None:
+            with console.status(f"drawing {name}"):
+                film(told_by(source), result, given, animate, name)
+            console.print(f"[green]wrote[/] {escape(str(animate))}", soft_wrap=True)
+
+
+def _besides(names: Sequence[str], known: Mapping[str, str]) -> list[str]:
+    """Those of the names that are no outputs: inputs, and local variables.
+
+    Raises SettingError with all that is unknown.
+    """
+    unknown = [n for n in names if n not in known and n != "time"]
+    if unknown:
+        near = {n: difflib.get_close_matches(n, known, 1) for n in unknown}
+        hints = [f"{n!r} (did you mean {m[0]!r}?)" if (m := near[n]) else repr(n) for n in unknown]
+        raise SettingError(
+            f"--variable: there is no {', '.join(hints)}, expected some of {', '.join(known)}"
+        )
+    return [n for n in names if n in known and known[n] != "output"]
+
+
+def _first_of(result: Result) -> list[str]:
+    """What one looks for first: multipliers, coordinates, the times of events."""
+    from ...names import DEPARTURE_TIME, SLIP_TIME, those
+    from ...verification.plot import default_names
+
+    known = list(result.dtype.names or ())
+    return default_names(known) + those(known, DEPARTURE_TIME, SLIP_TIME)
+
+
+def _print_last(name: str, result: Result, names: Sequence[str] = ()) -> None:
+    """The last values of the named variables, of all outputs without names."""
+    from ...model.units import for_reading
+    from ...page.table import new_table, print_whole
+    from ...verification.result import NOT_YET, as_text
+
+    table = new_table(f"{name} at t = {result['time'][-1]:g} s", "variable", "value", "unit")
+    table.columns[0].justify = table.columns[2].justify = "left"
+    for n in names or list(result.dtype.names or ())[1:]:
+        text = as_text(result[n][-1], 9) if result.known(n)[-1] else NOT_YET
+        table.add_row(escape(n), text, escape(for_reading(result.units.get(n))))
+    print_whole(console, table)
+
+
+def _save(path: Path, result: Any) -> None:
+    """All columns; names are quoted, because that of an acceleration holds a comma."""
+    from ...fmu.write import write_whole
+    from ...verification.crosscheck import as_csv
+
+    write_whole(path, as_csv(result, [n for n in result.dtype.names if n != "time"]).encode())

@@ -1,0 +1,36 @@
+"""`lagfmu stress`: FMUs at the extremes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..options import JsonFile, JunitFile, Target
+from ..terminal import console, plainly
+
+LIMIT = 60.0  # [s] for one probe
+
+
+def stress(
+    targets: Annotated[
+        list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist/stress"),
+    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Some of the probes only.")] = False,
+    limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = LIMIT,
+    json: JsonFile = None,
+    junit: JunitFile = None,
+) -> None:
+    """Push FMUs to the extremes: each row is right, refused with a clear message, or wrong."""
+    from ..finish import finish
+    from ..stress import stress as probed
+
+    with plainly():
+        done = probed(targets, out, console, target.value, scene or (), quick, limit)
+        finish("stress", done, json, junit)

@@ -1,0 +1,131 @@
+"""`lagfmu sweep`: many runs, with progress, what came of them, and a figure."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from ...errors import SettingError
+from ..options import InputFile, StepSize, StopTime, Tolerance
+from ..terminal import console, plainly
+
+
+def sweep(
+    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=RANGE",
+            help="A parameter, start value or solver setting; several are crossed. RANGE is "
+            "FROM:TO:COUNT, FROM:TO:COUNT:log, or V,V,...",
+        ),
+    ] = None,
+    sample: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="'NAME ~ LAW'",
+            help="With --runs. LAW is uniform(low, high), loguniform(low, high), normal(mean, sd) or "
+            "truncnormal(mean, sd, low, high).",
+        ),
+    ] = None,
+    runs: Annotated[int | None, typer.Option(help="How many samples.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
+    sampling: Annotated[str, typer.Option(help="latin-hypercube or sobol.")] = "latin-hypercube",
+    rows: Annotated[
+        Path | None,
+        typer.Option("--from", help="A .csv or .parquet file, a row a run under the names."),
+    ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME:HOW",
+            help="What to keep of each run, repeatable (default: largest multipliers, departures). HOW is "
+            "last, max, min, mean, time-of-max or trajectory.",
+        ),
+    ] = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Tolerance = None,
+    inputs: InputFile = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Which FMU of a model file (default: its first).")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="runs.parquet or .csv; .nc or .zarr with trajectories."),
+    ] = None,
+    on: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="A Dask scheduler, tcp://HOST:PORT; else this machine."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes of this machine (default: its cores).")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where an interrupted sweep stopped.")
+    ] = False,
+    figure: Annotated[
+        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
+    ] = None,
+) -> None:
+    """Run an FMU many times: parameters and start values crossed, sampled, or from a file."""
+    from ...study.sweep.design import axis, distribution, from_file
+    from ...study.sweep.plot import FIGURES, plot
+    from ...study.sweep.sweep import sweep as run
+    from ...verification.reference import read_table
+    from ..progress import told
+    from ..swept import print_sweep
+
+    with plainly():
+        axes, laws = _once(map(axis, vary or ())), _once(map(distribution, sample or ()))
+        if figure is not None and figure.suffix not in FIGURES:
+            raise SettingError(f"--plot {str(figure)!r}: expected a file {', '.join(FIGURES)}")
+        table = None
+        if rows is not None:
+            names, values = from_file(rows)
+            table = {n: values[:, k] for k, n in enumerate(names)}
+        with told(out) as tell:
+            found = run(
+                target,
+                axes,
+                sample=laws,
+                runs=runs,
+                seed=seed,
+                sampling=sampling,
+                rows=table,
+                keep=keep or (),
+                stop_time=stop_time,
+                step_size=step_size,
+                tolerance=tolerance,
+                inputs=None if inputs is None else read_table(inputs),
+                scene=scene,
+                out=out,
+                on=on,
+                workers=workers,
+                resume=resume,
+                progress=tell,
+                command=shlex.join(["lagfmu", *sys.argv[1:]]),
+            )
+        print_sweep(found)
+        if out is not None:
+            console.print(f"[green]wrote[/] {escape(str(out))}", soft_wrap=True)
+        if figure is not None:
+            console.print(f"[green]wrote[/] {escape(str(plot(found, figure)))}", soft_wrap=True)
+
+
+def _once(pairs: Iterator[tuple[str, Any]]) -> Mapping[str, Any]:
+    """What is given for each name.  Raises SettingError."""
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise SettingError(f"{name} varies in two ways")
+        found[name] = value
+    return found

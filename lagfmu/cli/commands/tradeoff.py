@@ -1,0 +1,66 @@
+"""`lagfmu tradeoff`: what accuracy costs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..options import JsonFile, JunitFile, Target
+from ..terminal import console, plainly
+
+
+def tradeoff(
+    targets: Annotated[
+        list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path(
+        "dist/tradeoff"
+    ),
+    target: Annotated[
+        Target | None,
+        typer.Option(
+            help="What is built of model files: native where there is a compiler, else python."
+        ),
+    ] = None,
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
+    ] = None,
+    step_size: Annotated[
+        list[float] | None, typer.Option(help="Communication step in s; repeatable.")
+    ] = None,
+    tolerance: Annotated[
+        list[float] | None, typer.Option(help="Relative tolerance; repeatable.")
+    ] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Solver method; repeatable.")] = None,
+    repeats: Annotated[int | None, typer.Option(help="Timed runs of each setting.")] = None,
+    full: Annotated[
+        bool,
+        typer.Option("--full", help="The whole grid: minutes instead of half a minute an FMU."),
+    ] = False,
+    json: JsonFile = None,
+    junit: JunitFile = None,
+) -> None:
+    """Measure error against wall time over methods, tolerances and communication steps.
+
+    A closed form that is missed at a tolerance is marked in the table: a trade-off measures, it does not
+    judge.
+    """
+    from ..finish import finish
+    from ..tradeoff import compare
+
+    with plainly():
+        done = compare(
+            targets,
+            out,
+            console,
+            None if target is None else target.value,
+            step_size or (),
+            tolerance or (),
+            method or (),
+            repeats,
+            scene or (),
+            full,
+        )
+        finish("tradeoff", done, json, junit)

@@ -1,0 +1,126 @@
+"""`lagfmu verify`: FMUs held against what is known, for eyes and for pipelines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...errors import LagfmuError, SimulationError, UsageError
+from ..options import (
+    InputFile,
+    JsonFile,
+    JunitFile,
+    Settings,
+    StepSize,
+    StopTime,
+    Tolerance,
+    assignments,
+)
+from ..terminal import plainly
+
+if TYPE_CHECKING:
+    from ...verification.pipeline import Report
+
+
+def verify(
+    fmus: Annotated[list[Path], typer.Argument(metavar="FILE.fmu...", help="FMUs.")],
+    set_: Settings = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Tolerance = None,
+    inputs: InputFile = None,
+    reference: Annotated[
+        Path | None, typer.Option(help="CSV of a run that this one is held against besides.")
+    ] = None,
+    rtol: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="RTOL|NAME=RTOL",
+            help="Allowed part of a reference column's largest value (default 1e-6); repeatable.",
+        ),
+    ] = None,
+    atol: Annotated[float, typer.Option(help="Allowed besides, in the column's unit.")] = 0.0,
+    json: JsonFile = None,
+    junit: JunitFile = None,
+) -> None:
+    """Simulate FMUs through fmpy and hold them against the closed forms that they carry.
+
+    The exit code is the largest of all FMUs'.
+    """
+    from ..finish import finish, print_verdicts
+
+    with plainly():
+        done = examine(
+            fmus,
+            assignments(set_),
+            stop_time,
+            step_size,
+            tolerance,
+            inputs,
+            reference,
+            rtol or (),
+            atol,
+        )
+        for one in done:
+            if one.found is not None:
+                print_verdicts(one.found)
+        finish("verify", done, json, junit)
+
+
+def tolerances(texts: Sequence[str]) -> tuple[float, dict[str, float]]:
+    """RTOL or NAME=RTOL, repeatable: the one for all, and those of single variables."""
+    common, own = 1e-6, {}
+    for text in texts:
+        name, sign, value = (part.strip() for part in text.rpartition("="))
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if not 0 <= number < float("inf"):
+            raise UsageError(f"--rtol {text!r}: expected a number from 0, or NAME=NUMBER")
+        if sign:
+            own[name] = number
+        else:
+            common = number
+    return common, own
+
+
+def examine(
+    fmus: Sequence[Path],
+    values: Mapping[str, Any],
+    stop_time: float | None,
+    step_size: float | None,
+    tolerance: float | None,
+    inputs: Path | None,
+    reference: Path | None,
+    rtol: Sequence[str],
+    atol: float,
+) -> list[Report]:
+    """Each FMU; one that cannot be run does not keep the others from it.  Raises UsageError."""
+    from ...verification.pipeline import refused
+    from ...verification.reference import Reference, read_table
+    from ...verification.report import report
+    from ...verification.verify import verify as held
+
+    if reference is None and (rtol or atol):
+        raise UsageError("--rtol and --atol are for --reference")
+    if reference is not None and len(fmus) > 1:
+        raise UsageError("--reference belongs to one FMU")
+    common, own = tolerances(rtol)
+    try:
+        signals = None if inputs is None else read_table(inputs)
+        table = None if reference is None else Reference(read_table(reference), common, atol, own)
+    except SimulationError as error:
+        raise UsageError(str(error)) from None
+    done = []
+    for fmu in fmus:
+        try:
+            found = held(fmu, values, stop_time, step_size, tolerance, signals, table)
+        except LagfmuError as error:
+            done.append(refused(str(fmu), error))
+        else:
+            done.append(report(str(fmu), found))
+    return done

@@ -1,0 +1,46 @@
+"""How a command ends that judges FMUs: tables for eyes, files and an exit code for pipelines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+from rich.markup import escape
+
+from ..fmu.write import write_whole
+from ..page.table import new_table, print_whole
+from ..verification.pipeline import Report, as_json, as_junit, exit_code
+from ..verification.verify import Verification
+from .terminal import console, errors, say_error
+
+
+def finish(command: str, reports: Sequence[Report], json: Path | None, junit: Path | None) -> None:
+    """Write what a pipeline reads, say what could not be run, and end with the exit code."""
+    if json is not None:
+        write_whole(json, as_json(reports).encode())
+    if junit is not None:
+        write_whole(junit, as_junit(f"lagfmu {command}", reports))
+    for one in reports:
+        if one.error:
+            say_error(one.error)
+    raise typer.Exit(exit_code(reports))
+
+
+def print_verdicts(found: Verification) -> None:
+    """A row a statement, and in words what failed."""
+    title = f"{found.name}: {'pass' if found.passed else 'FAIL'}"
+    table = new_table(title, "statement", "largest error", "allowed", "verdict", text=["statement"])
+    for row, check in zip(found.rows(), found.checks, strict=True):
+        colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
+        table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
+    print_whole(console, table)
+    if not found.closed_forms:
+        console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
+    for check in found.checks:
+        if not check.passed and check.detail:
+            errors.print(
+                f"[red]{escape(check.name)}:[/] {escape(check.detail)}",
+                highlight=False,
+                soft_wrap=True,
+            )

@@ -1,0 +1,59 @@
+"""The model files that a command names: loaded, and their scenes with what the command line says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ..errors import UsageError
+from ..model.file import ModelFile, load
+from ..model.formula import with_outputs
+from ..model.scene import Scene
+from .options import LISTS, Names, Needs
+
+
+def loaded(path: Path, added: Names, arguments: Names = None) -> ModelFile:
+    """A model file, with further outputs; of a family the one of these arguments."""
+    file = load(path, arguments or ())
+    return replace(file, model=with_outputs(file.model, added or []))
+
+
+def chosen(file: ModelFile, names: Names) -> list[Scene]:
+    """The scenes of a file that are called so; all of them without names.  Raises UsageError."""
+    known = [s.name for s in file.scenes]
+    unknown = ", ".join(repr(n) for n in names or [] if n not in known)
+    if unknown:
+        raise UsageError(f"{file.path}: no FMU is called {unknown}; known: {', '.join(known)}")
+    return [s for s in file.scenes if names is None or s.name in names]
+
+
+def narrowed(scenes: Sequence[Scene], needs: Needs) -> list[Scene]:
+    """The scenes with what was said on the command line; what was not said stays.
+
+    Raises UsageError if one name is given to several, and RequestError for a scene that cannot be.
+    """
+    name = needs.get("name")
+    if name is not None and len(scenes) > 1:
+        raise UsageError(
+            f"--name {name}: the file has {len(scenes)} FMUs, choose one of them with --scene: "
+            f"{', '.join(s.name for s in scenes)}"
+        )
+    said = {k: v for k, v in needs.items() if v is not None}
+    said |= {k: _split(said[k]) for k in LISTS if k in said}
+    return [replace(s, **said) for s in scenes]
+
+
+def _split(texts: Sequence[str]) -> tuple[str, ...]:
+    """NAME,NAME as names; a comma within parentheses belongs to the name, as in der(x,2)."""
+    found: list[str] = []
+    for text in texts:
+        depth, word = 0, ""
+        for letter in f"{text},":
+            depth += (letter == "(") - (letter == ")")
+            if letter == "," and depth <= 0:
+                found.append(word.strip())
+                word = ""
+            else:
+                word += letter
+    return tuple(w for w in found if w)
