@@ -223,6 +223,13 @@ class Single:
     def get(self, name: str) -> float:
         return self.reals([name])[0]
 
+    def integer(self, name: str) -> int:
+        """Of an Integer or a Boolean."""
+        value = c_int()
+        kind = self.library.variables[name].type
+        self.does(f"Get{kind}", self.references([name]), c_size_t(1), byref(value))
+        return value.value
+
     def set_call(self, name: str, value: float) -> tuple[Any, ...]:
         return self.references([name]), c_size_t(1), byref(c_double(value))
 

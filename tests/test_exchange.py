@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fmi2 import EXCHANGE, Library, Single
+from fmi2 import EXCHANGE, EventInfo, Library, Single
 from sympy import Rational, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -243,3 +243,16 @@ def test_what_an_importer_has_not_seen_is_said(library, of):
         one.states((r, 0.0, theta, rate))
         one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
         assert event.value == expected
+
+
+def test_an_event_that_cannot_be_met_asks_for_no_other(library):
+    """After an error fmi2NewDiscreteStates wants no further call, and fmi2CompletedIntegratorStep no
+    event: importers go on by what stands there."""
+    one = continuous(library("PendulumCartesian"))
+    event, end = c_int(1), c_int(1)
+    one.states((0.0, 1.0, 0.0, 0.0))  # both ends of the rod in one place: no direction pulls
+    one.refuses("CompletedIntegratorStep", 1, byref(event), byref(end))
+    assert (event.value, end.value) == (0, 0)
+    info = EventInfo(1, 1, 1, 1, 1, 1.0)
+    one.refuses("NewDiscreteStates", byref(info))
+    assert bytes(info) == bytes(EventInfo())

@@ -8,8 +8,8 @@
  * (Baumgarte 1972), with alpha of the order of the motion's own natural rate, so that nothing becomes
  * stiff and the drift stays in proportion to the importer's tolerance, whatever that is.  lambda, as it
  * is read, is that of the unstabilized equations.  Where this does not hold the drift (constraints that
- * depend on each other), fmi2CompletedIntegratorStep asks for an event, in which the state is
- * projected.  Projection alone costs a restart of the importer's integrator each time. */
+ * depend on each other) an event does (exchange_events.c).  Projection alone would cost a restart of the
+ * importer's integrator each time. */
 #include "exchange.h"
 
 #include <math.h>
@@ -21,10 +21,7 @@
 #include "optional.h"
 #include "schur.h"
 
-static const double GAIN = 3;     /* of the stabilization, in units of the motion's natural rate */
-static const double SHORT = 1e-2; /* natural time in which a contact closes what drift has opened */
-static const double CLOSE = 10;   /* condition of rows that stand for all, beyond which they are chosen anew */
-static const double LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
+static const double GAIN = 3; /* of the stabilization, in units of the motion's natural rate */
 
 void exchange_begin(Instance *x) {
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
@@ -76,7 +73,7 @@ Status exchange_nominals(Instance *x, double *nominals) {
 }
 
 /* Accelerations and multipliers at the state. */
-static Status evaluate(Instance *x) {
+Status exchange_evaluate(Instance *x) {
     Solver *s = &x->solver;
     if (x->evaluated) return OK;
     if (instance_start(x) != OK) return FAILED;
@@ -89,27 +86,14 @@ static Status evaluate(Instance *x) {
 }
 
 /* The multipliers of all rows, those too that depend on others. */
-static Status find_multipliers(Instance *x) {
+Status exchange_multipliers(Instance *x) {
     Solver *s = &x->solver;
-    if (!s->state.now.dependent) return evaluate(x);
+    if (!s->state.now.dependent) return exchange_evaluate(x);
     if (instance_start(x) != OK) return FAILED;
     flow_begin(s);
     x->evaluated = 0;
     return mechanism_motion_near(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
                                  s->active, s->state.offset, s->state.size);
-}
-
-/* Which rows stand for all from here on. */
-static Status choose_rows(Instance *x) {
-    Solver *s = &x->solver;
-    if (s->system->m < 2) return OK;
-    flow_begin(s);
-    x->evaluated = 0;
-    if (mechanism_motion_near(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
-                              s->active, s->state.offset, s->state.size) != OK)
-        return FAILED;
-    flow_choose_rows(s);
-    return OK;
 }
 
 /* Adds the accelerations that lead back onto the constraints. */
@@ -132,7 +116,7 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
     const System *system = s->system;
-    if (evaluate(x) != OK) return FAILED;
+    if (exchange_evaluate(x) != OK) return FAILED;
     for (int j = 0; j < system->n; j++) {
         derivatives[2 * j] = s->state.v[j];
         derivatives[2 * j + 1] = b->vdot[j];
@@ -145,7 +129,7 @@ Status exchange_indicators(Instance *x, double *indicators) {
     Mechanism *b = &s->stepped;
     const System *system = s->system;
     if (indicators_count(system) == 0) return OK;
-    if (find_multipliers(x) != OK) return FAILED;
+    if (exchange_multipliers(x) != OK) return FAILED;
     const Instant at = flow_instant(s, s->state.now.t);
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     if (system->jumps > 0)
@@ -165,126 +149,4 @@ Status exchange_indicators(Instance *x, double *indicators) {
         indicators[c] = s->state.closed[c] ? b->lambda[k] : b->f[k] + s->state.gap[c];
     }
     return OK;
-}
-
-/* The worst residual of a row that acts, relative to the constraint's own size. */
-static Status drift(Instance *x, double *worst) {
-    Solver *s = &x->solver;
-    Mechanism *b = &s->stepped;
-    const System *system = s->system;
-    *worst = 0;
-    if (evaluate(x) != OK) return FAILED;
-    const int *active = b->sliding != NULL ? b->sliding->acting(b, s->active) : s->active;
-    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
-        return FAILED;
-    for (int k = 0; k < system->m; k++) {
-        double size = 0, speed = 0;
-        if (!active[k]) continue;
-        for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++) {
-            const int j = system->entry_column[e];
-            size += fabs(b->G[e]) * s->state.size[j];
-            speed += fabs(b->G[e]) * fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
-        }
-        if (system->rows[k].kind != NONHOLONOMIC && size > 0)
-            *worst = fmax(*worst, fabs(b->f[k] - s->state.offset[k]) / size);
-        if (speed > 0) *worst = fmax(*worst, fabs(mechanism_slip(b, k, s->state.v)) / speed);
-    }
-    return OK;
-}
-
-/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated and goes
- * further in, or is pulled back in.  x->pull: the accelerations towards them. */
-static Status find_happened(Instance *x, int *any) {
-    Solver *s = &x->solver;
-    Mechanism *b = &s->stepped;
-    *any = 0;
-    if (find_multipliers(x) != OK) return FAILED;
-    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
-        return FAILED;
-    for (int c = 0; c < s->system->contacts; c++) {
-        const int k = s->system->contact[c];
-        x->pull[c] = b->gamma[k] - mechanism_row(b, k, b->vdot);
-        if (s->state.closed[c])
-            x->happened[c] = b->lambda[k] <= 0;
-        else
-            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 &&
-                             (mechanism_slip(b, k, s->state.v) < 0 || x->pull[c] > 0);
-        *any |= x->happened[c];
-    }
-    if (s->system->frictions == 0) return OK;
-    const int first = indicators_first_of_frictions(s->system);
-    OPTIONAL.slides->indicators(s, s->work_slides);
-    for (int i = 0; i < 2 * s->system->frictions; i++) {
-        x->happened[first + i] = s->work_slides[i] < -indicators_range(s, first + i).slack;
-        *any |= x->happened[first + i];
-    }
-    return OK;
-}
-
-/* The rows that stand for all others are about to depend on each other. */
-static int are_close(const Linear *l) {
-    return l->rung != RUNG_SCHUR || schur_of(l)->condition > CLOSE;
-}
-
-Status exchange_step_done(Instance *x, int *event) {
-    Solver *s = &x->solver;
-    double worst;
-    int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
-    *event = s->system->jumps > 0 &&
-             OPTIONAL.jumps->stale(s, flow_instant(s, s->state.now.t), s->state.q);
-    if (s->system->m == 0) return OK;
-    if (drift(x, &worst) != OK) return FAILED;
-    if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
-    if (find_happened(x, &any) != OK) return FAILED;
-    if (!any && s->system->frictions > 0) {
-        double *y = s->work_advance;
-        memcpy(y, s->state.q, (size_t)s->system->n * sizeof *y);
-        memcpy(y + s->system->n, s->state.v, (size_t)s->system->n * sizeof *y);
-        if (OPTIONAL.slides->turn(s, s->state.now.t, y) != OK) return FAILED;
-    }
-    *event = *event || any || worst > LIMIT;
-    return OK;
-}
-
-/* The levels of forces that jump; `changed`: 1 if one is not what it was. */
-static Status settle_jumps(Instance *x, int *changed) {
-    Solver *s = &x->solver;
-    const Instant at = flow_instant(s, s->state.now.t);
-    int again = 0;
-    *changed = 0;
-    if (s->system->jumps == 0) return OK;
-    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, NULL, changed);
-    x->evaluated = 0;
-    if (evaluate(x) != OK) return FAILED; /* what rests on a surface may be about to leave it */
-    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
-    *changed |= again;
-    x->evaluated = 0;
-    return OK;
-}
-
-Status exchange_event(Instance *x, int *moved) {
-    Solver *s = &x->solver;
-    int any, jumped;
-    double worst;
-    *moved = 0;
-    if (instance_start(x) != OK) return FAILED;
-    if (s->system->contacts > 0 && OPTIONAL.switch_released(s, SHORT / s->state.now.rate) != OK) return FAILED;
-    x->observed = x->evaluated = 0;
-    if (settle_jumps(x, &jumped) != OK) return FAILED;
-    if (find_happened(x, &any) != OK) return FAILED;
-    if (any || (jumped && s->system->contacts + s->system->frictions > 0)) {
-        *moved = 1;
-        x->evaluated = 0;
-        if (OPTIONAL.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
-        if (OPTIONAL.switch_modes(s, x->happened) != OK) return FAILED;
-        return choose_rows(x);
-    }
-    if (drift(x, &worst) != OK) return FAILED;
-    if (!(worst > LIMIT)) return OK;
-    *moved = 1;
-    x->evaluated = 0;
-    if (mechanism_project(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
-                          s->active, s->state.offset, s->state.size) != OK)
-        return FAILED;
-    return choose_rows(x);
 }

@@ -20,8 +20,14 @@ Status exchange_nominals(Instance *x, double *nominals);
 /* After a step of the importer's integrator; `event`: 1 if the state should be projected. */
 Status exchange_step_done(Instance *x, int *event);
 
-/* Contacts open or are struck where their indicators say so, and a state that has drifted off the
- * constraints is projected; `moved`: 1 if the continuous states changed. */
+/* At an event: the state that has drifted comes back onto the constraints, before inputs are set anew; then
+ * contacts open or are struck, and frictions slip or hold, where their indicators say so.  `moved`: 1 if the
+ * continuous states changed in either. */
+Status exchange_enter_event(Instance *x);
 Status exchange_event(Instance *x, int *moved);
+
+/* Accelerations and multipliers at the state; the multipliers of all rows, those too that depend on others. */
+Status exchange_evaluate(Instance *x);
+Status exchange_multipliers(Instance *x);
 
 #endif

@@ -18,6 +18,7 @@ static fmi2Status wrong_size(Component *c, const char *function, size_t given, i
 fmi2Status fmi2EnterEventMode(fmi2Component component) {
     Component *c = component;
     if (!component_allowed(c, EXCHANGE)) return component_forbidden(c, "fmi2EnterEventMode");
+    if (exchange_enter_event(&c->instance) != OK) return component_failed(c, fmi2Error);
     c->instance.phase = EVENT;
     return fmi2OK;
 }
@@ -25,10 +26,10 @@ fmi2Status fmi2EnterEventMode(fmi2Component component) {
 fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventInfo) {
     Component *c = component;
     int moved = 0;
+    if (eventInfo != NULL) memset(eventInfo, 0, sizeof *eventInfo); /* importers look at it after an error too */
     if (!component_allowed(c, EVENT)) return component_forbidden(c, "fmi2NewDiscreteStates");
     if (eventInfo == NULL) return component_missing(c, "fmi2NewDiscreteStates");
     if (exchange_event(&c->instance, &moved) != OK) return component_failed(c, fmi2Error);
-    memset(eventInfo, 0, sizeof *eventInfo);
     eventInfo->valuesOfContinuousStatesChanged = moved ? fmi2True : fmi2False;
     return fmi2OK;
 }
@@ -47,12 +48,13 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component component,
     Component *c = component;
     int event = 0;
     (void)noSetFMUStatePriorToCurrentPoint;
+    if (enterEventMode != NULL) *enterEventMode = fmi2False;
+    if (terminateSimulation != NULL) *terminateSimulation = fmi2False;
     if (!component_allowed(c, CONTINUOUS)) return component_forbidden(c, "fmi2CompletedIntegratorStep");
     if (enterEventMode == NULL || terminateSimulation == NULL)
         return component_missing(c, "fmi2CompletedIntegratorStep");
     if (exchange_step_done(&c->instance, &event) != OK) return component_failed(c, fmi2Error);
     *enterEventMode = event ? fmi2True : fmi2False;
-    *terminateSimulation = fmi2False;
     return fmi2OK;
 }
 

@@ -65,7 +65,7 @@ void instance_reset(Instance *x) {
     x->tolerance = 0;
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->solver.on_demand = 1;
-    x->started = x->running = x->warned = x->observed = x->evaluated = x->followed = 0;
+    x->started = x->running = x->warned = x->moved = x->observed = x->evaluated = x->followed = 0;
     for (int k = 0; k < VARIABLE_COUNT; k++)
         if (VARIABLES[k].type == TYPE_REAL &&
             (VARIABLES[k].role != ROLE_OUTPUT || VARIABLES[k].place == AT_INPUT))
@@ -566,7 +566,7 @@ typedef struct {
     Numbers now;
     Settings settings, given;
     double since, start_time, stop_time, tolerance, solver_stop_time;
-    int exchange, phase, started, running, warned;
+    int exchange, phase, started, running, warned, moved;
 } Record;
 
 static size_t record_head(void) { return (sizeof(Record) + 15) / 16 * 16; }
@@ -591,6 +591,7 @@ void instance_save(Instance *x, char *record) {
     head.started = x->started;
     head.running = x->running;
     head.warned = x->warned;
+    head.moved = x->moved;
     if (ERROR_BARS != NULL) ERROR_BARS->save(x);
     memcpy(record, &head, sizeof head);
     memset(record + sizeof head, 0, record_head() - sizeof head);
@@ -614,6 +615,7 @@ void instance_restore(Instance *x, const char *record) {
     x->phase = head.phase;
     x->started = head.started;
     x->running = head.running;
+    x->moved = head.moved;
     x->warned = head.warned;
     x->observed = x->evaluated = x->followed = 0;
     if (ERROR_BARS != NULL) ERROR_BARS->restore(x);

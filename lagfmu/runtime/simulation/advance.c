@@ -292,7 +292,7 @@ Status solver_follow(Solver *s) {
     if (system->prescribed_count > 0) {
         if (system->contacts == 0)
             system_active(system, s->state.closed, s->active);
-        else if (OPTIONAL.switch_released(s, s->state.now.span) != OK)
+        else if (OPTIONAL.switch_released(s, s->state.now.span, 0) != OK)
             return FAILED;
         const Instant at = flow_instant(s, s->state.now.t);
         if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,

@@ -99,6 +99,27 @@ static Status change(Solver *s, Instant at, const int *left, const double *arriv
     return rest_finish(&x, OK);
 }
 
+static Status stop(Solver *s, Instant at, const int *left) {
+    const System *system = s->system;
+    Mechanism *b = &s->stepped;
+    Slide *held = s->trial_slides;
+    int any = 0;
+    if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
+    memcpy(held, s->state.slide, (size_t)system->frictions * sizeof *held);
+    for (int i = 0; i < system->frictions; i++) {
+        const Friction *law = &system->friction[i];
+        if (!left[2 * i] || held[i].sticks) continue;
+        held[i].sticks = any = 1;
+        for (int r = 0; r < law->rows; r++) s->state.offset[law->row[r]] = b->f[law->row[r]];
+    }
+    if (!any) return OK;
+    b->friction->slide = held;
+    const Status stopped = mechanism_project(b, at, s->state.q, s->state.v, s->active, s->state.offset,
+                                             s->state.size);
+    b->friction->slide = s->state.slide;
+    return stopped;
+}
+
 static Status renew(Solver *s) {
     Mechanism *b = &s->stepped;
     int any = 0;
@@ -120,7 +141,7 @@ static Status renew(Solver *s) {
 
 const Slides SLIDES = {
     .sliding = &SLIDING, .doubles = rubbing_doubles, .ints = rubbing_ints,
-    .begin = begin, .change = change, .renew = renew,
+    .begin = begin, .change = change, .stop = stop, .renew = renew,
     .indicators = slipping_indicators, .range = slipping_range,
     .turns = slipping_turns, .turn = slipping_turn,
     .work = slipping_work, .jacobian = slipping_jacobian, .rub = rubbing,

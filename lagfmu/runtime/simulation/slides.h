@@ -22,6 +22,8 @@ typedef struct {
      * have dissipated since the velocities were `arriving` (n; NULL: nothing). */
     Status (*change)(Solver *s, Instant at, const int *left, const double *arriving, int *closed,
                      const int *touching, const int *leaving);
+    /* Where `left` says that a slip has ended, the state (q and v) is moved to where it is 0. */
+    Status (*stop)(Solver *s, Instant at, const int *left);
     /* Frictions that stuck, and of which an input has moved the surface away, slip. */
     Status (*renew)(Solver *s);
     /* Two indicators a friction, of the latest motion, and their ranges. */

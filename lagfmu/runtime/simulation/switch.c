@@ -152,8 +152,9 @@ Status switch_modes(Solver *s, const int *happened) {
 
 /* Contact c is closed, but the motion of its surface has just been set anew and leaves a gap, or a speed at
  * which it opens; `parted`: more of it than the contact, had it not been there for the last `span` seconds,
- * would have closed by itself: then it did not only lose what the surface did otherwise than foreseen. */
-static Status has_parted(Solver *s, Instant at, int c, double span, int *parted) {
+ * would have closed by itself: then it did not only lose what the surface did otherwise than foreseen.  A
+ * part `drift` of the constraint's own size and speed is what an integrator has left. */
+static Status has_parted(Solver *s, Instant at, int c, double span, double drift, int *parted) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
     const int k = system->contact[c];
@@ -162,26 +163,28 @@ static Status has_parted(Solver *s, Instant at, int c, double span, int *parted)
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     const double gap = b->f[k], speed = mechanism_slip(b, k, s->state.v);
     const double natural = mechanism_row_size(b, k, s->state.size) * s->state.now.rate;
-    const double slow = SLOW * fmax(natural, mechanism_row_size(b, k, s->state.v) + fabs(b->nu[k]));
-    if (!(gap > s->state.gap[c] || speed > slow)) return OK;
+    const double moves = fmax(natural, mechanism_row_size(b, k, s->state.v) + fabs(b->nu[k]));
+    const double slow = fmax(SLOW, drift) * moves;
+    const double close = fmax(s->state.gap[c], drift * mechanism_row_size(b, k, s->state.size));
+    if (!(gap > close || speed > slow)) return OK;
     s->state.closed[c] = 0;
     system_active(system, s->state.closed, s->active);
     s->state.closed[c] = 1;
     if (mechanism_motion(b, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     const double approach = fmax(b->gamma[k] - mechanism_row(b, k, b->vdot), 0);
-    *parted = gap > fmax(s->state.gap[c], approach * span * span / 2) ||
+    *parted = gap > fmax(close, approach * span * span / 2) ||
               speed > fmax(slow, approach * span);
     return OK;
 }
 
-Status switch_released(Solver *s, double span) {
+Status switch_released(Solver *s, double span, double drift) {
     const System *system = s->system;
     if (system->prescribed_count == 0) return OK;
     const Instant at = flow_instant(s, s->state.now.t);
     for (int c = 0; c < system->contacts; c++) {
         int parted;
         if (!s->state.closed[c]) continue;
-        if (has_parted(s, at, c, span, &parted) != OK) return FAILED;
+        if (has_parted(s, at, c, span, drift, &parted) != OK) return FAILED;
         if (!parted) continue;
         s->state.closed[c] = 0;
         s->state.armed[c] = 1;

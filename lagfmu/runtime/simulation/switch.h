@@ -10,7 +10,8 @@ Status switch_modes(Solver *s, const int *happened);
 
 /* Opens contacts that a jump of a prescribed motion has left a gap in, or a speed at which they part: a
  * departure.  A gap that the contact, pressed as it is, would have closed within `span` [s] is none: the
- * motion went on a little otherwise than its derivatives had foreseen over a step of that length. */
-Status switch_released(Solver *s, double span);
+ * motion went on a little otherwise than its derivatives had foreseen over a step of that length.  `drift`: that
+ * part of the constraint's own size and speed is what an integrator that knows no constraints may have left. */
+Status switch_released(Solver *s, double span, double drift);
 
 #endif

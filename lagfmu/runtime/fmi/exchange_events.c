@@ -1,0 +1,193 @@
+/* exchange_events.c -- what happens between two steps of an importer's integrator (Model Exchange).
+ *
+ * Some importers stop at the zero of an indicator, others only see at the end of a step that there was one:
+ * what is read there lies beyond the event, and off the constraints by all that the integrator has let drift.
+ * So nothing is judged as it stands.  First the state goes back onto the rows that acted until now; then lambda,
+ * gaps and cones say what has happened; a slip that has gone past 0 is set to 0, a contact that was
+ * penetrated to f = 0 (landing.c); then the modes are switched.  What is missed in time is at most a step, and so
+ * is the error. */
+#include "exchange.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "indicators.h"
+#include "flow.h"
+#include "optional.h"
+#include "schur.h"
+
+static const double SHORT = 1e-2; /* natural time in which a contact closes what drift has opened */
+static const double CLOSE = 10;   /* condition of rows that stand for all, beyond which they are chosen anew */
+static const double LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
+
+/* Which rows stand for all from here on. */
+static Status choose_rows(Instance *x) {
+    Solver *s = &x->solver;
+    if (s->system->m < 2) return OK;
+    flow_begin(s);
+    x->evaluated = 0;
+    if (mechanism_motion_near(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
+                              s->active, s->state.offset, s->state.size) != OK)
+        return FAILED;
+    flow_choose_rows(s);
+    return OK;
+}
+
+/* The worst residual of a row that acts, relative to the constraint's own size. */
+static Status drift(Instance *x, double *worst) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    const System *system = s->system;
+    *worst = 0;
+    if (exchange_evaluate(x) != OK) return FAILED;
+    const int *active = b->sliding != NULL ? b->sliding->acting(b, s->active) : s->active;
+    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+        return FAILED;
+    for (int k = 0; k < system->m; k++) {
+        double size = 0, speed = 0;
+        if (!active[k]) continue;
+        for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++) {
+            const int j = system->entry_column[e];
+            size += fabs(b->G[e]) * s->state.size[j];
+            speed += fabs(b->G[e]) * fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
+        }
+        if (system->rows[k].kind != NONHOLONOMIC && size > 0)
+            *worst = fmax(*worst, fabs(b->f[k] - s->state.offset[k]) / size);
+        if (speed > 0) *worst = fmax(*worst, fabs(mechanism_slip(b, k, s->state.v)) / speed);
+    }
+    return OK;
+}
+
+/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated and goes
+ * further in, or is pulled back in.  x->pull: the accelerations towards them. */
+static Status find_happened(Instance *x, int *any) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    *any = 0;
+    if (exchange_multipliers(x) != OK) return FAILED;
+    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+        return FAILED;
+    for (int c = 0; c < s->system->contacts; c++) {
+        const int k = s->system->contact[c];
+        x->pull[c] = b->gamma[k] - mechanism_row(b, k, b->vdot);
+        if (s->state.closed[c])
+            x->happened[c] = b->lambda[k] <= 0;
+        else
+            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 &&
+                             (mechanism_slip(b, k, s->state.v) < 0 || x->pull[c] > 0);
+        *any |= x->happened[c];
+    }
+    if (s->system->frictions == 0) return OK;
+    const int first = indicators_first_of_frictions(s->system);
+    OPTIONAL.slides->indicators(s, s->work_slides);
+    for (int i = 0; i < 2 * s->system->frictions; i++) {
+        x->happened[first + i] = s->work_slides[i] < -indicators_range(s, first + i).slack;
+        *any |= x->happened[first + i];
+    }
+    return OK;
+}
+
+/* The rows that stand for all others are about to depend on each other. */
+static int are_close(const Linear *l) {
+    return l->rung != RUNG_SCHUR || schur_of(l)->condition > CLOSE;
+}
+
+Status exchange_step_done(Instance *x, int *event) {
+    Solver *s = &x->solver;
+    double worst;
+    int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
+    *event = s->system->jumps > 0 &&
+             OPTIONAL.jumps->stale(s, flow_instant(s, s->state.now.t), s->state.q);
+    if (s->system->m == 0) return OK;
+    if (drift(x, &worst) != OK) return FAILED;
+    if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
+    if (find_happened(x, &any) != OK) return FAILED;
+    if (!any && s->system->frictions > 0) {
+        double *y = s->work_advance;
+        memcpy(y, s->state.q, (size_t)s->system->n * sizeof *y);
+        memcpy(y + s->system->n, s->state.v, (size_t)s->system->n * sizeof *y);
+        if (OPTIONAL.slides->turn(s, s->state.now.t, y) != OK) return FAILED;
+    }
+    *event = *event || any || worst > LIMIT;
+    return OK;
+}
+
+/* The levels of forces that jump; `changed`: 1 if one is not what it was. */
+static Status settle_jumps(Instance *x, int *changed) {
+    Solver *s = &x->solver;
+    const Instant at = flow_instant(s, s->state.now.t);
+    int again = 0;
+    *changed = 0;
+    if (s->system->jumps == 0) return OK;
+    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, NULL, changed);
+    x->evaluated = 0;
+    if (exchange_evaluate(x) != OK) return FAILED; /* what rests on a surface may be about to leave it */
+    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
+    *changed |= again;
+    x->evaluated = 0;
+    return OK;
+}
+
+/* Contacts whose surface was moved away open; `drift`: what of a gap the integrator may have made. */
+static Status release(Instance *x, double drift) {
+    Solver *s = &x->solver;
+    if (s->system->contacts == 0) return OK;
+    x->evaluated = 0;
+    return OPTIONAL.switch_released(s, SHORT / s->state.now.rate, drift);
+}
+
+/* The state back onto the rows that act. */
+static Status project(Instance *x) {
+    Solver *s = &x->solver;
+    if (s->system->m == 0) return OK;
+    flow_begin(s);
+    x->observed = x->evaluated = 0;
+    return mechanism_project(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
+                             s->active, s->state.offset, s->state.size);
+}
+
+/* What an importer has done to its inputs until now belongs to the step; what it does after, to the event. */
+static Status come_back(Instance *x) {
+    if (release(x, LIMIT) != OK || project(x) != OK) return FAILED;
+    return choose_rows(x);
+}
+
+static Status pass(Instance *x) {
+    Solver *s = &x->solver;
+    int any, jumped;
+    if (release(x, 0) != OK) return FAILED;
+    if (settle_jumps(x, &jumped) != OK || project(x) != OK || choose_rows(x) != OK) return FAILED;
+    if (find_happened(x, &any) != OK) return FAILED;
+    if (!any && !(jumped && s->system->contacts + s->system->frictions > 0)) return OK;
+    x->evaluated = 0;
+    if (s->system->frictions > 0 &&
+        OPTIONAL.slides->stop(s, flow_instant(s, s->state.now.t),
+                              x->happened + indicators_first_of_frictions(s->system)) != OK)
+        return FAILED;
+    if (OPTIONAL.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
+    if (OPTIONAL.switch_modes(s, x->happened) != OK) return FAILED;
+    return choose_rows(x);
+}
+
+/* `act`, and whether it has changed the state. */
+static Status moving(Instance *x, Status (*act)(Instance *)) {
+    Solver *s = &x->solver;
+    const size_t bytes = (size_t)s->system->n * sizeof(double);
+    double *q = s->work_advance, *v = q + s->system->n;
+    if (instance_start(x) != OK) return FAILED;
+    memcpy(q, s->state.q, bytes);
+    memcpy(v, s->state.v, bytes);
+    x->observed = x->evaluated = 0;
+    if (act(x) != OK) return FAILED;
+    x->moved |= memcmp(q, s->state.q, bytes) != 0 || memcmp(v, s->state.v, bytes) != 0;
+    return OK;
+}
+
+Status exchange_enter_event(Instance *x) { return moving(x, come_back); }
+
+Status exchange_event(Instance *x, int *moved) {
+    if (moving(x, pass) != OK) return FAILED;
+    *moved = x->moved;
+    x->moved = 0;
+    return OK;
+}
