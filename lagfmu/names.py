@@ -17,12 +17,22 @@ VALUE = (
 OWN = "own"  # an output that the model names itself, in several words: bob.height
 MULTIPLIER, UNIQUE, RESIDUAL = "lambda", "unique", "residual"  # of a constraint
 FORCE = "Q"  # on a coordinate: of all constraints, or the share of one
-CONTACT, DEPARTURE = "contact", "departure"
-STICKS, MARGIN, POWER, SLIPPING = "sticks", "margin", "power", "slipping"  # of a friction
+CONTACT, DEPARTURE, CLOSING = "contact", "departure", "closing"
+STICKS, MARGIN, POWER = "sticks", "margin", "power"  # of a friction
+SLIPPING, STICKING = "slipping", "sticking"  # likewise: its events
 SLIP = "slip"  # of a constraint that holds by friction
 DEPARTURES, DEPARTURE_TIME = "departure.count", "departure.time"
+CLOSINGS, CLOSING_TIME = "closing.count", "closing.time"
+IMPULSE = "closing.impulse"
 SLIPS, SLIP_TIME = "slipping.count", "slipping.time"
-COUNT_OF = {DEPARTURE_TIME: DEPARTURES, SLIP_TIME: SLIPS}  # of the events whose latest time it is
+STICKINGS, STICKING_TIME = "sticking.count", "sticking.time"
+COUNT_OF = {  # of the events whose latest time it is
+    DEPARTURE_TIME: DEPARTURES,
+    CLOSING_TIME: CLOSINGS,
+    SLIP_TIME: SLIPS,
+    STICKING_TIME: STICKINGS,
+}
+COUNTS = tuple(COUNT_OF.values())
 KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
 ENERGY, SOLVER = "energy", "solver"
@@ -33,10 +43,11 @@ METHOD, TOLERANCE, STEP = "solver.method", "solver.tolerance", "solver.step"
 MAXIMUM_STEP, MAXIMUM_STEPS = "solver.maximum_step", "solver.maximum_steps"
 
 OF_ONE = (MULTIPLIER, UNIQUE, RESIDUAL, CONTACT, STICKS, MARGIN, POWER, SLIP)
-EVENTS = (DEPARTURE, SLIPPING)
+EVENTS = (DEPARTURE, CLOSING, SLIPPING, STICKING)
+NATIVE = (CLOSING, STICKING)  # what native FMUs alone tell
 REACTIONS = (MULTIPLIER, FORCE)
 MODES = (CONTACT, STICKS)
-OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING)
+OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING, STICKING)
 RESERVED = (  # what nothing of a model's can be called
     *("Q", "contact", "count", "departure", "der", "energy", "error", "lambda", "residual"),
     *("solver", "t", "time", "unique", "velocity"),
@@ -97,7 +108,7 @@ def read(text: str) -> Subject:
         return Subject(head, "", derivative(rest[1]) if of_velocity else ".".join(rest))
     if head in EVENTS and len(rest) in (2, 3):
         constraint, last, rate = rest[0], rest[-1], len(rest) - 2
-        if last in ("count", "time"):
+        if last in ("count", "time") or (head == CLOSING and last == "impulse"):
             return Subject(f"{head}.{last}", constraint)
         return Subject(head, constraint, last, rate)
     if head == FORCE and len(rest) in (1, 2):
@@ -127,7 +138,7 @@ def counted(text: str) -> str:
     found = read(text)
     if found.quantity == ERROR:
         return counted(found.coordinate)
-    if found.head not in EVENTS or found.quantity in (DEPARTURES, SLIPS):
+    if found.head not in EVENTS or found.quantity in COUNTS:
         return ""
     return name(f"{found.head}.count", found.constraint)
 

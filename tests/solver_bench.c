@@ -185,6 +185,8 @@ double bench_number(const Bench *b, const char *name) {
 
 void *bench_array(Bench *b, const char *name) {
     Solver *s = &b->solver;
+    const Latest *left = &s->state.latest[DEPARTURE];
+    const int embedded = s->system->embed != NULL;
     const struct {
         const char *name;
         void *values;
@@ -192,8 +194,8 @@ void *bench_array(Bench *b, const char *name) {
         {"state.q", s->state.q}, {"state.v", s->state.v}, {"state.offset", s->state.offset},
         {"state.scale", s->state.scale}, {"state.size", s->state.size}, {"state.gap", s->state.gap},
         {"state.closed", s->state.closed}, {"state.armed", s->state.armed},
-        {"state.count", s->state.count}, {"state.departure_time", s->state.departure_time},
-        {"state.departure_q", s->state.departure_q}, {"state.departure_v", s->state.departure_v},
+        {"state.count", left->count}, {"state.departure_time", left->time},
+        {"state.departure_q", left->q}, {"state.departure_v", left->v},
         {"rank", b->rank}, {"active", s->active}, {"p", s->p}, {"value", s->drive.value}, {"first", s->drive.first},
         {"second", s->drive.second}, {"M", s->stepped.M}, {"G", s->stepped.G},
         {"vdot", s->stepped.vdot}, {"lambda", s->stepped.lambda},
@@ -201,8 +203,8 @@ void *bench_array(Bench *b, const char *name) {
         {"seen.lambda", b->seen.lambda}, {"seen.residual", b->seen.residual},
         {"seen.unique", b->seen.unique}, {"seen.force", b->seen.force},
         {"seen.share", b->seen.share}, {"seen.s", b->seen.s}, {"seen.sdot", b->seen.sdot},
-        {"seen.sddot", b->seen.sddot}, {"seen.departure_q", b->seen.departure_q},
-        {"seen.departure_v", b->seen.departure_v},
+        {"seen.sddot", b->seen.sddot}, {"seen.departure_q", embedded ? b->seen.latest_q[DEPARTURE] : left->q},
+        {"seen.departure_v", embedded ? b->seen.latest_v[DEPARTURE] : left->v},
         {"seen.own", b->seen.own},
     };
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)

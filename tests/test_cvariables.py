@@ -135,6 +135,8 @@ def arrays(p: Prepared) -> dict[str, Any]:
     coordinates, rows = full.coordinates, [row.name for row in full.rows]
     entries = [(rows[k], coordinates[j]) for k, j in zip(*full.jacobian, strict=True)]
     contacts = [system.rows[k].name for k in system.contacts]
+    count = len(contacts)  # at the start nothing has closed
+    seen |= {v.name: 0 for v in p.table.variables if v.of.head == "closing"}
     return {
         "seen": seen,
         "PARAMETER": parameters,
@@ -155,12 +157,17 @@ def arrays(p: Prepared) -> dict[str, Any]:
         "TOTAL": [seen.get("energy.total")],
         "OUTPUT": [seen[own.name] for own in full.outputs],
         "CONTACT": [seen[f"contact.{c}"] for c in contacts],
-        "COUNT": [seen[f"departure.{c}.count"] for c in contacts],
-        "DEPARTURE_TIME": [seen[f"departure.{c}.time"] for c in contacts],
+        "DEPARTURE_COUNT": [[seen[f"departure.{c}.count"]] for c in contacts],
+        "DEPARTURE_TIME": [[seen[f"departure.{c}.time"]] for c in contacts],
         "DEPARTURE_Q": [[seen[f"departure.{c}.{q}"] for q in coordinates] for c in contacts],
         "DEPARTURE_V": [
             [seen[f"departure.{c}.velocity.{q}"] for q in coordinates] for c in contacts
         ],
+        "IMPULSE": [0] * count,
+        "CLOSING_COUNT": [[0]] * count,
+        "CLOSING_TIME": [[0]] * count,
+        "CLOSING_Q": [[0] * full.n] * count,
+        "CLOSING_V": [[0] * full.n] * count,
         "STEPS": [seen["solver.steps"]],
     }
 
@@ -183,7 +190,7 @@ def test_places_hold_what_the_names_say(table: Any, name: str) -> None:
         if place in ("S", "SDOT", "SDDOT"):
             assert re.sub(r"der\((\w+).*", r"\1", full_name) not in own
         values = at[place]
-        if place.startswith("DEPARTURE_") and place != "DEPARTURE_TIME":
+        if place.startswith(("DEPARTURE_", "CLOSING_")):
             values = values[row.contact]
         assert values[row.index] == at["seen"][full_name]
     used = [(row.place, row.index, row.contact) for row in rows]

@@ -25,6 +25,7 @@ pytest.importorskip("wasmtime", reason="pip install -e '.[test]'")
 
 from wasm import Module
 
+EVENTS = ("departure.", "closing.", "slipping.", "sticking.")
 ROUNDING = 1e-14  # relative: the two C libraries differ in the last place of sin, cos and pow
 MOVE = """() => {
     const slider = document.querySelector("#dials input[data-name]");
@@ -137,7 +138,7 @@ def check_end(shown: dict[str, Any], expected: Run) -> None:
     """Every lambda at the end, and every event."""
     assert shown["time"] == list(expected.time)
     for n in expected.values:
-        if n.startswith(("lambda.", "departure.", "slipping.", "energy.total")):
+        if n.startswith(("lambda.", *EVENTS, "energy.total")):
             end, bound = shown["values"][n][-1], expected.bounds.get(n, 0.0)
             assert end == pytest.approx(expected.values[n][-1], abs=bound, rel=0), n
 
@@ -149,7 +150,7 @@ def test_the_page_shows_the_native_fmus_run(page: Page, described: Run) -> None:
     check_end(shown, described)
     listed = [e["time"] for e in shown["events"]]
     for n, column in described.values.items():
-        if n.endswith(".time") and n.startswith(("departure.", "slipping.")) and column[-1] > 0:
+        if n.endswith(".time") and n.startswith(EVENTS) and column[-1] > 0:
             assert min(abs(t - column[-1]) for t in listed) <= described.bounds[n], n
 
 

@@ -97,7 +97,7 @@ def test_fmutool_reports_no_error(path):
 # ---------------------------------------------------------------------------- the description
 
 
-def test_names_are_those_of_the_design(name, xml, prepared):
+def test_names_are_those_of_the_design(name, xml, prepared, target):
     """Motion, multipliers, forces, residuals, energies, contacts and departures, and nothing else."""
     model = prepared(name).model
     q = [name_of(c) for c in model.coordinates]
@@ -122,6 +122,12 @@ def test_names_are_those_of_the_design(name, xml, prepared):
         expected |= {f"slip.{row}" for row in law.of} | {"energy.dissipated"}
         expected |= {f"slipping.{law.name}.{s}" for s in ("time", "count", *q)}
         expected |= {f"slipping.{law.name}.velocity.{s}" for s in q}
+    if target == "native":
+        events = {v for v in expected if v.startswith(("departure.", "slipping."))}
+        expected |= {re.sub("^departure", "closing", v) for v in events if v[0] == "d"}
+        expected |= {re.sub("^slipping", "sticking", v) for v in events if v[0] == "s"}
+        contacts = [c.name for c in model.constraints if isinstance(c, Contact)]
+        expected |= {f"closing.{c}.impulse" for c in contacts}
     expected |= {o.name for o in model.outputs}
     expected |= {f"energy.{e}" for e in ("kinetic", "potential", "total")}
     expected |= {

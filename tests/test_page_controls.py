@@ -122,6 +122,9 @@ def test_bounces_are_told_with_time_and_impulse(opened: Opened) -> None:
     assert first.startswith("contact floor was struck at t = ")
     assert float(words[7]) == pytest.approx((2 / 9.81) ** 0.5, rel=1e-8)
     assert float(words[10]) == pytest.approx((2 * 9.81) ** 0.5 * 1.7, rel=1e-8)
+    landing = page.tab.locator("#events li").all_inner_texts()[0]
+    assert float(landing.split(" s")[0]) == pytest.approx((2 / 9.81) ** 0.5, rel=1e-8)
+    assert landing.endswith("closing.floor, impulse 7.53006 N·s")
 
 
 def test_a_departure_that_has_not_been_has_no_time(opened: Opened) -> None:
@@ -311,11 +314,13 @@ def test_every_control_has_a_name(name: str, opened: Opened) -> None:
 
 def test_slipping_and_sticking_are_marked(opened: Opened) -> None:
     """The block on the belt rides until k x = mu_s m g, x = speed t: it begins to slip at mu_s m g/(k speed)
-    = 0.24525 s; that it sticks again is told, too."""
+    = 0.24525 s; it sticks again after the slide, and that is told at its time too."""
     page = opened("Belt")
     page.until("lagfmu.runs")
     told = page.tab.locator("#events li").all_inner_texts()
     first = next(text for text in told if "slipping.grip" in text)
     assert float(first.split(" s")[0]) == pytest.approx(0.5 * 9.81 / (100 * 0.2), rel=1e-6)
-    assert any("sticks.grip begins" in text for text in told)
+    stuck = next(text for text in told if "sticking.grip" in text)
+    slide = (np.pi - np.arctan(0.981)) / 5  # (2/w)(pi - atan(d w/v)), d = (mu_s - mu_k) m g/k
+    assert float(stuck.split(" s")[0]) == pytest.approx(0.24525 + slide, rel=1e-6)
     assert "Friction" in page.tab.locator("#chart-choices").inner_text()

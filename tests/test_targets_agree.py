@@ -118,7 +118,8 @@ def test_both_tell_the_same_motion(python_fmu, native_fmu, name, changed):
         stop = FORGETS.get(name, stop)
     run = {"tolerance": tolerance, "stop_time": stop, "step_size": stop / POINTS}
     expected, found = both(python_fmu, native_fmu, name, values, **run)
-    assert expected.dtype.names == found.dtype.names
+    alone = ("closing.", "sticking.")  # what native FMUs alone tell
+    assert expected.dtype.names == tuple(n for n in found.dtype.names if not n.startswith(alone))
     assert len(found) == len(expected) == POINTS + 1
     check(expected, found)
     ended = [n for n in found.dtype.names if n.startswith("departure.") and n.endswith(".time")]

@@ -14,6 +14,7 @@ from typing import Any
 
 from pythonfmu.builder import FmuBuilder
 
+from .. import names
 from ..codegen.py.optional import files_left_out, files_of_its_own
 from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
@@ -72,7 +73,7 @@ class {name}(Fmi2Slave):
 
 def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content."""
-    scene, table = prepared.scene, _offered(prepared)
+    scene, table = prepared.scene, prepared.table
     runtime = _runtime(scene, prepared.system, bool(prepared.model.splines))
     package = f"lagfmu_{_digest(*runtime.values(), *(k.encode() for k in runtime))}"
     text = _script(prepared, table, package)
@@ -103,20 +104,27 @@ def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
     return pack(contents)
 
 
-def _offered(prepared: Prepared) -> VariableTable:
-    """The variables, with the methods that are written in Python.  Raises BuildError."""
+def offered(prepared: Prepared) -> VariableTable:
+    """The variables that it has, with the methods that are written in Python.  Raises BuildError."""
     scene = prepared.scene
     if scene.method not in IN_PYTHON:
         raise BuildError(
             f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
             f"{', '.join(IN_PYTHON)}, or the target native"
         )
-    return prepared.table.offering([m for m in scene.selectable if m in IN_PYTHON])
+    asked = [v.name for v in prepared.table.outputs if v.of.head in names.NATIVE]
+    if asked and not scene.complete:
+        raise BuildError(
+            f"scene {scene.name!r}: native FMUs alone tell {', '.join(asked)}: leave them out of its "
+            "outputs, or choose the target native"
+        )
+    known = prepared.table.without(*names.NATIVE)
+    return known.offering([m for m in scene.selectable if m in IN_PYTHON])
 
 
 def slave_of(prepared: Prepared) -> Any:
     """What the FMU's script makes an instance of, for this process.  Raises BuildError."""
-    table = _offered(prepared)
+    table = offered(prepared)
     members = {"system": prepared.system, "variables": [_row(v) for v in table.variables]}
     return type(prepared.scene.name, (LagfmuSlave,), members | _facts(prepared, table))
 

@@ -121,8 +121,9 @@ def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]
 
 
 def _as_built(prepared: Prepared, target: str) -> Prepared:
-    """With the nominal values of states; a python FMU has no model exchange."""
-    table = prepared.table.with_nominals(_nominals(prepared))
+    """With the nominal values of states; a python FMU has no model exchange and no native variables."""
+    table = prepared.table if target == "native" else python.offered(prepared)
+    table = table.with_nominals(_nominals(prepared))
     return replace(
         prepared, table=table if target == "native" else table.without_local_derivatives()
     )

@@ -42,7 +42,7 @@ from .variables import Value, Variable, VariableTable
 
 SPEED = METRE / SECOND
 BARRED = (  # what has an error bar, besides coordinates, velocities and outputs of one word
-    *(names.MULTIPLIER, names.FORCE, names.OWN, names.DEPARTURE_TIME, names.SLIP_TIME),
+    *(names.MULTIPLIER, names.FORCE, names.OWN, *names.COUNT_OF),
 )
 
 
@@ -482,6 +482,7 @@ class _Builder:
             variables.append(self.output(of, text, None, behind, "Boolean"))
             what = f"departure{{}} from {c.name}"
             variables += self._event(names.DEPARTURE, c.name, what)
+            variables += self._closing(c)
         return variables
 
     def friction_outputs(self) -> list[Variable]:
@@ -501,8 +502,9 @@ class _Builder:
             variables.append(self.output(Subject(names.MARGIN, law.name), text, FORCE, behind))
             text = f"power of {what}, lambda times slip velocity, never positive"
             variables.append(self.output(Subject(names.POWER, law.name), text, POWER, behind))
-            what = f"start{{}} of slipping of {law.name}"
-            variables += self._event(names.SLIPPING, law.name, what)
+            for events in (names.SLIPPING, names.STICKING):
+                what = f"start{{}} of {events} of {law.name}"
+                variables += self._event(events, law.name, what)
         if self.eom.frictions:
             text = (
                 "energy that frictions and impacts dissipated so far (Model Exchange: impacts alone; "
@@ -524,6 +526,15 @@ class _Builder:
             if v.of.quantity in BARRED
             or (v.of.quantity == names.VALUE and v.of.order < 2 and v.role in ("output", "start"))
         ]
+
+    def _closing(self, c: Contact) -> list[Variable]:
+        """Its impacts, those that bounce too, and where it closes without one; just before them."""
+        found = self._event(names.CLOSING, c.name, f"closing{{0}} or impact{{0}} of {c.name}")
+        unit = dimension_of(sp.sympify(c.expression), self.model.units, c.name) or ONE
+        blow = multiplier_unit(unit, False) * SECOND
+        text = f"impulse of {c.name} in its latest impact: the integral of its multiplier over time"
+        impulse = self.output(Subject(names.IMPULSE, c.name), text, blow, (), discrete=True)
+        return [*found[:2], impulse, *found[2:]]
 
     def _event(self, quantity: str, of: str, what: str) -> list[Variable]:
         """How often it happened; time, coordinates and velocities when it did so last."""

@@ -14,7 +14,7 @@ from ..model.units import ONE, DisplayUnit, Unit
 from ..names import Subject
 
 Value = float | int | bool | str
-RECORD = (names.STEPS, names.CONTACT, names.DEPARTURES, names.STICKS, names.SLIPS)
+RECORD = (names.STEPS, names.CONTACT, names.STICKS, *names.COUNTS)
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class VariableTable:
 
         Local, if they are not among the outputs, but there are the states, so that their start values
         can be set, their derivatives for model exchange, and the record of the run: the steps that
-        were taken, which contacts are closed or have opened and which frictions stick or have slipped, for
+        were taken, which contacts are closed and which frictions stick, and how often that changed, for
         that says which closed form holds.
         """
         moving = {*self.states, *self.derivatives}
@@ -103,6 +103,12 @@ class VariableTable:
         known = {v.name for v in kept}
         kept = [v if v.derivative_of in known else replace(v, derivative_of=None) for v in kept]
         return VariableTable(tuple(kept), self.states, self.derivatives)
+
+    def without(self, *heads: str) -> VariableTable:
+        """Without the variables of these kinds, and their error bars."""
+        gone = {v.name for v in self.variables if v.of.head in heads}
+        kept = tuple(v for v in self.variables if v.name not in gone and v.bar_of not in gone)
+        return replace(self, variables=kept)
 
     def offering(self, methods: Collection[str]) -> VariableTable:
         """The same, where `solver.method` can only be one of these."""

@@ -23,7 +23,7 @@ GROUPS = {  # by the kind of what a variable is of
     names.FORCE: "Generalized forces of constraint",
     names.ENERGY: "Energies",
     **dict.fromkeys((names.RESIDUAL, names.UNIQUE), "Residuals, zero where a constraint acts"),
-    **dict.fromkeys((names.CONTACT, names.DEPARTURE), "Contacts and departures"),
+    **dict.fromkeys((names.CONTACT, names.DEPARTURE, names.CLOSING), "Contacts"),
     names.ERROR: "Error bars",
     names.SOLVER: "Solver",
     names.OWN: "Outputs",
@@ -67,7 +67,7 @@ def _variable(v: Any, named: set[str]) -> dict[str, Any]:
         "description": v.description or "",
         "column": v.causality == "output" and v.type in NUMBERS,
         "discrete": v.variability == "discrete",
-        "event": names.read(v.name).quantity in (names.DEPARTURES, names.SLIPS),
+        "event": names.read(v.name).quantity in names.COUNTS,
         "counted": count if (count := names.counted(v.name)) in named else "",
     }
 

@@ -92,6 +92,8 @@ def subjects(form: Form) -> dict[str, tuple[Indices, Indices]]:
         row = frozenset({k})
         found |= {names.name(quantity, c.name): (NONE, row) for quantity in of_rows}
         found |= _event(eom, names.DEPARTURE, c.name, row)
+        found |= _event(eom, names.CLOSING, c.name, row)
+        found[names.name(names.IMPULSE, c.name)] = NONE, row
         for j, q in enumerate(eom.q):
             found[names.name(names.FORCE, c.name, str(q))] = frozenset({j}), row
     for o in eom.outputs:
@@ -121,7 +123,7 @@ def _motion(q: Expr) -> list[str]:
 def _event(
     eom: EquationsOfMotion, quantity: str, of: str, rows: Indices
 ) -> dict[str, tuple[Indices, Indices]]:
-    """What is kept of a departure or the start of slipping."""
+    """What is kept of what happens to a contact or a friction."""
     found = {names.name(f"{quantity}.{what}", of): (NONE, rows) for what in ("count", "time")}
     for j, q in enumerate(eom.q):
         for order in (0, 1):
@@ -140,6 +142,7 @@ def _of_frictions(eom: EquationsOfMotion) -> dict[str, tuple[Indices, Indices]]:
         own = [names.name(head, law.name) for head in (names.STICKS, names.MARGIN, names.POWER)]
         own += [names.name(names.SLIP, name) for name in law.of]
         found |= dict.fromkeys(own, (NONE, rows)) | _event(eom, names.SLIPPING, law.name, rows)
+        found |= _event(eom, names.STICKING, law.name, rows)
     if every:
         found[names.DISSIPATED] = NONE, every
     return found

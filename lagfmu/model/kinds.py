@@ -183,6 +183,12 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
             )
         seen[name] = kind
     contacts = {c.name for c in model.constraints if isinstance(c, Contact)}
+    if contacts and seen.get("impulse") == "coordinate":
+        c = min(contacts)
+        problems.append(
+            f"the coordinate 'impulse' in a model with contacts: 'closing.{c}.impulse' would be its value "
+            f"when {c!r} closed, and the impulse then: choose another name"
+        )
     names = set()
     for constraint in model.constraints:
         check_name("constraint", constraint.name, problems)

@@ -44,8 +44,8 @@ class Scene:
     else all.
     `reals_only`: for importers that take every variable for a Real: modes and counts are Reals (1.0 for
     true), and `solver.method` is left out.
-    `error_bars`: besides each lambda, Q, coordinate, velocity, output of the model's own and time of a
-    departure or a start of slipping that is an output, `error.NAME`: an estimate of how far this run's
+    `error_bars`: besides each lambda, Q, coordinate, velocity, output of the model's own and time of an
+    event that is an output, `error.NAME`: an estimate of how far this run's
     value may be off, by a companion run (docs/error_bars.md); co-simulation only.
     `derivatives`: whether a native FMU offers directional derivatives; None: unless `outputs` are
     named.

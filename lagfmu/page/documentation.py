@@ -44,7 +44,7 @@ GROUPS = (
     ),
     ("Energies", ""),
     ("Outputs of the model", "What they are made of stands among the equations."),
-    ("Contacts and departures", ""),
+    ("Contacts", ""),
     ("Friction", "Sticking, slip velocities, and what is left before a contact slips."),
     ("Solver", "Method, accuracy, and what was done."),
 )
@@ -54,7 +54,7 @@ TITLES = {  # by the kind of what a variable is of
     "solver": "Solver",
     names.OWN: "Outputs of the model",
     names.FORCE: "Generalized forces of constraint",
-    **dict.fromkeys((names.CONTACT, names.DEPARTURE), "Contacts and departures"),
+    **dict.fromkeys((names.CONTACT, names.DEPARTURE, names.CLOSING), "Contacts"),
     **dict.fromkeys(
         (names.MULTIPLIER, names.RESIDUAL, names.UNIQUE), "Multipliers and constraints"
     ),
@@ -111,6 +111,7 @@ def page(
             for c in acting
         ],
         contacts=[c for c in acting if isinstance(c, Contact)],
+        told={(v.of.quantity, v.of.constraint) for v in table.variables},
         moved=[
             (
                 m.name,

@@ -22,7 +22,7 @@ from .. import names
 from ..errors import SettingError, SimulationError
 from ..fmu.archive import unpack
 from ..fmu.described import Trajectory, experiment_of, has_error_bars, items_of, read_description
-from ..fmu.python import slave_of
+from ..fmu.python import offered, slave_of
 from ..fmu.slave import Refused
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
@@ -154,7 +154,7 @@ def _simulate_model(
     inputs: Trajectory | None,
     besides: Sequence[str],
 ) -> Trajectory:
-    scene, table = prepared.scene, prepared.table
+    scene, table = prepared.scene, offered(prepared)
     settable = {
         v.name: _Settable(
             v.kind,

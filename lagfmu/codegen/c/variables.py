@@ -83,13 +83,8 @@ ALONE = {  # where a value lies of which there is one
     names.DISSIPATED: "LOST",
 }
 OF_ROW = {names.MULTIPLIER: "LAMBDA", names.UNIQUE: "UNIQUE", names.RESIDUAL: "RESIDUAL"}
-OF_CONTACT = {
-    names.CONTACT: "CONTACT",
-    names.DEPARTURES: "COUNT",
-    names.DEPARTURE_TIME: "DEPARTURE_TIME",
-}
+OF_CONTACT = {names.CONTACT: "CONTACT", names.IMPULSE: "IMPULSE"}
 OF_FRICTION = {names.STICKS: "STICKS", names.MARGIN: "MARGIN", names.POWER: "POWER"}
-OF_SLIDE = {names.SLIPS: "SLIP_COUNT", names.SLIP_TIME: "SLIP_TIME"}
 
 
 class Places:
@@ -125,15 +120,15 @@ class Places:
         if what in OF_ROW:
             return OF_ROW[what], self.rows[c], NONE
         if what in OF_CONTACT:
-            return OF_CONTACT[what], self.contacts[c], self.contacts[c]
-        if what == names.DEPARTURE:
-            return f"DEPARTURE_{'QV'[rate]}", self.coordinates[q], self.contacts[c]
+            return OF_CONTACT[what], self.contacts[c], NONE
+        if of.head in names.EVENTS:
+            index, part = (self.coordinates[q], "QV"[rate]) if q else (0, what.partition(".")[2])
+            i = (self.contacts if of.head in (names.DEPARTURE, names.CLOSING) else self.frictions)[
+                c
+            ]
+            return f"{of.head}_{part}".upper(), index, i
         if what in OF_FRICTION:
             return OF_FRICTION[what], self.frictions[c], NONE
-        if what in OF_SLIDE:
-            return OF_SLIDE[what], self.frictions[c], self.frictions[c]
-        if what == names.SLIPPING:
-            return f"SLIP_{'QV'[rate]}", self.coordinates[q], self.frictions[c]
         if what == names.SLIP:
             i, j = self.slips[c]
             return "SLIP", 2 * i + j, i

@@ -56,9 +56,11 @@ class Trajectory {
       if (v.event) {
         const name = v.name.slice(0, -".count".length);
         const times = this.columns[PLACE.get(`${name}.time`)];
+        const impulse = PLACE.get(`${name}.impulse`);
         for (let i = 1; i < column.length; i++) {
           const more = column[i] - column[i - 1];
-          const text = more > 1 ? `${name} (latest of ${more})` : name;
+          const blow = this.columns[impulse]?.[i] > 0 ? `, impulse ${shown(this.columns[impulse][i])} ${COLUMNS[impulse].unit}` : "";
+          const text = `${name}${more > 1 ? ` (latest of ${more})` : ""}${blow}`;
           if (more > 0 && times) found.push({ time: times[i], text });
         }
       } else if (v.type === "Boolean" && !v.name.startsWith("unique.")) {

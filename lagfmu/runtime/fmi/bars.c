@@ -134,11 +134,9 @@ static void turn(Instance *x) {
 
 /* The time of an event pairs by the count of its own kind. */
 static int is_paired_for(const Variable *of, const Solver *a, const Solver *b, int all) {
-    if (of->place == AT_DEPARTURE_TIME)
-        return a->state.count[of->index] == b->state.count[of->index];
-    if (of->place == AT_SLIP_TIME)
-        return a->state.slip_count[of->index] == b->state.slip_count[of->index];
-    return all;
+    if (!is_of_event(of->place)) return all;
+    const EventKind kind = event_kind(of->place);
+    return a->state.latest[kind].count[of->contact] == b->state.latest[kind].count[of->contact];
 }
 
 /* Both runs can be read at the present state and inputs. */
@@ -164,9 +162,8 @@ static int compare(Instance *x, const Variable *bar, int paired, double share, d
     *worst = b->worst[bar->contact];
     *size = b->size[bar->contact];
     if (instance_value(&x->solver, &x->seen, of, &mine) != OK) return 0;
-    if (of->place == AT_DEPARTURE_TIME || of->place == AT_SLIP_TIME) {
-        const int count = of->place == AT_DEPARTURE_TIME ? x->solver.state.count[of->index]
-                                                         : x->solver.state.slip_count[of->index];
+    if (is_of_event(of->place)) {
+        const int count = x->solver.state.latest[event_kind(of->place)].count[of->contact];
         *size = count > 0 ? fmax(fabs(x->start_time), fabs(x->solver.state.now.t)) : 0;
     } else {
         *size = fmax(*size, fabs(mine));

@@ -31,10 +31,8 @@ void instance_layout(Instance *x, Arena *arena) {
         x->set = arena_ints(&saved, system->inputs);
         x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
-        x->closed = arena_ints(&scratch, system->contacts);
-        x->count = arena_ints(&scratch, system->contacts);
-        x->stuck = arena_ints(&scratch, system->frictions);
-        x->slips = arena_ints(&scratch, system->frictions);
+        for (int k = 0; k < EVENT_KINDS; k++)
+            x->before[k] = arena_ints(&scratch, event_count_of(system, (EventKind)k));
         x->happened = arena_ints(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
@@ -96,12 +94,24 @@ static Status follow(Instance *x) {
 
 /* ------------------------------------------------------------------ values */
 
-static double departed(const Solver *s, int contact, int index, const double *seen,
-                       const double *own) {
-    const System *full = s->system->full;
-    if (full != NULL) return seen[contact * full->n + index];
-    if (s->state.count[contact] == 0) return 0;
-    return own[contact * s->system->n + index];
+/* What lies ready of an event; 0 if it is a state by the coordinates of an embedding. */
+static int ready_of_event(const Solver *s, const Variable *v, double *value) {
+    const Latest *latest = &s->state.latest[event_kind(v->place)];
+    const int at = v->contact * s->system->n + v->index;
+    switch (event_part(v->place)) {
+        case AT_DEPARTURE_COUNT: *value = latest->count[v->contact]; return 1;
+        case AT_DEPARTURE_TIME: *value = latest->time[v->contact]; return 1;
+        default: break;
+    }
+    if (s->system->full != NULL) return 0;
+    *value = event_part(v->place) == AT_DEPARTURE_Q ? latest->q[at] : latest->v[at];
+    return 1;
+}
+
+/* The state at an event by the coordinates of an embedding. */
+static double of_event(const Solver *s, const Observed *o, const Variable *v) {
+    const int at = v->contact * s->system->full->n + v->index, of_q = event_part(v->place) == AT_DEPARTURE_Q;
+    return (of_q ? o->latest_q : o->latest_v)[event_kind(v->place)][at];
 }
 
 /* Values that were set; 0 if it is none of these. */
@@ -122,6 +132,7 @@ static int was_set(const Instance *x, const Variable *v, double *value) {
 /* Values that lie ready in the state; 0 if the value has to be calculated first. */
 static int ready(const Solver *s, const Variable *v, double *value) {
     const int embedded = s->system->full != NULL;
+    if (is_of_event(v->place)) return ready_of_event(s, v, value);
     switch (v->place) {
         case AT_Q:
             if (embedded) return 0;
@@ -135,12 +146,7 @@ static int ready(const Solver *s, const Variable *v, double *value) {
         case AT_SDOT: *value = s->state.v[v->index]; return 1;
         case AT_STEPS: *value = s->state.now.steps; return 1;
         case AT_CONTACT: *value = s->state.closed[v->index]; return 1;
-        case AT_COUNT: *value = s->state.count[v->index]; return 1;
-        case AT_DEPARTURE_TIME: *value = s->state.departure_time[v->index]; return 1;
-        case AT_SLIP_COUNT: *value = s->state.slip_count[v->index]; return 1;
-        case AT_SLIP_TIME: *value = s->state.slip_time[v->index]; return 1;
-        case AT_SLIP_Q: *value = s->state.slip_q[v->contact * s->system->n + v->index]; return 1;
-        case AT_SLIP_V: *value = s->state.slip_v[v->contact * s->system->n + v->index]; return 1;
+        case AT_IMPULSE: *value = s->state.impulse[v->index]; return 1;
         case AT_LOST: *value = s->state.now.lost; return 1;
         default: return 0;
     }
@@ -155,8 +161,11 @@ double instance_setting(const Instance *x, const Variable *v) {
 }
 
 Status instance_value(Solver *s, const Observed *o, const Variable *v, double *value) {
-    const State *state = &s->state;
     if (ready(s, v, value)) return OK;
+    if (is_of_event(v->place)) {
+        *value = of_event(s, o, v);
+        return OK;
+    }
     switch (v->place) {
         case AT_Q: *value = o->q[v->index]; break;
         case AT_V: *value = o->v[v->index]; break;
@@ -175,12 +184,6 @@ Status instance_value(Solver *s, const Observed *o, const Variable *v, double *v
         case AT_MARGIN: *value = o->margin[v->index]; break;
         case AT_POWER: *value = o->power[v->index]; break;
         case AT_OUTPUT: *value = o->own[v->index]; break;
-        case AT_DEPARTURE_Q:
-            *value = departed(s, v->contact, v->index, o->departure_q, state->departure_q);
-            break;
-        case AT_DEPARTURE_V:
-            *value = departed(s, v->contact, v->index, o->departure_v, state->departure_v);
-            break;
         default: return fail(&s->why, "%s has no value", v->name);
     }
     return OK;
@@ -371,54 +374,45 @@ static void move_inputs(Instance *x, double t) {
     drive->since = t;
 }
 
-static void report_strike(Instance *x, int c, const char *name) {
+/* What contact, or friction, i has done in this step, and when it did so last. */
+static void report(Instance *x, EventKind kind, int i) {
+    static const char *const SORT[] = {"contact", "contact", "friction", "friction"};
+    static const char *const DONE[] = {"opened", "closed", "began to slip", "began to stick"};
     const Solver *s = &x->solver;
-    char latest[32] = "";
-    if (s->strikes[c] > 1)
-        (void)snprintf(latest, sizeof latest, ", the latest of %d", s->strikes[c]);
-    (void)snprintf(x->note, sizeof x->note,
-                   "contact %s was struck at t = %s s, impulse %s (of its lambda times s)%s", name,
-                   digits(s->struck_at[c]).text, digits(s->impulse[c]).text, latest);
+    const Latest *latest = &s->state.latest[kind];
+    const int again = latest->count[i] - x->before[kind][i], struck = kind == CLOSING && s->state.impulse[i] > 0;
+    const char *name = kind <= CLOSING ? s->system->rows[s->system->contact[i]].name : s->system->friction[i].name;
+    const char *stays = struck && s->state.closed[i] ? ", and stays closed" : "";
+    char impulse[80] = "", more[32] = "";
+    if (again == 0) return;
+    if (struck)
+        (void)snprintf(impulse, sizeof impulse, ", impulse %s (of its lambda times s)",
+                       digits(s->state.impulse[i]).text);
+    if (again > 1) (void)snprintf(more, sizeof more, ", the latest of %d", again);
+    (void)snprintf(x->note, sizeof x->note, "%s %s %s at t = %s s%s%s%s", SORT[kind], name,
+                   struck ? "was struck" : DONE[kind], digits(latest->time[i]).text, impulse, more, stays);
     x->tell(x->context, NOTE_EVENT, x->note);
 }
 
-static void report_events(Instance *x) {
-    const State *now = &x->solver.state;
-    if (x->quiet) return;
-    for (int c = 0; c < x->solver.system->contacts; c++) {
-        const char *name = x->solver.system->rows[x->solver.system->contact[c]].name;
-        if (x->solver.strikes[c] > 0) report_strike(x, c, name);
-        if (now->count[c] != x->count[c])
-            (void)snprintf(x->note, sizeof x->note, "contact %s opened at t = %s s", name,
-                           digits(now->departure_time[c]).text);
-        else if (now->closed[c] && !x->closed[c])
-            (void)snprintf(x->note, sizeof x->note, "contact %s closed", name);
-        else
-            continue;
-        x->tell(x->context, NOTE_EVENT, x->note);
-    }
-    for (int i = 0; i < x->solver.system->frictions; i++) {
-        const char *name = x->solver.system->friction[i].name;
-        if (now->slip_count[i] != x->slips[i])
-            (void)snprintf(x->note, sizeof x->note, "friction %s began to slip at t = %s s", name,
-                           digits(now->slip_time[i]).text);
-        else if (now->slide[i].sticks && !x->stuck[i])
-            (void)snprintf(x->note, sizeof x->note, "friction %s sticks", name);
-        else
-            continue;
-        x->tell(x->context, NOTE_EVENT, x->note);
-    }
+/* Of two kinds that take turns, the one that was first. */
+static void report_both(Instance *x, EventKind one, EventKind other, int i) {
+    const Latest *latest = x->solver.state.latest;
+    const int turned = latest[other].time[i] < latest[one].time[i];
+    report(x, turned ? other : one, i);
+    report(x, turned ? one : other, i);
 }
 
-static void note_modes(Instance *x) {
+static void report_events(Instance *x) {
     const System *s = x->solver.system;
-    const size_t size = (size_t)s->contacts * sizeof *x->closed;
-    memcpy(x->closed, x->solver.state.closed, size);
-    memcpy(x->count, x->solver.state.count, size);
-    memset(x->solver.strikes, 0, size);
-    for (int i = 0; i < s->frictions; i++) {
-        x->stuck[i] = x->solver.state.slide[i].sticks;
-        x->slips[i] = x->solver.state.slip_count[i];
+    if (x->quiet) return;
+    for (int c = 0; c < s->contacts; c++) report_both(x, CLOSING, DEPARTURE, c);
+    for (int i = 0; i < s->frictions; i++) report_both(x, SLIPPING, STICKING, i);
+}
+
+static void remember_counts(Instance *x) {
+    for (int k = 0; k < EVENT_KINDS; k++) {
+        const int count = event_count_of(x->solver.system, (EventKind)k);
+        memcpy(x->before[k], x->solver.state.latest[k].count, (size_t)count * sizeof(int));
     }
 }
 
@@ -448,7 +442,7 @@ Status instance_step(Instance *x, double t_end) {
     instance_save(x, x->backup);
     if (PRESCRIBED != NULL) PRESCRIBED->begin_step(x);
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
-    if (s->system->contacts + s->system->frictions > 0) note_modes(x);
+    if (s->system->contacts + s->system->frictions > 0) remember_counts(x);
     if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;

@@ -37,8 +37,7 @@ typedef struct Instance {
     Rank *rank;             /* (2 n) who said them; found anew at each start */
     double *expected;       /* (inputs) values at the end of the latest step */
     int *set;               /* (inputs) 1: set since the latest step */
-    int *closed, *count;    /* (contacts) before a step */
-    int *stuck, *slips;     /* (frictions) likewise */
+    int *before[EVENT_KINDS]; /* (contacts, or frictions) how many events there were before a step */
     int *happened;          /* (contacts) */
     double *pull;            /* (contacts) [of f/s^2] acceleration towards each, of exchange.c */
     char *saved, *backup;   /* what must be saved; a copy from before a step */

@@ -37,6 +37,9 @@ typedef struct {
 
 #define NOW(name, member, sort) {name, offsetof(Solver, state.now.member), sort, ONE}
 #define SOLVER(name, member, sort, many) {name, offsetof(Solver, member), sort, many}
+#define LATEST(name, kind, many) \
+    SOLVER(name, state.latest[kind].count, COUNT, many), SOLVER(name, state.latest[kind].time, FINITE, many), \
+        SOLVER(name, state.latest[kind].q, FINITE, many##_N), SOLVER(name, state.latest[kind].v, FINITE, many##_N)
 #define INSTANCE(name, member, sort, many) {name, offsetof(Instance, member), sort, many}
 
 static const Saved OF_SOLVER[] = {
@@ -56,7 +59,6 @@ static const Saved OF_SOLVER[] = {
     NOW("rho / sigma", choice.ratio, LIMIT),
     NOW("step count", steps, COUNT),
     NOW("step count", tiny, COUNT),
-    NOW("count of impacts", strikes, COUNT),
     NOW("mode of the step ahead", ahead, FLAG),
     NOW("mode of the step ahead", between, FLAG),
     NOW("mode of the step ahead", fresh, FLAG),
@@ -92,14 +94,11 @@ static const Saved OF_SOLVER[] = {
     SOLVER("rank of the constraints", state.basis, FLAG, ROWS),
     SOLVER("modes", state.closed, FLAG, CONTACTS),
     SOLVER("modes", state.armed, FLAG, CONTACTS),
-    SOLVER("counts", state.count, COUNT, CONTACTS),
-    SOLVER("departures", state.departure_time, FINITE, CONTACTS),
-    SOLVER("departures", state.departure_q, FINITE, CONTACTS_N),
-    SOLVER("departures", state.departure_v, FINITE, CONTACTS_N),
-    SOLVER("counts", state.slip_count, COUNT, FRICTIONS),
-    SOLVER("starts of slipping", state.slip_time, FINITE, FRICTIONS),
-    SOLVER("starts of slipping", state.slip_q, FINITE, FRICTIONS_N),
-    SOLVER("starts of slipping", state.slip_v, FINITE, FRICTIONS_N),
+    LATEST("departures", DEPARTURE, CONTACTS),
+    LATEST("closings", CLOSING, CONTACTS),
+    LATEST("starts of slipping", SLIPPING, FRICTIONS),
+    LATEST("starts of sticking", STICKING, FRICTIONS),
+    SOLVER("impulses", state.impulse, SIZE, CONTACTS),
     SOLVER("indicators", state.indicator, FINITE, WATCHED),
     SOLVER("step ahead", integrator.y, FINITE, TWICE_N),
     SOLVER("step ahead", integrator.y_old, FINITE, TWICE_N),

@@ -3,14 +3,14 @@
 #ifndef LAGFMU_VARIABLES_H
 #define LAGFMU_VARIABLES_H
 
-#include "system.h"
+#include "state.h"
 
 typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN, TYPE_STRING } Type;
 
 /* what may set it */
 typedef enum { ROLE_PARAMETER, ROLE_START, ROLE_INPUT, ROLE_SOLVER, ROLE_OUTPUT } Role;
 
-/* where its value lies (`index`, and for departures `contact`) */
+/* where its value lies (`index`, and for events `contact`) */
 typedef enum {
     AT_PARAMETER,      /* p[index] */
     AT_METHOD, AT_TOLERANCE, AT_STEP, AT_MAXIMUM_STEP, AT_MAXIMUM_STEPS,
@@ -22,13 +22,16 @@ typedef enum {
     AT_SHARE,          /* entry index of G */
     AT_KINETIC, AT_POTENTIAL, AT_TOTAL,
     AT_OUTPUT,         /* own output index */
-    AT_CONTACT, AT_COUNT, AT_DEPARTURE_TIME, /* contact index */
-    AT_DEPARTURE_Q, AT_DEPARTURE_V,          /* full coordinate index, of `contact` */
+    AT_CONTACT, AT_IMPULSE,                  /* contact index */
     AT_STEPS,
     AT_STICKS, AT_MARGIN, AT_POWER,          /* friction index */
     AT_SLIP,                                 /* twice the friction's index, and one more for its second row */
-    AT_SLIP_COUNT, AT_SLIP_TIME,             /* friction index */
-    AT_SLIP_Q, AT_SLIP_V,                    /* coordinate index, of friction `contact` */
+    /* of the latest event of contact, or friction, `contact`, in the order of EventKind: how often and when; full
+     * coordinate index */
+    AT_DEPARTURE_COUNT, AT_DEPARTURE_TIME, AT_DEPARTURE_Q, AT_DEPARTURE_V,
+    AT_CLOSING_COUNT, AT_CLOSING_TIME, AT_CLOSING_Q, AT_CLOSING_V,
+    AT_SLIPPING_COUNT, AT_SLIPPING_TIME, AT_SLIPPING_Q, AT_SLIPPING_V,
+    AT_STICKING_COUNT, AT_STICKING_TIME, AT_STICKING_Q, AT_STICKING_V,
     AT_LOST,                                 /* energy dissipated */
     AT_ERROR           /* error bar number `contact`, of the variable at position `index` (bars.h) */
 } Place;
@@ -45,6 +48,13 @@ typedef struct {
     int positive;    /* zero is refused */
     int given;       /* role START: the model's `start` says it; otherwise nobody did, and it is 0 */
 } Variable;
+
+/* Of an event's variable: the event's kind, and the place of the same variable of a departure. */
+static inline EventKind event_kind(Place place) { return (EventKind)((place - AT_DEPARTURE_COUNT) / 4); }
+static inline Place event_part(Place place) {
+    return (Place)(AT_DEPARTURE_COUNT + (place - AT_DEPARTURE_COUNT) % 4);
+}
+static inline int is_of_event(Place place) { return place >= AT_DEPARTURE_COUNT && place <= AT_STICKING_V; }
 
 extern const Variable VARIABLES[];
 extern const int VARIABLE_COUNT;

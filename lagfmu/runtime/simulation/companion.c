@@ -76,11 +76,13 @@ static int slides_paired(const Slide *a, const Slide *b) {
 int companion_paired(const Solver *a, const Solver *b) {
     const System *s = a->system;
     const State *x = &a->state, *y = &b->state;
-    int paired = x->now.strikes == y->now.strikes;
-    for (int c = 0; c < s->contacts; c++)
-        paired &= x->closed[c] == y->closed[c] && x->count[c] == y->count[c];
+    int paired = 1;
+    for (int k = 0; k < EVENT_KINDS; k++)
+        for (int i = 0; i < event_count_of(s, (EventKind)k); i++)
+            paired &= x->latest[k].count[i] == y->latest[k].count[i];
+    for (int c = 0; c < s->contacts; c++) paired &= x->closed[c] == y->closed[c];
     for (int k = 0; k < s->jumps; k++) paired &= x->level[k] == y->level[k];
     for (int k = 0; k < s->frictions; k++)
-        paired &= x->slip_count[k] == y->slip_count[k] && slides_paired(&x->slide[k], &y->slide[k]);
+        paired &= slides_paired(&x->slide[k], &y->slide[k]);
     return paired;
 }

@@ -268,6 +268,7 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
     int *entering = s->iwork_impact + impact_ints(system->m, contacts) - contacts;
     double *Lambda = s->work_impact + impact_doubles(system->n, system->m, contacts) - system->m;
     memset(struck, 0, (size_t)contacts * sizeof *struck);
+    memset(s->push, 0, (size_t)contacts * sizeof *s->push);
     for (int round = 1; round <= IMPACT_ROUNDS; round++) {
         if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
         if (!find_entering(s, v, touching, slow, round == IMPACT_ROUNDS, entering)) return OK;
@@ -275,9 +276,7 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
         for (int c = 0; c < contacts; c++) {
             const double push = Lambda[system->contact[c]];
             if (!entering[c] || !(push > 0)) continue;
-            s->impulse[c] = struck[c] ? s->impulse[c] + push : push;
-            s->struck_at[c] = at.t;
-            s->strikes[c] += !struck[c];
+            s->push[c] += push;
             struck[c] = 1;
         }
     }

@@ -20,7 +20,7 @@ typedef struct {
 
 /* All impacts of an instant; v (n) is replaced by the velocities after them.  `touching`: flags, the
  * contacts that an impact can reach; `slow` (m): speeds that count as none; `struck`: flags, set for the
- * contacts that took an impulse.  FAILED: no velocities satisfy the contacts. */
+ * contacts that took an impulse, which is in s->push.  FAILED: no velocities satisfy the contacts. */
 Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching,
                const double *slow, int *struck);
 

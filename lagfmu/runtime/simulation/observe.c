@@ -117,13 +117,14 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
     return observe_residuals(s, at, b, o);
 }
 
-static void observe_departures(const Solver *s, Observed *o) {
-    const int own = s->system->n, full = s->system->embed != NULL ? s->system->full->n : own;
-    for (int c = 0; c < s->system->contacts; c++) {
-        double *q = o->departure_q + c * full, *v = o->departure_v + c * full;
-        if (s->state.count[c] > 0) {
-            expand(s, s->state.departure_time[c], s->state.departure_q + c * own,
-                   s->state.departure_v + c * own, q, v);
+/* The states of the latest events, by the full coordinates. */
+static void observe_events(const Solver *s, EventKind kind, Observed *o) {
+    const int own = s->system->n, full = s->system->full->n;
+    const Latest *latest = &s->state.latest[kind];
+    for (int i = 0; i < event_count_of(s->system, kind); i++) {
+        double *q = o->latest_q[kind] + i * full, *v = o->latest_v[kind] + i * full;
+        if (latest->count[i] > 0) {
+            expand(s, latest->time[i], latest->q + i * own, latest->v + i * own, q, v);
             continue;
         }
         for (int j = 0; j < full; j++) q[j] = v[j] = 0;
@@ -157,7 +158,8 @@ static void names(const Solver *s, const System *full, Owner of, int i, const ch
 /* FAILED if a value is not finite; the cause names them as the FMU's variables are named. */
 static Status check_finite(Solver *s, const System *full, const Observed *o) {
     const System *own = s->system;
-    const int n = full->n, departed = own->contacts * n, stepped = own->embed != NULL ? own->n : 0;
+    const int n = full->n, stepped = own->embed != NULL ? own->n : 0;
+    const int kept = stepped > 0 ? own->contacts * n : 0; /* with an embedding there are no frictions */
     const double total = o->energy[0] + o->energy[1];
     const struct {
         const double *values;
@@ -178,8 +180,10 @@ static Status check_finite(Solver *s, const System *full, const Observed *o) {
         {&o->energy[0], 1, OF_NONE, "energy.kinetic"},
         {&o->energy[1], 1, OF_NONE, "energy.potential"},
         {&total, 1, OF_NONE, "energy.total"},
-        {o->departure_q, departed, OF_CONTACT, "departure.%s.%s"},
-        {o->departure_v, departed, OF_CONTACT, "departure.%s.velocity.%s"},
+        {o->latest_q[DEPARTURE], kept, OF_CONTACT, "departure.%s.%s"},
+        {o->latest_v[DEPARTURE], kept, OF_CONTACT, "departure.%s.velocity.%s"},
+        {o->latest_q[CLOSING], kept, OF_CONTACT, "closing.%s.%s"},
+        {o->latest_v[CLOSING], kept, OF_CONTACT, "closing.%s.velocity.%s"},
         {o->slip, 2 * own->frictions, OF_SLIP, "slip.%s"},
         {o->margin, own->frictions, OF_FRICTION, "margin.%s"},
         {o->power, own->frictions, OF_FRICTION, "power.%s"},
@@ -210,7 +214,7 @@ Status solver_observe(Solver *s, Observed *o) {
     expand(s, at.t, s->state.q, s->state.v, o->q, o->v);
     if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;
     if (full->energies != NULL) full->energies(at.t, o->q, o->v, at.u, at.p, o->energy);
-    observe_departures(s, o);
+    for (int k = 0; k < EVENT_KINDS && s->system->embed != NULL; k++) observe_events(s, (EventKind)k, o);
     if (check_finite(s, full, o) != OK) return FAILED;
     return outputs_observe(full, at, o, &s->why);
 }

@@ -63,12 +63,8 @@ static Status lose(Solver *s, const double *arriving) {
     return OK;
 }
 
-static void note_slipping(Solver *s, int i) {
-    const size_t n = (size_t)s->system->n;
-    s->state.slip_count[i] += 1;
-    s->state.slip_time[i] = s->state.now.t;
-    memcpy(s->state.slip_q + (size_t)i * n, s->state.q, n * sizeof(double));
-    memcpy(s->state.slip_v + (size_t)i * n, s->state.v, n * sizeof(double));
+static void note(Solver *s, EventKind kind, int i) {
+    state_note(&s->state, kind, i, s->system->n, s->state.q, s->state.v);
 }
 
 static Status change(Solver *s, Instant at, const int *left, const double *arriving, int *closed,
@@ -94,7 +90,7 @@ static Status change(Solver *s, Instant at, const int *left, const double *arriv
         const int stuck = s->state.slide[i].sticks, sticks = x.slides[i].sticks;
         for (int r = 0; r < law->rows && sticks && !stuck; r++)
             s->state.offset[law->row[r]] = b->f[law->row[r]];
-        if (b->friction->loaded[i] && stuck && !sticks) note_slipping(s, i);
+        if (b->friction->loaded[i] && stuck != sticks) note(s, sticks ? STICKING : SLIPPING, i);
     }
     return rest_finish(&x, OK);
 }
@@ -134,7 +130,7 @@ static Status renew(Solver *s) {
         if (!s->state.slide[i].sticks) continue;
         if (hypot(slip[0], slip[1]) <= SLIDES_JUMP * s->state.slide[i].noise) continue;
         rest_slide_along(b, i, s->state.v, &s->state.slide[i]);
-        note_slipping(s, i);
+        note(s, SLIPPING, i);
     }
     return OK;
 }

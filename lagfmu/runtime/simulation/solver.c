@@ -22,15 +22,15 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->closed = arena_ints(saved, contacts);
     x->armed = arena_ints(saved, contacts);
     x->left = arena_ints(saved, indicators);
-    x->count = arena_ints(saved, contacts);
-    x->departure_time = arena_doubles(saved, contacts);
-    x->departure_q = arena_doubles(saved, contacts * n);
-    x->departure_v = arena_doubles(saved, contacts * n);
+    for (int k = 0; k < EVENT_KINDS; k++) {
+        const int count = event_count_of(s, (EventKind)k);
+        x->latest[k].count = arena_ints(saved, count);
+        x->latest[k].time = arena_doubles(saved, count);
+        x->latest[k].q = arena_doubles(saved, count * n);
+        x->latest[k].v = arena_doubles(saved, count * n);
+    }
+    x->impulse = arena_doubles(saved, contacts);
     x->slide = arena_take(saved, (size_t)s->frictions, sizeof *x->slide);
-    x->slip_count = arena_ints(saved, s->frictions);
-    x->slip_time = arena_doubles(saved, s->frictions);
-    x->slip_q = arena_doubles(saved, s->frictions * n);
-    x->slip_v = arena_doubles(saved, s->frictions * n);
     x->indicator = arena_doubles(saved, indicators);
     integrator_layout(i, saved, scratch, 2 * n, OPTIONAL.methods, METHOD_COUNT);
     x->y = i->y;
@@ -62,9 +62,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     }
     s->active = arena_ints(scratch, m);
     s->scale = arena_doubles(scratch, 2 * n);
-    s->strikes = arena_ints(scratch, contacts);
-    s->struck_at = arena_doubles(scratch, contacts);
-    s->impulse = arena_doubles(scratch, contacts);
+    s->push = arena_doubles(scratch, contacts);
     s->u = arena_doubles(scratch, system->inputs + system->jumps);
     s->work_jumps = arena_doubles(scratch, system->jumps > 0 ? 2 * system->jumps + n : 0);
     s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);
@@ -79,10 +77,10 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_rub = arena_take(scratch, some ? OPTIONAL.slides->doubles(system) : 0, sizeof(double));
     s->iwork_rub = arena_take(scratch, some ? OPTIONAL.slides->ints(system) : 0, sizeof(int));
     s->trial_slides = arena_take(scratch, (size_t)frictions, sizeof *s->trial_slides);
-    s->work_slides = arena_doubles(scratch, some * (2 * frictions + 5 * n));
+    s->work_slides = arena_doubles(scratch, some * (2 * frictions + 4 * n));
     s->iwork_slides = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
     s->iwork_events = arena_ints(scratch, 6 * contacts);
-    s->work_switch = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m);
+    s->work_switch = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + n);
     s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(n, m, contacts));
     s->iwork_impact = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));
 }
@@ -110,8 +108,10 @@ void observed_layout(Observed *o, Arena *arena, const System *system) {
     o->s = arena_doubles(arena, stepped);
     o->sdot = arena_doubles(arena, stepped);
     o->sddot = arena_doubles(arena, stepped);
-    o->departure_q = arena_doubles(arena, system->contacts * n);
-    o->departure_v = arena_doubles(arena, system->contacts * n);
+    for (int k = 0; k < EVENT_KINDS && stepped > 0; k++) {
+        o->latest_q[k] = arena_doubles(arena, event_count_of(system, (EventKind)k) * n);
+        o->latest_v[k] = arena_doubles(arena, event_count_of(system, (EventKind)k) * n);
+    }
     o->slip = arena_doubles(arena, 2 * system->frictions);
     o->margin = arena_doubles(arena, system->frictions);
     o->power = arena_doubles(arena, system->frictions);

@@ -23,8 +23,7 @@ typedef struct {
     double *scale;             /* (2 n) of errors, in the present step */
     double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
-    int *strikes;              /* (contacts) impacts since the caller set them to 0 */
-    double *struck_at, *impulse; /* (contacts) of the latest: time [s], impulse [of lambda times s] */
+    double *push;              /* (contacts) impulse of the impacts of the present instant [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
     double *work_initial;      /* (6 n + 3 m) of initial.c, afar.c and magnitudes.c */
@@ -38,10 +37,10 @@ typedef struct {
     double *work_rub;          /* of rubbing.c */
     int *iwork_rub;
     Slide *trial_slides;       /* (frictions) of rest.c, with */
-    double *work_slides;       /* (2 frictions + 5 n) */
+    double *work_slides;       /* (2 frictions + 4 n) */
     int *iwork_slides;         /* (4 frictions + 2 contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and switch.c */
-    double *work_switch;       /* (m) of switch.c */
+    double *work_switch;       /* (m + n) of switch.c */
     double *work_impact;       /* of impact.c, see there */
     int *iwork_impact;
     Why why;
@@ -92,7 +91,7 @@ typedef struct {
     double energy[2];              /* kinetic, potential */
     double *own, *other;           /* (output_count) the model's own; where these are not finite */
     double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
-    double *departure_q, *departure_v; /* (contacts * n) in full coordinates */
+    double *latest_q[EVENT_KINDS], *latest_v[EVENT_KINDS]; /* of an embedding: state.latest in full coordinates */
     double *slip, *margin, *power; /* (2 frictions), (frictions), (frictions) */
     int *sticks;                   /* (frictions) */
 } Observed;

@@ -6,6 +6,8 @@
  * that the three stay derivatives of each other. */
 #include "state.h"
 
+#include <string.h>
+
 const char *const METHOD_NAMES[METHOD_COUNT] = {
     [AUTO] = "auto", [DOP853] = "dop853", [RK4] = "rk4", [RADAU5] = "radau5", [RATTLE] = "rattle"};
 
@@ -26,4 +28,13 @@ void drive_at(const System *s, const Drive *drive, double t, double *u) {
         u[k + 1] += e * third / 2;
         u[k + 2] += third;
     }
+}
+
+void state_note(State *x, EventKind kind, int i, int n, const double *q, const double *v) {
+    Latest *latest = &x->latest[kind];
+    const size_t bytes = (size_t)n * sizeof *q;
+    latest->count[i] += 1;
+    latest->time[i] = x->now.t;
+    memcpy(latest->q + (size_t)i * (size_t)n, q, bytes);
+    memcpy(latest->v + (size_t)i * (size_t)n, v, bytes);
 }

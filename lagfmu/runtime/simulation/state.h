@@ -55,9 +55,17 @@ typedef struct {
     Choice choice;       /* of the method `auto` */
     double lost;         /* [J] that frictions and impacts have dissipated, ... */
     double lost_old, lost_ahead; /* ... and so far where the integrator began its step, and stands */
-    int strikes;         /* impacts so far: contacts that were struck */
     LocalErrors local, local_old; /* so far, and without the latest step */
 } Numbers;
+
+/* What happens again and again: to a contact, which opens and is closed or struck, and to a friction, which
+ * begins to slip and to stick.  Of each kind: how often, and the time and the state of the latest. */
+typedef enum { DEPARTURE, CLOSING, SLIPPING, STICKING, EVENT_KINDS } EventKind;
+typedef struct {
+    int *count;
+    double *time;   /* [s] */
+    double *q, *v;  /* (n of each) */
+} Latest;
 
 /* ... and its arrays, which lie in one block. */
 typedef struct {
@@ -71,17 +79,21 @@ typedef struct {
     int *basis;               /* (m) rows that act, as many of them as were independent there */
     int *closed, *armed;      /* (contacts) */
     int *left;                /* (indicators) its range at the event ahead: 1 upwards, -1 downwards */
-    int *count;               /* (contacts) departures so far */
-    double *departure_time;   /* (contacts) [s] of the latest */
-    double *departure_q, *departure_v; /* (contacts * n) state then */
+    Latest latest[EVENT_KINDS]; /* of each contact, or friction */
+    double *impulse;          /* (contacts) [of lambda times s] of the latest closing; 0: none */
     Slide *slide;             /* (frictions) how they stand */
-    int *slip_count;          /* (frictions) starts of slipping so far */
-    double *slip_time;        /* (frictions) [s] of the latest */
-    double *slip_q, *slip_v;  /* (frictions * n) state then */
     double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
     double *y, *f, *y_old, *f_old, *dense; /* the integrator's own, shared with it */
     char *block;              /* all of the arrays above */
     size_t block_size;
 } State;
+
+/* How many there are to which events of a kind happen: contacts, or frictions. */
+static inline int event_count_of(const System *s, EventKind kind) {
+    return kind <= CLOSING ? s->contacts : s->frictions;
+}
+
+/* An event of contact, or friction, i, now and at the state q, v (n). */
+void state_note(State *x, EventKind kind, int i, int n, const double *q, const double *v);
 
 #endif

@@ -115,11 +115,20 @@ static Status set_levels(Solver *s, Instant at, const int *closed) {
 }
 
 static void note_departure(Solver *s, int c) {
-    const size_t n = (size_t)s->system->n;
-    s->state.count[c] += 1;
-    s->state.departure_time[c] = s->state.now.t;
-    memcpy(s->state.departure_q + (size_t)c * n, s->state.q, n * sizeof(double));
-    memcpy(s->state.departure_v + (size_t)c * n, s->state.v, n * sizeof(double));
+    state_note(&s->state, DEPARTURE, c, s->system->n, s->state.q, s->state.v);
+}
+
+/* A contact that landed or closes, or took an impulse that is not rounding of the others': its closing, at the
+ * velocities `arriving` (n) before any impact. */
+static void note_closings(Solver *s, const int *happened, const int *closed, const double *arriving) {
+    double most = 0;
+    for (int c = 0; c < s->system->contacts; c++) most = fmax(most, s->push[c]);
+    for (int c = 0; c < s->system->contacts; c++) {
+        const int landed = !s->state.closed[c] && (happened[c] || closed[c]);
+        if (!landed && !(s->push[c] > IMPACT_PULL * most)) continue;
+        state_note(&s->state, CLOSING, c, s->system->n, s->state.q, arriving);
+        s->state.impulse[c] = s->push[c];
+    }
 }
 
 Status switch_modes(Solver *s, const int *happened) {
@@ -127,8 +136,9 @@ Status switch_modes(Solver *s, const int *happened) {
     const int contacts = system->contacts;
     const Instant at = flow_instant(s, s->state.now.t);
     const int rubs = system->frictions > 0;
-    double *arriving = rubs ? s->work_slides + 2 * system->frictions + 4 * system->n : NULL;
-    if (rubs) memcpy(arriving, s->state.v, (size_t)system->n * sizeof *arriving);
+    double *arriving = s->work_switch + system->m;
+    memcpy(arriving, s->state.v, (size_t)system->n * sizeof *arriving);
+    memset(s->push, 0, (size_t)contacts * sizeof *s->push);
     int *flags = s->iwork_events;
     Flags x = {flags, flags + contacts, flags + 2 * contacts, flags + 3 * contacts,
                flags + 4 * contacts};
@@ -141,10 +151,10 @@ Status switch_modes(Solver *s, const int *happened) {
     if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
                           s->state.size) != OK)
         return FAILED;
+    note_closings(s, happened, x.closed, arriving);
     for (int c = 0; c < contacts; c++) {
         if (s->state.closed[c] && !x.closed[c]) note_departure(s, c);
         if (happened[c] || x.struck[c]) s->state.armed[c] = 0;
-        s->state.now.strikes += x.struck[c];
         s->state.closed[c] = x.closed[c];
     }
     return OK;
