@@ -72,7 +72,7 @@ def build_scene(
             warnings.simplefilter("always")
             try:
                 begun = time.perf_counter()
-                asked, choice = settled(file.model, scene, file.closed_forms, target)
+                asked, choice = settled(file.model, scene, target)
                 if prepared is None or prepared.asked != asked:
                     prepared = prepare(file.model, asked)
                 folder, forms = out / target, file.closed_forms

@@ -54,7 +54,7 @@ def build_fmu(
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
     `target` is 'python' or 'native'; a native FMU has binaries for `platforms`, see compiler.PLATFORMS.
-    A scene with an `accuracy` takes half a minute more: its settings and formulation are measured.
+    A scene with an `accuracy` takes some runs more: its tolerance is found by bisection.
 
     `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them.  With `check` the
     FMU is simulated through fmpy and held against them here, and its page shows the figures; a native FMU
@@ -67,7 +67,7 @@ def build_fmu(
     Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
     VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
-    scene, choice = settled(model, scene or Scene(model.name), closed_forms, target)
+    scene, choice = settled(model, scene or Scene(model.name), target)
     prepared = prepare(model, scene)
     built = package(prepared, out, closed_forms, target, platforms, choice, check, reference, page)
     found = built.verification
@@ -145,11 +145,9 @@ def package(
     return Built(path, found)
 
 
-def settled(
-    model: Model, scene: Scene, closed_forms: Sequence[ClosedForm | Conserved], target: str
-) -> tuple[Scene, str]:
-    """The scene with the settings that hold its accuracy, and HTML on how they were chosen."""
+def settled(model: Model, scene: Scene, target: str) -> tuple[Scene, str]:
+    """The scene with the tolerance that holds its accuracy, and HTML on how it was chosen."""
     if scene.accuracy is None:
         return scene, ""
-    found = choose(model, scene, closed_forms, parse(scene.accuracy), target=target)
+    found = choose(model, scene, parse(scene.accuracy), target=target)
     return found.scene, section(found)

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 class Method:
     """One entry of the menu.
 
-    `made_of` are the integrators behind it where it is not one itself; `evaluations` of the equations in
-    a step, about; `remark` is what the description of `solver.method` says of it.
+    `made_of` are the integrators behind it where it is not one itself; `remark` is what the description of
+    `solver.method` says of it.
     """
 
     name: str
@@ -24,15 +24,14 @@ class Method:
     fixed_step: bool = False
     native_only: bool = False
     made_of: tuple[str, ...] = ()
-    evaluations: int = 0
 
 
 MENU = (
     Method("auto", 1, "dop853, but radau5 where it is stiff", made_of=("dop853", "radau5")),
-    Method("dop853", 2, evaluations=12),
-    Method("rk4", 3, "fixed step", fixed_step=True, evaluations=4),
-    Method("radau5", 4, "stiff", evaluations=20),
-    Method("rattle", 5, "fixed step", fixed_step=True, native_only=True, evaluations=21),
+    Method("dop853", 2),
+    Method("rk4", 3, "fixed step", fixed_step=True),
+    Method("radau5", 4, "stiff"),
+    Method("rattle", 5, "fixed step", fixed_step=True, native_only=True),
 )
 INSTEAD = {  # SciPy's names, and a method that was offered once -> the one to take
     **dict.fromkeys(("dopri5", "RK23", "RK45", "DOP853"), "dop853"),
@@ -44,7 +43,6 @@ NUMBERS = {m.name: m.number for m in MENU}
 IN_PYTHON = tuple(m.name for m in MENU if not m.native_only)
 INTEGRATORS = tuple(m.name for m in MENU if not m.made_of)
 FIXED_STEP = tuple(m.name for m in MENU if m.fixed_step)
-EVALUATIONS = {m.name: m.evaluations for m in MENU if m.evaluations}
 
 
 def integrators(methods: Collection[str]) -> tuple[str, ...]:

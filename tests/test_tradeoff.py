@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import random
@@ -21,35 +20,24 @@ from test_cli import SMALL, lagfmu
 from lagfmu import Scene, simulate
 from lagfmu.errors import BuildError, SimulationError
 from lagfmu.fmu.write import write
-from lagfmu.methods import EVALUATIONS, NUMBERS
 from lagfmu.model.file import load
 from lagfmu.model.goal import Goal, parse
 from lagfmu.page.table import print_whole
 from lagfmu.prepare.prepare import prepare
-from lagfmu.study.tradeoff import choose as choosing
-from lagfmu.study.tradeoff.choose import choose, pick
-from lagfmu.study.tradeoff.front import front
-from lagfmu.study.tradeoff.held_out import Case, other_values
+from lagfmu.study.tradeoff.choose import bisected, choose
+from lagfmu.study.tradeoff.held_out import other_values
 from lagfmu.study.tradeoff.importer import Importer
-from lagfmu.study.tradeoff.measure import (
-    Plan,
-    Tradeoff,
-    default_plan,
-    measure,
-    quick_plan,
-    take_turns,
-)
-from lagfmu.study.tradeoff.quantities import residual
+from lagfmu.study.tradeoff.measure import Plan, Point, Tradeoff, measure, take_turns
 from lagfmu.study.tradeoff.reference import refer
 from lagfmu.study.tradeoff.report import table
-from lagfmu.study.tradeoff.search import Clock, Walk, coarsest
-from lagfmu.study.tradeoff.setting import Setting, dials, tolerances
-from lagfmu.study.tradeoff.survey import formulations, survey
-from lagfmu.verification.verify import closed_forms_in, verify
+from lagfmu.study.tradeoff.setting import Setting
+from lagfmu.verification.verify import verify
 
 MODELS = Path(__file__).parent.parent / "models"
 PENDULUM = load(MODELS / "pendulum.py")
 SWING = Scene("Swing", stop_time=2.0, step_size=0.1)
+SHORT = Scene("Swing", stop_time=1.0, step_size=0.05)
+WIRE = Scene("Wire", stop_time=1.5, step_size=0.05)
 
 
 def built(name: str, scene: Scene, folder: Path) -> Path:
@@ -59,20 +47,19 @@ def built(name: str, scene: Scene, folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def wire(tmp_path_factory) -> Tradeoff:
-    """The rotating wire at two tolerances and two fixed steps."""
-    folder = tmp_path_factory.mktemp("wire")
-    fmu = built("rotating_wire", Scene("Wire", stop_time=1.5, step_size=0.05), folder)
+def wire(tmp_path_factory) -> tuple[Path, Tradeoff]:
+    """The rotating wire at two tolerances and some fixed steps."""
+    fmu = built("rotating_wire", WIRE, tmp_path_factory.mktemp("wire"))
     methods = ("dop853", "rattle", "rk4")
-    plan = Plan((0.05, 0.15), (1e-3, 1e-6), methods, halvings=3, limit=1e9, budget=1e9)
-    return measure(fmu, plan, repeats=2)
+    return fmu, measure(fmu, Plan(0.15, (1e-3, 1e-6), methods, halvings=3, repeats=2))
 
 
 @pytest.fixture(scope="module")
 def swing(tmp_path_factory) -> tuple[Path, Tradeoff]:
     """The Cartesian pendulum, whose motion in time stands in no closed form of its file."""
     fmu = built("pendulum", SWING, tmp_path_factory.mktemp("swing"))
-    return fmu, measure(fmu, Plan((0.1,), (1e-4, 1e-7, 1e-10), ("dop853", "radau5")), repeats=1)
+    plan = Plan(0.1, (1e-4, 1e-7, 1e-10), ("dop853", "radau5"), repeats=1)
+    return fmu, measure(fmu, plan)
 
 
 def jacobi(t, theta0=1.0, m=1.0, g=9.81, L=1.0):
@@ -82,106 +69,72 @@ def jacobi(t, theta0=1.0, m=1.0, g=9.81, L=1.0):
     return -m * g * (3 * (1 - 2 * (k * sn) ** 2) - 2 * np.cos(theta0)) / (2 * L)
 
 
-# ------------------------------------------------------------------ the front
-
-
-def test_the_front_is_what_nothing_dominates():
-    """p is on the front if and only if no q is as good in both and better in one."""
-    chance = random.Random(1)
-    for _ in range(50):
-        points = [(chance.randrange(8) / 7, chance.randrange(8) / 7) for _ in range(20)]
-        kept = front(points)
-        for k, (e, c) in enumerate(points):
-            beaten = any(x <= e and y <= c and (x, y) != (e, c) for x, y in points)
-            assert ((e, c) in [points[i] for i in kept]) == (not beaten)
-            assert k not in kept or not beaten
-        assert len({points[i] for i in kept}) == len(kept)
-
-
-def test_the_front_runs_from_cheap_to_accurate():
-    """Costs rise and errors fall along it; what is not finite never stands on it."""
-    points = [(1e-3, 1.0), (1e-6, 3.0), (1e-5, 4.0), (float("inf"), 0.1), (1e-9, float("nan"))]
-    assert front(points) == [0, 1]
-
-
 # ------------------------------------------------------------------ references and errors
 
 
-def test_errors_are_those_against_the_closed_form(wire, tmp_path):
+def test_what_won_is_what_nothing_dominates(wire):
+    """A setting wins if and only if none is as good in both error and time, and better in one."""
+    chance = random.Random(1)
+    setting = Setting("dop853", 1e-6, 0.0, 0.1)
+    for _ in range(50):
+        points = tuple(
+            Point(setting, {"lambda.drive": e / 7}, k, seconds=(c / 7,))
+            for k in range(20)
+            for e, c in [(1 + chance.randrange(8), chance.randrange(8))]
+        )
+        found = replace(wire[1], points=points)
+        places = [(found.error(p), p.cost) for p in points]
+        kept = {(found.error(p), p.cost) for p in found.front}
+        assert len(kept) == len(found.front)
+        for e, c in places:
+            beaten = any(x <= e and y <= c and (x, y) != (e, c) for x, y in places)
+            assert ((e, c) in kept) == (not beaten)
+
+
+def test_errors_are_those_against_the_closed_form(wire):
     """lambda = m (r0 w)^2 sinh(2 w t): the torque of the motor, known for all time."""
-    assert wire.reference.source["lambda.drive"] == "closed form in time"
-    fmu = built("rotating_wire", Scene("Wire", stop_time=1.5, step_size=0.05), tmp_path)
-    for row in (r for r in wire.rows if r.setting.method == "dop853"):
-        h, tolerance = row.setting.communication, row.setting.tolerance
-        run = simulate(fmu, 1.5, h, tolerance, {"solver.method": "dop853"})
+    fmu, found = wire
+    own = found.reference.own["lambda.drive"]
+    assert own < 1e-12
+    for point in (p for p in found.points if p.setting.method == "dop853"):
+        values = {"solver.method": "dop853"}
+        run = simulate(fmu, 1.5, 0.15, point.setting.tolerance, values)
         torque = (0.1 * 2.0) ** 2 * np.sinh(4.0 * run["time"])
         error = np.abs(run["lambda.drive"] - torque).max() / np.abs(torque).max()
-        assert row.errors["lambda.drive"] == pytest.approx(error, rel=1e-6, abs=1e-15)
-    fixed = [r.errors["lambda.drive"] for r in wire.rows if r.setting.method == "rk4"]
-    assert fixed[-1] < 1e-6 < max(fixed)
+        assert abs(point.errors["lambda.drive"] - error) <= 2 * own
 
 
-def test_a_closed_form_in_the_state_becomes_one_in_time(fmu):
-    """lambda(phi) of the knife edge and phi = omega t give lambda = -2 m g sin(alpha) sin(omega t)."""
-    path = fmu("KnifeEdge")
-    with Importer(path) as importer:
-        found = refer(importer, closed_forms_in(path), {"phi": 0.3}, 0.1, 1.0)
-        plain = refer(importer, closed_forms_in(path), None, 0.1, 1.0)
-    expected = -2 * 9.81 * 0.5 * np.sin(plain.run["time"])
-    assert found.source["lambda.edge"] == plain.source["lambda.edge"] == "closed form in time"
-    assert plain.values["lambda.edge"] == pytest.approx(expected, abs=1e-14)
-    assert found.checked < 1e-13
-
-
-def test_a_converged_run_states_its_own_error(swing):
-    """The pendulum's lambda is known by Jacobi's sn: the reference is as near as it says."""
-    reference = swing[1].reference
-    assert reference.source["lambda.rod"] == "converged run"
-    exact = jacobi(reference.run["time"])
-    error = np.abs(reference.values["lambda.rod"] - exact).max() / np.abs(exact).max()
-    assert error <= 2 * reference.own["lambda.rod"] < 1e-12
-    method, difference = reference.opinion
-    assert method.startswith("radau5")
-    assert difference < 1e-9
-
-
-def test_errors_against_the_converged_run_are_the_true_ones(swing):
-    """They differ from those against Jacobi's sn by the reference's own error at most."""
+def test_the_reference_is_as_near_as_it_says(swing):
+    """The pendulum's lambda is known by Jacobi's sn, at 1e-13 and at every tolerance that is measured."""
     fmu, found = swing
-    for row in found.rows:
-        values = {"solver.method": row.setting.method}
-        run = simulate(fmu, 2.0, 0.1, row.setting.tolerance, values)
+    reference = found.reference
+    exact = jacobi(reference.run["time"])
+    error = np.abs(reference.run["lambda.rod"] - exact).max() / np.abs(exact).max()
+    assert error <= 2 * reference.own["lambda.rod"] < 1e-12
+    for point in found.points:
+        values = {"solver.method": point.setting.method}
+        run = simulate(fmu, 2.0, 0.1, point.setting.tolerance, values)
         exact = jacobi(run["time"])
         error = np.abs(run["lambda.rod"] - exact).max() / np.abs(exact).max()
-        assert abs(row.errors["lambda.rod"] - error) <= 3 * found.reference.own["lambda.rod"]
+        assert abs(point.errors["lambda.rod"] - error) <= 3 * reference.own["lambda.rod"]
 
 
-def test_what_is_below_the_references_error_is_marked(wire):
-    """lambda of a coarser run that equals the reference says nothing below the reference's error."""
-    reference = wire.reference
-    row = replace(wire.rows[0], errors=dict.fromkeys(reference.own, 0.0))
-    assert wire.worst(row, "lambda") == reference.own["lambda.drive"]
-    for r in wire.rows:
-        assert set(r.below) == {n for n, e in r.errors.items() if e < reference.own[n]}
+def test_no_error_is_below_the_references_own(wire):
+    """lambda of a run that equals the reference says nothing below the reference's error."""
+    found = wire[1]
+    point = replace(found.points[0], errors=dict.fromkeys(found.reference.own, 0.0))
+    assert found.error(point) == found.reference.own["lambda.drive"]
 
 
 def test_a_missed_event_is_an_infinite_error(fmu):
     """A run without the departure, or with one too many, has no right time of it."""
     path = fmu("Hemisphere")
     with Importer(path) as importer:
-        reference = refer(importer, closed_forms_in(path), communication=0.1)
+        reference = refer(importer, communication=0.1)
         run = importer.observe(Setting("dop853", 1e-6, 0.0, 0.1))
     assert reference.errors(run)["departure.surface.time"] < 1e-6
     run["departure.surface.count"] = 0
     assert reference.errors(run)["departure.surface.time"] == float("inf")
-
-
-def test_the_residual_counts_while_the_constraint_acts(fmu):
-    """r - a grows to half a metre in flight: that is no error of the hemisphere's surface."""
-    with Importer(fmu("Hemisphere")) as importer:
-        run = importer.observe(Setting("dop853", 1e-6, 0.0, 0.1))
-    assert run["residual.surface"].max() > 0.4
-    assert residual(run) < 1e-12
 
 
 # ------------------------------------------------------------------ measuring
@@ -196,7 +149,7 @@ def test_settings_take_turns():
         return 1.0
 
     found = take_turns(
-        [lambda k=k: piece(k) for k in range(6)], Plan((0.1,), repeats=5), lambda *_: None
+        [lambda k=k: piece(k) for k in range(6)], Plan(0.1, repeats=5), lambda *_: None
     )
     rounds = [tuple(order[6 * k : 6 * k + 6]) for k in range(1, 6)]  # the first warms up
     assert all(sorted(r) == list(range(6)) for r in rounds)
@@ -205,52 +158,42 @@ def test_settings_take_turns():
 
 
 def test_a_refused_method_is_reported_and_the_others_are_measured(wire):
-    """The python target has no rattle: its refusal is told, dop853 and rk4 have rows and times."""
-    assert "expected one of" in wire.refused["rattle"]
-    assert {r.setting.method for r in wire.rows} == {"dop853", "rk4"}
-    assert all(len(r.seconds) == 2 and min(r.seconds) > 0 for r in wire.rows)
-    assert all(0 < seconds < r.median for seconds in wire.floor.values() for r in wire.rows)
+    """The python target has no rattle: its refusal is told, dop853 and rk4 have points and times."""
+    found = wire[1]
+    (note,) = found.notes
+    assert note.startswith("rattle is refused")
+    assert {p.setting.method for p in found.points} == {"dop853", "rk4"}
+    assert all(len(p.seconds) == 2 and min(p.seconds) > 0 for p in found.points)
 
 
 def test_a_fixed_step_of_order_four_gains_sixteenfold(wire):
     """Halving rk4's step divides the error by 2^4."""
-    rows = [r for r in wire.rows if r.setting.method == "rk4" and r.setting.communication == 0.15]
-    ratio = rows[1].errors["lambda.drive"] / rows[2].errors["lambda.drive"]
+    points = [p for p in wire[1].points if p.setting.method == "rk4"]
+    ratio = points[1].errors["lambda.drive"] / points[2].errors["lambda.drive"]
     assert np.log2(ratio) == pytest.approx(4, abs=0.15)
 
 
 def test_the_command_writes_table_files_and_figure(tmp_path):
-    """JSON with everything, CSV with as many rows, the figure twice; the reference's error is told."""
-    model = tmp_path / "link.py"
-    model.write_text(SMALL.replace("WRONG", "-1"))
-    out = tmp_path / "out"
-    text = lagfmu(
-        *("tradeoff", model, "--scene", "Link", "--out", out, "--repeats", 2, "--target", "python"),
-        *("--tolerance", 1e-4, "--method", "dop853", "--method", "rk4", "--step-size", 0.02),
-    )
-    assert "Link (python), 5 communication steps of 0.02 s" in text
-    assert "own error" in text
-    data = json.loads((out / "python" / "Link.json").read_text())
-    assert data["reference"]["quantities"]["lambda.link"]["own_error"] > 0
-    rows = list(csv.DictReader((out / "python" / "Link.csv").read_text().splitlines()))
-    assert len(rows) == len(data["rows"]) > 1
-    assert float(rows[0]["error(lambda.link)"]) == data["rows"][0]["errors"]["lambda.link"]
-    assert (out / "python" / "Link.png").stat().st_size > 1e4
-    assert (out / "python" / "Link.svg").read_text().count("<svg") == 1
-
-
-def test_an_output_of_ones_own_is_measured_too(tmp_path):
-    """The pull of the link is -lambda: it has the same error."""
+    """JSON with everything, the figure twice; the pull of the link, an output of one's own, is -lambda and
+    has the same error."""
     model, out = tmp_path / "link.py", tmp_path / "out"
     text = SMALL.replace("WRONG", "-1").replace(
         "constraints=", "outputs=[Output('pull', -multiplier('link'), 'N')], constraints="
     )
     model.write_text("from lagfmu import Output, multiplier\n" + text)
-    words = ["tradeoff", model, "--scene", "Link", "--out", out, "--repeats", 1]
-    words += ["--target", "python", "--tolerance", 1e-4, "--method", "rk4", "--step-size", 0.05]
-    lagfmu(*words)
-    for row in csv.DictReader((out / "python" / "Link.csv").read_text().splitlines()):
-        assert row["error(pull)"] == row["error(lambda.link)"]
+    text = lagfmu(
+        *("tradeoff", model, "--scene", "Link", "--out", out, "--repeats", 2, "--target", "python"),
+        *("--tolerance", 1e-4, "--method", "dop853", "--method", "rk4", "--step-size", 0.02),
+    )
+    assert "Link (python), every 0.02 s" in text
+    assert "own error" in text
+    data = json.loads((out / "python" / "Link.json").read_text())
+    assert data["reference"]["lambda.link"]["own"] > 0
+    assert len(data["points"]) > 1
+    for point in data["points"]:
+        assert point["errors"]["pull"] == point["errors"]["lambda.link"]
+    assert (out / "python" / "Link.png").stat().st_size > 1e4
+    assert (out / "python" / "Link.svg").read_text().count("<svg") == 1
 
 
 def test_a_pipeline_reads_what_was_measured(tmp_path):
@@ -261,15 +204,15 @@ def test_a_pipeline_reads_what_was_measured(tmp_path):
     words = ["tradeoff", model, "--scene", "Link", "--out", tmp_path / "out", "--repeats", 1]
     words += ["--tolerance", 1e-4, "--method", "dop853", "--method", "rk4", "--step-size", 0.05]
     printed = lagfmu(*words, "--junit", xml, "--json", data)
-    assert re.search(r"✗ dop853 1e-4, every 0\.05 s: lambda\.link", printed)
+    assert re.search(r"✗ dop853 1e-4: lambda\.link", printed)
     suite = ET.parse(xml).getroot().find("testsuite")
     assert not suite.findall("testcase[failure]")
     (found,) = json.loads(data.read_text())
-    missed = {r["method"]: r["closed_forms_that_do_not_hold"] for r in found["rows"]}
+    missed = {p["setting"]["method"]: p["missed"] for p in found["points"]}
     assert "lambda" in missed["dop853"][0]
     assert not missed["rk4"]
     assert found["verdict"] == "pass"
-    assert int(suite.get("tests")) == len(found["rows"]) > 1
+    assert int(suite.get("tests")) == len(found["points"]) > 1
     text = lagfmu("tradeoff", tmp_path / "gone.fmu", "--out", tmp_path / "out", code=3)
     assert "there is no such file" in text
     assert "expected one of dop853, rk4" in lagfmu("tradeoff", model, "--method", "rk45", code=2)
@@ -280,22 +223,13 @@ def test_the_table_fits_80_columns_whole(swing):
     found = swing[1]
     for width in (80, 40):
         text = io.StringIO()
-        print_whole(Console(file=text, width=width), table(found, 0.1))
+        print_whole(Console(file=text, width=width), table(found))
         printed = text.getvalue()
         assert "…" not in printed
         assert max(map(len, printed.splitlines())) <= width
-        for row in found.rows:
-            assert str(row.steps) in printed
-            assert f"{found.worst(row, 'lambda'):.1e}" in printed
-
-
-def test_without_options_a_tradeoff_is_short(native_fmu):
-    """The pendulum's FMU, 10 s in 1,000 steps: at most 60 settings, and 5 s for repeated timing."""
-    with Importer(native_fmu("PendulumCartesian")) as importer:
-        quick, whole = quick_plan(importer), default_plan(importer)
-    assert quick.budget <= 5
-    assert len(quick.tolerances) < len(whole.tolerances)
-    assert quick.communications == whole.communications
+        for point in found.points:
+            assert str(point.steps) in printed
+            assert f"{found.error(point):.1e}" in printed
 
 
 # ------------------------------------------------------------------ choosing
@@ -326,63 +260,20 @@ def test_other_values_are_near_within_bounds_and_keep_the_contacts(fmu):
             assert run["contact.surface"][0]
 
 
-def test_a_scene_that_names_its_formulation_keeps_it():
-    """The default may become any that the model has; nullspace and minimal are somebody's wish."""
-    all_three = ("multipliers", "nullspace", "minimal")
-    assert formulations(PENDULUM.model, SWING) == all_three
-    for name in all_three[1:]:
-        assert formulations(PENDULUM.model, replace(SWING, formulation=name)) == (name,)
-
-
 @pytest.fixture(scope="module")
 def choices():
-    """The pendulum in its default formulation, chosen for 1e-4 and for 1e-9 of lambda."""
-    model, forms = PENDULUM.model, PENDULUM.closed_forms
+    """The pendulum, chosen for 1e-4 and for 1e-9 of lambda."""
     goals = (Goal(1e-4, ("lambda.rod",)), Goal(1e-9, ("lambda.rod",)))
-    plan = Plan((0.25,), methods=("dop853", "radau5"), repeats=1, limit=1e9)
-    scene = replace(SWING, stop_time=1.0, step_size=0.25)
-    found = []
-    for goal in goals:
-        measured = survey(model, scene, forms, goal, plan=plan)
-        counted = [  # times in proportion to the work, so that the choice is the same on every machine
-            replace(o, row=replace(o.row, seconds=(1e-5 * o.evaluations,)))
-            for o in measured.options
-        ]
-        found.append(pick(model, replace(measured, options=tuple(counted)), forms, goal))
-    return found
+    return [choose(PENDULUM.model, SHORT, goal, target="native") for goal in goals]
 
 
-class Powers:
-    """A method whose error is 3 tol, or (10 h)^4 with a fixed step; counts what is measured."""
-
-    def __init__(self) -> None:
-        self.coarse_runs: list[Setting] = []
-        self.full_runs: list[Setting] = []
-
-    def error(self, setting: Setting) -> float:
-        return 3 * setting.tolerance or (10 * setting.step) ** 4
-
-    def coarse(self, setting: Setting, limit: float) -> float:
-        self.coarse_runs.append(setting)
-        return self.error(setting)
-
-    def full(self, setting: Setting, limit: float):
-        self.full_runs.append(setting)
-        return None, self.error(setting)
-
-
-@pytest.mark.parametrize("goal", [1e-2, 1e-5, 1e-6, 1e-9, 1e-12])
-@pytest.mark.parametrize("near", [0, 4, 10])
-@pytest.mark.parametrize("method", ["dop853", "rk4"])
-def test_the_coarsest_setting_that_holds_is_found_wherever_the_search_begins(goal, near, method):
-    """Error 3 tol <= goal, or (10 h)^4 <= goal: the search ends at the largest such tol or h."""
-    grid = dials(method, 0.1, tolerances(1), 10)
-    bench = Powers()
-    near = near if method == "dop853" else 0
-    held = coarsest(Walk(grid, bench, goal, Clock()), near, thorough=False)
-    assert held == next(k for k, d in enumerate(grid) if bench.error(d) <= goal)
-    assert len(bench.full_runs) <= 2
-    assert len(set(bench.coarse_runs)) == len(bench.coarse_runs)
+@pytest.mark.parametrize("first", range(9))
+def test_bisection_finds_the_first_that_holds(first):
+    """Of eight settings from coarse to fine, in at most four runs; 8 if none does."""
+    asked = []
+    found = bisected(8, lambda k: bool(asked.append(k)) or k >= first)
+    assert found == first
+    assert len(asked) <= 4
 
 
 def test_an_fmu_built_for_an_accuracy_is_verified_to_that(tmp_path):
@@ -400,73 +291,80 @@ def test_an_fmu_built_for_an_accuracy_is_verified_to_that(tmp_path):
 def test_the_choice_holds_the_accuracy_on_held_out_values(choices, tmp_path):
     """lambda by Jacobi's sn, at another mass, gravity and length, at angles that it was not chosen on."""
     for choice in choices:
-        fmu = write(prepare(PENDULUM.model, choice.scene), tmp_path, PENDULUM.closed_forms)
+        fmu = write(prepare(PENDULUM.model, choice.scene), tmp_path, target="native")
         for theta0, m, g, L in ((0.96, 1.04, 9.5, 0.97), (1.04, 0.97, 10.1, 1.03)):
-            start = {"m": m, "g": g, "L": L}
-            if choice.scene.formulation == "minimal":
-                start |= {"theta": theta0}
-            else:
-                start |= {"x": L * np.sin(theta0), "y": -L * np.cos(theta0)}
+            start = {"m": m, "g": g, "L": L, "x": L * np.sin(theta0), "y": -L * np.cos(theta0)}
             for h in (0.1, 0.25):
                 run = simulate(fmu, 1.0, h, start_values=start)
                 exact = jacobi(run["time"], theta0, m, g, L)
                 error = np.abs(run["lambda.rod"] - exact).max() / np.abs(exact).max()
                 assert error <= choice.goal.accuracy / 2
         assert choice.held_out_error <= choice.goal.accuracy / 2
-        assert choice.option.error <= choice.goal.accuracy / 5
+        assert choice.trial.error <= choice.goal.accuracy / 5
 
 
-def test_the_coarse_choice_is_cheaper(choices):
-    """1e-4 needs at least a quarter fewer evaluations of the equations than 1e-9."""
-    coarse, fine = (c.option for c in choices)
-    assert coarse.evaluations <= 0.75 * fine.evaluations
-    assert coarse.evaluations == coarse.row.steps * EVALUATIONS[coarse.row.setting.method]
+def test_what_is_a_step_coarser_does_not_hold(choices):
+    """The choice is the coarsest: the next coarser tolerance, which bisection has tried, misses; fewer digits
+    cost fewer steps."""
+    for choice in choices:
+        coarser = [t for t in choice.trials if t.setting.tolerance > choice.trial.setting.tolerance]
+        assert coarser[-1].setting.tolerance <= 2.5 * choice.trial.setting.tolerance
+        assert coarser[-1].error > choice.goal.on_the_scene
+    coarse, fine = (c.trial for c in choices)
+    assert coarse.steps <= 0.75 * fine.steps
 
 
-def test_what_misses_elsewhere_gives_way_to_something_tighter(choices, monkeypatch):
-    """A choice that fails on held-out values is replaced by one whose error is smaller."""
-    coarse, fine = choices  # what is on the front of a survey, by seconds, depends on the machine
-    measured = replace(coarse.survey, options=(coarse.option, fine.option))
-    names = measured.names
-    bad = [Case({}, dict.fromkeys(names, 1.0), dict.fromkeys(names, 0.0), 1)]
-    answers = iter([bad, list(coarse.cases)])
-    monkeypatch.setattr(choosing, "held_out", lambda *_: next(answers))
-    choice = pick(PENDULUM.model, measured, PENDULUM.closed_forms, coarse.goal)
-    assert [o for o, _ in choice.failed] == [coarse.option]
-    assert choice.option == fine.option
-    assert choice.option.error < coarse.option.error
+def test_what_misses_elsewhere_gives_way_to_something_finer(choices, monkeypatch):
+    """A choice that fails on held-out values is replaced by one with a tighter tolerance."""
+    monkeypatch.setattr(Goal, "held_out", property(lambda goal: goal.accuracy / 40))
+    first, goal = choices[0], choices[0].goal
+    choice = choose(PENDULUM.model, SHORT, goal, target="native")
+    assert choice.failed[0][0] == first.trial
+    assert choice.trial.setting.tolerance < first.trial.setting.tolerance
+    assert choice.held_out_error <= goal.accuracy / 40
 
 
-def test_what_nothing_holds_is_refused_with_the_best_that_was_reached(choices):
+def test_a_fixed_step_is_halved_until_it_holds():
+    """rk4 has no tolerance: its step is found, and the FMU states the accuracy that was asked for."""
+    scene = replace(SHORT, method="rk4")
+    choice = choose(PENDULUM.model, scene, Goal(1e-7, ("lambda.rod",)), target="native")
+    halvings = np.log2(0.05 / choice.scene.step)
+    assert halvings == round(halvings) > 1
+    assert choice.scene.tolerance == 1e-7
+    assert choice.trial.error <= 2e-8
+
+
+def test_what_nothing_holds_is_refused_with_the_best_that_was_reached():
     """The message names the setting, its error and the output that is worst."""
-    measured = choices[0].survey
-    loose = [o for o in measured.options if o.error > 1e-6]
-    best = min(loose, key=lambda o: o.error)
-    with pytest.raises(BuildError, match=re.escape(f"{best}: {best.error:.1e} of lambda.rod")):
-        pick(PENDULUM.model, replace(measured, options=tuple(loose)), (), Goal(1e-7))
+    scene = replace(SHORT, method="radau5")
+    with pytest.raises(
+        BuildError, match=r"best on the scene is radau5 \de-1\d: .*e-1\d of lambda\.rod"
+    ):
+        choose(PENDULUM.model, scene, Goal(1e-12, ("lambda.rod",)), target="native")
 
 
 def test_an_output_that_is_not_measured_is_refused():
     """--accuracy 1e-6:pull: no such output; the message lists those that there are."""
     with pytest.raises(SimulationError, match=r"'pull'.*lambda\.rod"):
-        choose(PENDULUM.model, SWING, (), Goal(1e-4, ("pull",)))
+        choose(PENDULUM.model, SWING, Goal(1e-4, ("pull",)))
 
 
 def test_the_built_fmu_says_what_was_chosen_and_why(tmp_path):
-    """Its defaults are the choice; its page has the section with the table and the curve."""
+    """Its default is the choice; its page has the section with what was tried; the bytes are the same twice,
+    for no time is measured."""
     model = tmp_path / "link.py"
     model.write_text(SMALL.replace("WRONG", "-1"))
-    arguments = ("--scene", "Link", "--accuracy", "1e-6:lambda.link", "--out", tmp_path / "dist")
-    text = lagfmu("build", model, *arguments)
-    assert "chosen for 1e-06 of lambda.link" in text
+    arguments = ("--scene", "Link", "--accuracy", "1e-6:lambda.link", "--out")
+    text = lagfmu("build", model, *arguments, tmp_path / "dist")
     assert "Link: pass" in text
     fmu = tmp_path / "dist" / "python" / "Link.fmu"
     with zipfile.ZipFile(fmu) as archive:
         page = archive.read("documentation/index.html").decode()
         description = archive.read("modelDescription.xml").decode()
-    method = re.search(r"chosen for 1e-06 of lambda\.link: \w+, (\w+)", text)[1]
-    assert f'start="{NUMBERS[method]}"' in description
+    tolerance = re.search(r"chosen for 1e-06 of lambda\.link: auto ([\de-]+)", text)[1]
+    assert f'tolerance="{float(tolerance)!r}"' in description
     section = page[page.index('id="choice"') :]
-    assert "<svg" in section
     assert "Held-out values" in section
     assert section.count('"pass">chosen<') == 1
+    lagfmu("build", model, *arguments, tmp_path / "again")
+    assert (tmp_path / "again" / "python" / "Link.fmu").read_bytes() == fmu.read_bytes()

@@ -38,8 +38,7 @@ class Scene:
     lambda.
     `frictions`: those that may slip; what the others limit always sticks, while their contact is closed.
     `accuracy`: '1e-6' or '1e-6:lambda.surface', the relative error that the FMU is to hold; the
-    method, its tolerance or step, and the formulation if None, are then measured and chosen when it
-    is built.
+    method's tolerance or step is then found by bisection when it is built.
     `methods`: those that `solver.method` can be set to; None: `method` alone if `outputs` are named,
     else all.
     `reals_only`: for importers that take every variable for a Real: modes and counts are Reals (1.0 for

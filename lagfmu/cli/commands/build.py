@@ -55,8 +55,8 @@ def build(
         str | None,
         typer.Option(
             metavar="ERROR[:OUTPUT,...]",
-            help="Measure, and build with the cheapest solver settings and formulation that hold this "
-            "relative error, e.g. 1e-6 or 1e-6:lambda.surface.",
+            help="Find the coarsest tolerance that holds this relative error, and build with it, e.g. "
+            "1e-6 or 1e-6:lambda.surface.",
         ),
     ] = None,
     page_: Annotated[

@@ -28,7 +28,7 @@ def tradeoff(
         list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
     ] = None,
     step_size: Annotated[
-        list[float] | None, typer.Option(help="Communication step in s; repeatable.")
+        float | None, typer.Option(help="Communication step in s (default: the FMU's own).")
     ] = None,
     tolerance: Annotated[
         list[float] | None, typer.Option(help="Relative tolerance; repeatable.")
@@ -37,12 +37,12 @@ def tradeoff(
     repeats: Annotated[int | None, typer.Option(help="Timed runs of each setting.")] = None,
     full: Annotated[
         bool,
-        typer.Option("--full", help="The whole grid: minutes instead of half a minute an FMU."),
+        typer.Option("--full", help="Every decade of the tolerance, not every other one."),
     ] = False,
     json: JsonFile = None,
     junit: JunitFile = None,
 ) -> None:
-    """Measure error against wall time over methods, tolerances and communication steps.
+    """Measure the error of lambda against wall time, over methods and their tolerances.
 
     A closed form that is missed at a tolerance is marked in the table: a trade-off measures, it does not
     judge.
@@ -56,7 +56,7 @@ def tradeoff(
             out,
             console,
             None if target is None else target.value,
-            step_size or (),
+            step_size,
             tolerance or (),
             method or (),
             repeats,

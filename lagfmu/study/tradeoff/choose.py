@@ -1,132 +1,160 @@
-"""The cheapest method, tolerance or step, and formulation that holds an accuracy, with a margin.
+"""The coarsest tolerance (or fixed step) that holds an accuracy with a margin, by bisection.
 
-It is chosen on the scene's own values and held against others, on the FMU as it is built; where it
-fails there, the next that is more accurate is taken.
+It is found on the scene's own values, at its communication step and at up to ten times that, and held against
+other start values and parameters; where it misses the accuracy there, the next finer one is taken.  The
+scene's method and formulation stay.
 """
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ...errors import BuildError, LagfmuError
+from ...errors import BuildError, SimulationError
 from ...fmu.write import write
 from ...methods import METHODS
-from ...model.closed_form import ClosedForm, Conserved
 from ...model.goal import Goal
 from ...model.model import Model
 from ...model.scene import Scene
 from ...prepare.prepare import prepare
-from ...verification.verify import closed_forms_in
-from .held_out import Case, held_out
+from ...verification.simulate import steps_of
+from .held_out import Case, cases
 from .importer import Importer
-from .measure import Tick
-from .survey import Option, Survey, ranked, survey
+from .quantities import selected
+from .reference import Reference, refer, wider
+from .setting import Setting, ladder
 
+TOLERANCES = tuple(float(f"{d}e-{k}") for k in range(3, 14) for d in (10, 5, 2))  # 1e-2 ... 2e-13
 ATTEMPTS = 6
+Tick = Callable[[str, int, int], None]  # what is done, how far, of how many
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One setting: the largest error of what was asked, of which quantity, and the internal steps."""
+
+    setting: Setting
+    error: float
+    worst: str
+    steps: int
+
+    def __str__(self) -> str:
+        return f"{self.setting}: {self.error:.1e}" + (f" of {self.worst}" if self.worst else "")
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What was chosen for a goal: the scene to build, the option, the held-out cases, the survey.
-
-    `failed` are options that held the accuracy on the scene and missed it elsewhere.
-    """
+    """What was chosen for a goal: the scene to build, its trial, all trials on the scene from coarse to fine,
+    held-out cases with their trials, and what the errors are relative to."""
 
     goal: Goal
     scene: Scene
-    option: Option
-    cases: tuple[Case, ...]
-    failed: tuple[tuple[Option, float], ...]
-    survey: Survey
+    trial: Trial
+    trials: tuple[Trial, ...]
+    cases: tuple[tuple[Case, Trial], ...]
+    failed: tuple[tuple[Trial, float], ...]
+    names: tuple[str, ...]
+    reference: Reference
 
     @property
     def held_out_error(self) -> float:
         """The largest error at the held-out values, the reference's own added."""
-        return max(c.error(self.survey.names) for c in self.cases)
+        return max(trial.error for _, trial in self.cases)
 
 
 def choose(
-    model: Model,
-    scene: Scene,
-    closed_forms: Sequence[ClosedForm | Conserved],
-    goal: Goal,
-    tick: Tick | None = None,
-    target: str = "python",
+    model: Model, scene: Scene, goal: Goal, tick: Tick | None = None, target: str = "python"
 ) -> Choice:
-    """Measure and choose.  Raises BuildError naming the best that was reached if nothing holds."""
-    measured = survey(model, scene, closed_forms, goal, tick, target)
-    return pick(model, measured, closed_forms, goal, tick)
+    """Raises BuildError naming the best that was reached if nothing holds."""
+    wide = replace(scene, methods=METHODS, reals_only=False, error_bars=False)
+    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+        path = write(prepare(model, wide), folder, (), target=target)
+        with Importer(path) as importer:
+            return _chosen(importer, scene, goal, tick or (lambda *_: None))
 
 
-def pick(
-    model: Model,
-    measured: Survey,
-    closed_forms: Sequence[ClosedForm | Conserved],
-    goal: Goal,
-    tick: Tick | None = None,
-) -> Choice:
-    """The choice from a survey; see `choose`."""
-    say = tick or (lambda *_: None)
-    failed: list[tuple[Option, float]] = []
-    reasons: list[str] = []
-    for option in ranked(measured.options, goal.on_the_scene):
-        if len(failed) + len(reasons) == ATTEMPTS:
+def _chosen(importer: Importer, scene: Scene, goal: Goal, say: Tick) -> Choice:
+    say("reference", 0, 1)
+    reference = refer(importer)
+    names = tuple(q.name for q in selected(reference.known, goal.names))
+    dials = ladder(scene.method, importer.step_size, TOLERANCES)
+    tried: dict[int, Trial] = {}
+
+    def holds(k: int) -> bool:
+        if k not in tried:
+            say(str(dials[k]), len(tried), len(dials).bit_length())
+            tried[k] = attempt(importer, dials[k], reference, names)
+        return tried[k].error <= goal.on_the_scene
+
+    first = bisected(len(dials), holds)
+    others = cases(importer) if first < len(dials) else []
+    failed: list[tuple[Trial, float]] = []
+    for k in range(first, len(dials)):
+        if len(failed) == ATTEMPTS:
             break
-        if any(option.error >= f.error for f, _ in failed):
-            continue  # what fails elsewhere is not replaced by something less accurate
-        say(f"held-out values: {option}", len(failed), ATTEMPTS)
+        if not holds(k) or any(tried[k].error >= t.error for t, _ in failed):
+            continue  # what misses elsewhere is not replaced by something no more accurate
+        found: list[tuple[Case, Trial]] = []
+        for case in others:
+            say(f"{dials[k]} at held-out values", len(found), len(others))
+            found.append((case, attempt(importer, dials[k], case.reference, names, case.values)))
+        worst = max(trial.error for _, trial in found)
+        if worst <= goal.held_out:
+            tolerance, trials = dials[k].tolerance, tuple(tried[j] for j in sorted(tried))
+            settled = replace(scene, tolerance=tolerance or goal.accuracy, step=dials[k].step)
+            return Choice(
+                *(goal, settled, tried[k], trials, tuple(found), tuple(failed), names, reference)
+            )
+        failed.append((tried[k], worst))
+    raise BuildError(_nothing(scene, goal, list(tried.values()), failed))
+
+
+def bisected(count: int, holds: Callable[[int], bool]) -> int:
+    """The first of 0 ... count - 1 that holds, given that all that follow it do; `count` if none does."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if holds(middle):
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+def attempt(
+    importer: Importer,
+    setting: Setting,
+    reference: Reference,
+    names: Sequence[str],
+    values: Mapping[str, float] | None = None,
+) -> Trial:
+    """The larger error at the FMU's communication step and at the wider one, the reference's own added;
+    infinite where it cannot be run."""
+    worst, largest, steps = "", 0.0, 0
+    for width in (importer.step_size, wider(importer)):
         try:
-            chosen = as_scene(measured.scene, option, goal)
-            with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-                prepared = prepare(
-                    model, replace(chosen, methods=METHODS, reals_only=False, error_bars=False)
-                )
-                path = write(prepared, folder, closed_forms, target=measured.target)
-                with Importer(path) as importer:
-                    cases = held_out(importer, closed_forms_in(path))
-        except LagfmuError as error:
-            reasons.append(f"{option}: {error}")
-            continue
-        choice = Choice(goal, chosen, option, tuple(cases), tuple(failed), measured)
-        if choice.held_out_error <= goal.held_out:
-            return choice
-        failed.append((option, choice.held_out_error))
-    raise BuildError(_nothing(measured, goal, failed, reasons))
-
-
-def as_scene(scene: Scene, option: Option, goal: Goal) -> Scene:
-    """The scene whose FMU has the option's formulation and setting by default.
-
-    With a fixed step, which has no tolerance, the FMU states the accuracy that was asked for.
-    """
-    setting = option.row.setting
-    return replace(
-        scene,
-        formulation=option.formulation,
-        method=setting.method,
-        tolerance=setting.tolerance or goal.accuracy,
-        step=setting.step,
-    )
+            run = importer.observe(replace(setting, communication=width), values)
+        except SimulationError:
+            return Trial(setting, float("inf"), "", 0)
+        errors = reference.errors(run)
+        name = max(names, key=lambda n: errors[n] + reference.own[n])
+        if errors[name] + reference.own[name] > largest:
+            worst, largest = name, errors[name] + reference.own[name]
+        steps = max(steps, steps_of(run))
+    return Trial(setting, largest, worst, steps)
 
 
 def _nothing(
-    measured: Survey, goal: Goal, failed: Sequence[tuple[Option, float]], reasons: Sequence[str]
+    scene: Scene, goal: Goal, tried: Sequence[Trial], failed: Sequence[tuple[Trial, float]]
 ) -> str:
-    best = min(measured.options, key=lambda o: o.error, default=None)
-    lines = [f"{measured.scene.name}: no setting holds a relative error of {goal} with its margin"]
-    if best is not None:
-        worst = max(
-            measured.names, key=lambda n: max(best.row.errors[n], measured.reference.own[n])
-        )
-        lines.append(f"the best on the scene is {best}: {best.error:.1e} of {worst}")
-    lines += [
-        f"{o} holds {o.error:.1e} on the scene but {e:.1e} on held-out values" for o, e in failed
+    lines = [
+        f"{scene.name}: no setting holds a relative error of {goal} with its margin",
+        f"the best on the scene is {min(tried, key=lambda t: t.error)}",
     ]
-    lines += list(reasons)
+    lines += [f"{t} on the scene, but {e:.1e} on held-out values" for t, e in failed]
     lines.append(
-        "ask for less, name the outputs that matter (--accuracy 1e-6:lambda.NAME), or shorten the "
-        "scene"
+        "ask for less, name the outputs that matter (--accuracy 1e-6:lambda.NAME), take another method, "
+        "or shorten the scene"
     )
     return "; ".join(lines)

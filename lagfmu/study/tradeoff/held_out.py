@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.closed_forms import CarriedForm
 from ...fmu.described import Trajectory
-from ...verification.simulate import steps_of
 from .importer import Importer
-from .measure import wider
-from .reference import refer
+from .reference import Reference, refer
 from .setting import Setting
 
 SHARE = 0.05  # of a value, or of its largest magnitude in the scene where all start values are zero
@@ -25,40 +22,17 @@ TRIES = 40
 
 @dataclass(frozen=True)
 class Case:
-    """One run of a built FMU at other values: what was set, the error of each quantity, the steps."""
+    """The FMU at other values: what was set, and what it should report there."""
 
     values: Mapping[str, float]
-    errors: Mapping[str, float]
-    own: Mapping[str, float]
-    steps: int
-
-    def error(self, names: Sequence[str]) -> float:
-        """The largest error of the named quantities; the reference's own is added to it."""
-        return max(self.errors[n] + self.own[n] for n in names)
+    reference: Reference
 
 
-def held_out(importer: Importer, closed_forms: Sequence[CarriedForm]) -> list[Case]:
-    """The FMU as it was built, with its default settings, at other points.
-
-    Errors are the larger ones of the FMU's communication step and of up to ten times that.
-
-    Raises SimulationError if it cannot be run there.
-    """
-    built = Setting("", 0.0, 0.0, importer.step_size)
-    scene = importer.observe(built)
-    found = []
-    for k in range(CASES):
-        values = other_values(importer, scene, random.Random(k))
-        reference = refer(importer, closed_forms, values, second_opinion=False)
-        run = importer.observe(built, values)
-        steps = steps_of(run)
-        errors = reference.errors(run)
-        wide = reference.errors(
-            importer.observe(replace(built, communication=wider(importer)), values)
-        )
-        worst = {n: max(e, wide[n]) for n, e in errors.items()}
-        found.append(Case(values, worst, reference.own, steps))
-    return found
+def cases(importer: Importer) -> list[Case]:
+    """Other points, with their references.  Raises SimulationError if it cannot be run there."""
+    scene = importer.observe(_built(importer))
+    drawn = [other_values(importer, scene, random.Random(k)) for k in range(CASES)]
+    return [Case(values, refer(importer, values)) for values in drawn]
 
 
 def other_values(importer: Importer, scene: Trajectory, chance: random.Random) -> dict[str, float]:
@@ -68,11 +42,10 @@ def other_values(importer: Importer, scene: Trajectory, chance: random.Random) -
     them.  Values that it refuses, or at which other contacts are closed at the start, are drawn again.
     """
     reason = "other contacts are closed at the start"
-    built = Setting("", 0.0, 0.0, importer.step_size)
     for _ in range(TRIES):
         values = _drawn(importer, scene, chance)
         try:
-            begun = importer.observe(built, values, stop=importer.step_size)
+            begun = importer.observe(_built(importer), values, stop=importer.step_size)
         except SimulationError as error:
             reason = str(error)
             continue
@@ -85,25 +58,30 @@ def other_values(importer: Importer, scene: Trajectory, chance: random.Random) -
     )
 
 
+def _built(importer: Importer) -> Setting:
+    return Setting("", 0.0, 0.0, importer.step_size)
+
+
 def _drawn(importer: Importer, scene: Trajectory, chance: random.Random) -> dict[str, float]:
-    values: dict[str, float] = {}
-    starts = [
+    given = [
         v
-        for v in importer.outputs
-        if v.type == "Real" and v.initial in ("exact", "approx") and v.start is not None
+        for v in importer.description.modelVariables
+        if v.type == "Real" and v.start is not None and names.read(v.name).head != names.SOLVER
     ]
+    starts = [v for v in given if v.initial in ("exact", "approx") and v in importer.outputs]
     still = all(float(v.start) == 0 for v in starts)
-    for v in importer.description.modelVariables:
-        if v.type != "Real" or v.start is None or names.read(v.name).head == names.SOLVER:
-            continue
-        value = float(v.start)
-        moved = value * (1 + SHARE * chance.uniform(-1, 1))
+    values: dict[str, float] = {}
+    for v in given:
+        share, value = SHARE * chance.uniform(-1, 1), float(v.start)
+        moved = value * (1 + share)
         if v in starts and still:
-            moved = SHARE * chance.uniform(-1, 1) * float(np.abs(scene[v.name]).max())
+            moved = share * float(np.abs(scene[v.name]).max())
         elif v not in starts and v.causality != "parameter":
             continue
-        low = -np.inf if v.min is None else float(v.min)
-        high = np.inf if v.max is None else float(v.max)
+        low, high = (
+            float(-np.inf if v.min is None else v.min),
+            float(np.inf if v.max is None else v.max),
+        )
         if moved != value and low <= moved <= high:
             values[v.name] = moved
     return values

@@ -64,25 +64,6 @@ def _is_own(name: str, known: Collection[str]) -> bool:
     return full and names.derivative(name) not in known
 
 
-def residual(run: Trajectory) -> float:
-    """The largest |residual| of a constraint, in its own SI unit, while it acts.
-
-    A contact acts while it is closed; what acts with a contact has a multiplier of zero otherwise.
-    """
-    known = run.dtype.names or ()
-    contacts = names.constraints(known, names.CONTACT)
-    largest = 0.0
-    for constraint in names.constraints(known, names.RESIDUAL):
-        acts = np.ones(len(run), dtype=bool)
-        if constraint in contacts:
-            acts = run[names.name(names.CONTACT, constraint)]
-        elif contacts:
-            acts = run[names.name(names.MULTIPLIER, constraint)] != 0
-        missed = np.abs(run[names.name(names.RESIDUAL, constraint)])
-        largest = max(largest, float(missed[acts].max(initial=0.0)))
-    return largest
-
-
 def selected(known: Sequence[Quantity], asked: Sequence[str]) -> tuple[Quantity, ...]:
     """Those that match a name, a pattern (Q.*) or a group; all without names.
 

@@ -1,4 +1,4 @@
-"""What is varied: method, tolerance or step, communication step; and the grids over them."""
+"""What is varied: the method, and its tolerance or step."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from ...methods import FIXED_STEP
 from ...names import METHOD, STEP
 
-ORDERS = {"rk4": 4, "rattle": 6}  # of convergence
+HALVINGS = 10  # of a fixed step, at most
 
 
 @dataclass(frozen=True)
@@ -40,21 +40,17 @@ class Setting:
         return values | {STEP: self.step} if self.step else values
 
     def __str__(self) -> str:
-        return f"{self.method or 'as built'} {self.dial}, every {self.communication:.3g} s"
+        return f"{self.method or 'as built'} {self.dial}"
 
 
-def tolerances(decades: int = 2) -> tuple[float, ...]:
-    """1e-3 ... 1e-13, loosest first, `decades` apart."""
-    return tuple(float(f"1e-{k}") for k in range(3, 14, decades))
+def ladder(
+    method: str, communication: float, tolerances: Sequence[float], halvings: int = HALVINGS
+) -> list[Setting]:
+    """The settings of one method at one communication step [s], from coarse to fine.
 
-
-def dials(method: str, communication: float, grid: Sequence[float], halvings: int) -> list[Setting]:
-    """The settings of one method at one communication step, from coarse to fine.
-
-    A fixed step divides the communication step evenly, hence H, H/2, H/4, ...
+    A fixed step divides the communication step evenly: H, H/2, H/4, ...
     """
     if method in FIXED_STEP:
-        return [
-            Setting(method, 0.0, communication / 2**k, communication) for k in range(halvings + 1)
-        ]
-    return [Setting(method, tol, 0.0, communication) for tol in grid]
+        steps = [communication / 2**k for k in range(halvings + 1)]
+        return [Setting(method, 0.0, h, communication) for h in steps]
+    return [Setting(method, tol, 0.0, communication) for tol in tolerances]
