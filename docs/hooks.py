@@ -17,6 +17,8 @@ import lagfmu
 
 MODELS = Path(__file__).parent.parent / "models"
 MODEL = re.compile(r"\[([^\]]+)\]\(\.\./models/(\w+)\.py\)")
+EMPTY_HEAD = re.compile(r"<thead>\s*<tr>(?:\s*<th[^>]*></th>)+\s*</tr>\s*</thead>")
+EMPTY_HEADING = re.compile(r"<th[^>]*></th>")
 NOTEBOOK = (
     '`jupytext --to ipynb docs/tutorial.md` makes a notebook of it (`pip install -e ".[docs]"`)'
 )
@@ -40,6 +42,11 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
         return f"[{found[1]}](gallery/{found[2]}.html)" if found[2] in made else found[1]
 
     return MODEL.sub(link, markdown).replace(NOTEBOOK, "[tutorial.ipynb](tutorial.ipynb)")
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """A table whose head is empty has none, and an empty cell of a head is no heading."""
+    return EMPTY_HEADING.sub("<td></td>", EMPTY_HEAD.sub("", html))
 
 
 def notebook(text: str) -> str:

@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.resources import files
 from typing import Any
 
 import pytest
@@ -87,6 +88,14 @@ class Page:
         }"""
         self.tab.evaluate(script, [name, value])
         self.until(f"lagfmu.runs > {before}")
+
+    def violations(self) -> list[str]:
+        """What axe-core finds wrong, controls below 24 pixels among it: rule and first element of each."""
+        package = pytest.importorskip("axe_playwright_python", reason="pip install -e '.[test]'")
+        self.tab.evaluate((files(package) / "axe.min.js").read_text(encoding="utf-8"))
+        script = "() => axe.run({ rules: { 'target-size': { enabled: true } } })"
+        found = self.tab.evaluate(script)["violations"]
+        return [f"{v['id']}: {v['nodes'][0]['html'][:200]}" for v in found]
 
     def close(self) -> None:
         self.context.close()

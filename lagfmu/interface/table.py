@@ -265,7 +265,7 @@ class _Builder:
                 causality="parameter",
                 variability="fixed",
                 initial="exact",
-                description=p.description or f"parameter {name_of(p.symbol)}",
+                description=p.description,
                 start=float(p.value),
                 unit=self.units[name_of(p.symbol)],
                 minimum=p.min,

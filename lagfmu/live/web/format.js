@@ -17,6 +17,11 @@ function withUnit(value, unit, digits) {
   return unit ? `${shown(value, digits)} ${unit}` : shown(value, digits);
 }
 
+/* A value of a variable with its unit; a truth as a word. */
+function worded(variable, value, digits) {
+  return variable.type === "Boolean" ? shown(Boolean(value)) : withUnit(value, variable.unit, digits);
+}
+
 /* An element with attributes and children; a text is text, never markup. */
 function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);

@@ -12,6 +12,7 @@ let asked = 0; // when the change was made that is not yet drawn [ms]
 const picture = FACTS.picture ? new Picture(byId("picture"), FACTS.picture) : null;
 const player = new Player((t) => showTime(t));
 const charts = new Charts(byId("charts"), byId("chart-choices"), (t) => player.seek(t));
+const lead = new Lead(byId("lead"), (t) => player.seek(t));
 const accuracy = new Accuracy(settings, changed);
 const dials = buildDials(byId("dials"), settings, changed);
 const measureLater = calmly(() => accuracy.measure(), 250);
@@ -68,6 +69,7 @@ function refused(message) {
 
 function show() {
   charts.show(trajectory);
+  lead.show(trajectory);
   if (picture) picture.show(trajectory);
   player.setEnd(trajectory.end, settings.stepSize);
   dials.tell(trajectory);
@@ -101,6 +103,7 @@ function showLog(log) {
 function showTime(t) {
   if (!trajectory) return;
   charts.now(t);
+  lead.now(t);
   if (picture) picture.now(t);
   if (byId("values-box").open) showValues(t);
   describeLater();

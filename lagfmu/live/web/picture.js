@@ -4,7 +4,8 @@ const SVG = "http://www.w3.org/2000/svg";
 const SAMPLES = 120; // points of a path; rows that the view is fitted to
 const HANGING = 24; // pieces of a slack string
 const HALVINGS = 20; // until its length is found, to a millionth
-const MARGIN = 44;
+const MARGIN = 16;
+const AXES = 26; // CSS pixels: the axes of a picture in space
 const LONGEST = 0.22; // of the view: the arrow of the largest force
 
 function svg(tag, attributes = {}) {
@@ -15,13 +16,13 @@ function svg(tag, attributes = {}) {
 
 const pointsOf = (list) => list.map(([x, y]) => `${x.toFixed(2)},${y.toFixed(2)}`).join(" ");
 
-/* Each kind: `points` gives what must be in view, in the world; `draw` sets its elements on the screen. */
+/* Each kind: `points` gives what must be in view, in the world; `draw` sets its elements on the screen, and
+ * returns circles that cover it, where no label shall stand. */
 const SHAPES = {
   line: {
     make: () => [svg("polyline", { class: "line" })],
     points: (s, look) => [...s.points.map((p) => p(look)), ...lowest(s, look)],
-    draw: ([line], s, look, view) =>
-      line.setAttribute("points", pointsOf(linePoints(s, look).map(view.screen))),
+    draw: ([line], s, look, view) => drawn(line, linePoints(s, look).map(view.screen)),
   },
   rod: {
     make: () => [
@@ -34,6 +35,7 @@ const SHAPES = {
       const ends = s.points.map((p) => view.screen(p(look)));
       setLine(bar, ends[0], ends[1]);
       joints.forEach((joint, k) => setCenter(joint, ends[k]));
+      return covered(ends, 5);
     },
   },
   spring: {
@@ -51,7 +53,8 @@ const SHAPES = {
         const side = k === 0 || k === turns ? 0 : k % 2 ? 1 : -1;
         found.push([a[0] + part * dx + side * nx, a[1] + part * dy + side * ny]);
       }
-      line.setAttribute("points", pointsOf([...found, b]));
+      drawn(line, [...found, b]);
+      return covered([a, b], 8);
     },
   },
   disk: {
@@ -74,7 +77,8 @@ const SHAPES = {
         const a = s.angle(look);
         setLine(spoke, c, [c[0] + r * Math.cos(a), c[1] - r * Math.sin(a)]);
       }
-      if (s.trace) trace.setAttribute("points", pointsOf(view.past(s.center).map(view.screen)));
+      if (s.trace) drawn(trace, view.past(s.center).map(view.screen));
+      return [[...c, r + 1]];
     },
   },
   ground: {
@@ -92,13 +96,13 @@ const SHAPES = {
         strokes.push(`M${x.toFixed(1)} ${y.toFixed(1)}L${ex.toFixed(1)} ${ey.toFixed(1)}`);
       }
       hatch.setAttribute("d", strokes.join(""));
+      return covered([a, b], 5);
     },
   },
   path: {
     make: () => [svg("polyline", { class: "path" })],
     points: (s, look) => pathPoints(s, look),
-    draw: ([line], s, look, view) =>
-      line.setAttribute("points", pointsOf(pathPoints(s, look).map(view.screen))),
+    draw: ([line], s, look, view) => drawn(line, pathPoints(s, look).map(view.screen)),
   },
   arrow: {
     make: () => [
@@ -116,24 +120,25 @@ const SHAPES = {
       const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
       const seen = Number.isFinite(length) && length > 1.5;
       for (const part of [shaft, head, label]) part.style.display = seen ? "" : "none";
-      if (!seen) return;
+      if (!seen) return [];
       const [tx, ty] = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
       const tip = Math.min(9, length);
       const base = [to[0] - tip * tx, to[1] - tip * ty];
       setLine(shaft, from, base);
       const side = tip * 0.45;
-      head.setAttribute(
-        "points",
-        pointsOf([to, [base[0] - side * ty, base[1] + side * tx], [base[0] + side * ty, base[1] - side * tx]])
-      );
+      drawn(head, [to, [base[0] - side * ty, base[1] + side * tx], [base[0] + side * ty, base[1] - side * tx]]);
       label.textContent = `${s.name} ${withUnit(size, "N", 3)}`;
-      label.setAttribute("x", Math.min(Math.max(to[0] + 6 * tx, 4), view.width - 4));
-      const y = to[1] + 6 * ty + (ty > 0 ? 10 : 0);
-      label.setAttribute("y", Math.min(Math.max(y, 13), view.height - 5));
-      label.setAttribute("text-anchor", to[0] > view.width * 0.66 ? "end" : "start");
+      view.arrows.push({ from, to, label });
+      return [];
     },
   },
 };
+
+/* Draws a way of points on the screen. */
+function drawn(line, points) {
+  line.setAttribute("points", pointsOf(points));
+  return covered(points);
+}
 
 function setLine(line, [x1, y1], [x2, y2]) {
   for (const [key, value] of Object.entries({ x1, y1, x2, y2 })) line.setAttribute(key, value);
@@ -221,6 +226,7 @@ class Picture {
         return { shape: compiledShape(s), kind, parts };
       });
     for (const { parts, shape } of this.shapes) if (shape.kind === "arrow") root.append(...parts);
+    this.axes = this.space ? this.makeAxes() : [];
     this.screen = this.screen.bind(this);
     this.flat = this.flat.bind(this);
     this.past = this.past.bind(this);
@@ -250,6 +256,7 @@ class Picture {
     this.trajectory = trajectory;
     const low = [Infinity, Infinity];
     const high = [-Infinity, -Infinity];
+    this.forces = []; // [foot, vector] in the plane that is seen
     const forces = new Map();
     const stride = Math.max(1, Math.floor(trajectory.time.length / SAMPLES));
     for (let row = 0; row < trajectory.time.length; row += stride) {
@@ -258,6 +265,7 @@ class Picture {
         if (shape.kind === "arrow") {
           const size = Math.hypot(...shape.vector(look));
           if (size > 0) forces.set(shape, [...(forces.get(shape) || []), size]);
+          this.forces.push([this.flat(shape.at(look)), this.flat(shape.vector(look))]);
         }
         if (shape.kind === "path" && row > 0 && !shape.moves) continue;
         for (const p of kind.points(shape, look)) {
@@ -286,13 +294,51 @@ class Picture {
     this.width = Math.max(width, 100);
     this.height = Math.max(height, 100);
     this.root.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
-    const [w, h] = [this.high[0] - this.low[0], this.high[1] - this.low[1]];
-    const room = [this.width - 2 * MARGIN, this.height - 2 * MARGIN];
-    this.scale = Math.min(room[0] / (w || 1e-9), room[1] / (h || 1e-9), 1e9);
-    if (w === 0 && h === 0) this.scale = 1;
-    this.left = (this.width - w * this.scale) / 2;
-    this.bottom = (this.height + h * this.scale) / 2;
     this.reach = LONGEST * Math.min(this.width, this.height);
+    const [w, h] = [this.high[0] - this.low[0], this.high[1] - this.low[1]];
+    const room = [0, 0, 0, 0]; // that arrows need besides: left, right, below, above
+    for (let turn = 0; turn < 3; turn++) {
+      const across = (this.width - 2 * MARGIN - room[0] - room[1]) / (w || 1e-9);
+      const up = (this.height - 2 * MARGIN - room[2] - room[3]) / (h || 1e-9);
+      this.scale = w === 0 && h === 0 ? 1 : Math.min(across, up, 1e9);
+      this.makeRoom(room, [w * this.scale, h * this.scale]);
+    }
+    this.left = (this.width - w * this.scale + room[0] - room[1]) / 2;
+    this.bottom = (this.height + h * this.scale - room[2] + room[3]) / 2;
+  }
+
+  /* How far arrows reach beyond the bodies [CSS pixels]; one that is longer than it should be is a spike. */
+  makeRoom(room, size) {
+    for (const [foot, vector] of this.forces) {
+      const long = Math.min(1, this.strongest / Math.hypot(...vector)) * (this.reach / this.strongest);
+      for (const i of [0, 1]) {
+        const tip = (foot[i] - this.low[i]) * this.scale + vector[i] * long;
+        if (!Number.isFinite(tip)) continue;
+        room[2 * i] = Math.max(room[2 * i], -tip);
+        room[2 * i + 1] = Math.max(room[2 * i + 1], tip - size[i]);
+      }
+    }
+  }
+
+  /* The directions of x, y and z, in the corner below on the left. */
+  makeAxes() {
+    return ["x", "y", "z"].map((name, k) => {
+      const line = svg("line", { class: "axis" });
+      const label = svg("text", { class: "axis-name" });
+      label.textContent = name;
+      this.root.append(line, label);
+      return { line, label, along: [0, 1, 2].map((i) => Number(i === k)) };
+    });
+  }
+
+  drawAxes() {
+    const from = [AXES + 12, this.height - AXES - 4];
+    for (const { line, label, along } of this.axes) {
+      const [x, y] = this.flat(along);
+      setLine(line, from, [from[0] + AXES * x, from[1] - AXES * y]);
+      label.setAttribute("x", from[0] + (AXES + 8) * x);
+      label.setAttribute("y", from[1] - (AXES + 8) * y + 4);
+    }
   }
 
   past(center) {
@@ -306,7 +352,10 @@ class Picture {
 
   now(t) {
     this.placed = this.trajectory.place(t);
+    this.arrows = [];
     const look = this.look(this.placed);
-    for (const { shape, kind, parts } of this.shapes) kind.draw(parts, shape, look, this);
+    const bodies = this.shapes.flatMap(({ shape, kind, parts }) => kind.draw(parts, shape, look, this));
+    this.drawAxes();
+    placeLabels(this.arrows, bodies, this.width, this.height);
   }
 }

@@ -1,0 +1,109 @@
+"""The live page and the page in an FMU on a phone, on a desk and read aloud: what is where, and how large."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser import Page
+
+from lagfmu.page.documentation import page as documentation
+from lagfmu.page.documentation import with_figures
+from lagfmu.prepare.prepare import Prepared
+
+Opened = Callable[..., Page]
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+LYING = {**PHONE, "viewport": {"width": 844, "height": 390}}
+SEEN = """async () => {
+    const seen = (e) => {
+        const box = e.getBoundingClientRect();
+        const at = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+        return box.top >= 0 && box.bottom <= innerHeight && e.contains(at);
+    };
+    const found = [];
+    for (const e of document.querySelectorAll("#dials input[type=range], #tolerance")) {
+        e.focus();
+        await new Promise(requestAnimationFrame);
+        const parts = ["#picture", "#lead .plot", "#scrub"].map((q) => document.querySelector(q));
+        if (![e, ...parts].every(seen)) found.push(e.dataset.name || e.id);
+    }
+    return found;
+}"""
+SMALL = """() => [...document.querySelectorAll("input, select, button, summary")]
+    .filter((e) => e.checkVisibility())
+    .map((e) => [e.outerHTML, (e.type === "checkbox" ? e.labels[0] : e).getBoundingClientRect()])
+    .filter(([, box]) => box.width < 24 || box.height < 24)
+    .map(([text]) => text)"""
+
+
+@pytest.mark.parametrize("screen", [PHONE, LYING], ids=["upright", "lying"])
+@pytest.mark.parametrize("name", ["Hemisphere", "SliderCrank"])
+def test_who_moves_a_slider_sees_the_motion(name: str, screen: Any, opened: Opened) -> None:
+    """On a phone, whichever slider has the focus: it, the whole picture, a curve and the time are on the
+    screen together, and nothing lies over them."""
+    page = opened(name, **screen)
+    page.until("lagfmu.runs")
+    assert (
+        page.tab.evaluate("() => document.querySelectorAll('#dials input[type=range]').length") > 5
+    )
+    assert page.tab.evaluate(SEEN) == []
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_a_finger_meets_every_control(width: int, opened: Opened) -> None:
+    """Each is 24 pixels high and wide at least (WCAG 2.2, 2.5.8); of a box to tick its label counts."""
+    page = opened("Belt", viewport={"width": width, "height": 844})
+    page.until("lagfmu.runs")
+    page.tab.evaluate("() => document.querySelectorAll('details').forEach((d) => (d.open = true))")
+    assert page.tab.evaluate(SMALL) == []
+
+
+def test_the_curve_beside_the_picture_is_the_readers_choice(opened: Opened) -> None:
+    """At first it is the first lambda; a truth is drawn in steps and told as a word."""
+    page = opened("Belt")
+    page.until("lagfmu.runs")
+    shown = page.tab.locator("#lead-name option:checked")
+    assert shown.inner_text().startswith("lambda.")
+    page.tab.locator("#lead-name").select_option(label="sticks.grip")
+    assert page.tab.locator("#lead-value").inner_text() == "yes"
+    told = page.tab.locator("#lead .plot").get_attribute("aria-label")
+    assert str(told).startswith("sticks.grip over time: sticks.grip from no to yes")
+
+
+def test_residuals_are_drawn_for_those_who_ask(opened: Opened) -> None:
+    """They are rounding, 1e-16: at first no chart has them, and a tick brings it."""
+    page = opened("PendulumCartesian")
+    page.until("lagfmu.runs")
+    captions = page.tab.locator("#charts figcaption")
+    assert not any(t.startswith("Residuals") for t in captions.all_inner_texts())
+    page.tab.get_by_label("Residuals, zero where a constraint acts").check()
+    assert any(t.startswith("Residuals") for t in captions.all_inner_texts())
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_of_a_page_keeps_a_reader_out(width: int, theme: str, opened: Opened) -> None:
+    """axe-core finds nothing in the live page, everything unfolded and drawn: headings in order, contrast,
+    names, sizes."""
+    page = opened(
+        "Belt", viewport={"width": width, "height": 844}, color_scheme=theme, bypass_csp=True
+    )
+    page.until("lagfmu.runs")
+    page.tab.evaluate("() => document.querySelectorAll('details').forEach((d) => (d.open = true))")
+    assert page.violations() == []
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_nothing_of_the_documentation_keeps_a_reader_out(
+    theme: str, prepared: Callable[[str], Prepared], browser: Any, tmp_path: Path
+) -> None:
+    """axe-core finds nothing in the page of an FMU with contacts, frictions and its verification, on a phone:
+    wide tables scroll by keys."""
+    path = tmp_path / "index.html"
+    figures = [("energy", "1e-9", "1e-8", "pass"), ("force", "1", "1e-8", "FAIL")]
+    path.write_text(with_figures(documentation(prepared("Belt")), figures), encoding="utf-8")
+    page = Page(browser, path, viewport={"width": 390, "height": 844}, color_scheme=theme)
+    assert page.violations() == []
+    page.close()

@@ -1,0 +1,71 @@
+"""The site that mkdocs builds of docs/: strictly, with what its hooks add, and for every reader."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser import Page
+from once import once
+
+REPOSITORY = Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="module")
+def site(shared_folder: Path) -> Path:
+    """The site with the live pages of two models."""
+    pytest.importorskip("mkdocs")
+
+    def make(place: Path) -> None:
+        command = [
+            sys.executable,
+            "-m",
+            "mkdocs",
+            "build",
+            "--strict",
+            "-q",
+            "-d",
+            str(place / "site"),
+        ]
+        run = subprocess.run(
+            command,
+            cwd=REPOSITORY,
+            env={**os.environ, "LAGFMU_GALLERY": "hemisphere,belt"},
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
+        assert run.returncode == 0, run.stderr[-2000:]
+
+    return once(shared_folder / "site", make) / "site"
+
+
+def test_the_site_builds_strictly(site: Path) -> None:
+    """Every page in the navigation, no broken link, every name of the reference documented; the gallery
+    holds live pages (of two models here), the tutorial is there as a notebook."""
+    assert "lagfmu" in (site / "gallery" / "belt.html").read_text(encoding="utf-8")
+    assert 'href="hemisphere.html"' in (site / "gallery" / "index.html").read_text(encoding="utf-8")
+    assert (site / "tutorial.ipynb").is_file()
+    assert 'href="../tutorial.ipynb"' in (site / "tutorial" / "index.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", ["", "gallery/", "tutorial/", "live/"])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_nothing_of_the_site_keeps_a_reader_out(
+    name: str, theme: str, site: Path, browser: Any
+) -> None:
+    """axe-core finds nothing: contrast, headings, heads of tables, links told by more than colour."""
+    page = Page(
+        browser,
+        site / name / "index.html",
+        color_scheme=theme,
+        viewport={"width": 800, "height": 900},
+    )
+    page.until("document.querySelector('[data-md-component=container]')")
+    assert page.violations() == []
+    page.close()
