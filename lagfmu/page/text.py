@@ -14,6 +14,7 @@ from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.integrability.classify import Classification, classify
 from ..model.model import Contact, Nonholonomic, name_of
 from ..names import FORCE, MULTIPLIER, OWN
+from ..prepare.consistency import of_undecided
 from ..prepare.prepare import Derived, Prepared
 from ..solver.precedence import OMITTED
 from .documentation import as_given, shown
@@ -48,6 +49,8 @@ def show(prepared: Prepared, console: Console) -> None:
             "the least norm, rows scaled so that g M⁻¹ gᵀ = 1; Q is unique"
         )
         _print(console, "  ", text)
+    if structure.undecided:
+        _print(console, "  ", of_undecided(structure.undecided, structure.redundant))
 
     saved = savings(prepared)
     if saved is not None:

@@ -23,6 +23,7 @@ from ..model.units import ONE, for_reading
 from ..names import RESIDUAL, derivative, motion, name
 from ..solver.afar import project_from_afar
 from ..solver.failure import OmittedStartError, StepFailureError
+from ..solver.friction import law
 from ..solver.initial import Start, start
 from ..solver.instant import Instant
 from ..solver.jumps import levels_at
@@ -36,6 +37,7 @@ from .diagnosis import cause_of_failure, negative_energy
 from .starts import ranks
 
 TRIALS = 5
+ALONE = 1e-6  # part of a unit vector of multipliers that push nothing, up to which one has no part in it
 MISSED = 1e-9  # part of a constraint's terms by which it is missed
 
 
@@ -46,13 +48,15 @@ class RedundantConstraintWarning(UserWarning):
 @dataclass(frozen=True)
 class Structure:
     """n, m, rank of G with all constraints acting, degrees of freedom, redundant constraints, all whose
-    multipliers are not unique, start, and the constraints that the given start values miss, in words."""
+    multipliers are not unique, frictions whose normal forces are not, start, and the constraints that the
+    given start values miss, in words."""
 
     n: int
     m: int
     rank: int
     redundant: tuple[str, ...]
     shared: tuple[str, ...]
+    undecided: tuple[str, ...]
     start: Start
     missed: tuple[str, ...]
 
@@ -92,13 +96,17 @@ def examine(
         at = Instant(full, 0.0, inputs, p)
         M, _, G, _, _ = at.evaluate(q, v)
         f = at.residual(q) if full.contacts else np.zeros(full.m)
-        ranks.append(_rank(full, G, f, np.abs(G) @ np.abs(q)))
+        try:
+            C = law(at, q, v).C if full.frictions else np.zeros((0, full.m))
+        except StepFailureError:
+            continue
+        ranks.append(_rank(full, G, f, np.abs(G) @ np.abs(q), C))
         masses.append(M)
     size = np.abs([M.diagonal() for M in masses]).max(axis=0)
     negative = negative_energy(full, masses[0], size)
     if negative:
         raise ModelError(eom.model.name, [negative])
-    rank, redundant, shared = max(ranks, key=lambda r: r[0])
+    rank, redundant, shared, undecided = max(ranks, key=lambda r: r[0])
     if redundant:
         warnings.warn(
             f"model {eom.model.name!r}: constraint{'s' if len(redundant) > 1 else ''} "
@@ -108,8 +116,25 @@ def examine(
             RedundantConstraintWarning,
             stacklevel=3,
         )
+    if undecided:
+        warnings.warn(
+            f"model {eom.model.name!r}: {of_undecided(undecided, redundant)}",
+            RedundantConstraintWarning,
+            stacklevel=3,
+        )
     missed = _missed(table, system, begun, u, p)
-    return Structure(eom.n, eom.m, rank, redundant, shared, begun, missed)
+    return Structure(eom.n, eom.m, rank, redundant, shared, undecided, begun, missed)
+
+
+def of_undecided(frictions: Sequence[str], redundant: Sequence[str]) -> str:
+    """That the motion may depend on how redundant constraints share a normal force, and the remedy."""
+    several = len(frictions) > 1
+    return (
+        f"the normal force{'s' if several else ''} of friction{'s' if several else ''} "
+        f"{', '.join(map(repr, frictions))} {'are' if several else 'is'} not unique, and the motion may "
+        "depend on it: taken is that of the multipliers of least norm; take as `normal` a sum of "
+        f"multipliers that is unique, or leave out what is redundant ({', '.join(redundant)})"
+    )
 
 
 def _spans(system: System, begun: Start, p: Sequence[float]) -> list[float]:
@@ -257,15 +282,16 @@ def _nearby(
 
 
 def _rank(
-    full: System, G: Matrix, f: Vector, size: Vector
-) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
+    full: System, G: Matrix, f: Vector, size: Vector, C: Matrix
+) -> tuple[int, tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Rank of G with rows scaled to unit norm; the rows that add nothing to those before them: what is left
     of each beside the span of those (Gram and Schmidt, twice); and all whose multiplier is not unique: those
     with a part in the null space of G^T (Wojtyra 2005).  Contacts come last: one that cannot be closed
-    while those on which it depends are (a wall on either side) is no redundancy."""
+    while those on which it depends are (a wall on either side) is no redundancy.  C (frictions, rows) takes
+    multipliers to normal forces: the frictions of which one is not unique come last."""
     norm = np.linalg.norm(G, axis=1)
     norm = np.where(norm > 0, norm, 1.0)
-    G, f, size = G / norm[:, None], f / norm, size / norm
+    G, f, size, C = G / norm[:, None], f / norm, size / norm, C / norm
     span = np.zeros((0, full.n))
     redundant: list[str] = []
     rows: list[int] = []
@@ -283,7 +309,13 @@ def _rank(
         else:
             redundant.append(full.rows[k].name)
         rows.append(k)
-    return len(span), tuple(redundant), _shared(full, G, sorted(rows), len(redundant))
+    rows.sort()
+    left = _left_null_space(G[rows], len(redundant))
+    shared = np.linalg.norm(left, axis=1) > ALONE
+    grows = np.linalg.norm(C[:, rows] @ left, axis=1) > ALONE * np.linalg.norm(C[:, rows], axis=1)
+    names = tuple(full.rows[k].name for k, part in zip(rows, shared, strict=True) if part)
+    frictions = tuple(x.name for x, part in zip(full.frictions, grows, strict=True) if part)
+    return len(span), tuple(redundant), names, frictions
 
 
 def _apart(k: int, rows: Sequence[int], G: Matrix, f: Vector, size: Vector) -> bool:
@@ -292,10 +324,8 @@ def _apart(k: int, rows: Sequence[int], G: Matrix, f: Vector, size: Vector) -> b
     return bool(abs(f[k] - share @ f[rows]) > MISSED * (size[k] + np.abs(share) @ size[rows]))
 
 
-def _shared(full: System, G: Matrix, rows: Sequence[int], count: int) -> tuple[str, ...]:
-    """Those of `rows` with a part in the null space of G^T, which has `count` dimensions."""
-    if not count or not rows:
-        return ()
-    left = np.linalg.svd(G[rows])[0][:, len(rows) - count :]
-    parts = np.linalg.norm(left, axis=1)
-    return tuple(full.rows[k].name for k, part in zip(rows, parts, strict=True) if part > 1e-6)
+def _left_null_space(G: Matrix, count: int) -> Matrix:
+    """(rows, count), orthonormal: the multipliers that push nothing."""
+    if not count or not len(G):
+        return np.zeros((len(G), 0))
+    return np.linalg.svd(G)[0][:, len(G) - count :]

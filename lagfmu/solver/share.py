@@ -1,10 +1,11 @@
 """Redundant sticking: which of the multipliers that hold the same motion lies within the cones.
 
-Where rows depend on each other lambda is one of lambda + Z y, with Z the null space of G^T.  A friction
-sticks as long as *some* y has |lambda_t| <= mu N in every cone.  The least reserve over all cones,
-min (mu N - |lambda_t|), is a concave function of y: its maximum is found by the ellipsoid method (Shor
-1977; Boyd & Vandenberghe 2008), for one y by bisection.  What is reported is the lambda of least norm if
-that is within the cones, else the nearest on the way to the maximum.
+Where rows depend on each other lambda is one of lambda + Z y, with Z the null space of G^T.  Normal forces
+are those of the lambda of least norm, and Z is what leaves them as they are.  A friction sticks as long as
+*some* y has |lambda_t| <= mu N in every cone.  The least reserve over all cones, min (mu N - |lambda_t|), is
+a concave function of y: its maximum is found by the ellipsoid method (Shor 1977; Boyd & Vandenberghe 2008),
+for one y by bisection.  What is reported is the lambda of least norm if that is within the cones, else the
+nearest on the way to the maximum.
 """
 
 from __future__ import annotations
@@ -30,6 +31,10 @@ def best_share(
 ) -> tuple[Vector, Vector]:
     """The multipliers (m) to report, and those of the largest reserve."""
     Z = dependencies(G, rows)
+    _, grows, turned = np.linalg.svd(
+        C / np.maximum(np.abs(C).max(axis=1, keepdims=True), np.finfo(float).tiny) @ Z.T
+    )
+    Z = turned[(grows > SHARE_DEPENDENT).sum() :] @ Z
     if not len(Z):
         return lam, lam
 

@@ -78,9 +78,7 @@ Status exchange_evaluate(Instance *x) {
     if (x->evaluated) return OK;
     if (instance_start(x) != OK) return FAILED;
     flow_begin(s);
-    if (mechanism_motion(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
-                         flow_rows(s)) != OK)
-        return FAILED;
+    if (flow_motion(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
     x->evaluated = 1;
     return OK;
 }
@@ -107,7 +105,7 @@ static Status stabilize(Instance *x, double *derivatives) {
         return FAILED;
     for (int k = 0; k < s->system->m; k++)
         c[k] = -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
-    if (linear_solve(&b->linear, NULL, c, a, NULL) != OK) return OK; /* rows contradict each other */
+    if (linear_nearest(&b->linear, c, a) != OK) return OK; /* rows contradict each other */
     for (int j = 0; j < s->system->n; j++) derivatives[2 * j + 1] += a[j];
     return OK;
 }

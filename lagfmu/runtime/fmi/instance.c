@@ -33,6 +33,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
         for (int k = 0; k < EVENT_KINDS; k++)
             x->before[k] = arena_ints(&scratch, event_count_of(system, (EventKind)k));
+        x->shared = arena_ints(&scratch, system->frictions);
         x->happened = arena_ints(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
@@ -64,6 +65,7 @@ void instance_reset(Instance *x) {
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->solver.on_demand = 1;
     x->started = x->running = x->warned = x->moved = x->observed = x->evaluated = x->followed = 0;
+    memset(x->shared, 0, (size_t)x->solver.system->frictions * sizeof *x->shared);
     for (int k = 0; k < VARIABLE_COUNT; k++)
         if (VARIABLES[k].type == TYPE_REAL &&
             (VARIABLES[k].role != ROLE_OUTPUT || VARIABLES[k].place == AT_INPUT))
@@ -310,6 +312,25 @@ static void choose_settings(Instance *x) {
     x->tell(x->context, NOTE_WARNING, x->note);
 }
 
+/* Once for each: redundant rows share a normal force, and the motion may depend on how. */
+static void warn_of_shares(Instance *x) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    if (s->system->frictions == 0) return;
+    flow_begin(s);
+    if (flow_motion(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return;
+    for (int i = 0; i < s->system->frictions; i++) {
+        if (x->shared[i] || b->sliding->presses_uniquely(b, i)) continue;
+        x->shared[i] = 1;
+        (void)snprintf(x->note, sizeof x->note,
+                       "friction %s: its normal force is not unique, and the motion may depend on it: taken is that "
+                       "of the multipliers of least norm; take as normal force a sum of multipliers that is unique, "
+                       "or leave out what is redundant",
+                       s->system->friction[i].name);
+        x->tell(x->context, NOTE_WARNING, x->note);
+    }
+}
+
 Status instance_start(Instance *x) {
     Solver *s = &x->solver;
     if (x->started) return OK;
@@ -324,6 +345,7 @@ Status instance_start(Instance *x) {
         return FAILED;
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     x->started = 1;
+    warn_of_shares(x);
     x->observed = x->evaluated = 0;
     if (ERROR_BARS != NULL) ERROR_BARS->start(x);
     return OK;
@@ -409,6 +431,13 @@ static void report_events(Instance *x) {
     for (int i = 0; i < s->frictions; i++) report_both(x, SLIPPING, STICKING, i);
 }
 
+static int has_closed(const Instance *x) {
+    int any = 0;
+    for (int c = 0; c < x->solver.system->contacts; c++)
+        any |= x->solver.state.latest[CLOSING].count[c] != x->before[CLOSING][c];
+    return any;
+}
+
 static void remember_counts(Instance *x) {
     for (int k = 0; k < EVENT_KINDS; k++) {
         const int count = event_count_of(x->solver.system, (EventKind)k);
@@ -456,6 +485,7 @@ Status instance_step(Instance *x, double t_end) {
     memset(x->set, 0, (size_t)s->system->inputs * sizeof *x->set);
     if (s->system->lookup_count > 0) warn_of_tables(x);
     if (s->system->contacts + s->system->frictions > 0) report_events(x);
+    if (has_closed(x)) warn_of_shares(x);
     tell_of_method(x, product, implicit);
     return OK;
 }

@@ -172,13 +172,11 @@ static double tangential(const Mechanism *b, int i, const double *lambda, double
     return length_of(force);
 }
 
-/* Are the multipliers that a friction which sticks depends on the only ones? */
+/* Are the multipliers of a friction that sticks the only ones? */
 static int is_unique(const Mechanism *b, int i) {
     const Friction *law = &b->system->friction[i];
     int all = 1;
     for (int r = 0; r < law->rows; r++) all &= b->linear.unique[law->row[r]];
-    for (int k = law->first; k < law->first + law->normals; k++)
-        all &= b->linear.unique[b->system->press[k]];
     return all;
 }
 
@@ -229,4 +227,8 @@ static Status motion(Mechanism *b, Instant at, const double *q, const double *v,
     return OK;
 }
 
-const Sliding SLIDING = {layout, acting, motion};
+static int presses_uniquely(Mechanism *b, int i) {
+    return !b->friction->loaded[i] || share_presses_uniquely(b, i);
+}
+
+const Sliding SLIDING = {layout, acting, motion, presses_uniquely};

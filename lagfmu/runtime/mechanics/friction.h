@@ -67,4 +67,8 @@ double friction_eliminate(int size, double *A, double *right);
 size_t share_doubles(const System *s);
 void share_best(Mechanism *b, double *best);
 
+/* 0 if the normal force of friction i is not the only one with the motion that was evaluated last: rows that
+ * depend on each other share it. */
+int share_presses_uniquely(Mechanism *b, int i);
+
 #endif

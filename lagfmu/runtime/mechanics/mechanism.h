@@ -26,6 +26,8 @@ typedef struct {
     /* (m) `active` with the rows that stick by friction */
     const int *(*acting)(Mechanism *b, const int *active);
     Status (*motion)(Mechanism *b, Instant at, const double *q, const double *v, const int *active);
+    /* 0: friction i is pressed by a force that is not the only one with the latest motion */
+    int (*presses_uniquely)(Mechanism *b, int i);
 } Sliding;
 
 struct Mechanism {

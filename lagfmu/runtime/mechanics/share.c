@@ -1,10 +1,11 @@
 /* share.c -- redundant sticking: which of the multipliers that hold the same motion lies within the cones.
  *
- * Where rows depend on each other lambda is one of lambda + Z^T y, with Z G = 0.  A friction sticks as long as
- * *some* y has |lambda_t| <= mu N in every cone.  The least reserve over all cones, min (mu N - |lambda_t|),
- * is concave in y: its maximum is found by the ellipsoid method (Shor 1977; Boyd & Vandenberghe 2008), for
- * one y by bisection.  What is reported is the lambda of least norm if that is within the cones, else the
- * nearest on the way to the maximum. */
+ * Where rows depend on each other lambda is one of lambda + Z^T y, with Z G = 0.  Normal forces are those of the
+ * lambda of least norm, sticking or slipping: by a strain of its own a body could hold whatever one likes.
+ * With N as it is a friction sticks as long as *some* y has |lambda_t| <= mu N in every cone.  The least
+ * reserve over all cones, min (mu N - |lambda_t|), is concave in y: its maximum is found by the ellipsoid
+ * method (Shor 1977; Boyd & Vandenberghe 2008), for one y by bisection.  What is reported is the lambda of
+ * least norm if that is within the cones, else the nearest on the way to the maximum. */
 #include <float.h>
 #include <string.h>
 
@@ -34,6 +35,16 @@ static double dot(int count, const double *a, const double *b) {
 
 static void add(int count, double part, const double *a, double *to) {
     for (int i = 0; i < count; i++) to[i] += part * a[i];
+}
+
+static void orthonormalize(Share *x) {
+    const int m = x->b->system->m;
+    for (int i = 0; i < x->count; i++) {
+        double *z = x->Z + i * m;
+        for (int j = 0; j < i; j++) add(m, -dot(m, x->Z + j * m, z), x->Z + j * m, z);
+        const double norm = sqrt(dot(m, z, z));
+        for (int k = 0; k < m; k++) z[k] /= norm;
+    }
 }
 
 /* Z: each row that acts eliminated by those before it, twice (Kahan). */
@@ -67,12 +78,34 @@ static void find_null_space(Share *x, double *basis, double *made, double *rest)
         for (int i = 0; i < m; i++) made[kept * m + i] = of[i] / left;
         kept += 1;
     }
-    for (int i = 0; i < x->count; i++) {
-        double *z = x->Z + i * m;
-        for (int j = 0; j < i; j++) add(m, -dot(m, x->Z + j * m, z), x->Z + j * m, z);
-        const double norm = sqrt(dot(m, z, z));
-        for (int k = 0; k < m; k++) z[k] /= norm;
+    orthonormalize(x);
+}
+
+/* By how much the normal force of friction i grows along z, relative to its coefficients. */
+static double press(const Mechanism *b, int i, const double *z) {
+    const Friction *law = &b->system->friction[i];
+    double sum = 0, most = 0;
+    for (int k = law->first; k < law->first + law->normals; k++) {
+        sum += b->friction->c[k] * z[b->system->press[k]];
+        most = fmax(most, fabs(b->friction->c[k]));
     }
+    return most > 0 ? sum / most : 0;
+}
+
+/* Of Z what presses friction i as before. */
+static void keep_normal(Share *x, int i) {
+    const int m = x->b->system->m;
+    int pivot = 0;
+    for (int j = 0; j < x->count; j++) {
+        x->slope[j] = press(x->b, i, x->Z + j * m);
+        if (fabs(x->slope[j]) > fabs(x->slope[pivot])) pivot = j;
+    }
+    if (x->count == 0 || !(fabs(x->slope[pivot]) > SHARE_DEPENDENT)) return;
+    for (int j = 0; j < x->count; j++)
+        if (j != pivot) add(m, -x->slope[j] / x->slope[pivot], x->Z + pivot * m, x->Z + j * m);
+    x->count -= 1;
+    memcpy(x->Z + pivot * m, x->Z + x->count * m, (size_t)m * sizeof *x->Z);
+    orthonormalize(x);
 }
 
 /* The least reserve at part * y [N]; its slope in y. */
@@ -87,18 +120,14 @@ static double worst(Share *x, double part, const double *y) {
     for (int i = 0; i < s->frictions; i++) {
         const Friction *law = &s->friction[i];
         if (!f->loaded[i] || !f->slide[i].sticks) continue;
-        const double N = friction_normal(b, i, x->there);
         double force = 0;
         for (int r = 0; r < law->rows; r++) force = hypot(force, x->there[law->row[r]]);
-        const double value = f->mu[2 * i] * fabs(N) - force;
+        const double value = f->mu[2 * i] * fabs(friction_normal(b, i, b->lambda)) - force;
         if (!(value < least)) continue;
         least = value;
         for (int j = 0; j < x->count; j++) {
             const double *z = x->Z + j * m;
             double slope = 0;
-            for (int k = law->first; k < law->first + law->normals; k++)
-                slope += f->c[k] * z[s->press[k]];
-            slope *= f->mu[2 * i] * (N < 0 ? -1 : 1);
             for (int r = 0; r < law->rows && force > 0; r++)
                 slope -= z[law->row[r]] * x->there[law->row[r]] / force;
             x->slope[j] = slope;
@@ -142,13 +171,14 @@ static void shrink_ellipsoid(Share *x, double wide) {
         for (int i = 0; i < count; i++) x->g[i] = x->Pg[i] / sqrt(size);
         add(count, 1 / (n + 1), x->g, x->y);
         for (int i = 0; i < count; i++)
-            for (int j = 0; j < count; j++)
-                x->P[i * count + j] = n * n / (n * n - 1) *
-                                      (x->P[i * count + j] - 2 / (n + 1) * x->g[i] * x->g[j]);
+            for (int j = 0; j <= i; j++) /* symmetric to the bit: what is not grows with each round */
+                x->P[j * count + i] = x->P[i * count + j] =
+                    n * n / (n * n - 1) * (x->P[i * count + j] - 2 / (n + 1) * x->g[i] * x->g[j]);
     }
 }
 
-void share_best(Mechanism *b, double *best) {
+/* With the null space of the rows that act. */
+static Share share_of(Mechanism *b) {
     const System *s = b->system;
     const int n = s->n, m = s->m;
     double *place = b->friction->share, *basis = place, *made = basis + m * n;
@@ -161,8 +191,24 @@ void share_best(Mechanism *b, double *best) {
     x.g = x.slope + m;
     x.Pg = x.g + m;
     x.P = x.Pg + m;
-    memcpy(best, b->lambda, (size_t)m * sizeof *best);
     find_null_space(&x, basis, made, rest);
+    return x;
+}
+
+int share_presses_uniquely(Mechanism *b, int i) {
+    const Share x = share_of(b);
+    for (int j = 0; j < x.count; j++)
+        if (fabs(press(b, i, x.Z + j * b->system->m)) > SHARE_DEPENDENT) return 0;
+    return 1;
+}
+
+void share_best(Mechanism *b, double *best) {
+    const System *s = b->system;
+    const int m = s->m;
+    Share x = share_of(b);
+    memcpy(best, b->lambda, (size_t)m * sizeof *best);
+    for (int i = 0; i < s->frictions; i++)
+        if (b->friction->loaded[i]) keep_normal(&x, i);
     if (x.count == 0) return;
     double wide = 0, low = 0, high = 1;
     for (int k = 0; k < m; k++) wide = fmax(wide, fabs(b->lambda[k]));

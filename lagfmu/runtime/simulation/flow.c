@@ -36,15 +36,17 @@ Instant flow_instant(Solver *s, double t) {
     return (Instant){t, s->u, s->p};
 }
 
+Status flow_motion(Solver *s, Instant at, const double *q, const double *v) {
+    return s->system->frictions > 0 ? mechanism_motion_near(&s->stepped, at, q, v, s->active,
+                                                            s->state.offset, s->state.size)
+                                    : mechanism_motion(&s->stepped, at, q, v, flow_rows(s));
+}
+
 static Status rate(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
-    const Instant at = flow_instant(s, t);
     s->stepped.stage = 1;
-    const Status status = s->system->frictions > 0
-                              ? mechanism_motion_near(&s->stepped, at, y, y + n, s->active,
-                                                      s->state.offset, s->state.size)
-                              : mechanism_motion(&s->stepped, at, y, y + n, flow_rows(s));
+    const Status status = flow_motion(s, flow_instant(s, t), y, y + n);
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
     for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */

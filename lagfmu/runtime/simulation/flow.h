@@ -26,6 +26,10 @@ const int *flow_rows(const Solver *s);
 /* Time t with the inputs then, and the levels of jumps behind them (kept in s->u). */
 Instant flow_instant(Solver *s, double t);
 
+/* The motion at a state that may lie off the constraints: by those rows, but by all that act where there are
+ * frictions, for the normal force is that of the multipliers of least norm. */
+Status flow_motion(Solver *s, Instant at, const double *q, const double *v);
+
 /* One accepted step towards t_bound, none longer than `longest` [s]. */
 Status flow_step(Solver *s, Integrator *i, double t_bound, double longest);
 

@@ -86,12 +86,12 @@ static void aim(Rest *x, int i) {
         x->guess[2 * i + r] = length > 0 ? -force[r] / length : x->slides[i].direction[r];
 }
 
-/* s' = G_t vdot - gamma_t of friction i, and what of it is rounding. */
-static Status find_rate(Rest *x, int i, double rate[2], double *floor) {
-    Mechanism *b = &x->s->stepped;
+/* (n) For each coordinate its acceleration, or the one that the forces at work could give it if they did not
+ * balance. */
+static const double *accelerations_at_work(const Rest *x) {
+    const Mechanism *b = &x->s->stepped;
     const System *s = b->system;
     double *forces = x->s->work_contacts, *reach = forces + s->n;
-    if (motion(x) != OK) return FAILED;
     for (int j = 0; j < s->n; j++) {
         forces[j] = fabs(b->F[j]);
         reach[j] = fabs(b->vdot[j]);
@@ -102,11 +102,25 @@ static Status find_rate(Rest *x, int i, double rate[2], double *floor) {
         const int j = s->mass_row[e];
         if (s->mass_column[e] == j && b->M[e] > 0) reach[j] = fmax(reach[j], forces[j] / b->M[e]);
     }
+    return reach;
+}
+
+/* G vdot - gamma of row k, in the motion that was evaluated last, and what of it is rounding. */
+static double rate_of(const Mechanism *b, int k, const double *reach, double *floor) {
+    *floor = SLIDES_BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
+    return mechanism_row(b, k, b->vdot) - b->gamma[k];
+}
+
+/* s' = G_t vdot - gamma_t of friction i, and what of it is rounding. */
+static Status find_rate(Rest *x, int i, double rate[2], double *floor) {
+    const Friction *law = &x->s->system->friction[i];
+    if (motion(x) != OK) return FAILED;
+    const double *reach = accelerations_at_work(x);
     rate[1] = *floor = 0;
-    for (int r = 0; r < s->friction[i].rows; r++) {
-        const int k = s->friction[i].row[r];
-        rate[r] = mechanism_row(b, k, b->vdot) - b->gamma[k];
-        *floor += SLIDES_BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
+    for (int r = 0; r < law->rows; r++) {
+        double own;
+        rate[r] = rate_of(&x->s->stepped, law->row[r], reach, &own);
+        *floor += own;
     }
     return OK;
 }
@@ -339,6 +353,21 @@ static int turn_contacts(const System *s, int i, int shut, int *closed, const in
     return any;
 }
 
+/* Does a surface that presses friction i go away, in the motion that was evaluated last?  One of several that
+ * share a load may be open and stay where it is: that is the same motion. */
+static int parts(const Rest *x, int i, const int *touching) {
+    const System *s = x->s->system;
+    const Friction *law = &s->friction[i];
+    const double *reach = accelerations_at_work(x);
+    for (int c = 0; c < s->contacts; c++)
+        for (int k = law->first; k < law->first + law->normals; k++) {
+            double floor;
+            if (s->press[k] != s->contact[c] || !touching[c]) continue;
+            if (rate_of(&x->s->stepped, s->contact[c], reach, &floor) > floor) return 1;
+        }
+    return 0;
+}
+
 /* FAILED if a friction at rest that begins to stick might as well let its contact open, or one whose contact
  * is open might as well stick. */
 static Status check_rest(Rest *x, const int *closed, const int *touching, const int *leaving) {
@@ -356,8 +385,10 @@ static Status check_rest(Rest *x, const int *closed, const int *touching, const 
             continue;
         memcpy(trial, closed, (size_t)system->contacts * sizeof *trial);
         if (!turn_contacts(system, i, !on, trial, touching, leaving)) continue;
+        if (!on && (motion(x) != OK || !parts(x, i, touching))) continue;
         x->slides[i].sticks = !on;
-        const int other = fits(x, trial, touching, leaving) && (on || f->reserve[i] >= 0);
+        const int other =
+            fits(x, trial, touching, leaving) && (on ? parts(x, i, touching) : f->reserve[i] >= 0);
         x->slides[i] = held;
         if (other)
             return fail(&s->why,
