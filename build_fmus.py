@@ -39,7 +39,7 @@ from lagfmu.prepare.prepare import Prepared, prepare
 MODELS = Path(__file__).parent / "models"
 RUNS = 3  # the time is the median of these
 HEADINGS = ["fmu", "target", "bytes", "build_s", "steps", "wall_ms_per_s"]
-HEADINGS += ["statement", "error", "allowed", "verdict"]
+HEADINGS += ["statement", "error", "allowed", "points", "verdict"]
 
 load_once = cache(load)
 
@@ -167,9 +167,9 @@ def _report(console: Console, width: int, made: Made) -> list[str]:
     notes = list(made.notes)
     verdict, cells, style = "FAIL", [made.scene, made.target], "bold red"
     if found is not None:
-        problems += [f"{name}: {c}" for c in found.checks if not c.passed]
+        problems += [f"{name}: {c}" for c in found.checks if c.failed]
         # not reached: it is of another start than the default one
-        notes += [f"{name}: {c}" for c in found.checks if c.passed and not c.points]
+        notes += [f"{name}: {c}" for c in found.checks if not c.points]
         cells.append(_cost(made, found))
         if found.worst is not None:
             cells += [f"{found.worst.error:.1e}", found.worst.name]

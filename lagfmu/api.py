@@ -72,7 +72,7 @@ def build_fmu(
     built = package(prepared, out, closed_forms, target, platforms, choice, check, reference, page)
     found = built.verification
     if found is not None and not found.passed:
-        failed = "; ".join(str(c) for c in found.checks if not c.passed)
+        failed = "; ".join(str(c) for c in found.checks if c.failed)
         raise VerificationError(f"{str(built.path)!r} was built, but does not hold: {failed}")
     return built.path
 

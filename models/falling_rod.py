@@ -73,8 +73,8 @@ model = Model(
 
 scenes = [Scene("FallingRod", stop_time=0.75, step_size=0.01)]
 
-# While the foot has stuck since the start, the rod turns about it: theta'' = -(3/4)(g/l) cos(theta), and
-# theta'^2 = theta0'^2 + (3/2)(g/l)(sin(theta0) - sin(theta)).
+# While the foot has been on the floor and has stuck since the start, the rod turns about it:
+# theta'' = -(3/4)(g/l) cos(theta), and theta'^2 = theta0'^2 + (3/2)(g/l)(sin(theta0) - sin(theta)).
 rate = -3 * g * cos(theta) / (4 * l)
 square = initial(theta.diff()) ** 2 + 3 * g / (2 * l) * (sin(initial(theta)) - sin(theta))
 slip = initial(x.diff()) + l * sin(initial(theta)) * initial(theta.diff())
@@ -82,13 +82,27 @@ turns = output("sticks.grip") * (1 - output("slipping.grip.count")) * (1 - outpu
 turns = turns * (1 - sign(Abs(slip)))  # a rod that begins by sliding sticks later on
 
 closed_forms = [
-    ClosedForm("der(theta,2) on the foot", rate, actual=theta.diff(t, 2), when=turns),
-    ClosedForm("theta'^2 on the foot", square, actual=theta.diff() ** 2, scale=g / l, when=turns),
+    ClosedForm(
+        "der(theta,2) on the foot",
+        rate,
+        actual=theta.diff(t, 2),
+        when=turns,
+        until_departure="floor",
+    ),
+    ClosedForm(
+        "theta'^2 on the foot",
+        square,
+        actual=theta.diff() ** 2,
+        scale=g / l,
+        when=turns,
+        until_departure="floor",
+    ),
     ClosedForm(
         "normal force on the foot",
         m * (g + l * (cos(theta) * rate - sin(theta) * square)),
         actual=output("lambda.floor"),
         when=turns,
+        until_departure="floor",
     ),
     ClosedForm(
         "friction on the foot",
@@ -96,6 +110,7 @@ closed_forms = [
         actual=output("lambda.foot"),
         scale=m * g,
         when=turns,
+        until_departure="floor",
     ),
     Conserved(
         "energy and heat", output("energy.total") + output("energy.dissipated"), scale=m * g * l

@@ -111,6 +111,7 @@ free = departure("wall", x) + departure("wall", x.diff()) * (t - departure("wall
 # No end has struck wall or floor: what is closed was so at the start.
 unstruck = Heaviside(initial(at_wall) - at_wall, 1) * Heaviside(initial(on_floor) - on_floor, 1)
 unstruck *= Heaviside(-output("departure.floor.count"), 1)
+unstruck *= Heaviside(initial(at_wall) - output("departure.wall.count"), 1)
 
 closed_forms = [
     ClosedForm("lambda.wall", wall, until_departure="wall", when=slid),

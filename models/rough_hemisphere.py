@@ -80,7 +80,7 @@ def w(angle):
 slides = 1 - output("sticks.grip")
 first = 1 - sign(output("slipping.grip.count"))  # it has slid since the start, ...
 upwards = Max(0, -sign(initial(theta.diff())))
-down = first * Max(0, output("slip.hold")) * (1 - upwards)  # ... and downwards
+down = slides * first * Max(0, output("slip.hold")) * (1 - upwards)  # ... and downwards
 angle = departure("surface", theta)
 
 closed_forms = [

@@ -395,7 +395,7 @@ def test_no_number_is_cut_at_80_columns(small, tmp_path):
     printed = CliRunner().invoke(app, arguments, env={"COLUMNS": "80"}).output
     assert "…" not in printed
     assert all(len(line) <= 80 for line in printed.splitlines() if "built" not in line)
-    assert re.search(r"\d\.\de[-+]\d\d +1e-07 +pass", printed)
+    assert re.search(r"\d\.\de[-+]\d\d +1e-07 +11 +pass", printed)
 
 
 def test_curves_are_told_apart_and_the_legend_covers_none():

@@ -63,7 +63,10 @@ turned = Model(  # two rods whose angles are relative, on a turning slope: a den
         Parameter(omega, 0.5, "rad/s"),
     ],
 )
-FIGURES = [("lambda.rod & more", "1.5e-14", "1e-07", "pass"), ("energy", "2", "1e-07", "FAIL")]
+FIGURES = [
+    ("lambda.rod & more", "1.5e-14", "1e-07", "9", "pass"),
+    ("energy", "2", "1e-07", "9", "FAIL"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -73,6 +73,17 @@ def test_the_exit_code_is_the_worst_of_all(hemisphere, wrong, tmp_path):
     assert run("verify", hemisphere, missing, "--set", "thta=1")[0] == 3
 
 
+def test_what_no_run_reached_is_no_success(tmp_path):
+    """The weight never leaves its floor: of a statement on its flight alone nothing is known, status 1."""
+    (tmp_path / "resting.py").write_text(WEIGHT)
+    forms = [ClosedForm("lambda.floor", symbols("g"), while_open="floor")]
+    model = load(tmp_path / "resting.py").model
+    fmu = build_fmu(model, tmp_path, Scene("Resting"), forms, "native", check=False)
+    code, text = run("verify", fmu)
+    assert code == 1
+    assert "none of 1 was: nothing is known of its physics" in text
+
+
 def test_a_suite_an_fmu_and_a_case_a_statement(hemisphere, wrong, tmp_path):
     """JUnit's XML: the numbers of suites, cases, failures and errors are those of what was found."""
     xml, data = tmp_path / "out.xml", tmp_path / "out.json"

@@ -30,15 +30,17 @@ def finish(command: str, reports: Sequence[Report], json: Path | None, junit: Pa
 def print_verdicts(found: Verification) -> None:
     """A row a statement, and in words what failed."""
     title = f"{found.name}: {'pass' if found.passed else 'FAIL'}"
-    table = new_table(title, "statement", "largest error", "allowed", "verdict", text=["statement"])
+    table = new_table(
+        title, "statement", "largest error", "allowed", "points", "verdict", text=["statement"]
+    )
     for row, check in zip(found.rows(), found.checks, strict=True):
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
-        table.add_row(escape(row[0]), row[1], row[2], f"[{colour}]{row[3]}[/]")
+        table.add_row(escape(row[0]), *row[1:4], f"[{colour}]{row[4]}[/]")
     print_whole(console, table)
     if not found.closed_forms:
         console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
     for check in found.checks:
-        if not check.passed and check.detail:
+        if check.failed and check.detail:
             errors.print(
                 f"[red]{escape(check.name)}:[/] {escape(check.detail)}",
                 highlight=False,

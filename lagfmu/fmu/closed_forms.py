@@ -37,6 +37,13 @@ class CarriedForm(ClosedForm):
 
     accuracy: float | None = None
 
+    @property
+    def lasts_until_landing(self) -> bool:
+        """Whether it is of something conserved that an impact may change, and does not say itself where it
+        holds: then it holds until a contact first closes."""
+        said = any(getattr(self, c) is not None for c in (*CONDITIONS, "when"))
+        return self.expected is None and not said and names.DISSIPATED not in self.variables
+
     def allowed(self, tolerance: float, as_built: bool) -> float:
         """The relative error that it may have; `as_built`: with the FMU's own settings."""
         if as_built and self.accuracy is not None:
@@ -84,6 +91,17 @@ class CarriedForm(ClosedForm):
             until_departure=None if self.until_departure in held else self.until_departure,
         )
 
+    def with_losses(self) -> CarriedForm:
+        """The same; of a conserved quantity that is linear in the energy, with what impacts and frictions
+        took from it, if it does not name that itself."""
+        energy, losses = output(names.TOTAL), output(names.DISSIPATED)
+        actual = sp.sympify(self.actual)
+        part = sp.diff(actual, energy)
+        linear = part != 0 and energy not in part.free_symbols
+        if self.expected is not None or not linear or losses in actual.free_symbols:
+            return self
+        return replace(self, actual=actual + part * losses)
+
 
 def carried(scene: Scene, closed_forms: Sequence[ClosedForm | Conserved]) -> list[CarriedForm]:
     """The closed forms that apply to this FMU."""
@@ -108,13 +126,14 @@ def pack_closed_forms(
     numbers: Mapping[str, Expr] | None = None,
     held: Collection[str] = (),
     tables: Sequence[Spline] = (),
+    contacts: Collection[str] = (),
 ) -> bytes:
     """JSON with the closed forms; expressions are indexed symbols, so that any name can be read back.
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
-    closed, `tables` those that the model looks up, besides those of the closed forms.  Those that need a
-    variable which the scene leaves out are left out too.  Raises ModelError if one uses what no FMU of
-    the model has.
+    closed, `contacts` those that may open, `tables` those that the model looks up, besides those of the
+    closed forms.  Those that need a variable which the scene leaves out are left out too.  Raises ModelError
+    if one uses what no FMU of the model has.
     """
     applying = [
         found
@@ -122,10 +141,13 @@ def pack_closed_forms(
         if (found := form.in_scene(numbers or {}, held)) is not None
     ]
     known = {v.name for v in table.variables}
+    if names.DISSIPATED in known:
+        applying = [form.with_losses() for form in applying]
+    modes = {names.name(names.CONTACT, c) for c in contacts}
     problems = []
     kept = []
     for form in applying:
-        missing = sorted(form.variables - known)
+        missing = sorted((form.variables | (modes if form.lasts_until_landing else set())) - known)
         if not missing:
             kept.append(form)
         elif scene.complete:

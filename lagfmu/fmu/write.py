@@ -13,7 +13,7 @@ from pathlib import Path
 from ..errors import BuildError, SettingError, UsageError
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import load
-from ..model.model import Model
+from ..model.model import Contact, Model
 from ..model.scene import Scene
 from ..page.documentation import page, with_figures
 from ..page.picture import IN_FMU, as_bytes, picture_of
@@ -60,6 +60,7 @@ def write(
             prepared.numbers,
             prepared.held,
             prepared.model.splines,
+            [c.name for c in prepared.equations.constraints if isinstance(c, Contact)],
         ),
     }
     if live:

@@ -164,7 +164,8 @@ def _group(v: Variable) -> str:
 
 
 def with_figures(text: str, figures: Sequence[tuple[str, ...]]) -> str:
-    """The page with rows (closed form, largest error, allowed, verdict) of a verification in their place."""
+    """The page with rows (closed form, largest error, allowed, points, verdict) of a verification in their
+    place."""
     link = '<li><a href="#verification">Verification</a></li>'
     found = template("page/verification.html.j2").render(figures=figures)
     return text.replace(LINK, link).replace(FIGURES, found.rstrip())

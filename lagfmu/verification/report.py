@@ -27,5 +27,5 @@ def report(file: str, found: Verification) -> Report:
 
 def _case(check: Check, fmu: str, seconds: float) -> Case:
     skipped = "not reached in this run" if check.points == 0 else ""
-    failure = "" if skipped or check.passed else str(check)
+    failure = str(check) if check.failed else ""
     return Case(check.name, fmu, failure, skipped, seconds)

@@ -151,7 +151,7 @@ def _errors(
             spent = time.perf_counter() - begun
             held = closed_forms if setting.tolerance else ()
             checks = [check_closed_form(c, run, parameters, setting.tolerance) for c in held]
-            missed = tuple(str(c) for c in checks if not c.passed)
+            missed = tuple(str(c) for c in checks if c.failed)
             own.append(Point(setting, reference.errors(run), steps_of(run), missed))
             if spent > plan.limit:
                 notes.append(
