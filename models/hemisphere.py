@@ -41,7 +41,7 @@ model = Model(
         Parameter(g, 9.81, "m/s^2", "acceleration of gravity", min=0),
         Parameter(a, 1.0, "m", "radius of the hemisphere", min=0),
     ],
-    start={r: 1.0, theta: 0.01},
+    start={r: a, theta: 0.01},
     description="Particle that slides down a smooth hemisphere and leaves it",
     descriptions={r: "distance from the centre", theta: "angle from the vertical"},
     picture=[

@@ -44,7 +44,7 @@ model = Model(
         Parameter(g, 9.81, "m/s^2", "acceleration of gravity", min=0),
         Parameter(a, 1.0, "m", "radius of the loop", min=0),
     ],
-    start={x: 0.0, y: -1.0, x.diff(): 6.0},
+    start={x: 0.0, y: -a, x.diff(): 6.0},
     description="Particle that runs up the inside of a vertical loop and falls off it",
     descriptions={x: "to the right of the centre", y: "above the centre"},
     picture=[

@@ -60,7 +60,7 @@ model = Model(
         Parameter(mu_s, 0.4, "1", "coefficient of static friction", min=0),
         Parameter(mu_k, 0.3, "1", "coefficient of kinetic friction", min=0),
     ],
-    start={r: 1.2, theta: 0.05, phi: 0.0},
+    start={r: a + R, theta: 0.05, phi: 0.0},
     description="Solid sphere that rolls down a fixed sphere and leaves it",
     descriptions={
         r: "distance of the centres",

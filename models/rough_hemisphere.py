@@ -49,7 +49,7 @@ model = Model(
         Parameter(mu_s, 0.3, "1", "coefficient of static friction", min=0),
         Parameter(mu_k, 0.2, "1", "coefficient of kinetic friction", min=0),
     ],
-    start={r: 1.0, theta: 0.4},
+    start={r: a, theta: 0.4},
     description="Particle that slides down a rough hemisphere and leaves it",
     descriptions={r: "distance from the centre", theta: "angle from the top"},
     picture=[

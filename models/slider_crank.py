@@ -69,7 +69,7 @@ model = Model(
         Parameter(c, 1e4, "N.s/m", "viscous damping beside the spring", min=0),
     ],
     inputs=[Input(tau, "N.m", 0.0, "torque on the crank")],
-    start={phi: 0.0, x: 0.4, y: 0.6, phi.diff(): 10.0},
+    start={phi: 0.0, x: r + l, y: r + l + s, phi.diff(): 10.0},
     description="Slider-crank that drags a load by a stiff, damped spring",
     descriptions={
         phi: "angle of the crank from the slider's line",

@@ -211,17 +211,17 @@ def check_parabola(result, radius, theta0, speed, g=9.81):
 
 
 def test_a_start_inside_the_sphere_is_moved_onto_its_surface(fmu):
-    """A particle put at r = 1 inside a sphere of a = 2 is put on its surface, r = 2, with a warning
+    """A particle put at r = 1.5 inside a sphere of a = 2 is put on its surface, r = 2, with a warning
     that names the value, and slides from there."""
     with instance(fmu("Hemisphere")) as one:
-        one.start({"a": 2.0, "theta": 0.3}, tolerance=1e-12)
+        one.start({"a": 2.0, "r": 1.5, "theta": 0.3}, tolerance=1e-12)
         assert one.get("r") == 2.0
         assert one.get("theta") == 0.3
         assert one.get("contact.surface")
         assert one.get("lambda.surface") == pytest.approx(9.81 * np.cos(0.3), rel=1e-14)
         assert [(status, category) for status, category, _ in one.log] == [(1, "logStatusWarning")]
         message = one.log[0][2]
-        assert "start value r = 1.0" in message
+        assert "start value r = 1.5" in message
         assert "projected to 2.0" in message
         one.step(3.0)
         angle = one.get("departure.surface.theta")
@@ -229,26 +229,26 @@ def test_a_start_inside_the_sphere_is_moved_onto_its_surface(fmu):
 
 
 def test_a_start_above_the_sphere_is_in_flight(fmu):
-    """r = 1 over a sphere of a = 0.5: the particle is in free flight from the start, nothing is moved,
+    """r = 1.25 over a sphere of a = 0.5: the particle is in free flight from the start, nothing is moved,
     lambda is 0, and no departure is counted."""
     with instance(fmu("Hemisphere")) as one:
-        one.start({"a": 0.5, "theta": 1.4}, tolerance=1e-12)
-        assert one.get("r") == 1.0
+        one.start({"a": 0.5, "r": 1.25, "theta": 1.4}, tolerance=1e-12)
+        assert one.get("r") == 1.25
         assert not one.get("contact.surface")
         assert one.get("lambda.surface") == 0
-        assert one.get("residual.surface") == 0.5
+        assert one.get("residual.surface") == 0.75
         assert one.log == []
     result = simulate_fmu(
         str(fmu("Hemisphere")),
         stop_time=0.3,
         output_interval=0.01,
         relative_tolerance=1e-12,
-        start_values={"a": 0.5, "theta": 1.4, "der(theta)": 0.2},
+        start_values={"a": 0.5, "r": 1.25, "theta": 1.4, "der(theta)": 0.2},
     )
     assert not result["contact.surface"].any()
     assert (result["lambda.surface"] == 0).all()
     assert (result["departure.surface.count"] == 0).all()
-    check_parabola(result, 1.0, 1.4, 0.2)
+    check_parabola(result, 1.25, 1.4, 1.25 * 0.2)
 
 
 @pytest.mark.parametrize("share", [1 + 1e-6, 1.1, 4.0])

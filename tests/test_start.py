@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy import read_model_description
 from linkages import pinned_rod
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
-from lagfmu import Model, Parameter, simulate
+from lagfmu import Model, Parameter, Scene, simulate
 from lagfmu.cli.app import app
 from lagfmu.errors import ModelError, SimulationError
 from lagfmu.fmu.compiler import find_compiler
@@ -159,8 +160,101 @@ def test_a_start_without_inertia_is_refused_by_the_fmu(target, tmp_path):
         simulate(fmu, start_values={"theta": 0.0})
 
 
-def test_a_start_in_parameters_is_no_number():
-    """x = l/2 cos(theta) as a start value: it would be wrong as soon as l is set; what to do is said."""
-    length = symbols("l", positive=True)
-    with pytest.raises(ModelError, match=r"start of x is the expression l/2, expected a number"):
-        pinned_rod({theta: 0.0, x: length / 2})
+L_ROD = symbols("l", positive=True)
+
+
+@pytest.fixture(scope="module", params=["python", "native"])
+def placed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pinned rod whose start places its middle by the rod's length."""
+    if request.param == "native" and find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    model = pinned_rod({theta: 0.3, x: L_ROD / 2 * cos(0.3), y: L_ROD / 2 * sin(0.3)})
+    return write(prepare(model), tmp_path_factory.mktemp("placed"), target=request.param)
+
+
+def test_a_start_of_parameters_follows_them(placed: Path) -> None:
+    """A rod of 2 m that starts at 0.3 rad has its middle at (cos, sin) of it: nothing has to be moved."""
+    at, told = begun(placed, l=2.0)
+    assert (at["x"], at["y"]) == (pytest.approx(np.cos(0.3)), pytest.approx(np.sin(0.3)))
+    assert at["theta"] == 0.3
+    assert told == []
+
+
+def test_a_start_that_is_set_goes_before_its_expression(placed: Path) -> None:
+    """x = 1 of a rod of 2 m is where it stands upright; y, which the model gives, has to follow."""
+    at, told = begun(placed, l=4.0, x=1.0)
+    assert at["x"] == pytest.approx(1.0, rel=1e-12)
+    assert at["x"] ** 2 + at["y"] ** 2 == pytest.approx(4.0, rel=1e-12)
+    assert any(text.startswith("start value y = 0.59") for text in told), told
+
+
+def test_a_start_set_to_the_described_value_counts_as_not_set(placed: Path) -> None:
+    """Some importers set every value of the description: that is no wish."""
+    described = read_model_description(str(placed)).modelVariables
+    x0 = next(float(v.start) for v in described if v.name == "x")
+    at, told = begun(placed, l=2.0, x=x0)
+    assert at["x"] == pytest.approx(np.cos(0.3))
+    assert told == []
+
+
+def test_a_start_of_parameters_is_approximate_and_says_so() -> None:
+    """FMI: a value that the FMU may change is no exact start; what it follows is in its description."""
+    table = prepare(spring(2 * REACH), Scene("Spring", outputs=["der(x)"])).table
+    assert (table["x"].initial, table["x"].start) == ("approx", 1.0)
+    assert table["x"].depends_initially == ("a",)
+    assert table["x"].description.endswith("starts at 2*a unless another start is set")
+    assert "a" in table  # nothing but the start depends on it
+
+
+REACH, MASS, OTHER, STIFFNESS = symbols("a m M k", positive=True)
+
+
+def spring(start: object) -> Model:
+    """A mass on a spring, drawn out at the start."""
+    return Model(
+        "Spring",
+        lagrangian=MASS * x.diff() ** 2 / 2 - STIFFNESS * x**2 / 2,
+        coordinates={x: "m"},
+        parameters=[
+            Parameter(REACH, 0.5, "m"),
+            Parameter(MASS, 1.0, "kg"),
+            Parameter(OTHER, 2.0, "kg"),
+            Parameter(STIFFNESS, 1.0, "N/m"),
+        ],
+        start={x: start},
+    )
+
+
+@pytest.mark.parametrize(
+    ("start", "says"),
+    [
+        (MASS, "start of x.*has unit kg, expected m"),
+        (2 * x, "start of x = 2.x holds t, x, expected a number or an expression of parameters"),
+        (symbols("b"), "holds b"),
+        (REACH * MASS / (2 * MASS - OTHER), "is zoo at the values of the parameters"),
+    ],
+)
+def test_a_start_that_cannot_be_found_is_refused(start: object, says: str) -> None:
+    """A mass is no length, a coordinate not known yet, a quotient by 0 no number."""
+    with pytest.raises(ModelError, match=says):
+        spring(start)
+
+
+def test_a_start_that_is_infinite_at_what_is_set_is_refused(tmp_path: Path) -> None:
+    """a m/(M - m) at m = M: the FMU says which start value has no value."""
+    model = spring(REACH * MASS / (OTHER - MASS))
+    for target in ("native", "python") if find_compiler() else ("python",):
+        fmu = write(prepare(model), tmp_path / target, target=target)
+        assert begun(fmu, m=1.5)[0]["x"] == pytest.approx(1.5)
+        with pytest.raises(
+            SimulationError, match="start value of x is an expression of parameters"
+        ):
+            simulate(fmu, start_values={"m": 2.0})
+
+
+def test_the_minimal_formulation_starts_its_own_coordinates() -> None:
+    """x and y by expressions of l, where the form steps theta: it would have to solve for it."""
+    model = pinned_rod({x: L_ROD / 2 * cos(0.3), y: L_ROD / 2 * sin(0.3)})
+    with pytest.raises(ModelError, match="by expressions of parameters, which the minimal form"):
+        prepare(model, Scene("Rod", formulation="minimal"))
+    assert prepare(model, Scene("Rod", outputs=["Q.theta"])).formulation == "multipliers"

@@ -426,6 +426,15 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
         states = names.motion(self.system.coordinates)
         y, rank = [value[name] for name in states], [self._rank(name) for name in states]
         n, u = self.system.n, self._values(self.inputs)
+        for j, x in self._formulas():
+            if rank[j] == SET:
+                continue
+            if not math.isfinite(x):
+                raise StepFailureError(
+                    f"the start value of {states[j]} is an expression of parameters, which has no finite "
+                    "value at those that are set: set other parameters, or this start"
+                )
+            y[j] = x
         found = start(self.system, self.settings, self.start_time, y[:n], y[n:], u, self.p, rank)
         for moved in found.moved:
             if moved.rank == OMITTED:
@@ -443,6 +452,16 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
                 self._warn(told)
             elif told:
                 self.log(told, Fmi2Status.ok, "logEvents")
+
+    def _formulas(self) -> list[tuple[int, float]]:
+        """The start values that are expressions of parameters, with their position; NaN without a value."""
+        found: Sequence[float] = ()
+        if self.system.starts is not None:
+            try:
+                found = self.system.starts(self.p)
+            except (ArithmeticError, ValueError):  # what is NaN or infinite in C
+                found = [math.nan] * len(self.system.started)
+        return list(zip(self.system.started, found, strict=True))
 
     def _rank(self, name: str) -> int:
         """Who said a start value: the importer if it differs from what is described, the model, nobody."""

@@ -98,8 +98,8 @@ class _Builder:
         self.known = {*self.state_names, *self.inputs}
         self.descriptions = {name_of(s): text for s, text in self.model.descriptions.items()}
         self.movable = self._movable()
-        self.given = self._given()
-        self.starts = {name: self.given.get(name, 0.0) for name in self.state_names}
+        self.given = eom.starts()
+        self.starts = {name: self.given.get(name, sp.S.Zero) for name in self.state_names}
 
     # ------------------------------------------------------------------ dependencies
 
@@ -114,16 +114,6 @@ class _Builder:
             if rows:
                 moved |= {str(eom.v[j]) for j in coordinates}
         return moved
-
-    def _given(self) -> dict[str, float]:
-        """The start values that the model says, by name."""
-        model, given = self.model, {}
-        for state, value in model.start.items():
-            given[str(self.eom.symbols[state])] = float(value)
-        if model.embedding is not None:
-            for state, value in model.embedding.start.items():
-                given[str(self.eom.symbols[state])] = float(value)
-        return given
 
     def symbols(self, *expressions: Expr) -> set[str]:
         """Names of the symbols that the expressions hold, reduced coordinates put in."""
@@ -170,7 +160,9 @@ class _Builder:
             if found & own & self.movable:
                 found |= behind
         parameters = {str(p) for p in self.eom.p}
-        exact = set(self.state_names) - self.movable
+        formulas = {name for name, e in self.starts.items() if e.free_symbols}
+        found |= self.symbols(*(self.starts[name] for name in found & formulas))
+        exact = set(self.state_names) - self.movable - formulas
         return self.sorted(found & (parameters | exact | set(self.inputs)))
 
     def sorted(self, symbols: Iterable[str]) -> tuple[str, ...]:
@@ -207,7 +199,10 @@ class _Builder:
 
     def state(self, of: Subject, description: str, derivative_of: str | None) -> Variable:
         name = of.name
-        approx = name in self.movable
+        start = self.starts[name]
+        approx = name in self.movable or bool(start.free_symbols)
+        if start.free_symbols:
+            description += f"; starts at {start} unless another start is set"
         return Variable(
             of=of,
             kind="Real",
@@ -216,7 +211,7 @@ class _Builder:
             variability="continuous",
             initial="approx" if approx else "exact",
             description=description,
-            start=self.starts[name],
+            start=self.eom.at_parameters(start),
             given=name in self.given,
             unit=self.units[name],
             derivative_of=derivative_of,

@@ -221,6 +221,22 @@ class EquationsOfMotion(Displayed):
         """The constraints that hold by friction alone, by name."""
         return {name: law for law in self.frictions for name in law.of}
 
+    def starts(self, embedded: bool = True) -> dict[str, Expr]:
+        """The start values that the model gives, by the name of the coordinate or velocity: numbers, or
+        expressions of parameters; those of its embedding too if `embedded`."""
+        own = self.model.embedding.start if embedded and self.model.embedding else {}
+        given = {**self.model.start, **own}
+        return {str(self.symbols[s]): self.plain(e) for s, e in given.items()}
+
+    def at_parameters(self, expression: Expr, numbers: Mapping[Expr, Expr] | None = None) -> float:
+        """An expression of parameters at `numbers`, else at their values, in doubles as the FMU finds it."""
+        expression = expression.xreplace(numbers or {})
+        wanted = sorted(expression.free_symbols, key=str)
+        if not wanted:
+            return float(expression)
+        values = {name_of(p.symbol): float(p.value) for p in self.model.parameters}
+        return float(sp.lambdify(wanted, expression, "math")(*(values[str(s)] for s in wanted)))
+
     def plain(self, expression: Expr) -> Expr:
         """An expression of the model's dynamicsymbols in this object's plain symbols and numbers."""
         return sp.sympify(expression).xreplace(self.symbols).xreplace(self.numbers)
@@ -234,6 +250,13 @@ def _changed(output: Output, change: Callable[[Expr], Expr]) -> Output:
         expression=change(sp.sympify(output.expression)),
         otherwise=None if other is None else change(sp.sympify(other)),
     )
+
+
+def formulas_of(eom: EquationsOfMotion) -> dict[int, Expr]:
+    """The start values that are expressions of parameters, by their position among (q, v)."""
+    given = eom.starts()
+    found = {j: given[str(s)] for j, s in enumerate((*eom.q, *eom.v)) if str(s) in given}
+    return {j: e for j, e in found.items() if e.free_symbols}
 
 
 def symbols_of(o: Output) -> set[Expr]:

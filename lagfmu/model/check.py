@@ -97,18 +97,23 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
                 f"rate of input {name_of(i.symbol)!r} is {i.rate!r}, but only an input that stands in a "
                 "constraint (a prescribed motion) has one: leave it out"
             )
+    parameters = {p.symbol: p.value for p in model.parameters}
     states = {s for q in model.coordinates for s in (q, q.diff(t))}
-    _check_start("start", model.start, states, problems)
+    _check_start("start", model.start, states, parameters, problems)
     if model.embedding is not None:
         states = {s for q in model.embedding.coordinates for s in (q, q.diff(t))}
-        _check_start("embedding start", model.embedding.start, states, problems)
+        _check_start("embedding start", model.embedding.start, states, parameters, problems)
         for q in model.embedding.relations:
             if q not in model.coordinates:
                 problems.append(f"embedding gives {plain(q)}, which is no coordinate of the model")
 
 
 def _check_start(
-    what: str, start: Mapping[Expr, float], states: set[Expr], problems: list[str]
+    what: str,
+    start: Mapping[Expr, Expr],
+    states: set[Expr],
+    parameters: Mapping[Expr, float],
+    problems: list[str],
 ) -> None:
     for state, value in start.items():
         if isinstance(state, str):
@@ -124,11 +129,20 @@ def _check_start(
                 "derivative of one"
             )
         if isinstance(value, sp.Basic) and value.free_symbols:
-            problems.append(
-                f"{what} of {plain(state)} is the expression {plain(value)}, expected a number, because "
-                "parameters can be set in the FMU: write its value, or leave it out: what is left out "
-                "follows from the constraints, also where an importer changes a parameter"
-            )
+            if others := _unknown(value, set(parameters)):
+                problems.append(
+                    f"{what} of {plain(state)} = {plain(value)} holds {', '.join(others)}, expected a number "
+                    "or an expression of parameters"
+                )
+                continue
+            if not all(map(is_number, parameters.values())):
+                continue  # told there
+            found = value.xreplace({s: sp.Float(x) for s, x in parameters.items()}).evalf()
+            if not found.is_Float or not found.is_finite:
+                problems.append(
+                    f"{what} of {plain(state)} = {plain(value)} is {found} at the values of the parameters, "
+                    "expected a finite number"
+                )
             continue
         _finite(f"{what} of {plain(state)}", value, problems)
 
@@ -277,6 +291,11 @@ def _check_dimensions(model: ModelFields, units: dict[Expr, Unit], problems: lis
         if isinstance(constraint, Contact):
             one = POWER / POWER
             check(constraint.restitution, one, f"restitution of {constraint.name!r}")
+    starts = list(model.start.items())
     if model.embedding is not None:
+        starts += model.embedding.start.items()
         for q, phi in model.embedding.relations.items():
             check(phi, units[q], f"embedding of {plain(q)}")
+    for state, value in starts:
+        if sp.sympify(value).free_symbols:
+            check(value, units[state], f"start of {plain(state)}")

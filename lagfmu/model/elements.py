@@ -136,7 +136,7 @@ class Embedding:
 
     coordinates: Mapping[Expr, str]
     relations: Mapping[Expr, Expr]
-    start: Mapping[Expr, float] = field(default_factory=dict)
+    start: Mapping[Expr, Expr] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class ModelFields:
     constraints: Sequence[Constraint] = ()
     parameters: Sequence[Parameter] = ()
     inputs: Sequence[Input] = ()
-    start: Mapping[Expr, float] = field(default_factory=dict)
+    start: Mapping[Expr, Expr] = field(default_factory=dict)
     embedding: Embedding | None = None
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)

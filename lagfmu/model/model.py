@@ -60,11 +60,11 @@ class Model(ModelFields, Displayed):
     Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is
     given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
     each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
-    numbers in that unit.  A unit may be a multiple of an SI unit (g, mm, deg): the model keeps every number
-    in SI, and in `display_units` the unit in which importers show it.  `descriptions` may explain
-    coordinates.  `outputs` are quantities besides those that every FMU reports, `picture` how it looks.  A
-    `Friction` is written among `constraints` and kept in `frictions`.  `author`, `version`, `license` and
-    `copyright` are told to importers.
+    numbers in that unit or to expressions of parameters.  A unit may be a multiple of an SI unit (g, mm,
+    deg): the model keeps every number in SI, and in `display_units` the unit in which importers show it.
+    `descriptions` may explain coordinates.  `outputs` are quantities besides those that every FMU reports,
+    `picture` how it looks.  A `Friction` is written among `constraints` and kept in `frictions`.  `author`,
+    `version`, `license` and `copyright` are told to importers.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """

@@ -205,8 +205,9 @@ def begin(
 ) -> tuple[Start, list[float], list[float]]:
     """The start with the values of the table and `numbers`, the inputs and the parameters then."""
     u, p = values_at_start(eom, table, numbers)
-    q0 = [float(table[c].start or 0.0) for c in system.coordinates]
-    v0 = [float(table[derivative(c)].start or 0.0) for c in system.coordinates]
+    given = {name: eom.at_parameters(e, numbers) for name, e in eom.starts().items()}
+    q0 = [given.get(c, 0.0) for c in system.coordinates]
+    v0 = [given.get(derivative(c), 0.0) for c in system.coordinates]
     try:
         begun = start(system, Settings(), 0.0, q0, v0, u, p, ranks(system, table, {}))
         observe(system, begun.state, u, p)

@@ -140,7 +140,9 @@ def prepare(
         problems = [*error.problems, *_resting_motions(form.equations)]
         known = Derived(model, scene, form, whole)
         raise CannotStartError(error.name, problems, known) from error
-    missed = misses(form, whole, lowered, numbers, structure.start, model.start)
+    given = derived.starts(embedded=False)
+    wanted = {name: derived.at_parameters(e, numbers) for name, e in given.items()}
+    missed = misses(form, whole, lowered, numbers, structure.start, wanted)
     if missed and not told_apart(form, missed):
         every = Form(derived)
         try:
@@ -151,7 +153,7 @@ def prepare(
             raise CannotStartError(error.name, error.problems, known) from error
         again = prepare(started, asked)
         laid_again = again.form, again.whole, lower(again.form)
-        check_branch(model, misses(*laid_again, numbers, again.structure.start, model.start))
+        check_branch(model, misses(*laid_again, numbers, again.structure.start, wanted))
         return again
     return Prepared(
         model=model,
@@ -204,6 +206,7 @@ def _asked(
     eom: EquationsOfMotion, scene: Scene, problems: list[str], laid: Laid
 ) -> tuple[Scene, Form, tuple[str, ...]]:
     """The scene with its formulation, the form that this gives, and the outputs by name."""
+    movable = any(e.free_symbols for e in eom.starts().values())  # follows what is set
     if eom.frictions:
         problems += _refused_with_friction(eom, scene)
     chosen = replace(scene, formulation=scene.formulation or "multipliers")
@@ -213,7 +216,7 @@ def _asked(
             form = replace(form, reduction=reduce(eom))
         except DerivationError as error:
             raise DerivationError(f"scene {scene.name!r}: {error}") from error
-    elif scene.formulation is None and not scene.complete and not eom.frictions:
+    elif scene.formulation is None and not scene.complete and not eom.frictions and not movable:
         try:
             reduced = Form(eom, reduce(eom), "minimal")
         except DerivationError:

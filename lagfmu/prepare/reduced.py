@@ -31,7 +31,7 @@ def misses(
     system: System,
     numbers: Mapping[Any, Any],
     begun: Start,
-    wanted: Mapping[Any, float],
+    wanted: Mapping[str, float],
 ) -> dict[str, tuple[float, float]]:
     """The values `wanted` that the form, which begins with `begun`, does not begin with, by name: as given,
     and as it begins."""
@@ -46,8 +46,7 @@ def misses(
     size = dict.fromkeys(motion(full.coordinates)[:n], np.abs(q).max(initial=0.0))
     size |= dict.fromkeys(motion(full.coordinates)[n:], np.abs(v).max(initial=0.0))
     found = {}
-    for state, value in wanted.items():
-        name, given = str(eom.symbols[state]), float(value)
+    for name, given in wanted.items():
         if name in has and abs(has[name] - given) > ALLOWED * max(abs(given), size[name]):
             found[name] = (given, has[name])
     return found
@@ -80,6 +79,15 @@ def restarted(model: Model, form: Form, structure: Structure, missed: Mapping[st
     own = {str(s): q for q, s in eom.symbols.items()}
     stepped = [str(s) for s in (*reduction.s, *reduction.sdot)]
     told = ", ".join(f"{n} = {given!r}" for n, (given, _) in missed.items())
+    if any(eom.plain(e).free_symbols for e in model.start.values()):
+        raise ModelError(
+            model.name,
+            [
+                f"start gives {told} by expressions of parameters, which the minimal formulation would have "
+                f"to solve for {', '.join(map(str, reduction.s))}: start these, or take formulation "
+                "'multipliers'"
+            ],
+        )
     begun = structure.start
     check_given(model.name, begun.moved, structure.missed)
     names = motion([str(eom.symbols[q]) for q in model.coordinates])

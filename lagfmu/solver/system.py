@@ -84,6 +84,8 @@ class System:
     boxes of t, q, v and u (interval.py); `driven`: length of u, the inputs and the
     levels of jumps behind them.
 
+    starts(p) -> the start values that are expressions of parameters, at the positions `started` of (q, v).
+
     `estimated` are those of `prescribed` that are followed by a third derivative.  `outputs` are those of
     the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
@@ -115,6 +117,8 @@ class System:
     floors: tuple[bool, ...] = ()
     bounds: Callable[..., Any] | None = None
     driven: int = 0
+    started: tuple[int, ...] = ()
+    starts: Callable[..., Any] | None = None
 
     @cached_property
     def n(self) -> int:

@@ -15,7 +15,7 @@ from typing import Any
 import sympy as sp
 
 from ...mechanics.differential import Differential
-from ...mechanics.equations import TIME, EquationsOfMotion, FrictionLaw
+from ...mechanics.equations import TIME, EquationsOfMotion, FrictionLaw, formulas_of
 from ...mechanics.form import Form
 from ...mechanics.formulations.minimal import Reduction
 from ...mechanics.jumps import NONE, Jumps, levelled
@@ -326,6 +326,15 @@ class _System:
                 "Where tables are looked up.",
                 words.state,
                 {"places": _results([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])},
+            )
+        formulas = formulas_of(eom) if not eom.bare else {}
+        if formulas:
+            states = [str(s) for s in (*eom.q, *eom.v)]
+            found["starts"] = define(
+                "starts",
+                "Start values that are expressions of parameters.",
+                {"p": words.p},
+                {"w": [Result(e, states[j]) for j, e in formulas.items()]},
             )
         jumps = self.jumps.mapped(_real([*eom.q, *eom.v, *eom.u, *eom.p, TIME]))
         if jumps.surfaces:

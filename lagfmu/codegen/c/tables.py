@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from textwrap import wrap
 from typing import Any
 
-from ...mechanics.equations import EquationsOfMotion
+from ...mechanics.equations import EquationsOfMotion, formulas_of
 from ...model.model import Constraint, Contact, Nonholonomic
 from . import elimination
 from . import solve as csolve
@@ -88,6 +88,14 @@ class Tables:
         reach, ends = self._lookups(functions)
         parts += [own, reach]
         more |= ends
+        if "starts" in functions:
+            started = list(formulas_of(eom))
+            parts.append(self._integers("started", started))
+            more |= {
+                "started_count": len(started),
+                "started": f"{p}started",
+                "starts": f"{p}starts",
+            }
         fields = {
             "n": eom.n,
             "m": eom.m,

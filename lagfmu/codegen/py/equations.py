@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from ...mechanics.equations import TIME, EquationsOfMotion
+from ...mechanics.equations import TIME, EquationsOfMotion, formulas_of
 from ...mechanics.form import Form
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.elements import Expr
@@ -161,6 +161,11 @@ def _system(
     if jumps.surfaces:
         text, found = "h of each jump: where it passes 0, or a whole number.", jumps.surfaces
         parts.append(function(f"{prefix}surfaces", text, still, {"h": [s.h for s in found]}, names))
+    started = formulas_of(eom)
+    if started:
+        text = "Start values that are expressions of parameters."
+        values = {"w": list(started.values())}
+        parts.append(function(f"{prefix}starts", text, {"p": eom.p}, values, names))
     changing = bounds.rates(eom, _constraints(eom, rows), jumps)
     if changing:
         parts.append(_bounds(prefix, eom, changing))
@@ -194,6 +199,7 @@ def _system(
         f"    formulation={formulation!r},\n"
         f"    parameters={_strings(eom.p)},\n"
         f"{_surfaces(prefix, jumps, len(eom.driven))}"
+        + (f"    started={tuple(started)!r},\n    starts={prefix}starts,\n" if started else "")
         + (f"    bounds={prefix}bounds,\n" if changing else "")
         + (f"    frictions={_frictions(eom)},\n    coulomb=coulomb,\n" if eom.frictions else "")
         + f"{_listed(own)}{looked_up})\n"

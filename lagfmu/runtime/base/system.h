@@ -82,6 +82,11 @@ struct System {
                      double *energy);
     /* coefficient of restitution of each row (m); NULL without contacts */
     void (*restitution)(const double *p, double *e);
+    /* Start values that the model gives as expressions of parameters: w (started_count), at these positions
+     * of (q, v).  0 and NULL without. */
+    int started_count;
+    const int *started;
+    void (*starts)(const double *p, double *w);
     /* The derivative of all of these along the direction (dt, dq, dv, du): what changes in the values
      * when the state moves that way.  dM (masses), dF (n), dG (entries), dnu, dgamma, df (m),
      * denergy (2).  NULL where nobody asks for derivatives. */

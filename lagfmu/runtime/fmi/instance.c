@@ -31,6 +31,8 @@ void instance_layout(Instance *x, Arena *arena) {
         x->set = arena_ints(&saved, system->inputs);
         x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
         x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
+        x->begin = arena_doubles(&scratch, 2 * system->n);
+        x->formula = arena_doubles(&scratch, system->started_count);
         for (int k = 0; k < EVENT_KINDS; k++)
             x->before[k] = arena_ints(&scratch, event_count_of(system, (EventKind)k));
         x->shared = arena_ints(&scratch, system->frictions);
@@ -299,6 +301,27 @@ static void find_ranks(Instance *x) {
     }
 }
 
+/* The start values that were set; of the others those that the model gives as expressions, at the parameters. */
+static Status find_begin(Instance *x) {
+    Solver *s = &x->solver;
+    const System *system = s->system;
+    const int n = system->n;
+    memcpy(x->begin, x->q0, (size_t)n * sizeof *x->begin);
+    memcpy(x->begin + n, x->v0, (size_t)n * sizeof *x->begin);
+    if (system->started_count > 0) system->starts(s->p, x->formula);
+    for (int i = 0; i < system->started_count; i++) {
+        const int j = system->started[i];
+        if (x->rank[j] == SET) continue;
+        if (!isfinite(x->formula[i]))
+            return fail(&s->why,
+                        "the start value of %s%s%s is an expression of parameters, which has no finite value "
+                        "at those that are set: set other parameters, or this start",
+                        j < n ? "" : "der(", system->coordinates[j % n], j < n ? "" : ")");
+        x->begin[j] = x->formula[i];
+    }
+    return OK;
+}
+
 static void choose_settings(Instance *x) {
     Settings *s = &x->solver.settings;
     *s = x->given;
@@ -338,7 +361,9 @@ Status instance_start(Instance *x) {
     s->stop_time = x->stop_time;
     s->drive.since = x->start_time;
     find_ranks(x);
-    if (solver_start(s, x->start_time, x->q0, x->v0, x->rank, tell_moved, x) != OK) return FAILED;
+    if (find_begin(x) != OK) return FAILED;
+    const double *q0 = x->begin, *v0 = q0 + s->system->n;
+    if (solver_start(s, x->start_time, q0, v0, x->rank, tell_moved, x) != OK) return FAILED;
     /* model exchange has no communication step: 1 s stands in for it */
     if (x->exchange && magnitudes_incomplete(s) &&
         magnitudes_complete(s, flow_instant(s, x->start_time), 1) != OK)
