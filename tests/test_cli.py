@@ -151,6 +151,14 @@ def test_verify_obeys_changed_parameters_and_settings(fmu):
     assert "cos(theta) at the departure" in text
 
 
+@pytest.mark.parametrize("command", ["verify", "simulate"])
+def test_a_value_may_have_a_unit(fmu, command):
+    """2000 g is 2 kg, 90 deg no mass: `--set` converts what has a unit of its own, everything else is SI."""
+    lagfmu(command, fmu("Hemisphere"), "--set", "m=2000g", "--set", "theta=17.2 deg", code=0)
+    text = lagfmu(command, fmu("Hemisphere"), "--set", "m=90deg", code=2)
+    assert "--set 'm=90deg': value = '90deg' has unit rad, expected kg" in text
+
+
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [

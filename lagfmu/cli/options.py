@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from ..errors import UsageError
+from ..errors import UnitError, UsageError
 from ..names import METHOD
 
 Names = list[str] | None
@@ -164,8 +164,12 @@ def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     return with_options
 
 
-def assignments(texts: Names) -> dict[str, Any]:
-    """NAME=VALUE texts as a dict of numbers; the value of solver.method stays text.  Raises UsageError."""
+def assignments(texts: Names, units: Callable[[], Mapping[str, str | None]]) -> dict[str, Any]:
+    """NAME=VALUE texts as a dict of numbers in SI; the value of solver.method stays text.
+
+    `units` gives the unit of each variable; it is asked only where a value has one of its own, as m=200g.
+    Raises UsageError.
+    """
     values: dict[str, Any] = {}
     for text in texts or []:
         name, sign, value = (part.strip() for part in text.partition("="))
@@ -174,7 +178,17 @@ def assignments(texts: Names) -> dict[str, Any]:
         try:
             values[name] = float(value)
         except ValueError:
-            if name != METHOD:
-                raise UsageError(f"--set {text!r}: {value!r} is no number") from None
-            values[name] = value
+            values[name] = value if name == METHOD else _quantity(text, value, units().get(name))
     return values
+
+
+def _quantity(text: str, value: str, unit: str | None) -> float:
+    """A value that has a unit of its own, in SI."""
+    from ..model.units import parse_quantity, parse_unit
+
+    if unit is None:
+        raise UsageError(f"--set {text!r}: {value!r} is no number")
+    try:
+        return parse_quantity(value, parse_unit(unit, text), f"--set {text!r}: value")
+    except UnitError as error:
+        raise UsageError(str(error)) from None

@@ -48,6 +48,11 @@ def numbers_of(description: Any) -> dict[str, float]:
     }
 
 
+def units_of(variables: Sequence[Any]) -> dict[str, str | None]:
+    """The unit of each variable, of a table or of fmpy, by name."""
+    return {v.name: getattr(v.unit, "name", v.unit) for v in variables}
+
+
 def is_python(fmu: Path) -> bool:
     """True for a python FMU."""
     with zipfile.ZipFile(fmu) as archive:

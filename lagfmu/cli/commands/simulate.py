@@ -57,7 +57,7 @@ def simulate(
     With a figure, a table or a film only multipliers, coordinates and times of events are printed; -v names
     others.
     """
-    from ...fmu.described import read_description
+    from ...fmu.described import read_description, units_of
     from ...live.playable import told_by
     from ...prepare.prepare import prepare
     from ...verification.reference import read_table
@@ -84,7 +84,7 @@ def simulate(
             name, variables = description.modelName, description.modelVariables
         known = {v.name: v.causality for v in variables if v.causality != "parameter"}
         besides = _besides(variable or (), known)
-        given = assignments(set_)
+        given = assignments(set_, lambda: units_of(variables))
         with console.status(f"simulating {name}"):
             signals = None if inputs is None else read_table(inputs)
             result = simulated(

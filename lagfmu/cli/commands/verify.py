@@ -55,7 +55,7 @@ def verify(
     with plainly():
         done = examine(
             fmus,
-            assignments(set_),
+            assignments(set_, lambda: _units(fmus)),
             stop_time,
             step_size,
             tolerance,
@@ -68,6 +68,15 @@ def verify(
             if one.found is not None:
                 print_verdicts(one.found)
         finish("verify", done, json, junit)
+
+
+def _units(fmus: Sequence[Path]) -> dict[str, str | None]:
+    """The unit of each variable of these FMUs."""
+    from ...fmu.described import read_description, units_of
+
+    return {
+        n: u for path in fmus for n, u in units_of(read_description(path).modelVariables).items()
+    }
 
 
 def tolerances(texts: Sequence[str]) -> tuple[float, dict[str, float]]:
