@@ -51,6 +51,41 @@ def test_who_moves_a_slider_sees_the_motion(name: str, screen: Any, opened: Open
     assert page.tab.evaluate(SEEN) == []
 
 
+COVERED = """() => {
+    const scrub = document.getElementById("scrub");
+    const labels = () => [...document.querySelectorAll("#picture .force")].filter((e) => e.checkVisibility());
+    const found = [];
+    for (let part = 0; part <= 1; part += 0.05) {
+        scrub.value = part * scrub.max;
+        scrub.dispatchEvent(new Event("input"));
+        const boxes = labels().map((e) => e.getBBox());
+        const disks = [...document.querySelectorAll("#picture .disk, #picture .particle")];
+        for (const [k, b] of boxes.entries()) {
+            for (const d of disks) {
+                const [x, y, r] = ["cx", "cy", "r"].map((n) => Number(d.getAttribute(n)));
+                const dx = Math.max(b.x - x, 0, x - b.x - b.width);
+                const dy = Math.max(b.y - y, 0, y - b.y - b.height);
+                if (Math.hypot(dx, dy) < r - 2) found.push([part, labels()[k].textContent]);
+            }
+            for (const o of boxes.slice(k + 1)) {
+                const across = Math.max(o.x - b.x - b.width, b.x - o.x - o.width);
+                const up = Math.max(o.y - b.y - b.height, b.y - o.y - o.height);
+                if (Math.max(across, up) < -3) found.push([part, labels()[k].textContent]);
+            }
+        }
+    }
+    return found;
+}"""
+
+
+@pytest.mark.parametrize("name", ["Bowling", "HalfCar", "RollingSphere", "Chain"])
+def test_no_label_stands_on_a_body(name: str, opened: Opened) -> None:
+    """At every time the names and values of the arrows stand beside disks and bobs, and beside each other."""
+    page = opened(name, viewport={"width": 1280, "height": 844})
+    page.until("lagfmu.runs")
+    assert page.tab.evaluate(COVERED) == []
+
+
 @pytest.mark.parametrize("width", [390, 1280])
 def test_a_finger_meets_every_control(width: int, opened: Opened) -> None:
     """Each is 24 pixels high and wide at least (WCAG 2.2, 2.5.8); of a box to tick its label counts."""
@@ -80,6 +115,20 @@ def test_residuals_are_drawn_for_those_who_ask(opened: Opened) -> None:
     assert not any(t.startswith("Residuals") for t in captions.all_inner_texts())
     page.tab.get_by_label("Residuals, zero where a constraint acts").check()
     assert any(t.startswith("Residuals") for t in captions.all_inner_texts())
+
+
+DOTS = """() => [...document.querySelectorAll("mover")].map((m) => {
+    const [letter, dots] = [...m.children].map((e) => getComputedStyle(e));
+    return parseFloat(dots.fontSize) / parseFloat(letter.fontSize) * (dots.fontWeight >= 700);
+})"""
+
+
+def test_one_dot_is_told_from_two(opened: Opened) -> None:
+    """The dots of velocities and accelerations are bold and larger than a script: x with a dot and x with two
+    differ at arm's length."""
+    found = opened("PendulumCartesian").tab.evaluate(DOTS)
+    assert len(found) > 3
+    assert min(found) > 0.75
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

@@ -195,8 +195,19 @@ def test_the_arrow_is_as_long_as_the_force(opened: Callable[..., Page]) -> None:
     assert not shaft.is_visible()
 
 
+AXIS = 26  # pixels
+AXES = """() => {
+    const names = [...document.querySelectorAll("#picture .axis-name")].map((e) => e.textContent);
+    return [...document.querySelectorAll("#picture .axis")].map((line, k) => {
+        const [x1, y1, x2, y2] = ["x1", "y1", "x2", "y2"].map((n) => Number(line.getAttribute(n)));
+        return [names[k], x2 - x1, y1 - y2];
+    });
+}"""
+
+
 def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
-    """A spherical pendulum: z stays upward on the screen as the view is turned."""
+    """A spherical pendulum: z stays upward on the screen as the view is turned, and so does its axis in the
+    corner; those of x and y turn."""
 
     z = dynamicsymbols("z")
     m, g = sp.symbols("m g", positive=True)
@@ -218,7 +229,7 @@ def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
     out.write_text(render(playable_of(prepare(model, Scene("Spherical")))), encoding="utf-8")
     page = Page(browser, out)
     page.until("lagfmu.runs")
-    places = []
+    places, axes = [], []
     for angle in (-60, 30):
         page.tab.evaluate(
             """(angle) => {
@@ -231,7 +242,11 @@ def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
         bar = page.tab.locator("#picture .rod")
         places.append([float(str(bar.get_attribute(k))) for k in ("x1", "y1", "x2", "y2")])
         assert places[-1][3] > places[-1][1]  # the bob hangs below the pivot
+        axes.append(page.tab.evaluate(AXES))
     assert places[0] != places[1]
+    assert [name for name, *_ in axes[0]] == ["x", "y", "z"]
+    assert axes[0][0] != axes[1][0]
+    assert axes[0][2] == axes[1][2] == ["z", 0, pytest.approx(AXIS * np.cos(0.42))]
     page.close()
     assert page.problems == []
 

@@ -1,4 +1,4 @@
-"""A picture of a simulation: multipliers on top, the motion below, departures and slips marked."""
+"""A picture of a simulation: multipliers on top, the motion below, events marked."""
 
 from __future__ import annotations
 
@@ -15,10 +15,19 @@ from ..errors import SettingError
 from ..fmu.described import Trajectory
 from ..model.units import for_reading
 
-COLOURS = ("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72", "#6940a5", "#64473a")
-DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # once the colours are used up
-SAID = {names.DEPARTURES: "leaves", names.SLIPS: "slips"}  # and the times of those events:
-TIMES = {names.DEPARTURES: names.DEPARTURE_TIME, names.SLIPS: names.SLIP_TIME}
+COLOURS = (
+    *("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72"),
+    *("#6940a5", "#8a6d00", "#c0392b", "#5b6570"),
+)
+DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))  # four curves each
+SAID = {  # what is free from then on, dashed; what is held, dotted
+    names.DEPARTURES: ("leaves {}", "--"),
+    names.SLIPS: ("{} slips", "--"),
+    names.CLOSINGS: ("meets {}", ":"),
+    names.STICKINGS: ("{} sticks", ":"),
+}
+TIMES = {count: time for time, count in names.COUNT_OF.items()}
+LETTER = 0.075  # in, the width of one in the name of an event
 PER_COLUMN = 8  # curves in one column of a legend, which stands beside its panel
 
 
@@ -78,28 +87,30 @@ def panels(
     from .figure import STYLE, Drawn
 
     known = list(result.dtype.names or ())
-    members_of: dict[tuple[bool, str], list[str]] = {}
+    members_of: dict[tuple[bool, str, str], list[str]] = {}
     for n in chosen:
         later = names.read(n).quantity != names.MULTIPLIER
-        members_of.setdefault((later, units.get(n, "")), []).append(n)
+        members_of.setdefault((later, units.get(n, ""), _counts(result[n])), []).append(n)
     with mpl.rc_context(STYLE | {"font.size": 11}):
         figure = Drawn(figsize=(7.5, 1.2 + 2.1 * len(members_of)), layout="constrained")
         axes = figure.subplots(len(members_of), 1, sharex=True, squeeze=False)
-        for axis, ((_, unit), members) in zip(axes[:, 0], members_of.items(), strict=True):
+        for axis, ((_, unit, counts), members) in zip(axes[:, 0], members_of.items(), strict=True):
             for k, n in enumerate(members):
-                turn, colour = divmod(k, len(COLOURS))
+                colour = COLOURS[k % len(COLOURS)]
                 axis.plot(
                     result["time"],
-                    result[n],
-                    color=COLOURS[colour],
-                    linestyle=DASHES[turn % len(DASHES)],
+                    result[n].astype(float),
+                    color=colour,
+                    linestyle=DASHES[k // 4 % len(DASHES)],
+                    drawstyle="steps-post" if counts else "default",
                     label=_label(result, n),
                     linewidth=1.8,
                 )
-                _band(axis, result, n, COLOURS[colour])
+                _band(axis, result, n, colour)
             axis.set_ylabel(f"[{for_reading(unit)}]" if for_reading(unit) else "")
             axis.margins(x=0)
-            _mark_events(axis, result, known, named=axis is axes[0, 0])
+            _whole_ticks(axis, counts)
+            _mark_events(axis, result, known, figure if axis is axes[0, 0] else None)
             axis.legend(
                 frameon=False,
                 loc="upper left",
@@ -110,6 +121,22 @@ def panels(
             )
         axes[-1, 0].set_xlabel("time [s]")
         yield figure, list(axes[:, 0])
+
+
+def _counts(column: Any) -> str:
+    """Whether a column is of truths, of counts, or (empty) of a quantity that may take any value."""
+    return {"b": "truths", "i": "counts", "u": "counts"}.get(column.dtype.kind, "")
+
+
+def _whole_ticks(axis: Any, counts: str) -> None:
+    """Truths stand at no and yes, counts at whole numbers."""
+    from matplotlib.ticker import MaxNLocator
+
+    if counts == "truths":
+        axis.set_yticks([0, 1], ["no", "yes"])
+        axis.set_ylim(-0.15, 1.15)
+    elif counts:
+        axis.yaxis.set_major_locator(MaxNLocator(nbins=6, integer=True))
 
 
 def _label(result: Trajectory, name: str) -> str:
@@ -147,8 +174,8 @@ def _band(axis: Any, result: Trajectory, name: str, colour: str) -> None:
 
 
 def moments(result: Trajectory, events: str, of: str) -> list[float]:
-    """The times [s] at which a contact departed or a friction began to slip, of those that the run tells: of
-    several within one communication step the latest."""
+    """The times [s] of the events of a contact or a friction that the run tells: of several within one
+    communication step the latest."""
     count, when = names.name(events, of), names.name(TIMES[events], of)
     if when not in (result.dtype.names or ()):
         return []
@@ -156,20 +183,38 @@ def moments(result: Trajectory, events: str, of: str) -> list[float]:
     return [float(x) for x in result[when][told]]
 
 
-def _mark_events(axis: Any, result: Trajectory, known: Sequence[str], named: bool) -> None:
-    """A dashed line at each departure and slip; the first of each is named."""
-    for events, word in SAID.items():
+def _mark_events(axis: Any, result: Trajectory, known: Sequence[str], figure: Any) -> None:
+    """A line at each event; with `figure` the first of each kind is named, above the panel, in rows
+    so that no name lies over another."""
+    start, end = result["time"][0], result["time"][-1]
+    named = []
+    for events, (words, style) in SAID.items():
         for of in names.constraints(known, events):
-            for k, moment in enumerate(moments(result, events, of)):
-                axis.axvline(moment, color="#888888", linewidth=1, linestyle="--")
-                if named and k == 0:
-                    late = moment > result["time"][-1] / 2
-                    axis.annotate(
-                        f" {word} {of} " if events == names.DEPARTURES else f" {of} {word} ",
-                        (moment, 1.0),
-                        xycoords=("data", "axes fraction"),
-                        ha="right" if late else "left",
-                        va="top",
-                        fontsize=9,
-                        color="#555555",
-                    )
+            found = moments(result, events, of)
+            for moment in found:
+                axis.axvline(moment, color="#888888", linewidth=1, linestyle=style)
+            if found:
+                named.append((found[0], words.format(of)))
+    if figure is None:
+        return
+    wide = (
+        (end - start) * LETTER / (0.62 * figure.get_figwidth())
+    )  # s, of one letter; a legend has the rest
+    taken: list[float] = []  # where each row is free from
+    for moment, text in sorted(named):
+        width = wide * len(text)
+        late = moment + width > end
+        left = moment - width if late else moment
+        row = next((k for k, free in enumerate(taken) if free <= left), len(taken))
+        taken[row : row + 1] = [left + width + wide]
+        axis.annotate(
+            text,
+            (moment, 1.0),
+            (0, 3 + 11 * row),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            ha="right" if late else "left",
+            va="bottom",
+            fontsize=9,
+            color="#555555",
+        )

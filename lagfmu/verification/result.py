@@ -89,7 +89,7 @@ class Result(np.ndarray):  # type: ignore[type-arg]
     def _repr_html_(self) -> str:
         if self.dtype.names is None:
             return f"<pre>{escape(repr(self))}</pre>"
-        head = "".join(f"<th>{h}</th>" for h in ("", "smallest", "largest", "last", "unit"))
+        head = "".join(f"<th>{h}</th>" for h in ("variable", "smallest", "largest", "last", "unit"))
         body = "".join(
             "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in self._rows()
         )

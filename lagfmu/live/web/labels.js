@@ -2,6 +2,7 @@
 
 const LETTER = 7; // CSS pixels, of 12px text
 const LINE = 14;
+const REACHES = [6, 26]; // from the arrow: where there is no room beside it, farther off
 
 /* Circles [x, y, radius] that cover a way of points on the screen. */
 function covered(points, radius = 3) {
@@ -35,11 +36,14 @@ function boxes(from, to, width) {
   const middle = [(from[0] + to[0]) / 2, (from[1] + to[1]) / 2];
   const [left, right] = [[ty, -tx], [-ty, tx]];
   const places = [[to, [tx, ty]], [to, right], [to, left], [middle, right], [middle, left]];
+  places.push([from, [-tx, -ty]], [from, right], [from, left]);
   const way = (x) => (Math.abs(x) < 0.3 ? 0 : Math.sign(x));
-  return [...places, [from, [-tx, -ty]], [from, right], [from, left]].map(([[x, y], [ax, ay]]) => [
-    x + 6 * ax + ((way(ax) - 1) * width) / 2,
-    y + 6 * ay + ((way(ay) - 1) * LINE) / 2,
-  ]);
+  return REACHES.flatMap((reach) =>
+    places.map(([[x, y], [ax, ay]]) => [
+      x + reach * ax + ((way(ax) - 1) * width) / 2,
+      y + reach * ay + ((way(ay) - 1) * LINE) / 2,
+    ])
+  );
 }
 
 /* Places the texts of all arrows of a picture; each stays where it is as long as it is free there. */
