@@ -3,13 +3,13 @@
  * An importer's integrator knows no constraints: f = 0 and G v = nu, differentiated twice, drift away
  * (Hairer & Wanner II, sect. VII.2).  The accelerations that it gets are therefore stabilized,
  *
- *   G vdot = gamma - 2 alpha (G v - nu) - alpha^2 f ,  alpha = GAIN * rate
+ *   G vdot = gamma - 2 alpha (G v - nu) - alpha^2 f           G vdot = gamma - alpha (G v - nu)
  *
- * (Baumgarte 1972), with alpha of the order of the motion's own natural rate, so that nothing becomes
- * stiff and the drift stays in proportion to the importer's tolerance, whatever that is.  lambda, as it
- * is read, is that of the unstabilized equations.  Where this does not hold the drift (constraints that
- * depend on each other) an event does (exchange_events.c).  Projection alone would cost a restart of the
- * importer's integrator each time. */
+ * (Baumgarte 1972; the second where there is no f), with alpha of the order of the motion's own rate
+ * (exchange_gain.c), so that nothing becomes stiff and the drift stays in proportion to the importer's
+ * tolerance, whatever that is.  lambda, as it is read, is that of the unstabilized equations.  Where this does
+ * not hold the drift (constraints that depend on each other) an event does (exchange_events.c).  Projection
+ * alone would cost a restart of the importer's integrator each time. */
 #include "exchange.h"
 
 #include <math.h>
@@ -21,7 +21,6 @@
 #include "optional.h"
 #include "schur.h"
 
-static const double GAIN = 3; /* of the stabilization, in units of the motion's natural rate */
 
 void exchange_begin(Instance *x) {
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
@@ -77,6 +76,7 @@ Status exchange_evaluate(Instance *x) {
     Solver *s = &x->solver;
     if (x->evaluated) return OK;
     if (instance_start(x) != OK) return FAILED;
+    if (x->gain < 0 && exchange_find_gain(x) != OK) return FAILED;
     flow_begin(s);
     if (flow_motion(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
     x->evaluated = 1;
@@ -98,13 +98,15 @@ Status exchange_multipliers(Instance *x) {
 static Status stabilize(Instance *x, double *derivatives) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
-    const double alpha = GAIN * s->state.now.rate;
+    const double alpha = x->gain;
     double *c = s->sensitivity.c, *a = s->sensitivity.dvdot;
-    if (s->system->m == 0) return OK;
+    if (!(alpha > 0)) return OK;
     if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int k = 0; k < s->system->m; k++)
-        c[k] = -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
+        c[k] = s->system->rows[k].kind == NONHOLONOMIC
+                   ? -alpha * mechanism_slip(b, k, s->state.v)
+                   : -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
     if (linear_nearest(&b->linear, c, a) != OK) return OK; /* rows contradict each other */
     for (int j = 0; j < s->system->n; j++) derivatives[2 * j + 1] += a[j];
     return OK;

@@ -26,6 +26,9 @@ Status exchange_step_done(Instance *x, int *event);
 Status exchange_enter_event(Instance *x);
 Status exchange_event(Instance *x, int *moved);
 
+/* How quickly drift dies, x->gain [1/s], for the motion from this state on. */
+Status exchange_find_gain(Instance *x);
+
 /* Accelerations and multipliers at the state; the multipliers of all rows, those too that depend on others. */
 Status exchange_evaluate(Instance *x);
 Status exchange_multipliers(Instance *x);

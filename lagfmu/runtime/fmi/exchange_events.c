@@ -189,5 +189,5 @@ Status exchange_event(Instance *x, int *moved) {
     if (moving(x, pass) != OK) return FAILED;
     *moved = x->moved;
     x->moved = 0;
-    return OK;
+    return exchange_find_gain(x);
 }

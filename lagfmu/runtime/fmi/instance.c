@@ -372,6 +372,7 @@ Status instance_start(Instance *x) {
     x->started = 1;
     warn_of_shares(x);
     x->observed = x->evaluated = 0;
+    x->gain = -1;
     if (ERROR_BARS != NULL) ERROR_BARS->start(x);
     return OK;
 }
@@ -614,7 +615,7 @@ Status instance_rates(Instance *x, Direction *d) {
 typedef struct {
     Numbers now;
     Settings settings, given;
-    double since, start_time, stop_time, tolerance, solver_stop_time;
+    double since, start_time, stop_time, tolerance, solver_stop_time, gain;
     int exchange, phase, started, running, warned, moved;
 } Record;
 
@@ -641,6 +642,7 @@ void instance_save(Instance *x, char *record) {
     head.running = x->running;
     head.warned = x->warned;
     head.moved = x->moved;
+    head.gain = x->gain;
     if (ERROR_BARS != NULL) ERROR_BARS->save(x);
     memcpy(record, &head, sizeof head);
     memset(record + sizeof head, 0, record_head() - sizeof head);
@@ -665,6 +667,7 @@ void instance_restore(Instance *x, const char *record) {
     x->started = head.started;
     x->running = head.running;
     x->moved = head.moved;
+    x->gain = head.gain;
     x->warned = head.warned;
     x->observed = x->evaluated = x->followed = 0;
     if (ERROR_BARS != NULL) ERROR_BARS->restore(x);

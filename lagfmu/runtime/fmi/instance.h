@@ -28,6 +28,7 @@ typedef struct Instance {
     int running;            /* 1: the start is over, only inputs can be set */
     Bars *bars;             /* error bars; NULL without */
     Past *past;             /* (estimated_count of the system) */
+    double gain;            /* [1/s] of model exchange's stabilization; < 0: not known yet */
     int moved;              /* 1: in model exchange, an event has changed the states since this was told */
     int warned;             /* 1: a jump of a prescribed motion has been told; 2 << i: lookup i outside */
     double *places;         /* (lookup_count) scratch */

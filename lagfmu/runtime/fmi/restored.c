@@ -114,6 +114,7 @@ static const Saved OF_SOLVER[] = {
 static const Saved OF_INSTANCE[] = {
     INSTANCE("type", exchange, FLAG, ONE),
     INSTANCE("whether an event has moved the states", moved, FLAG, ONE),
+    INSTANCE("stabilization", gain, FINITE, ONE),
     INSTANCE("mode", started, FLAG, ONE),
     INSTANCE("mode", running, FLAG, ONE),
     INSTANCE("solver.tolerance", solver.settings.tolerance, SIZE, ONE),

@@ -1,0 +1,134 @@
+/* exchange_gain.c -- how quickly drift is led back onto the constraints (Model Exchange).
+ *
+ *   alpha = 3 min(natural rate, max(rho, |dG/dt| / |G|, sqrt(|vdot|/size)))   [1/s]
+ *
+ * The natural rate (magnitudes.c) says how small a time may matter where nothing tells what is large: of a belt
+ * at 0.2 m/s under g it is 2 g / (0.2 m/s), 98 1/s, though nothing there is quicker than its spring.  So it is
+ * bounded by what the motion does: rho, the largest |eigenvalue| of its own linearization
+ *
+ *   d/dt (dq, dv) = (dv, dvdot(q, v; dq, dv))      (without stabilization)
+ *
+ * by the power method (Golub & Van Loan, Matrix Computations, sect. 7.3), its products by differences; by the
+ * rates at which rows turn (of a knife edge, whose rho is 0); and by the accelerations of coordinates whose size
+ * a parameter tells (at a turning point both are 0).  Drift dies like exp(-alpha t), at most three times as
+ * quickly as the motion itself changes: nothing becomes stiff. */
+#include "exchange.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "flow.h"
+#include "magnitudes.h"
+
+static const double GAIN = 3; /* in units of the motion's own rate */
+enum { ROUNDS = 24, SETTLED = 8 }; /* products, and how many of them only turn the vector */
+static const double PART = 0x1p-20; /* of the coordinates' sizes: how far they are displaced */
+
+/* The state that is displaced: sizes and direction (2 n), in which direction[j] = 1 is one size. */
+typedef struct {
+    Solver *s;
+    double *size, *direction, *vdot; /* vdot (n): where nothing is displaced */
+} Tried;
+
+static Status move(Solver *s, double *vdot) {
+    s->stepped.stage = 1;
+    const Status status = flow_motion(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v);
+    s->stepped.stage = 0;
+    memcpy(vdot, s->stepped.vdot, (size_t)s->system->n * sizeof *vdot);
+    return status;
+}
+
+static double largest(int count, const double *x) {
+    double most = 0;
+    for (int i = 0; i < count; i++) most = fmax(most, fabs(x[i]));
+    return most;
+}
+
+/* direction <- the linearization's product with it, and its length after one that was 1; 0 if it vanishes. */
+static Status multiply(const Tried *x, double *length) {
+    Solver *s = x->s;
+    const int n = s->system->n;
+    double *q = s->work_advance, *v = q + n, *vdot = v + n;
+    memcpy(q, s->state.q, (size_t)n * sizeof *q);
+    memcpy(v, s->state.v, (size_t)n * sizeof *v);
+    for (int j = 0; j < n; j++) {
+        s->state.q[j] += PART * x->size[j] * x->direction[j];
+        s->state.v[j] += PART * x->size[n + j] * x->direction[n + j];
+    }
+    const Status status = move(s, vdot);
+    memcpy(s->state.q, q, (size_t)n * sizeof *q);
+    memcpy(s->state.v, v, (size_t)n * sizeof *v);
+    if (status != OK) return FAILED;
+    for (int j = 0; j < n; j++) {
+        x->direction[j] = x->size[n + j] / x->size[j] * x->direction[n + j];
+        x->direction[n + j] = (vdot[j] - x->vdot[j]) / (PART * x->size[n + j]);
+    }
+    *length = largest(2 * n, x->direction);
+    for (int j = 0; j < 2 * n && *length > 0; j++) x->direction[j] /= *length;
+    return OK;
+}
+
+/* rho; infinite where the motion is not defined beside the state. */
+static double own_rate(const Tried *x) {
+    const int n = x->s->system->n;
+    double logarithm = 0, length;
+    for (int j = 0; j < 2 * n; j++) x->direction[j] = 1 - 1.618 * (j % 2) + 1 / (1.0 + j);
+    for (int round = 0; round < ROUNDS; round++) {
+        if (multiply(x, &length) != OK) return HUGE_VAL;
+        if (!(length > 0)) return 0;
+        if (round >= SETTLED) logarithm += log(length);
+    }
+    return exp(logarithm / (ROUNDS - SETTLED));
+}
+
+/* The largest rate that an acceleration gives to a coordinate whose size a parameter tells; an angle's is 1 rad. */
+static double sized_rate(Solver *s, const double *vdot) {
+    const System *system = s->system;
+    double *least = s->work_initial, rate = 0;
+    magnitudes_extents(system, s->p, least);
+    for (int j = 0; j < system->n; j++) {
+        const double size = system->dimension[j] == system->angles ? 1 : least[j];
+        if (size > 0) rate = fmax(rate, sqrt(fabs(vdot[j]) / size));
+    }
+    return rate;
+}
+
+/* The largest rate at which a row turns as the motion goes on, coordinates being measured by their sizes. */
+static double turning_rate(Solver *s, const double *size) {
+    const System *system = s->system;
+    Mechanism *b = &s->stepped;
+    double *G = s->sensitivity.dG, *q = s->work_advance, rate = 0;
+    const double ahead = PART / s->state.now.rate;
+    const Instant at = flow_instant(s, s->state.now.t);
+    memcpy(G, b->G, (size_t)system->entries * sizeof *G);
+    for (int j = 0; j < system->n; j++) q[j] = s->state.q[j] + ahead * s->state.v[j];
+    if (mechanism_evaluate(b, at, q, s->state.v) != OK) return 0;
+    for (int k = 0; k < system->m; k++) {
+        double turned = 0;
+        for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++)
+            turned += fabs(b->G[e] - G[e]) * size[system->entry_column[e]];
+        const double whole = mechanism_row_size(b, k, size);
+        if (whole > 0) rate = fmax(rate, turned / (ahead * whole));
+    }
+    return rate;
+}
+
+Status exchange_find_gain(Instance *x) {
+    Solver *s = &x->solver;
+    const int n = s->system->n;
+    const double natural = s->state.now.rate;
+    double *size = s->work_events;
+    const Tried tried = {s, size, size + 2 * n, size + 4 * n};
+    x->gain = 0;
+    if (s->system->m == 0) return OK;
+    flow_begin(s);
+    x->evaluated = 0;
+    if (move(s, tried.vdot) != OK) return FAILED;
+    for (int j = 0; j < n; j++) {
+        size[j] = s->state.size[j] > 0 ? s->state.size[j] : 1;
+        size[n + j] = size[j] * natural;
+    }
+    const double turning = turning_rate(s, size); /* of the G that was evaluated last */
+    x->gain = GAIN * fmin(natural, fmax(turning, fmax(own_rate(&tried), sized_rate(s, tried.vdot))));
+    return OK;
+}
