@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
+from instance import instance
 from runs import simulate_fmu
+from sympy import cos, sin, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Contact, Model, Nonholonomic, Parameter, build_fmu
+from lagfmu.errors import SimulationError
+from lagfmu.verification.simulate import simulate
 
 pytestmark = pytest.mark.python_cases(3)
 
@@ -106,3 +114,38 @@ def test_a_sideways_velocity_is_taken_away(fmu):
     along = np.cos(0.5) + 2 * np.sin(0.5)
     assert result["der(x)"][0] == pytest.approx(along * np.cos(0.5), rel=1e-14)
     assert result["der(y)"][0] == pytest.approx(along * np.sin(0.5), rel=1e-14)
+
+
+def test_a_blade_parallel_to_its_wall_is_named(tmp_path):
+    """On the wall y = 0 a blade at phi != 0 holds x too, and lambda.blade = -F / sin(phi) grows without bound
+    as it turns; where it is parallel, blade and wall are one row that asks for two accelerations."""
+    x, y, phi = dynamicsymbols("x y phi")
+    m, g, J, F = symbols("m g J F", positive=True)
+    model = Model(
+        name="Blade",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
+        + J * phi.diff() ** 2 / 2
+        - m * g * y
+        + F * x,
+        coordinates={x: "m", y: "m", phi: "rad"},
+        constraints=[
+            Nonholonomic("blade", x.diff() * sin(phi) - y.diff() * cos(phi)),
+            Contact("wall", y),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(J, 0.05, "kg.m^2"),
+            Parameter(F, 1.0, "N"),
+        ],
+        start={phi: -0.5, phi.diff(): 0.5},
+    )
+    path = build_fmu(model, tmp_path, target="native", check=False)
+    named = "'blade', 'wall' depend on each other"
+    with instance(path) as one:
+        with pytest.raises(FMICallException):
+            one.start({"phi": 0.0, "der(x)": 1.0})
+        assert named in one.log[-1][2]
+        assert "the configuration is singular" in one.log[-1][2]
+    with pytest.raises(SimulationError, match=named):
+        simulate(path, start_values={"solver.method": "rk4"}, stop_time=1.7, step_size=0.1)

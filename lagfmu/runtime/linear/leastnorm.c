@@ -125,7 +125,7 @@ Status least_norm_solve(Linear *l, const double *b, const double *c, double *x, 
     double most = right(l, &w, b, c);
     for (int i = w.cod.rank; i < w.cod.rows && !l->nearest && !(l->off > ON_CONSTRAINTS); i++)
         if (fabs(w.z[i]) > CONSISTENT * most)
-            return fail(l->why, "the constraints contradict each other at this state");
+            return linear_contradicted(l);
     substitute(l, b, c, x, lambda);
     refine(l, substitute, b, c, x, lambda);
     return OK;

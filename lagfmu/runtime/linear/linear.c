@@ -149,6 +149,19 @@ Status linear_factor(Linear *l, const double *M, const double *G, const int *act
     return factor_lists(l);
 }
 
+Status linear_contradicted(Linear *l) {
+    const char *comma = "";
+    (void)fail(l->why, "the constraints contradict each other at this state: ");
+    for (int k = 0; k < l->system->m; k++) {
+        if (l->unique[k]) continue;
+        why_append(l->why, "%s'%s'", comma, l->system->rows[k].name);
+        comma = ", ";
+    }
+    why_append(l->why, " depend on each other and ask for different accelerations (the configuration is "
+                       "singular if elsewhere they do not)");
+    return FAILED;
+}
+
 static Status solve_dense(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     if (check_right(l, b, c) != OK) return FAILED;
     if (l->rung != RUNG_KKT) return DEPENDENT->solve(l, b, c, x, lambda);

@@ -67,4 +67,7 @@ double linear_rank_threshold(const Linear *l);
  * independent, otherwise all.  Factors are lost. */
 int linear_basis(Linear *l, int *basis);
 
+/* FAILED: rows that depend on each other ask for different accelerations; the cause names them. */
+Status linear_contradicted(Linear *l);
+
 #endif

@@ -49,9 +49,7 @@ static int consistent(const Linear *l, const double *b, const double *c) {
 
 Status orthogonal_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     if (!l->nearest && !(l->off > ON_CONSTRAINTS) && !consistent(l, b, c))
-        return fail(l->why,
-                    "the constraints contradict each other at this state: dependent rows of G ask "
-                    "for different accelerations");
+        return linear_contradicted(l);
     weighted_solve(l, b, c, x, lambda);
     refine(l, weighted_solve, b, c, x, lambda);
     return OK;
