@@ -16,6 +16,7 @@ AT_CONTACTS = {
     "landing_lift": "landing.c",
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
+    "switch_contradicted": "switch.c",
 }
 BESIDE = ("after_step", "at_trial", "at_event", "inside")  # of companion.c
 COMPANION = ("bars.c", "companion.c")  # behind ERROR_BARS of variables.c

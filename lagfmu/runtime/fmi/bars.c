@@ -127,7 +127,7 @@ static void turn(Instance *x) {
     b->observed = 0;
     if (*b->lost) return;
     share(x);
-    *b->lost = solver_follow(&b->solver) != OK;
+    *b->lost = solver_look(&b->solver) != OK;
 }
 
 /* ------------------------------------------------------------------ bars */

@@ -83,15 +83,27 @@ static void unfollow(Instance *x) {
     x->phase = phase;
 }
 
-/* What is read of a motion that was set is read at the state with which the next step begins. */
+/* 1: inputs have other values than they had come to, and more than the forces may change with them. */
+static int turned(const Instance *x) {
+    const System *s = x->solver.system;
+    if (s->contacts + s->frictions + s->jumps + s->prescribed_count == 0) return 0;
+    for (int k = 0; k < s->inputs; k++)
+        if (x->solver.drive.value[k] != x->expected[k]) return 1;
+    return 0;
+}
+
+/* What is read after an input was set is read at the state with which the next step begins. */
 static Status follow(Instance *x) {
-    if (PRESCRIBED == NULL || x->followed || x->exchange || !x->started || !x->running) return OK;
-    if (!PRESCRIBED->turned(x)) return OK;
+    if (x->followed || x->exchange || !x->started || !x->running) return OK;
+    const int estimated = PRESCRIBED != NULL && PRESCRIBED->was_set(x);
+    if (!estimated && !turned(x)) return OK;
     instance_save(x, x->backup);
     x->followed = 1;
     x->observed = x->evaluated = 0;
+    if (estimated) PRESCRIBED->estimate(x);
+    x->solver.drive.turned = turned(x);
     if (ERROR_BARS != NULL) ERROR_BARS->turn(x);
-    if (solver_follow(&x->solver) == OK) return OK;
+    if (solver_look(&x->solver) == OK) return OK;
     unfollow(x);
     return FAILED;
 }
@@ -194,10 +206,12 @@ Status instance_value(Solver *s, const Observed *o, const Variable *v, double *v
 }
 
 Status instance_get(Instance *x, const Variable *v, double *value) {
-    if (was_set(x, v, value)) return OK;
+    const int estimated = v->place == AT_INPUT && x->solver.system->estimated_count > 0;
+    if (!estimated && was_set(x, v, value)) return OK;
     if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
     if (solver_arrive(&x->solver) != OK) return FAILED;
     if (follow(x) != OK) return FAILED;
+    if (estimated && was_set(x, v, value)) return OK;
     if (x->started && ready(&x->solver, v, value)) return OK;
     if (!x->observed && instance_observe(x) != OK) return FAILED;
     return instance_value(&x->solver, &x->seen, v, value);
@@ -496,6 +510,7 @@ Status instance_step(Instance *x, double t_end) {
     unfollow(x);
     instance_save(x, x->backup);
     if (PRESCRIBED != NULL) PRESCRIBED->begin_step(x);
+    s->drive.turned = turned(x);
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     if (s->system->contacts + s->system->frictions > 0) remember_counts(x);
     if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);

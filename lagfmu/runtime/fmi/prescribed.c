@@ -14,15 +14,11 @@ static int is_estimated(const System *s, int k) {
     return 0;
 }
 
-static int turned(const Instance *x) {
+static int was_set(const Instance *x) {
     const System *s = x->solver.system;
-    const double *u = x->solver.drive.value;
-    for (int i = 0; i < s->prescribed_count; i++) {
-        const int k = s->prescribed[i];
-        if (is_estimated(s, k)) continue;
+    for (int i = 0; i < s->estimated_count; i++)
         for (int order = 0; order <= 2; order++)
-            if (u[k + order] != x->expected[k + order]) return 1;
-    }
+            if (x->set[s->estimated[i] + order]) return 1;
     return 0;
 }
 
@@ -48,7 +44,7 @@ static const char *input_name(int k) {
 
 /* The rates of motions that have only values; one that was not set keeps its latest, one that never was
  * goes on by its rates. */
-static void estimate_rates(Instance *x) {
+static void estimate(Instance *x) {
     const System *s = x->solver.system;
     double *u = x->solver.drive.value;
     for (int i = 0; i < s->estimated_count; i++) {
@@ -84,7 +80,7 @@ static void warn_of_rates(Instance *x) {
 }
 
 static void begin_step(Instance *x) {
-    estimate_rates(x);
+    estimate(x);
     warn_of_rates(x);
 }
 
@@ -102,4 +98,4 @@ static Status restored(Instance *x) {
     return OK;
 }
 
-const Prescribed MOTIONS = {turned, order, rate, begin_step, restored};
+const Prescribed MOTIONS = {was_set, estimate, order, rate, begin_step, restored};

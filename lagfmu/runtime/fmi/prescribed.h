@@ -8,8 +8,9 @@
 #include "instance.h"
 
 typedef struct {
-    /* 1: a motion was set to another place or other rates than it went by. */
-    int (*turned)(const Instance *x);
+    /* 1: a motion whose rates are estimated was set since the latest step; estimates them. */
+    int (*was_set)(const Instance *x);
+    void (*estimate)(Instance *x);
     /* Where the input k stands in its motion: 0, 1 or 2 for u, der(u), der(u,2), 3 for a third derivative; -1
      * for other inputs. */
     int (*order)(const Instance *x, int k);

@@ -285,23 +285,6 @@ static Status complete_magnitudes(Solver *s, double span) {
     return magnitudes_complete(s, at, span);
 }
 
-Status solver_follow(Solver *s) {
-    const System *system = s->system;
-    if (!s->state.now.ahead && system->jumps > 0)
-        OPTIONAL.jumps->settle(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
-    if (system->prescribed_count > 0) {
-        if (system->contacts == 0)
-            system_active(system, s->state.closed, s->active);
-        else if (OPTIONAL.switch_released(s, s->state.now.span, 0) != OK)
-            return FAILED;
-        const Instant at = flow_instant(s, s->state.now.t);
-        if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                              s->state.size) != OK)
-            return FAILED;
-    }
-    return system->frictions > 0 ? OPTIONAL.slides->renew(s) : OK;
-}
-
 Status solver_advance(Solver *s, double t_end) {
     Numbers *now = &s->state.now;
     const double begun = now->t;

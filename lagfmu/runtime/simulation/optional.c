@@ -15,6 +15,7 @@ const Optional OPTIONAL = {
     .landing_lift = landing_lift,
     .switch_modes = switch_modes,
     .switch_released = switch_released,
+    .switch_contradicted = switch_contradicted,
     .jumps = &JUMPS,
     .slides = &SLIDES,
 };

@@ -38,6 +38,7 @@ typedef struct {
     Status (*landing_lift)(Solver *s, const int *happened, const double *pull);
     Status (*switch_modes)(Solver *s, const int *happened);
     Status (*switch_released)(Solver *s, double span, double drift);
+    Status (*switch_contradicted)(Solver *s);
     /* Of forces that jump; NULL where none do. */
     const Jumps *jumps;
     /* What constraints that hold by friction need; NULL where there are none. */

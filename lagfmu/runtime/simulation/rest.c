@@ -20,19 +20,21 @@ static const double PI = 3.14159265358979323846;
 void rest_set_noise(Solver *s, const double *speed, Slide *slides) {
     const Mechanism *b = &s->stepped;
     for (int i = 0; i < s->system->frictions; i++) {
-        slides[i].noise = 0;
+        double noise = 0;
         for (int r = 0; r < s->system->friction[i].rows; r++) {
             const int k = s->system->friction[i].row[r];
-            slides[i].noise += SLIDES_SLACK * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
+            noise += SLIDES_SLACK * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
         }
+        slides[i].noise = fmax(slides[i].noise, noise);
     }
 }
 
-/* Of the G that was evaluated last. */
+/* Of the G that was evaluated last.  Where a slide ends, it is rounding of the speed at which the step began. */
 void rest_renew_noise(Solver *s, Slide *slides) {
+    const double *before = s->integrator.y_old + s->system->n;
     double *speed = s->work_contacts;
     for (int j = 0; j < s->system->n; j++)
-        speed[j] = fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
+        speed[j] = fmax(fmax(fabs(s->state.v[j]), fabs(before[j])), s->state.size[j] * s->state.now.rate);
     rest_set_noise(s, speed, slides);
 }
 
@@ -135,6 +137,15 @@ static Status look_along(Rest *x, int i, double angle, double *across, double *a
     if (find_rate(x, i, rate, floor) != OK) return FAILED;
     *across = e[0] * rate[1] - e[1] * rate[0];
     *along = e[0] * rate[0] + e[1] * rate[1];
+    return OK;
+}
+
+Status rest_agrees(Rest *x, int i, int *agrees) {
+    const double *e = x->slides[i].direction;
+    double rate[2], floor;
+    x->active = x->s->active;
+    if (find_rate(x, i, rate, &floor) != OK) return FAILED;
+    *agrees = e[0] * rate[0] + e[1] * rate[1] >= -floor && fabs(e[0] * rate[1] - e[1] * rate[0]) <= floor;
     return OK;
 }
 

@@ -22,10 +22,14 @@ Rest rest_of(Solver *s, Instant at);
  * none) stopped slipping just now.  FAILED where the laws have no solution, or several (Painleve). */
 Status rest_settle(Rest *x, int *closed, const int *ended, const int *touching, const int *leaving);
 
+/* Does friction i, which slips at s = 0, go the way in which it begins to move?  Contacts as in s->active. */
+Status rest_agrees(Rest *x, int i, int *agrees);
+
 /* Back to the state's own modes, which are now those of x if `settled`. */
 Status rest_finish(Rest *x, Status settled);
 
-/* What of each slip velocity is rounding: of motions of this speed (n), of the motion as it is. */
+/* What of each slip velocity is rounding: of motions of this speed (n), of the motion as it is and was; it
+ * never becomes less. */
 void rest_set_noise(Solver *s, const double *speed, Slide *slides);
 void rest_renew_noise(Solver *s, Slide *slides);
 

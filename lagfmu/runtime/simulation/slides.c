@@ -116,6 +116,30 @@ static Status stop(Solver *s, Instant at, const int *left) {
     return stopped;
 }
 
+static Status contradicted(Solver *s, Instant at, int *left, int *any) {
+    const int count = s->system->frictions;
+    const struct Frictions *f = s->stepped.friction;
+    slipping_indicators(s, s->work_slides);
+    for (int k = 0; k < 2 * count; k++) {
+        left[k] = s->work_slides[k] < -slipping_range(s, k).slack;
+        *any |= left[k];
+    }
+    if (*any) return OK;
+    Rest x = rest_of(s, at);
+    Status status = OK;
+    for (int i = 0; i < count && status == OK; i++) {
+        const Slide *slide = &s->state.slide[i];
+        int agrees = 1;
+        if (!f->loaded[i] || slide->sticks || hypot(f->slip[2 * i], f->slip[2 * i + 1]) > slide->noise)
+            continue;
+        status = rest_agrees(&x, i, &agrees);
+        left[2 * i] = !agrees;
+        *any |= !agrees;
+    }
+    (void)rest_finish(&x, FAILED);
+    return status;
+}
+
 static Status renew(Solver *s) {
     Mechanism *b = &s->stepped;
     int any = 0;
@@ -137,7 +161,7 @@ static Status renew(Solver *s) {
 
 const Slides SLIDES = {
     .sliding = &SLIDING, .doubles = rubbing_doubles, .ints = rubbing_ints,
-    .begin = begin, .change = change, .stop = stop, .renew = renew,
+    .begin = begin, .change = change, .stop = stop, .contradicted = contradicted, .renew = renew,
     .indicators = slipping_indicators, .range = slipping_range,
     .turns = slipping_turns, .turn = slipping_turn,
     .work = slipping_work, .jacobian = slipping_jacobian, .rub = rubbing,

@@ -24,6 +24,9 @@ typedef struct {
                      const int *touching, const int *leaving);
     /* Where `left` says that a slip has ended, the state (q and v) is moved to where it is 0. */
     Status (*stop)(Solver *s, Instant at, const int *left);
+    /* What of each friction the forces of now contradict, in `left` (2 frictions) as at an event; of the latest
+     * motion.  `any`: 1 if something is. */
+    Status (*contradicted)(Solver *s, Instant at, int *left, int *any);
     /* Frictions that stuck, and of which an input has moved the surface away, slip. */
     Status (*renew)(Solver *s);
     /* Two indicators a friction, of the latest motion, and their ranges. */

@@ -66,10 +66,14 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
  * puts the saved one back (it keeps a copy). */
 Status solver_advance(Solver *s, double t_end);
 
-/* The inputs may have been set: levels of jumps are those of now, contacts whose surface went away open, the
- * others go with it; a prescribed motion may have another place and other rates than it went by.  What each
- * step begins with.  FAILED leaves the state in disorder. */
+/* follow.c -- the inputs may have been set: levels of jumps are those of now, contacts whose surface went away
+ * open, the others go with it; a prescribed motion may have another place and other rates than it went by, and
+ * forces others than the modes of contacts and frictions belong to (drive.turned).  What each step begins
+ * with.  FAILED leaves the state in disorder. */
 Status solver_follow(Solver *s);
+
+/* The same, with nothing counted, for a caller that then puts the saved state back. */
+Status solver_look(Solver *s);
 
 /* q and v at the communication point, where they are still to be found (on_demand).  FAILED: they cannot
  * be projected onto the constraints. */

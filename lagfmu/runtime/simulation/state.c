@@ -33,6 +33,7 @@ void drive_at(const System *s, const Drive *drive, double t, double *u) {
 void state_note(State *x, EventKind kind, int i, int n, const double *q, const double *v) {
     Latest *latest = &x->latest[kind];
     const size_t bytes = (size_t)n * sizeof *q;
+    if (x->looking) return;
     latest->count[i] += 1;
     latest->time[i] = x->now.t;
     memcpy(latest->q + (size_t)i * (size_t)n, q, bytes);

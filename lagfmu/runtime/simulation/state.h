@@ -27,6 +27,7 @@ typedef struct {
 typedef struct {
     double since;                     /* [s] when they were set */
     double *value, *first, *second;   /* (inputs) */
+    int turned;                       /* 1: they were set to other values than they had come to */
 } Drive;
 
 /* u at time t.  */
@@ -70,6 +71,7 @@ typedef struct {
 /* ... and its arrays, which lie in one block. */
 typedef struct {
     Numbers now;
+    int looking;              /* 1: events are not counted: solver_look(), after which a saved state is put back */
     double *q, *v;            /* (n) at t, on the constraints */
     double *level;            /* (jumps) on which side of its surface each jump of the forces is */
     double *offset;           /* (m) the level f = offset that a row keeps which came back with its contact */
@@ -93,7 +95,7 @@ static inline int event_count_of(const System *s, EventKind kind) {
     return kind <= CLOSING ? s->contacts : s->frictions;
 }
 
-/* An event of contact, or friction, i, now and at the state q, v (n). */
+/* An event of contact, or friction, i, now and at the state q, v (n), unless this is a look. */
 void state_note(State *x, EventKind kind, int i, int n, const double *q, const double *v);
 
 #endif

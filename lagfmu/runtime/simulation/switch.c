@@ -127,7 +127,7 @@ static void note_closings(Solver *s, const int *happened, const int *closed, con
         const int landed = !s->state.closed[c] && (happened[c] || closed[c]);
         if (!landed && !(s->push[c] > IMPACT_PULL * most)) continue;
         state_note(&s->state, CLOSING, c, s->system->n, s->state.q, arriving);
-        s->state.impulse[c] = s->push[c];
+        if (!s->state.looking) s->state.impulse[c] = s->push[c];
     }
 }
 
@@ -154,7 +154,7 @@ Status switch_modes(Solver *s, const int *happened) {
     note_closings(s, happened, x.closed, arriving);
     for (int c = 0; c < contacts; c++) {
         if (s->state.closed[c] && !x.closed[c]) note_departure(s, c);
-        if (happened[c] || x.struck[c]) s->state.armed[c] = 0;
+        if (happened[c] || x.struck[c] || s->state.closed[c] != x.closed[c]) s->state.armed[c] = 0;
         s->state.closed[c] = x.closed[c];
     }
     return OK;
@@ -202,4 +202,36 @@ Status switch_released(Solver *s, double span, double drift) {
     }
     system_active(system, s->state.closed, s->active);
     return OK;
+}
+
+/* `left` (indicators) as of an event, of frictions alone: contacts are settled from their accelerations. */
+static Status find_contradicted(Solver *s, Instant at, int *left, int *any) {
+    const System *system = s->system;
+    const int contacts = system->contacts;
+    const size_t bytes = (size_t)contacts * sizeof *left;
+    const double *q = s->state.q, *v = s->state.v;
+    Mechanism *b = &s->stepped;
+    int *modes = s->iwork_events, *touching = modes + contacts;
+    double *slow = s->work_switch;
+    memset(left, 0, (size_t)indicators_count(system) * sizeof *left);
+    if (mechanism_residual(b, at, q, b->f) != OK || mechanism_evaluate(b, at, q, v) != OK) return FAILED;
+    find_slow(s, slow);
+    for (int c = 0; c < contacts; c++) {
+        const int k = system->contact[c];
+        touching[c] = !s->state.closed[c] && fabs(b->f[k]) <= s->state.gap[c] &&
+                      fabs(mechanism_slip(b, k, v)) <= slow[k];
+    }
+    memcpy(modes, s->state.closed, bytes);
+    if (contacts_modes(s, at, q, v, modes, touching, NULL) != OK) return FAILED;
+    *any = memcmp(modes, s->state.closed, bytes) != 0;
+    for (int c = 0; c < contacts; c++) *any |= modes[c] && b->lambda[system->contact[c]] < 0;
+    if (*any || system->frictions == 0) return OK;
+    return OPTIONAL.slides->contradicted(s, at, left + indicators_first_of_frictions(system), any);
+}
+
+Status switch_contradicted(Solver *s) {
+    int any;
+    flow_begin(s);
+    if (find_contradicted(s, flow_instant(s, s->state.now.t), s->state.left, &any) != OK) return FAILED;
+    return any ? switch_modes(s, s->state.left) : OK;
 }

@@ -14,4 +14,10 @@ Status switch_modes(Solver *s, const int *happened);
  * part of the constraint's own size and speed is what an integrator that knows no constraints may have left. */
 Status switch_released(Solver *s, double span, double drift);
 
+/* Settles contacts and frictions together where a mode contradicts the forces of now: a closed contact would
+ * pull, an open one is pressed at f = df/dt = 0, a friction sticks beyond its cone, slips at s = 0 in a
+ * direction in which it does not begin to move, or one way where it moves the other, or has a bilateral normal
+ * force that has turned round. */
+Status switch_contradicted(Solver *s);
+
 #endif

@@ -1,0 +1,52 @@
+/* follow.c -- the state with which a step begins after inputs were set, to which everything belongs that is read
+ * before that step: the limit from the right.
+ *
+ * Forces that jump have the levels of now, what a prescribed motion carries goes with it, and modes that the
+ * new forces contradict are settled (switch.h). */
+#include "flow.h"
+#include "optional.h"
+
+/* What closed contacts and other constraints do when motions are prescribed anew. */
+static Status carry(Solver *s) {
+    const System *system = s->system;
+    if (system->contacts == 0)
+        system_active(system, s->state.closed, s->active);
+    else if (OPTIONAL.switch_released(s, s->state.now.span, 0) != OK)
+        return FAILED;
+    const Instant at = flow_instant(s, s->state.now.t);
+    return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                             s->state.size);
+}
+
+static Status settle_modes(Solver *s) {
+    return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.switch_contradicted(s);
+}
+
+/* What rests on a surface at which forces jump may be about to leave it. */
+static Status settle_jumps(Solver *s, int *changed) {
+    const Instant at = flow_instant(s, s->state.now.t);
+    *changed = 0;
+    if (s->system->jumps == 0) return OK;
+    flow_begin(s);
+    if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
+    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, changed);
+    return OK;
+}
+
+Status solver_follow(Solver *s) {
+    int changed;
+    if (!s->state.now.ahead && s->system->jumps > 0)
+        OPTIONAL.jumps->settle(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
+    if (s->system->prescribed_count > 0 && carry(s) != OK) return FAILED;
+    if (s->system->frictions > 0 && OPTIONAL.slides->renew(s) != OK) return FAILED;
+    if (!s->drive.turned) return OK;
+    if (settle_modes(s) != OK || settle_jumps(s, &changed) != OK) return FAILED;
+    return changed ? settle_modes(s) : OK;
+}
+
+Status solver_look(Solver *s) {
+    s->state.looking = 1;
+    const Status status = solver_follow(s);
+    s->state.looking = 0;
+    return status;
+}
