@@ -34,6 +34,11 @@ static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
     const System *system = s->system;
     const double *f = s->stepped.f;
     if (mechanism_residual(&s->stepped, at, s->state.q, s->stepped.f) != OK) return FAILED;
+    if (mechanism_evaluate(&s->stepped, at, s->state.q, s->state.v) != OK) return FAILED;
+    for (int c = 0; c < system->contacts; c++) { /* f of a motion that has gone far has more rounding */
+        const double rounding = LOST * mechanism_row_size(&s->stepped, system->contact[c], s->state.q);
+        s->state.gap[c] = fmax(s->state.gap[c], rounding);
+    }
     for (int c = 0; c < system->contacts; c++) {
         const int shut = s->state.closed[c];
         x->leaving[c] = happened[c] && shut;
