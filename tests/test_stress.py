@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import os
 import shutil
 import subprocess
@@ -31,7 +30,6 @@ from lagfmu.model.file import load
 from lagfmu.model.model import name_of
 from lagfmu.prepare.consistency import RedundantConstraintWarning
 from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress import worker
 from lagfmu.study.stress.bench import Bench, Finding
 from lagfmu.study.stress.closed_forms import judged as judged_forms
 from lagfmu.study.stress.closed_forms import magnitude
@@ -48,9 +46,8 @@ from lagfmu.study.stress.probe import (
     attempt,
     verdict,
 )
-from lagfmu.study.stress.report import VERDICTS, Stressed
-from lagfmu.study.stress.summary import as_summary
-from lagfmu.study.stress.underflow import underflow
+from lagfmu.study.stress.probes import probes
+from lagfmu.study.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed, as_markdown
 from lagfmu.verification.pipeline import NOT_RUN, WRONG_USAGE
 from lagfmu.verification.verify import applies
 
@@ -89,12 +86,12 @@ def test_the_hemisphere_is_never_wrong(native_fmu, tmp_path):
     (tried,) = stress([native_fmu("Hemisphere")], tmp_path, Console(file=text), quick=True)
     found = tried.found
     assert [r for r in found.rows if r.verdict in (WRONG, UNFINISHED)] == []
-    assert found.count(RIGHT) > 50
-    assert found.count(REFUSED) > 10
-    families = {"parameters", "scaling", "starts", "communication step", "tolerance", "long run"}
-    assert families | {"rollback", "instances"} <= set(found.families)
+    assert sum(r.verdict == RIGHT for r in found.rows) > 25
+    assert not any(r.worry for r in found.rows)
+    families = {"parameters", "starts", "communication step", "tolerance", "method", "long run"}
+    assert families | {"rollback", "model exchange"} <= {r.family for r in found.rows}
     data = json.loads((tmp_path / "native" / "Hemisphere.json").read_text())
-    assert data["verdicts"] == {v: found.count(v) for v in VERDICTS}
+    assert [data["verdicts"][v] for v in VERDICTS] == found.counts()[1:-2]
     assert "| Hemisphere | " in (tmp_path / "native.md").read_text()
     page = (tmp_path / "native" / "Hemisphere.md").read_text()
     assert f"`{data['sha256']}`" in page
@@ -161,33 +158,6 @@ def test_a_small_error_of_what_follows_from_other_outputs_is_found(
                 rows[column][int(np.argmax(rows["sticks.grip"]))] = -1e-100
 
             assert what in judged(one, heat)
-
-
-@pytest.mark.parametrize("values", [{"r": 1e-300}, {"omega": 1e-300}])
-def test_what_underflows_in_an_output_of_ones_own_is_no_error(lawful, values):
-    """sqrt(r'^2 + (r phi')^2) of 1e-300 m/s is 0 in doubles; 1e-150 m/s is lost no more."""
-    with Bench(lawful("RotatingWire"), quick=True) as one:
-        run = one.run(values, one.times(one.span(values)))
-        assert [c for c in one.checks(run) if c.ratio > 1] == []
-        run.rows["bead.speed"] += 1e-150
-        assert "bead.speed" in [c.what for c in one.checks(run) if c.ratio > 1]
-
-
-def test_underflow_is_bounded_whatever_the_order():
-    """A product may lose the smallest normal number, eta, times its other factors above 1, a root the root of
-    eta, a quotient what its denominator loses; where nothing underflows the bound is far below rounding."""
-    a, b, c = symbols = sp.symbols("a b c", real=True)
-    eta = sys.float_info.min
-
-    def lost(e, *values):
-        return float(underflow(e).subs(dict(zip(symbols, values, strict=False))))
-
-    assert lost(a + b, 1.0, 1.0) == 0
-    assert lost(a * b * c, 1e-200, 1e-200, 1e200) == pytest.approx(eta * 1e200)
-    assert lost(sp.sqrt(a**2 + b**2), 0.0, 0.0) == pytest.approx(math.sqrt(2 * eta))
-    assert 0 < lost(sp.sqrt(a**2 + b**2), 3.0, 4.0) < 1e-300
-    assert 0 < lost(sp.sin(a * b) / c, 3.0, 4.0, 2.0) < 1e-300
-    assert lost(c / (a * b), 1e-160, 1e-158, 1e-200) > abs(1e-200 / (1e-160 * 1e-158) - 1e118)
 
 
 @pytest.mark.parametrize("name", ["J_s", "J_p", "J_c"])
@@ -320,28 +290,31 @@ def test_a_solver_that_is_slightly_wrong_is_found(mutant, tmp_path):
     assert data["verdicts"][WRONG] > 0
 
 
-def test_the_summary_names_what_is_not_right(lawful, tmp_path):
-    """One page over all FMUs: versions, counts by FMU and family, and each row that is not right."""
-    refused = "setReal: error: 'm' = {}, expected a finite number"
+def test_the_summary_names_what_is_not_right():
+    """One page over all FMUs: versions, counts by FMU, each row that is wrong, and the refusals within a
+    factor of ten of the model's own values, which alone a user should look at."""
+    refused = "doStep: discard: the mass matrix is singular at t = 0 s"
     rows = (
         Verdict("parameters", "m = 1", RIGHT, "", "energy", 0.1, 9, 0.1),
         Verdict(
             "parameters", "m = 2", WRONG, "energy: 2.0e+00, allowed 1.0e+00", "energy", 2.0, 9, 0.1
         ),
-        *(
-            Verdict("bounds", f"m = {x}", REFUSED, refused.format(x), "", 0, 0, 0.1)
-            for x in ("nan", "inf")
-        ),
+        Verdict("parameters", "m = 0.1", REFUSED, refused, "", 0, 0, 0.1, near=True),
+        Verdict("parameters", "m = 1e-6", REFUSED, refused, "", 0, 0, 0.1),
     )
-    page = as_summary([Stressed(n, "native", "ab" * 32, False, 60.0, True, rows) for n in "AB"])
+    page = as_markdown([Stressed(n, "native", "ab" * 32, False, 60.0, True, rows) for n in "AB"])
     assert "lagfmu " in page
     assert "scipy " in page
-    assert "| parameters | 4 | 2 | 0 | 0 | 2 | 0 | 36 |" in page
-    assert "| all | 8 | 2 | 0 | 4 | 2 | 0 | 36 |" in page
+    assert "| A | 4 | 1 | 0 | 2 | 1 | 0 | 1 | 18 | `abababababababab` |" in page
     assert "## Wrong: 2" in page
     assert "- B, parameters, m = 2: energy: 2.0e+00, allowed 1.0e+00" in page
     assert "## Unfinished: none" in page
-    assert "| 4 | '...' = #, expected a finite number |" in page
+    assert "values: 2" in page
+    assert "- B, parameters, m = 0.1: " in page
+    assert "m = 1e-6" not in page
+    page = as_markdown([Stressed("A", "native", "ab" * 32, False, 60.0, True, rows)])
+    assert f"| m = 0.1 | refused | 0 |  | {WORRY}; " in page
+    assert f"| m = 1e-6 | refused | 0 |  | {NO_WORRY}; " in page
 
 
 def test_a_refusal_needs_a_cause():
@@ -464,15 +437,21 @@ def test_a_closed_form_is_not_judged_by_what_underflows_on_its_way(bench):
 
 
 def test_probes_cover_the_ranges(bench):
-    """Each parameter, both ends of steps and tolerances, every contact."""
-    names = [f"{p.family}: {p.name}" for p in worker.probes(bench.facts, quick=False)]
-    for wanted in ("communication step: 1e-09 natural", "communication step: 1e+06 natural"):
-        assert any(n.startswith(wanted) for n in names)
-    assert {"tolerance: 1e-1", "tolerance: 1e-14"} <= set(names)
-    assert "rollback: across the departure from surface" in names
+    """Each parameter, steps and tolerances from short to long, every contact; what is within a factor of ten
+    of the model's own values is known."""
+    found = {f"{p.family}: {p.name}": p for p in probes(bench.facts, quick=False)}
+    assert len(found) == len(probes(bench.facts, quick=False))
+    for wanted in ("communication step: 1e-09", "communication step: 1000"):
+        assert f"{wanted} natural times" in found
+    assert {"tolerance: 1e-2", "tolerance: 1e-12"} <= set(found)
+    assert "rollback: across the departure from surface" in found
     for p in "mga":
-        assert sum(n.startswith(f"parameters: {p} = ") for n in names) >= 8
-    assert len(names) == len(set(names))
+        assert sum(n.startswith(f"parameters: {p} = ") for n in found) >= 8
+    assert found["parameters: m = 10"].near
+    assert not found["parameters: m = 1000"].near
+    assert not found["parameters: m = 1e-06"].near
+    assert not found["starts: der(theta) = 1000"].near
+    assert found["starts: at rest"].near
 
 
 def test_what_balances_is_no_difference_of_runs(tmp_path):
@@ -502,4 +481,4 @@ def test_rates_that_an_fmu_estimates_are_read_by_the_judge(tmp_path):
     assert CliRunner().invoke(app, arguments).exit_code == 0
     data = json.loads((tmp_path / "native" / "Cam.json").read_text())
     assert data["verdicts"][WRONG] == 0
-    assert data["verdicts"][RIGHT] > 10
+    assert data["verdicts"][RIGHT] > 5

@@ -1,4 +1,4 @@
-"""`lagfmu stress` across calls: what is right passes, and an FMU that is slightly wrong is found.
+"""What goes on from one call to the next: what is right passes, and an FMU that is slightly wrong is found.
 
 The FMU is right; between it and the probe stands an importer that alters one answer.
 """
@@ -12,17 +12,21 @@ from typing import Any
 
 import fmpy
 import pytest
+import stress_calls as calls
+import stress_derivatives as derivatives
+import stress_unique as unique
+from stress_geometry import lay_geometry
 
 from lagfmu.fmu.compiler import find_compiler
-from lagfmu.study.stress import calls, derivatives, exchange, unique
+from lagfmu.study.stress import exchange
 from lagfmu.study.stress.bench import Bench
-from lagfmu.study.stress.geometry import lay_geometry
 from lagfmu.study.stress.lagrange import lay_beside
 from lagfmu.study.stress.player import Player
-from lagfmu.study.stress.probe import RIGHT, WRONG, Verdict, attempt, verdict
+from lagfmu.study.stress.probe import RIGHT, WRONG, Probe, Verdict, attempt, verdict
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
-FAMILIES = (calls, derivatives, exchange, unique)
+FAMILIES = (calls, derivatives, unique)
+EXCHANGE = Probe("model exchange", "the default experiment", exchange.compared, False)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +43,7 @@ def bench(native_fmu, prepared, tmp_path_factory) -> Iterator[Bench]:
 def rows(bench: Bench) -> dict[str, Verdict]:
     """Every row of the families, by the probe's name."""
     found = [p for family in FAMILIES for p in family.probes(bench.facts, bench.quick)]
-    return {p.name: verdict(p, attempt(p, bench), 0.0) for p in found}
+    return {p.name: verdict(p, attempt(p, bench), 0.0) for p in [*found, EXCHANGE]}
 
 
 def test_what_is_right_passes(bench):
@@ -128,8 +132,7 @@ def test_an_error_of_the_importers_integrator_is_none_of_the_fmus(bench, monkeyp
         return found
 
     monkeypatch.setattr(fmpy, "simulate_fmu", by_tolerance)
-    (probe,) = exchange.probes(bench.facts, bench.quick)
-    row = verdict(probe, attempt(probe, bench), 0.0)
+    row = verdict(EXCHANGE, attempt(EXCHANGE, bench), 0.0)
     assert row.verdict == RIGHT
     assert "the importer's integrator at 1e-11" in row.detail
 

@@ -1,4 +1,4 @@
-"""`lagfmu stress` at contacts that are struck together: what is right passes, a wrong law is found."""
+"""Contacts that are struck together: what is right passes, a wrong law is found (stress_impacts.py)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import stress_impacts as impacts
 from impact_models import corner, cradle, rod, table, wedge
+from stress_geometry import geometry_of, lay_geometry, twin
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -19,9 +21,7 @@ from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.write import write
 from lagfmu.model.model import Model
 from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress import impacts
 from lagfmu.study.stress.bench import Bench
-from lagfmu.study.stress.geometry import geometry_of, lay_geometry, twin
 from lagfmu.study.stress.probe import RIGHT, WRONG, Verdict, attempt, verdict
 
 pytestmark = [

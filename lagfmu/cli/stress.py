@@ -12,7 +12,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,15 +22,12 @@ from rich.markup import escape
 from ..errors import BuildError, TemporaryFolderError, UsageError
 from ..fmu.write import write, write_whole
 from ..model.file import ModelFile
-from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..study.stress.facts import facts_of
-from ..study.stress.geometry import lay_geometry, twin
 from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import NO_ROOM, UNFINISHED, WRONG, Verdict
-from ..study.stress.report import MEANING, Stressed, data, report, summary, table
-from ..study.stress.summary import as_summary
+from ..study.stress.report import MEANING, Stressed, as_markdown, data, report, summary, table
 from ..verification.pipeline import Report, text_of
 from .commands.stress import LIMIT
 from .tradeoff import progress
@@ -77,7 +73,7 @@ def _file(found: Sequence[Stressed], out: Path, console: Console) -> None:
     """OUT/TARGET.md: one summary over all FMUs of a target."""
     for target in dict.fromkeys(f.target for f in found):
         path = out / f"{target}.md"
-        write_whole(path, as_summary([f for f in found if f.target == target]).encode())
+        write_whole(path, as_markdown([f for f in found if f.target == target]).encode())
         console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
 
 
@@ -87,18 +83,7 @@ def build(file: ModelFile, scene: Scene, folder: Path, target: str, console: Con
         prepared = prepare(file.model, scene)
         fmu = write(prepared, folder, file.closed_forms, target=target)
         lay_beside(fmu, prepared)
-        if prepared.system.m:
-            lay_geometry(fmu, prepared)
-        if len(prepared.system.contacts) > 1:
-            _turned(file.model, scene, fmu, target)
         return fmu
-
-
-def _turned(model: Model, scene: Scene, fmu: Path, target: str) -> None:
-    """The same with its constraints declared in the opposite order, where the judge looks for it."""
-    other = replace(model, constraints=tuple(reversed(model.constraints)))
-    path = write(prepare(other, scene), fmu.parent / "reversed", (), target=target)
-    path.replace(twin(fmu))
 
 
 def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> Stressed:
@@ -109,7 +94,7 @@ def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> S
     console.print(table(one))
     stem = out / one.target / one.name
     write_whole(stem.with_suffix(".json"), text_of(data(one)).encode())
-    write_whole(stem.with_suffix(".md"), as_summary([one], every_probe=True).encode())
+    write_whole(stem.with_suffix(".md"), as_markdown([one]).encode())
     console.print(f"[green]wrote[/] {escape(str(stem))}.json, .md", soft_wrap=True)
     return one
 

@@ -139,9 +139,13 @@ def judged(
 def laws(closed_forms: tuple[CarriedForm, ...]) -> tuple[JudgedForm, ...]:
     """Lagrange's equations (lagrange.py), compiled: instantaneous even where time stands in them.
 
-    One value that has to vanish is rounding of the run, not of itself.
+    One value that has to vanish, or that projection makes vanish, is rounding of the run, not of itself.
     """
-    alone = [c.expected == 0 and sp.sympify(c.actual).is_Symbol for c in closed_forms]
+    alone = [
+        names.read(c.name).quantity == names.RESIDUAL
+        or (c.expected == 0 and sp.sympify(c.actual).is_Symbol)
+        for c in closed_forms
+    ]
     return tuple(
         _judged(c, True, not a, set(), sp.S.Zero) for c, a in zip(closed_forms, alone, strict=True)
     )

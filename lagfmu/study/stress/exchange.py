@@ -15,36 +15,27 @@ import fmpy
 
 from ...fmu.session import RefusalError
 from .bench import Bench, Finding
-from .facts import Facts
 from .judge import Check
-from .parameters import departures
 from .player import Run, table
-from .probe import Probe
+from .runs import departures
 
-FAMILY = "model exchange"
 TOLERANCES, REACHED = (1e-9, 1e-11), 1e-7
 POINTS = 40
 
 
-def probes(facts: Facts, quick: bool) -> list[Probe]:
-    """One, where the FMU has both interfaces; a prescribed motion needs an importer that moves it."""
-    if facts.description.modelExchange is None or facts.motions:
-        return []
-    return [Probe(FAMILY, "the default experiment", _default, False)]
-
-
-def _default(bench: Bench) -> Finding:
+def compared(bench: Bench) -> Finding:
+    """The default experiment by an importer's integrator and by the FMU's own."""
     facts = bench.facts
     right = bench.run({}, bench.times(facts.stop_time, POINTS))
     if right.refusal is not None:
         raise right.refusal
-    finding = _compared(bench, right, TOLERANCES[0])
+    finding = _at(bench, right, TOLERANCES[0])
     if any(check.ratio > 1 for check in finding.checks):
-        finding = _compared(bench, right, TOLERANCES[1])
+        finding = _at(bench, right, TOLERANCES[1])
     return finding
 
 
-def _compared(bench: Bench, right: Run, tolerance: float) -> Finding:
+def _at(bench: Bench, right: Run, tolerance: float) -> Finding:
     facts = bench.facts
     found = _exchanged(bench, tolerance)
     rows = table(facts, len(found))

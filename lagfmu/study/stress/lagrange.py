@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import sympy as sp
+from sympy.core.relational import Relational
 
 from ... import names
 from ...fmu.closed_forms import pack_closed_forms
@@ -34,13 +35,13 @@ from ...prepare.prepare import Prepared
 from ...verification.verify import closed_forms_in
 from .closed_forms import magnitude
 from .facts import ROUNDED, beside
-from .underflow import underflow
 
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
 SLOW = 1e-9  # of its terms: a slip velocity that has no direction yet
 NOTHING = 2.0**-52  # of the forces on others: a force that is none, however light what it acts on
 LEAST = sp.Float(math.ulp(0.0))  # of a lambda: what is smaller is 0 to a double
+ON = 1e-12  # of the terms of a jump's surface: a motion that stands on it
 GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps
 
 
@@ -63,16 +64,26 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
             if k != q and masses[k] != 0
             for least in (NOTHING if model.coordinates[q] == model.coordinates[k] else 0,)
         ]
-        scale = sp.Add(terms[q], *others)
-        forms.append(_form(f"Lagrange's equation of {name_of(q)}", inertia, force, scale, None))
+        name, scale = f"Lagrange's equation of {name_of(q)}", sp.Add(terms[q], *others)
+        forms.append(replace(_form(name, inertia, force, scale, None), when=_beside_jumps(model)))
     forms += _of_constraints(model, _alone(masses, terms))
     forms += _of_shares(model, variables)
     for law in model.frictions:
         forms += _of_friction(model, law)
     for o in model.outputs:
-        least = _lost(o.expression)
-        forms.append(ClosedForm(o.name, o.expression, scale=least, rounding=ROUNDING))
+        forms.append(ClosedForm(o.name, o.expression, rounding=ROUNDING))
     return [form for form in forms if _names(form) <= variables]
+
+
+def _beside_jumps(model: Model) -> Expr | None:
+    """1 where no force jumps, else 0: on a surface, as far as it is known, either side is right."""
+    forces = [sp.sympify(e) for e in model.forces.values()]
+    surfaces = {n.args[0] for e in forces for n in e.atoms(sp.sign, sp.Heaviside)}
+    surfaces |= {r.lhs - r.rhs for e in forces for r in e.atoms(Relational)}
+    surfaces |= {sp.sin(sp.pi * n.args[0]) for e in forces for n in e.atoms(sp.floor)}
+    known = [in_variables(h) for h in surfaces]
+    beside = [sp.Heaviside(sp.Abs(h) - ON * magnitude(h), 0) for h in known]
+    return sp.Mul(*beside) if beside else None
 
 
 def roundings(model: Model, variables: frozenset[str], used: frozenset[str]) -> list[ClosedForm]:
@@ -161,7 +172,7 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
             margin,
             static * N - force,
             output(margin),
-            scale=force + static * N + _lost(static * N - force),
+            scale=force + static * N,
             rounding=ROUNDING,
         )
     )
@@ -170,7 +181,7 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
             power,
             work,
             output(power),
-            scale=(1 - sticks) * force * speed + _lost(work),
+            scale=(1 - sticks) * force * speed,
             rounding=ROUNDING,
         )
     )
@@ -187,11 +198,6 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
             )
         )
     return forms
-
-
-def _lost(e: Expr) -> Expr:
-    """The size beside which ROUNDING is what underflow may make of an expression that an FMU evaluates."""
-    return underflow(in_variables(sp.sympify(e))) / ROUNDING
 
 
 def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:

@@ -16,17 +16,20 @@ CONSISTENT = "consistent"  # right at each instant; nothing could be said of the
 
 @dataclass(frozen=True)
 class Probe:
-    """`may_refuse`: false for what an FMU has to be able to do, where a refusal is wrong too."""
+    """`may_refuse`: false for what an FMU has to be able to do, where a refusal is wrong too; `near`: its
+    values are within a factor of ten of the model's own."""
 
     family: str
     name: str
     do: Callable[[Bench], Finding]
     may_refuse: bool = True
+    near: bool = False
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict on a probe; `closest`: the check that came nearest to its limit, `ratio` of it."""
+    """The verdict on a probe; `closest`: the check that came nearest to its limit, `ratio` of it; `near` as
+    in Probe."""
 
     family: str
     probe: str
@@ -36,6 +39,12 @@ class Verdict:
     ratio: float
     checks: int
     seconds: float
+    near: bool = False
+
+    @property
+    def worry(self) -> bool:
+        """A refusal that concerns the user: of values such as the model's own."""
+        return self.verdict == REFUSED and self.near
 
 
 def verdict(probe: Probe, finding: Finding, seconds: float) -> Verdict:
@@ -56,16 +65,16 @@ def verdict(probe: Probe, finding: Finding, seconds: float) -> Verdict:
         answer, detail = WRONG, "nothing could be checked"
     elif all(c.instant for c in finding.checks):
         answer = CONSISTENT
-    if worst is not None and not worst.ratio <= 1:
-        failed = [c for c in finding.checks if not c.ratio <= 1]
+    failed = [c for c in finding.checks if not c.ratio <= 1]
+    if failed:
         answer = WRONG
-        detail = "; ".join(
-            f"{c.what}: {c.error:.2e}, allowed {c.allowed:.2e}" for c in failed[:4]
-        ) + (f"; and {len(failed) - 4} more" if len(failed) > 4 else "")
-        if finding.refusal is not None:
-            detail += f" (then refused: {finding.refusal})"
+        told = [f"{c.what}: {c.error:.2e}, allowed {c.allowed:.2e}" for c in failed[:4]]
+        told += [f"and {len(failed) - 4} more"] if len(failed) > 4 else []
+        told += [f"then refused: {finding.refusal}"] if finding.refusal is not None else []
+        detail = "; ".join(told)
     return Verdict(
-        probe.family, probe.name, answer, detail, closest, ratio, len(finding.checks), seconds
+        *(probe.family, probe.name, answer, detail, closest, ratio, len(finding.checks), seconds),
+        near=probe.near,
     )
 
 

@@ -1,4 +1,4 @@
-"""A stress run for the terminal, and with every row for a pipeline; as Markdown: summary.py."""
+"""A stress run for the terminal, as Markdown for a reviewer, and with every row for a pipeline."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import platform
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from importlib import metadata
 from typing import Any
 
 from rich.markup import escape
@@ -15,21 +16,18 @@ from ...page.table import new_table
 from ...verification.pipeline import Case, Report
 from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Verdict
 
-FORMAT = 1
+FORMAT = 2
 VERDICTS = (RIGHT, CONSISTENT, REFUSED, WRONG, UNFINISHED)
-COLOURS = {
-    RIGHT: "green",
-    CONSISTENT: "green",
-    REFUSED: "cyan",
-    WRONG: "bold red",
-    UNFINISHED: "yellow",
-}
+COLOURS = dict(zip(VERDICTS, ("green", "green", "cyan", "bold red", "yellow"), strict=True))
+PACKAGES = ("lagfmu", "sympy", "numpy", "scipy", "fmpy", "pythonfmu")
+WORRY, NO_WORRY = "look at it: near the model's own values", "no worry: far from them"
 MEANING = (
     "right: every check held. consistent: so did Lagrange's equations and the constraints at each "
     "instant, but nothing could be said of the course of the motion. refused: discard or error, with a "
     "message that names the cause, and everything before it right. wrong: a check failed, the process "
     "was taken down, or a refusal had no cause. unfinished: still at work at the time limit; nothing is "
-    "known. Ratio: the error of the check that came nearest to its limit, over that limit."
+    "known. near: refusals of values within a factor of ten of the model's own, which a user should look "
+    "at. Ratio: the error of the check that came nearest to its limit, over that limit."
 )
 WITHOUT = (
     "An FMU without its model file: judged by the closed forms and invariants that it carries, not by "
@@ -50,14 +48,14 @@ class Stressed:
     laws: bool
     rows: tuple[Verdict, ...]
 
-    def count(self, verdict: str, family: str | None = None) -> int:
-        """Rows with that verdict."""
-        return sum(r.verdict == verdict and family in (None, r.family) for r in self.rows)
+    def counts(self) -> list[int]:
+        """Probes, rows of each verdict, refusals near the model's own values, checks."""
+        found = [sum(r.verdict == v for r in self.rows) for v in VERDICTS]
+        near = sum(r.worry for r in self.rows)
+        return [len(self.rows), *found, near, sum(r.checks for r in self.rows)]
 
-    @property
-    def families(self) -> list[str]:
-        """In order of appearance."""
-        return list(dict.fromkeys(r.family for r in self.rows))
+
+HEADS = ("probes", *VERDICTS, "near", "checks")
 
 
 def table(found: Stressed) -> Table:
@@ -79,7 +77,7 @@ def table(found: Stressed) -> Table:
             escape(row.probe),
             f"[{COLOURS[row.verdict]}]{row.verdict}[/]",
             str(row.checks),
-            ratio_of(row),
+            _ratio(row),
             escape(remark(row)),
         )
     return drawn
@@ -87,24 +85,80 @@ def table(found: Stressed) -> Table:
 
 def summary(all_found: Sequence[Stressed]) -> Table:
     """One line an FMU."""
-    columns = ("FMU", "target", "probes", *VERDICTS, "checks")
-    drawn = new_table("", *columns, words=("FMU", "target"))
+    drawn = new_table("", "FMU", "target", *HEADS, words=("FMU", "target"))
     for f in all_found:
-        counts = [f"[{COLOURS[v]}]{f.count(v)}[/]" if f.count(v) else "0" for v in VERDICTS]
-        checks = str(sum(r.checks for r in f.rows))
-        drawn.add_row(escape(f.name), f.target, str(len(f.rows)), *counts, checks)
+        drawn.add_row(escape(f.name), f.target, *map(str, f.counts()))
     return drawn
 
 
-def ratio_of(row: Verdict) -> str:
+def _ratio(row: Verdict) -> str:
     """Of the check that came nearest to its limit."""
     return f"{row.ratio:.1e}" if row.ratio else ""
 
 
 def remark(row: Verdict) -> str:
-    """What came nearest to its limit, or the reason."""
+    """What came nearest to its limit, or the reason; of a refusal, whether to worry."""
     nearest = row.closest if row.verdict == RIGHT and row.ratio else ""
-    return "; ".join(t for t in (nearest, row.detail) if t)
+    advice = "" if row.verdict != REFUSED else WORRY if row.near else NO_WORRY
+    return "; ".join(t for t in (advice, nearest, row.detail) if t)
+
+
+def as_markdown(found: Sequence[Stressed]) -> str:
+    """Versions, counts by FMU, whatever is not right, and of one FMU every row."""
+    names = f"{len(found)} FMUs" if len(found) > 1 else found[0].name
+    lines = [
+        f"# Stress of {names} ({found[0].target})",
+        "",
+        *_circumstances(found),
+        "",
+        MEANING,
+        "",
+    ]
+    lines += [cells("FMU", *HEADS, "SHA-256"), cells("---", *["---:"] * len(HEADS), "---")]
+    width = 16 if len(found) > 1 else 64
+    lines += [cells(f.name, *f.counts(), f"`{f.digest[:width]}`") for f in found]
+    for what in (WRONG, UNFINISHED, CONSISTENT):
+        rows = [(f.name, r) for f in found for r in f.rows if r.verdict == what]
+        lines += _listed(what.capitalize(), rows)
+    worries = [(f.name, r) for f in found for r in f.rows if r.worry]
+    lines += _listed("Refused within a factor of ten of the model's own values", worries)
+    if len(found) == 1:
+        heads = ("family", "probe", "verdict", "checks", "ratio", "nearest to its limit, or reason")
+        lines += ["", "## Every probe", "", cells(*heads), cells(*["---"] * len(heads))]
+        lines += [
+            cells(r.family, r.probe, r.verdict, r.checks, _ratio(r), remark(r))
+            for r in found[0].rows
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def cells(*contents: object) -> str:
+    """A row of a table."""
+    return "| " + " | ".join(str(c).replace("|", "\\|") for c in contents) + " |"
+
+
+def _listed(title: str, rows: Sequence[tuple[str, Verdict]]) -> list[str]:
+    lines = ["", f"## {title}: {len(rows) or 'none'}", ""]
+    return lines + [f"- {name}, {r.family}, {r.probe}: {r.detail}" for name, r in rows]
+
+
+def _circumstances(found: Sequence[Stressed]) -> list[str]:
+    versions = ", ".join(f"{p} {_version(p)}" for p in PACKAGES)
+    machine = f"{platform.system()} {platform.machine()}, Python {sys.version.split()[0]}"
+    limits = ", ".join(f"{x:g} s" for x in sorted({f.limit for f in found}))
+    lines = [f"{versions}; {machine}. At most {limits} for each probe."]
+    if any(f.quick for f in found):
+        lines.append("A quick run: some of the probes only.")
+    if without := [f.name for f in found if not f.laws]:
+        lines.append(f"{', '.join(without)}: {WITHOUT}")
+    return lines
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
 
 
 def report(file: str, found: Stressed) -> Report:
@@ -128,11 +182,6 @@ def data(found: Stressed) -> dict[str, Any]:
         "quick": found.quick,
         "limit": found.limit,
         "lagrange": found.laws,
-        "machine": {
-            "system": platform.system(),
-            "processor": platform.machine(),
-            "python": sys.version.split()[0],
-        },
-        "verdicts": {v: found.count(v) for v in VERDICTS},
+        "verdicts": dict(zip(HEADS, found.counts(), strict=True)),
         "rows": [asdict(r) for r in found.rows],
     }

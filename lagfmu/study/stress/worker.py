@@ -16,39 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import TemporaryFolderError
-from . import (
-    calls,
-    derivatives,
-    exchange,
-    impacts,
-    inputs,
-    parameters,
-    starts,
-    states,
-    stepping,
-    unique,
-)
 from .bench import Bench
-from .facts import Facts
-from .probe import NO_ROOM, Probe, attempt, verdict
-
-FAMILIES = (
-    parameters,
-    starts,
-    impacts,
-    stepping,
-    inputs,
-    calls,
-    derivatives,
-    unique,
-    states,
-    exchange,
-)
-
-
-def probes(facts: Facts, quick: bool) -> list[Probe]:
-    """All of them, in the order of the report."""
-    return [p for family in FAMILIES for p in family.probes(facts, quick)]
+from .probe import NO_ROOM, attempt, verdict
+from .probes import probes
 
 
 def main(fmu: str, results: str, first: str, quick: str) -> None:

@@ -20,16 +20,16 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from ... import names
-from ...fmu.session import RefusalError
-from ...verification.evaluate import function
-from ...verification.verify import applies
-from .bench import Bench, Finding
-from .closed_forms import JudgedForm, magnitude
-from .facts import Facts
-from .judge import Check
-from .player import table
-from .probe import Probe
+from lagfmu import names
+from lagfmu.fmu.session import RefusalError
+from lagfmu.study.stress.bench import Bench, Finding
+from lagfmu.study.stress.closed_forms import JudgedForm, magnitude
+from lagfmu.study.stress.facts import Facts
+from lagfmu.study.stress.judge import Check
+from lagfmu.study.stress.player import table
+from lagfmu.study.stress.probe import Probe
+from lagfmu.verification.evaluate import function
+from lagfmu.verification.verify import applies
 
 FAMILY = "derivatives"
 WITHIN = 1e-11

@@ -11,15 +11,15 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ... import names
-from ...fmu.closed_forms import pack_closed_forms, unpack_closed_forms
-from ...model.closed_form import TIME, ClosedForm
-from ...model.elements import Expr
-from ...model.model import Contact, Model, Nonholonomic, name_of
-from ...model.reactions import reactions_in
-from ...names import read
-from ...prepare.prepare import Prepared
-from ...verification.evaluate import function
+from lagfmu import names
+from lagfmu.fmu.closed_forms import pack_closed_forms, unpack_closed_forms
+from lagfmu.model.closed_form import TIME, ClosedForm
+from lagfmu.model.elements import Expr
+from lagfmu.model.model import Contact, Model, Nonholonomic, name_of
+from lagfmu.model.reactions import reactions_in
+from lagfmu.names import read
+from lagfmu.prepare.prepare import Prepared
+from lagfmu.verification.evaluate import function
 
 Column = NDArray[np.float64]
 Matrix = NDArray[np.float64]

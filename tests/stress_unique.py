@@ -9,13 +9,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from stress_geometry import Collision, Geometry, geometry_of
 
-from ...names import UNIQUE, name
-from .bench import Bench, Finding
-from .facts import Facts
-from .geometry import Collision, Geometry, geometry_of
-from .judge import Check, acts
-from .probe import Probe
+from lagfmu.names import UNIQUE, name
+from lagfmu.study.stress.bench import Bench, Finding
+from lagfmu.study.stress.facts import Facts
+from lagfmu.study.stress.judge import Check, acts
+from lagfmu.study.stress.probe import Probe
 
 FAMILY = "unique"
 ZERO, SURE = 1e-12, 1e-5  # singular values in between say nothing

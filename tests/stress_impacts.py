@@ -27,14 +27,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+from stress_geometry import Collision, Geometry, geometry_of, twin
 
-from ... import names
-from .bench import Bench, Finding
-from .facts import Facts
-from .geometry import Collision, Geometry, geometry_of, twin
-from .judge import Check
-from .player import Player
-from .probe import Probe
+from lagfmu import names
+from lagfmu.study.stress.bench import Bench, Finding
+from lagfmu.study.stress.facts import Facts
+from lagfmu.study.stress.judge import Check
+from lagfmu.study.stress.player import Player
+from lagfmu.study.stress.probe import Probe
 
 FAMILY = "impacts"
 ABOVE, JUST_ABOVE = 1e-6, 1e-12  # height of the start, relative to the gaps' own sizes

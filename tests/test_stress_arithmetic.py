@@ -1,0 +1,173 @@
+"""lagfmu's own arithmetic at the ends of the doubles, in any units, through forged bytes and many instances;
+what a user's model does at its own values is for `lagfmu stress`."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import pytest
+
+from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.session import RefusalError
+from lagfmu.study.stress.bench import Bench, Finding
+from lagfmu.study.stress.judge import Check, differ
+from lagfmu.study.stress.lagrange import lay_beside
+from lagfmu.study.stress.player import Player, Run, clear, play
+from lagfmu.study.stress.probe import REFUSED, RIGHT, WRONG, Probe, attempt, verdict
+from lagfmu.study.stress.runs import departures, started
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+NAMES = ("Hemisphere", "PendulumCartesian", "KnifeEdge", "CartPendulum", "Bowling")
+ENDS = (5e-324, 1e-300, 1e300)
+UNITS = ("kg", "m", "s")
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def bench(request, native_fmu, prepared, tmp_path_factory) -> Iterator[Bench]:
+    """A native FMU with Lagrange's equations of its model beside it."""
+    path = tmp_path_factory.mktemp("lawful") / f"{request.param}.fmu"
+    shutil.copy(native_fmu(request.param), path)
+    lay_beside(path, prepared(request.param))
+    with Bench(path, quick=True) as one:
+        yield one
+
+
+def told(bench: Bench, do: Callable[[Bench], Finding], may_refuse: bool = True) -> str:
+    """The verdict; of a wrong one the reason."""
+    found = verdict(Probe("", "", do, may_refuse), attempt(Probe("", "", do), bench), 0.0)
+    return f"{found.verdict}: {found.detail}" if found.verdict == WRONG else found.verdict
+
+
+@pytest.mark.thorough
+def test_no_parameter_or_start_is_too_small_or_too_large(bench):
+    """5e-324, 1e-300 and 1e300: the laws hold, or it is refused with the reason."""
+    settable = [*bench.facts.parameters, *bench.facts.starts]
+    for s in settable:
+        for value in ENDS if s in bench.facts.parameters else ENDS[2:]:
+            if s in bench.facts.starts or s.allows(value):
+                found = told(bench, partial(started, {s.name: value}))
+                assert not found.startswith(WRONG), f"{s.name} = {value}: {found}"
+
+
+def refused(ask: Callable[[Player], Any], bench: Bench) -> Finding:
+    """It must be refused, and what goes on is as if it had not been asked."""
+    h, refusal = bench.facts.step_size, None
+    with bench.another("asked") as one, bench.another("not asked") as two:
+        for each in (one, two):
+            each.begin({}, None)
+            each.step(h)
+        two.step(h)
+        try:
+            ask(one)
+        except RefusalError as error:
+            refusal = error
+        checks = [Check("refused", 0.0 if refusal else 1.0, 0.5)]
+        if refusal is not None:
+            one.step(h)
+            checks.append(differ(two.read(), one.read(), "as if it had not been asked:"))
+    return Finding(tuple(checks), refusal)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_what_is_no_number_is_refused_and_forgotten(bench, value):
+    """An input, a communication step: the FMU says so, and steps on as if it had not been asked."""
+    names = [i.name for i in bench.facts.inputs]
+    assert told(bench, partial(refused, lambda one: one.call("doStep", one.time, value))) == REFUSED
+    for name in names:
+        assert told(bench, partial(refused, lambda one, n=name: one.give({n: value}))) == REFUSED
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("power", [-60, -10, 10, 60])
+def test_other_units_give_the_same_motion(bench, power):
+    """In units of mass, length or time scaled by 2^power, and in all three at once, everything is the same
+    number times the scale of its unit: no threshold has a dimension."""
+    for axis in (0, 1, 2, None):
+        if abs(power) == 10 or axis is not None:
+            must = abs(power) == 10
+            found = told(bench, partial(scaled, axis, power), not must)
+            assert found in ((RIGHT,) if must else (RIGHT, REFUSED)), f"{axis}: {found}"
+
+
+def scaled(axis: int | None, power: int, bench: Bench) -> Finding:
+    """The default experiment in other units, and back."""
+    facts = bench.facts
+
+    def factor(name: str) -> float:
+        exponents = facts.dimensions[name]
+        if axis is None:  # kg, m and s at once, by different powers
+            return float(2.0 ** (power * (exponents[0] + 2 * exponents[1] - exponents[2])))
+        return float(2.0 ** (power * exponents[axis]))
+
+    base = bench.ordinary
+    settable = (*facts.parameters, *facts.starts, *facts.inputs)
+    values = {s.name: s.start * factor(s.name) for s in settable}
+    run = bench.run(values, [t * factor("time") for t in base.rows["time"].tolist()])
+    checks = bench.checks(run, facts.stop_time * factor("time"))
+    rows = run.rows.copy()
+    for name in set(rows.dtype.names or ()) & set(facts.dimensions):
+        rows[name] = rows[name] / factor(name)
+    back = Run(rows, base.values, run.tolerance, run.refusal)
+    growth = bench.amplification
+    checks += bench.agreement(base, back, growth, "same in the old units", facts.stop_time)
+    checks += departures(bench, base, back, float(growth[-1]))
+    return Finding(tuple(checks), run.refusal)
+
+
+@pytest.mark.parametrize("what", ["cut", "altered", "foreign"])
+def test_bytes_that_are_no_state_are_refused(bench, what):
+    """When they are read or when they are set, with the reason, and nothing changes."""
+    with bench.another("corrupted") as one:
+        one.begin({}, None)
+        one.step(bench.facts.step_size)
+        before = one.read()
+        state = one.save()
+        data = bytearray(one.call("serializeFMUstate", state))
+        one.call("freeFMUstate", state)
+        if what == "cut":
+            data = data[: len(data) // 2]
+        elif what == "altered":
+            data[len(data) * 2 // 3] ^= 0x55
+        else:
+            data = bytearray(b"\x01" * len(data))
+        with pytest.raises(RefusalError) as refusal:
+            one.restore(one.call("deSerializeFMUstate", bytes(data)), one.time)
+        assert clear(refusal.value)
+        assert differ(before, one.read(), "").ratio == 0
+
+
+def test_a_reset_instance_is_as_new(bench):
+    """The same bits as at first, after another run with other parameters."""
+    times = bench.times(bench.facts.stop_time, 10)
+    other = {p.name: p.start * 1.1 for p in bench.facts.parameters if p.allows(p.start * 1.1)}
+    with bench.another("fresh") as one:
+        first = play(one, {}, times)
+        play(one, other, times[:6])
+        assert play(one, {}, times).rows.tobytes() == first.rows.tobytes()
+
+
+def test_twenty_instances_do_not_meet(bench):
+    """Each with parameters of its own, stepped in turns: each as if it were alone."""
+    facts, some = bench.facts, []
+    times = bench.times(facts.stop_time, 6)
+    values = [
+        {p.name: p.start * x for p in facts.parameters if p.allows(p.start * x)}
+        for x in (1 + 0.01 * k for k in range(20))
+    ]
+    alone = [bench.run(v, times) for v in values]
+    try:
+        for k, v in enumerate(values):
+            some.append(Player(facts, bench.folder, f"instance {k}"))
+            some[k].begin(v, None)
+        for j, t in enumerate(times):
+            for k, one in enumerate(some):
+                if j:
+                    one.step(t - one.time)
+                row = alone[k].rows[j]
+                assert not [n for n, value in one.read().items() if value != row[n]]
+    finally:
+        for one in some:
+            one.close()
