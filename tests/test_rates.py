@@ -221,7 +221,7 @@ def test_the_input_is_the_motion_alone(estimating):
 def test_estimated_rates_are_of_second_order(estimating, native_fmu, rates):
     """The error of the tension, of l'' extrapolated over a step, falls with h^2, once there are four
     points; also by Hermite's polynomial where the importer gives derivatives."""
-    fine = lifted_with_all(native_fmu("Crane"), 1 / 400)
+    fine = lifted_with_all(native_fmu("Crane"), 1 / 400)[1][:, 0]
     errors = []
     for h in (0.1, 0.05, 0.025):
         run = lifted(estimating("native"), h, rates=rates)
@@ -234,19 +234,42 @@ def test_estimated_rates_are_of_second_order(estimating, native_fmu, rates):
     assert (orders > 1.8).all(), (errors, orders)
 
 
-def lifted_with_all(path, h: float) -> np.ndarray:
-    """The tension at the end of each step, with l, l', l'' as they are there."""
+def lifted_with_all(path, h: float, beyond: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """The tension and x at the end of each step, as read there, and then with l, l', l'' of that time; `beyond`:
+    derivatives of l'' that are given."""
+    names = ("rope.tension", "x")
     with instance(path) as one:
         start = {"x": 0.0, "y": -7.8125, "der(x)": 0.0, "der(y)": 0.0, "F": 500.0, "der(l)": 0.0}
         one.start(start)
-        found = []
+        vr = [one.variables["der(l,2)"].valueReference]
+        left, right = [], []
         for k in range(round(4.0 / h) + 1):
+            further = 2 * W**3 * np.sin(W * k * h), 2 * W**4 * np.cos(W * k * h)
             for name, value in zip(("l", "der(l)", "der(l,2)"), motion(k * h), strict=True):
                 one.set(name, value)
+            for order in range(1, beyond + 1):
+                one.fmu.setRealInputDerivatives(vr, [order], [further[order - 1]])
             if k:
-                found.append(one.get("rope.tension"))
+                right.append([one.get(n) for n in names])
             one.step(h)
-    return np.array(found)
+            left.append([one.get(n) for n in names])
+    return np.array(left[:-1]), np.array(right)
+
+
+@pytest.mark.parametrize("beyond", [0, 1, 2])
+def test_each_derivative_of_a_motion_gains_an_order(native_fmu, beyond):
+    """Held over a step h, l'' gives the force at its end to O(h), the motion to O(h^2); each of its derivatives
+    gains an order; the force that is read after a setting is as good as the motion."""
+    fine = lifted_with_all(native_fmu("Crane"), 1 / 400, 2)
+    errors = []
+    for h in (0.2, 0.1, 0.05):
+        for found, exact in zip(lifted_with_all(native_fmu("Crane"), h, beyond), fine, strict=True):
+            at = exact[round(400 * h) - 1 :: round(400 * h)]
+            errors.append(np.abs(found - at).max(0) / np.abs(at).max(0))
+    force, place = np.array(errors[::2]).T
+    assert np.log2(force[:-1] / force[1:]) == pytest.approx(beyond + 1, abs=0.15)
+    assert np.log2(place[:-1] / place[1:]) == pytest.approx(beyond + 2, abs=0.15)
+    assert (np.array(errors[1::2])[:, 0] < 10 * place + 1e-9).all()
 
 
 def test_both_targets_estimate_the_same(estimating):

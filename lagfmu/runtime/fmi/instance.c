@@ -271,13 +271,16 @@ void instance_set(Instance *x, const Variable *v, double value) {
 void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value) {
     unfollow(x);
     Drive *drive = &x->solver.drive;
-    const int k = v->index, place = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
-    if (place >= 0) { /* its derivatives are inputs themselves */
-        if (place + order <= 2) {
-            set_input(x, k + order, value);
-            if (!x->running) x->started = x->observed = 0;
-        }
+    int k = v->index;
+    const int place = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
+    if (place >= 0 && place + order <= 2) { /* that derivative is an input itself */
+        set_input(x, k + order, value);
+        if (!x->running) x->started = x->observed = 0;
         return;
+    }
+    if (place >= 0) { /* der(u,2) goes on by those beyond it */
+        k += 2 - place;
+        order -= 2 - place;
     }
     renew_input(x, k);
     double *where = order == 1 ? &drive->first[k] : &drive->second[k];

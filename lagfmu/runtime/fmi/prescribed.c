@@ -33,7 +33,7 @@ static int order(const Instance *x, int k) {
 
 static double rate(const Instance *x, int k, int place) {
     const int last = is_estimated(x->solver.system, k - place) ? 3 : 2;
-    return place < last ? x->solver.drive.value[k + 1] : 0;
+    return place < last ? x->solver.drive.value[k + 1] : x->solver.drive.first[k];
 }
 
 static const char *input_name(int k) {

@@ -2,8 +2,8 @@
  *
  *   u_k(e) = value_k + e (first_k + e second_k / 2) ,   e = t - since
  *
- * A prescribed motion stands in u as (u, der(u), der(u,2)) and goes on by these (Taylor's rule), so
- * that the three stay derivatives of each other. */
+ * A prescribed motion stands in u as (u, der(u), der(u,2)) and goes on by these and the derivatives of the last
+ * one (Taylor's rule), so that the three stay derivatives of each other. */
 #include "state.h"
 
 #include <string.h>
@@ -17,9 +17,9 @@ void drive_at(const System *s, const Drive *drive, double t, double *u) {
         u[k] = value[k] + e * (drive->first[k] + e * drive->second[k] / 2);
     for (int i = 0; i < s->prescribed_count; i++) {
         int k = s->prescribed[i];
-        u[k] = value[k] + e * (value[k + 1] + e * value[k + 2] / 2);
-        u[k + 1] = value[k + 1] + e * value[k + 2];
-        u[k + 2] = value[k + 2];
+        const double third = drive->first[k + 2], fourth = drive->second[k + 2];
+        u[k] = value[k] + e * (value[k + 1] + e / 2 * (value[k + 2] + e / 3 * (third + e * fourth / 4)));
+        u[k + 1] = value[k + 1] + e * (value[k + 2] + e / 2 * (third + e * fourth / 3));
     }
     for (int i = 0; i < s->estimated_count; i++) {
         const int k = s->estimated[i];

@@ -23,7 +23,8 @@ typedef struct {
 } Settings;
 
 /* Inputs as polynomials in the time since they were set: u_k(elapsed) = value + elapsed * first +
- * elapsed^2 / 2 * second.  A prescribed motion (u, der(u), der(u,2)) goes on by its derivatives. */
+ * elapsed^2 / 2 * second.  A prescribed motion (u, der(u), der(u,2)) goes on by its derivatives: first and second
+ * are 0 but of der(u,2). */
 typedef struct {
     double since;                     /* [s] when they were set */
     double *value, *first, *second;   /* (inputs) */
