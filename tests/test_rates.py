@@ -235,7 +235,7 @@ def test_estimated_rates_are_of_second_order(estimating, native_fmu, rates):
 
 
 def lifted_with_all(path, h: float, beyond: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """The tension and x at the end of each step, as read there, and then with l, l', l'' of that time; `beyond`:
+    """The tension and x at the end of each step, then with l, l', l'' of that time; `beyond`:
     derivatives of l'' that are given."""
     names = ("rope.tension", "x")
     with instance(path) as one:
@@ -258,7 +258,7 @@ def lifted_with_all(path, h: float, beyond: int = 0) -> tuple[np.ndarray, np.nda
 
 @pytest.mark.parametrize("beyond", [0, 1, 2])
 def test_each_derivative_of_a_motion_gains_an_order(native_fmu, beyond):
-    """Held over a step h, l'' gives the force at its end to O(h), the motion to O(h^2); each of its derivatives
+    """Held over a step h, l'' gives the force at its end to O(h), the motion to O(h^2); each derivative of it
     gains an order; the force that is read after a setting is as good as the motion."""
     fine = lifted_with_all(native_fmu("Crane"), 1 / 400, 2)
     errors = []
