@@ -18,6 +18,7 @@ from .model.model import (
     Output,
     Parameter,
 )
+from .model.page import Page
 from .model.picture import Arrow, Disk, Ground, Line, Rod, Spring, Track
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
@@ -44,6 +45,7 @@ __all__ = [
     "Model",
     "Nonholonomic",
     "Output",
+    "Page",
     "Parameter",
     "Result",
     "Rod",

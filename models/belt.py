@@ -17,6 +17,7 @@ from lagfmu import (
     Model,
     Nonholonomic,
     Output,
+    Page,
     Parameter,
     Scene,
     Spring,
@@ -75,6 +76,11 @@ model = Model(
         Arrow("belt", at=(x, z)),
         Arrow("ride", at=(x, z)),
     ],
+    page=Page(
+        sliders=[speed, mu_s, mu_k, k, m],
+        curves=["lambda.ride", x, "slip.ride", "sticks.grip", "margin.grip"],
+        ranges={speed: (0.05, 0.5), mu_s: (0, 1), mu_k: (0, 1), k: (10, 500)},
+    ),
 )
 
 scenes = [Scene("Belt", stop_time=3.0, step_size=0.01)]

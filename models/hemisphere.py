@@ -15,6 +15,7 @@ from lagfmu import (
     Disk,
     Ground,
     Model,
+    Page,
     Parameter,
     Scene,
     Track,
@@ -50,6 +51,11 @@ model = Model(
         Disk((r * sin(theta), r * cos(theta)), trace=True),
         Arrow("surface", at=(r * sin(theta), r * cos(theta))),
     ],
+    page=Page(
+        sliders=[theta, theta.diff(), a, m],
+        curves=["lambda.surface", theta, "energy.kinetic", "energy.potential", "energy.total"],
+        ranges={theta: (0.0, 1.2), theta.diff(): (-4, 4), a: (0.2, 2)},
+    ),
 )
 
 scenes = [Scene("Hemisphere", stop_time=2.0, step_size=0.01)]

@@ -20,6 +20,7 @@ from lagfmu import (
     Line,
     Model,
     Output,
+    Page,
     Parameter,
     Rod,
     Scene,
@@ -91,6 +92,11 @@ model = Model(
         Line(*block(y)),
         Arrow("rod", at=(x, 0), along=(2 * (x - r * cos(phi)), -2 * r * sin(phi))),
     ],
+    page=Page(
+        sliders=[phi.diff(), tau, r, k, c],
+        curves=["rod.thrust", "spring.pull", x, y, "crank.power"],
+        ranges={phi.diff(): (-30, 30), tau: (-5, 5), r: (0.05, 0.25), k: (1e3, 2e6)},
+    ),
 )
 
 scenes = [Scene("SliderCrank", method="radau5", stop_time=1.0, step_size=0.01)]

@@ -25,6 +25,8 @@ UNNAMED = """() => [...document.querySelectorAll("input, select, button, [role=i
     .map((e) => e.outerHTML)"""
 
 
+TICK_ALL = """() => document.querySelectorAll("#chart-choices input")
+    .forEach((box) => box.checked || box.click())"""
 VALUE = """async (name) => {
     document.getElementById("values-box").open = true;
     const rows = [...document.querySelectorAll("#values tr")];
@@ -140,6 +142,7 @@ def test_the_gap_of_a_contact_is_no_residual(opened: Opened) -> None:
     """r - a grows to 0.5 m after the departure: a heading of its own says what it is."""
     page = opened("Hemisphere")
     page.until("lagfmu.runs")
+    page.tab.evaluate(TICK_ALL)
     told = page.tab.locator("#charts figcaption").all_inner_texts()
     assert "Gaps of contacts [m]" in told
     assert not any(t.startswith("Residuals") for t in told)
@@ -261,6 +264,7 @@ def test_what_is_drawn_has_its_headings(opened: Opened) -> None:
     equations; and the library that draws, with its licence."""
     page = opened("Belt")
     page.until("lagfmu.runs")
+    page.tab.evaluate(TICK_ALL)
     told = page.tab.locator("#charts figcaption").all_inner_texts()
     for heading in (
         *(

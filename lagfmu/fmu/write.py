@@ -15,8 +15,9 @@ from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import load
 from ..model.model import Contact, Model
 from ..model.scene import Scene
+from ..page import picture as pictures
+from ..page import preset as presets
 from ..page.documentation import page, with_figures
-from ..page.picture import IN_FMU, as_bytes, picture_of
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import check_given, tell
 from . import native, python
@@ -65,9 +66,10 @@ def write(
     }
     if live:
         extra[LIVE] = live.encode()
-    picture = picture_of(prepared)
-    if picture is not None:
-        extra[IN_FMU] = as_bytes(picture)
+    if (picture := pictures.picture_of(prepared)) is not None:
+        extra[pictures.IN_FMU] = pictures.as_bytes(picture)
+    if (preset := presets.preset_of(prepared)) is not None:
+        extra[presets.IN_FMU] = presets.as_bytes(preset)
     if target == "native":
         content = native.build(prepared, extra, platforms)
     else:

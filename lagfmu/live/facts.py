@@ -15,6 +15,7 @@ from .. import names
 from ..fmu.archive import pack
 from ..fmu.described import experiment_of
 from ..model.units import for_reading
+from ..page.preset import SETTABLE
 
 NUMBERS = ("Real", "Integer", "Boolean")
 GROUPS = {  # by the kind of what a variable is of
@@ -31,12 +32,18 @@ GROUPS = {  # by the kind of what a variable is of
 }
 
 
-def facts(description: bytes, picture: dict[str, Any] | None) -> dict[str, Any]:
+def facts(
+    description: bytes, picture: dict[str, Any] | None, preset: dict[str, Any] | None = None
+) -> dict[str, Any]:
     """The facts as the page's scripts read them (web/api.js); numbers in SI, times in s."""
     archive = io.BytesIO(pack({"modelDescription.xml": description}))  # fmpy reads archives only
     read = fmpy.read_model_description(archive, validate=False)
     experiment = experiment_of(read)
     named = {v.name for v in read.modelVariables}
+    given = preset or {"sliders": [], "curves": [], "ranges": {}}
+    settable = {v.name for v in read.modelVariables if _role(v) in SETTABLE}
+    columns = {v.name for v in read.modelVariables if _is_column(v)}
+    variables = [_variable(v, named) for v in read.modelVariables]
     return {
         "name": read.modelName,
         "description": read.description or "",
@@ -45,8 +52,13 @@ def facts(description: bytes, picture: dict[str, Any] | None) -> dict[str, Any]:
             "stepSize": experiment.step_size,
             "tolerance": experiment.tolerance,
         },
-        "variables": [_variable(v, named) for v in read.modelVariables],
+        "variables": variables,
         "picture": picture,
+        "preset": {
+            "sliders": [n for n in given["sliders"] if n in settable],
+            "curves": [n for n in given["curves"] if n in columns],
+            "ranges": {n: ends for n, ends in given["ranges"].items() if n in settable},
+        },
     }
 
 
@@ -66,11 +78,15 @@ def _variable(v: Any, named: set[str]) -> dict[str, Any]:
         "min": None if v.min is None else float(v.min),
         "max": None if v.max is None else float(v.max),
         "description": v.description or "",
-        "column": v.causality == "output" and v.type in NUMBERS,
+        "column": _is_column(v),
         "discrete": v.variability == "discrete",
         "event": names.read(v.name).quantity in names.COUNTS,
         "counted": count if (count := names.counted(v.name)) in named else "",
     }
+
+
+def _is_column(v: Any) -> bool:
+    return v.causality == "output" and v.type in NUMBERS
 
 
 def _role(v: Any) -> str:

@@ -12,6 +12,7 @@ from ..codegen.c.amalgam import SOURCE
 from ..errors import BuildError
 from ..fmu.native import IDENTITY, sources_of
 from ..fmu.write import PAGE
+from ..page import preset as presets
 from ..page.documentation import mathml
 from ..page.picture import IN_FMU, picture_of, read_picture
 from ..page.typeset import typeset
@@ -29,6 +30,7 @@ class Told:
     description: bytes
     equations: list[Section]
     picture: dict[str, Any] | None
+    preset: dict[str, Any] | None
     sources: Mapping[str, bytes]
 
 
@@ -53,7 +55,7 @@ def playable(target: Prepared | Path) -> Playable:
         )
     # the page's instance is its own: one GUID for all, so that the same equations are the same bytes
     sources = {**told.sources, "identity.h": IDENTITY.format(guid="{page}").encode()}
-    found = facts(told.description, told.picture)
+    found = facts(told.description, told.picture, told.preset)
     return Playable(found, told.equations, compile_module(found["name"], sources))
 
 
@@ -63,7 +65,8 @@ def _told_by_prepared(prepared: Prepared) -> Told:
         (s.title, s.remark, [(e.label, safe_mathml(mathml(e.latex)), e.text) for e in s.equations])
         for s in typeset(prepared.form)
     ]
-    return Told(made.description, sections, picture_of(prepared), made.shipped)
+    preset = presets.preset_of(prepared)
+    return Told(made.description, sections, picture_of(prepared), preset, made.shipped)
 
 
 def _told_by_fmu(path: Path) -> Told:
@@ -77,7 +80,10 @@ def _told_by_fmu(path: Path) -> Told:
             }
             page = archive.read(PAGE) if PAGE in names else b""
             picture = read_picture(archive.read(IN_FMU)) if IN_FMU in names else None
-            return Told(archive.read("modelDescription.xml"), equations_of(page), picture, sources)
+            own = presets.IN_FMU
+            preset = presets.read_preset(archive.read(own)) if own in names else None
+            description = archive.read("modelDescription.xml")
+            return Told(description, equations_of(page), picture, preset, sources)
     except (zipfile.BadZipFile, KeyError, OSError) as error:
         raise BuildError(
             f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"

@@ -17,7 +17,7 @@ def recorded(told: Told, run: Any, given: Mapping[str, Any]) -> Playable:
 
     `given` are the parameters and start values that were set.
     """
-    found = facts(told.description, told.picture)
+    found = facts(told.description, told.picture, told.preset)
     for v in found["variables"]:
         if v["name"] in given and v["type"] != "String":
             v["start"] = float(given[v["name"]])

@@ -17,6 +17,7 @@ from .elements import Contact, Expr, ModelFields, Nonholonomic, is_number, name_
 from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
+from .page import check_page
 from .picture import check_picture
 from .reactions import reaction_units, reactions_in
 from .shapes import unusable_surfaces
@@ -44,6 +45,7 @@ def problems_of(model: ModelFields) -> list[str]:
     problems += unusable_surfaces(model)
     check_outputs(model, problems)
     check_picture(model, problems)
+    check_page(model, problems)
     _check_splines(model, problems)
     units = declared_units(model, problems)
     if not problems:

@@ -13,8 +13,7 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from .. import names
-from .elements import Expr
-from .model import name_of
+from .elements import Expr, name_of
 
 TIME = dynamicsymbols._t
 

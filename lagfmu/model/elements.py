@@ -162,6 +162,7 @@ class ModelFields:
     license: str = ""
     copyright: str = ""
     picture: Sequence[Any] = ()  # of the shapes in picture.py
+    page: Any = None  # the Page of page.py
     display_units: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -10,22 +10,27 @@ const AT_FIRST = [
   "Generalized forces of constraint",
   "Gaps of contacts",
 ];
+const CHOSEN = "Of interest"; // the group of the curves that the model's page names
 const MOST = 12; // curves of one chart
 const HEIGHT = 190;
 const NARROW = 260; // CSS pixels: below, a chart has smaller figures
 const WORDS = { Boolean: "yes or no", Integer: "counts" }; // where a unit would stand
 
-/* [{group, type, unit, places}]: what can be drawn together. */
+/* [{group, type, unit, places}]: what can be drawn together; at first the curves of the model's page. */
 function chartList() {
   const found = [];
-  COLUMNS.forEach((v, k) => {
-    if (v.type === "Real" && v.discrete) return;
-    const { group, type, unit } = v;
+  const add = (k, group) => {
+    const { type, unit } = COLUMNS[k];
     let chart = found.find((c) => c.group === group && c.type === type && c.unit === unit);
     if (!chart) found.push((chart = { group, type, unit, places: [] }));
     chart.places.push(k);
+  };
+  for (const name of FACTS.preset.curves) add(PLACE.get(name), CHOSEN);
+  COLUMNS.forEach((v, k) => {
+    if (v.type !== "Real" || !v.discrete) add(k, v.group);
   });
-  const rank = (c) => (AT_FIRST.indexOf(c.group) + 1 || 99);
+  const order = [CHOSEN, ...AT_FIRST];
+  const rank = (c) => (order.indexOf(c.group) + 1 || 99);
   return found.sort((a, b) => rank(a) - rank(b));
 }
 
@@ -183,7 +188,8 @@ class Charts {
   constructor(box, choices, seek) {
     Object.assign(this, { box, seek });
     this.list = chartList();
-    this.wanted = new Set(this.list.map((c) => c.group).filter((g) => AT_FIRST.includes(g)));
+    const first = FACTS.preset.curves.length ? [CHOSEN] : AT_FIRST;
+    this.wanted = new Set(this.list.map((c) => c.group).filter((g) => first.includes(g)));
     this.drawn = [];
     this.trajectory = null;
     for (const group of new Set(this.list.map((c) => c.group))) {

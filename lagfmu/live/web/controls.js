@@ -14,8 +14,11 @@ function niceStep(width) {
   return Number((factor * power).toPrecision(1));
 }
 
-/* The ends of a slider: the bounds, and where there are none what the value suggests. */
+/* The ends of a slider: those of the model's page, or the bounds, and where there are none what the value
+ * suggests. */
 function rangeOf(v) {
+  const told = FACTS.preset.ranges[v.name];
+  if (told) return { low: told[0], high: told[1], step: niceStep(told[1] - told[0]) };
   const value = Number(v.start);
   const size = Math.abs(value);
   let low = value < 0 ? 3 * value : 0;
@@ -96,8 +99,13 @@ class Dial {
  * start values. */
 function buildDials(box, settings, changed) {
   const dials = [];
-  for (const [role, title, open] of TITLES) {
-    const found = SETTABLE.filter((v) => v.role === role);
+  const first = FACTS.preset.sliders.map((name) => SETTABLE.find((v) => v.name === name));
+  const groups = TITLES.map(([role, title, open]) => [
+    SETTABLE.filter((v) => v.role === role && !first.includes(v)),
+    first.length ? `Other ${title.toLowerCase()}` : title,
+    open && !first.length,
+  ]);
+  for (const [found, title, open] of [[first, "To play with", true], ...groups]) {
     if (!found.length) continue;
     const made = found.map((v) => new Dial(v, settings, changed));
     dials.push(...made);
