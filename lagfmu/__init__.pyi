@@ -17,6 +17,7 @@ from .model.model import (
     Nonholonomic,
     Output,
     Parameter,
+    Peak,
 )
 from .model.page import Page
 from .model.picture import Arrow, Disk, Ground, Line, Rod, Spring, Track
@@ -47,6 +48,7 @@ __all__ = [
     "Output",
     "Page",
     "Parameter",
+    "Peak",
     "Result",
     "Rod",
     "Scene",

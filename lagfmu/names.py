@@ -44,7 +44,10 @@ MAXIMUM_STEP, MAXIMUM_STEPS = "solver.maximum_step", "solver.maximum_steps"
 
 OF_ONE = (MULTIPLIER, UNIQUE, RESIDUAL, CONTACT, STICKS, MARGIN, POWER, SLIP)
 EVENTS = (DEPARTURE, CLOSING, SLIPPING, STICKING)
-NATIVE = (CLOSING, STICKING)  # what native FMUs alone tell
+NATIVE = (CLOSING, STICKING, "peak")  # what native FMUs alone tell
+PEAK = "peak"  # the extremes of another variable: peak.lambda.rod.max
+PEAKS = tuple(f"{PEAK}.{part}" for part in ("max", "min", "max_time", "min_time"))
+RATES = ("", "velocity", "acceleration")  # a structured name has der() around it or not at all
 REACTIONS = (MULTIPLIER, FORCE)
 MODES = (CONTACT, STICKS)
 OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING, STICKING)
@@ -81,6 +84,10 @@ def name(quantity: str, constraint: str = "", coordinate: str = "", order: int =
     if quantity in (VALUE, OWN):
         return derivative(coordinate, order)
     head, _, tail = quantity.partition(".")
+    if head == PEAK:
+        rate = RATE.fullmatch(coordinate)
+        of = f"{RATES[int(rate[2] or 1)]}.{rate[1]}" if rate else coordinate
+        return f"{head}.{of}.{tail}"
     if quantity == ERROR and (rate := RATE.fullmatch(coordinate)) and rate[2] is None:
         coordinate, order = rate[1], 1  # a structured name has der() around it or not at all
     words = (head, constraint, tail, "velocity" if order else "", coordinate)
@@ -106,6 +113,10 @@ def read(text: str) -> Subject:
     if head == ERROR and rest:
         of_velocity = rest[0] == "velocity" and len(rest) == 2
         return Subject(head, "", derivative(rest[1]) if of_velocity else ".".join(rest))
+    if f"{head}.{rest[-1] if rest else ''}" in PEAKS and len(rest) > 1:
+        order = RATES.index(rest[0]) if rest[0] in RATES and len(rest) == 3 else 0
+        of = derivative(rest[1], order) if order else ".".join(rest[:-1])
+        return Subject(f"{head}.{rest[-1]}", "", of)
     if head in EVENTS and len(rest) in (2, 3):
         constraint, last, rate = rest[0], rest[-1], len(rest) - 2
         if last in ("count", "time") or (head == CLOSING and last == "impulse"):
@@ -124,6 +135,12 @@ def read(text: str) -> Subject:
 def bar(of: str) -> str:
     """The error bar of a variable."""
     return name(ERROR, "", of)
+
+
+def measured(text: str) -> str:
+    """The variable whose extreme it is; empty if it is none."""
+    found = read(text)
+    return found.coordinate if found.head == PEAK else ""
 
 
 def barred(text: str) -> str:

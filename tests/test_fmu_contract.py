@@ -142,6 +142,15 @@ def test_names_are_those_of_the_design(name, xml, prepared, target):
         assert bool(shares) == any(q[j] == c for _, j in prepared(name).equations.G.todok())
 
 
+def test_no_name_is_the_beginning_of_another(xml):
+    """Importers make records of names: a variable `a` beside `a.b` would be a number and a record."""
+    found = set(variables(xml))
+    for name in found:
+        parts = name.split(".")
+        groups = {".".join(parts[:k]) for k in range(1, len(parts))}
+        assert not groups & found, name
+
+
 UNITS = {
     ("Hemisphere", "lambda.surface"): {"kg": 1, "m": 1, "s": -2},
     ("Hemisphere", "Q.theta"): {"kg": 1, "m": 2, "s": -2},

@@ -82,11 +82,11 @@ def sources_of(prepared: Prepared) -> Sources:
         )
     everything = runtime_files()
     integrators = held(scene, form)
-    gone = files_left_out(scene, system, integrators)
+    gone = files_left_out(scene, system, integrators, bool(table.measured))
     generated = {
         "model.c": model_source(form, needs_tangents(scene, system)).encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
-        "optional.c": optional_source(scene, system, integrators).encode(),
+        "optional.c": optional_source(scene, system, integrators, bool(table.measured)).encode(),
     }
     gone |= generated.keys()
     runtime = {file: text for file, text in everything.items() if file not in gone}

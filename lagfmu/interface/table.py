@@ -20,6 +20,7 @@ from ..methods import FIXED_STEP, described
 from ..model.elements import Expr
 from ..model.model import Contact, Nonholonomic, name_of
 from ..model.scene import Scene
+from ..model.selection import select
 from ..model.units import (
     ENERGY,
     FORCE,
@@ -234,6 +235,7 @@ class _Builder:
         ]
         if self.scene.error_bars:
             variables += self.error_bars(variables)
+        variables += self.peaks(VariableTable(tuple(variables), (), ()).measurable)
         variables = [dataclasses.replace(v, display=self.displayed(v)) for v in variables]
         n = len(self.state_names) // 2
         q = self.state_names[:n]
@@ -521,6 +523,24 @@ class _Builder:
             if v.of.quantity in BARRED
             or (v.of.quantity == names.VALUE and v.of.order < 2 and v.role in ("output", "start"))
         ]
+
+    def peaks(self, measurable: Sequence[Variable]) -> list[Variable]:
+        """The extremes that the model asks for, of what is there."""
+        known = {v.name: v for v in measurable}
+        chosen = select([peak.of for peak in self.model.peaks], list(known), "", [])
+        return [self._peak(known[name], quantity) for name in chosen for quantity in names.PEAKS]
+
+    def _peak(self, v: Variable, quantity: str) -> Variable:
+        extreme = "largest" if "max" in quantity else "smallest"
+        text = f"{extreme} {v.name} so far, between communication points too"
+        text += " (model exchange: passed by the latest event, as exact as the importer's steps)"
+        made = self.output(Subject(quantity, "", v.name), text, v.unit, (), discrete=True)
+        if quantity.endswith("_time"):
+            text = f"time of {made.name.removesuffix('_time')}"
+            made = dataclasses.replace(made, description=text, unit=SECOND)
+        else:
+            made = dataclasses.replace(made, display=v.display)
+        return dataclasses.replace(made, measured=v, depends_initially=v.depends_initially)
 
     def _closing(self, c: Contact) -> list[Variable]:
         """Its impacts, those that bounce too, and where it closes without one; just before them."""

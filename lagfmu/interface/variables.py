@@ -27,7 +27,7 @@ class Variable:
     communication point, `depends_initially` the inputs and exact start values at the start.  `positive`:
     zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's `start` says
     it; otherwise it is 0 because nobody did.  `display`: the unit in which the model gives it, a multiple of
-    `unit`.
+    `unit`.  `measured`: the variable whose extreme it is.
     """
 
     of: Subject
@@ -49,6 +49,7 @@ class Variable:
     nominal: float | None = None
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
+    measured: Variable | None = None
 
     @cached_property
     def name(self) -> str:
@@ -109,6 +110,17 @@ class VariableTable:
         gone = {v.name for v in self.variables if v.of.head in heads}
         kept = tuple(v for v in self.variables if v.name not in gone and v.bar_of not in gone)
         return replace(self, variables=kept)
+
+    @property
+    def measurable(self) -> tuple[Variable, ...]:
+        """What may have a peak: the continuous outputs."""
+        return tuple(v for v in self.outputs if v.variability == "continuous")
+
+    @cached_property
+    def measured(self) -> dict[str, Variable]:
+        """The variables, by name, whose extremes are among these; they may not be themselves."""
+        found = (v.measured for v in self.variables)
+        return {v.name: v for v in found if v is not None}
 
     def offering(self, methods: Collection[str]) -> VariableTable:
         """The same, where `solver.method` can only be one of these."""

@@ -27,6 +27,7 @@ GROUPS = {  # by the kind of what a variable is of
     names.UNIQUE: "Whether λ is determined",
     **dict.fromkeys((names.CONTACT, names.DEPARTURE, names.CLOSING), "Contacts"),
     names.ERROR: "Error bars",
+    names.PEAK: "Extremes so far",
     names.SOLVER: "Solver",
     names.OWN: "Outputs",
 }

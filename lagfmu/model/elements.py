@@ -127,6 +127,17 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Peak:
+    """The extremes of a quantity over the continuous motion so far, between communication points too.
+
+    `of` is the name of a Real output of the FMU, or a pattern: `lambda.rod`, `Q.*`, `der(x)`, one of the
+    model's own.  A native FMU then tells `peak.NAME.max`, `.min`, and when: `.max_time`, `.min_time` [s].
+    """
+
+    of: str
+
+
+@dataclass(frozen=True)
 class Embedding:
     """Dependent coordinates as functions of independent ones, q = phi(s, t).
 
@@ -156,6 +167,7 @@ class ModelFields:
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)
     frictions: Sequence[Friction] = ()
+    peaks: Sequence[Peak] = ()
     outputs: Sequence[Output] = ()
     author: str = ""
     version: str = ""

@@ -26,6 +26,7 @@ from .elements import (
     Nonholonomic,
     Output,
     Parameter,
+    Peak,
     name_of,
 )
 from .frictions import check_kinds
@@ -83,7 +84,7 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
         ("parameters", model.parameters, (Parameter,)),
         ("inputs", model.inputs, (Input,)),
         ("constraints", model.constraints, (Holonomic, Nonholonomic, Contact, Friction)),
-        ("outputs", model.outputs, (Output,)),
+        ("outputs", model.outputs, (Output, Peak)),
     )
     for field_name, items, types in kinds:
         expected = ", ".join(t.__name__ for t in types)

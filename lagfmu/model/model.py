@@ -27,6 +27,7 @@ from .elements import (
     Nonholonomic,
     Output,
     Parameter,
+    Peak,
     name_of,
 )
 from .frictions import split
@@ -49,6 +50,7 @@ __all__ = [
     "Nonholonomic",
     "Output",
     "Parameter",
+    "Peak",
     "name_of",
 ]
 
@@ -63,8 +65,8 @@ class Model(ModelFields, Displayed):
     numbers in that unit or to expressions of parameters.  A unit may be a multiple of an SI unit (g, mm,
     deg): the model keeps every number in SI, and in `display_units` the unit in which importers show it.
     `descriptions` may explain coordinates.  `outputs` are quantities besides those that every FMU reports,
-    `picture` how it looks.  A `Friction` is written among `constraints` and kept in `frictions`.  `author`,
-    `version`, `license` and `copyright` are told to importers.
+    `picture` how it looks.  A `Friction` is written among `constraints` and kept in `frictions`, a `Peak` among
+    `outputs` and kept in `peaks`.  `author`, `version`, `license` and `copyright` are told to importers.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -82,6 +84,10 @@ class Model(ModelFields, Displayed):
         constraints, frictions = split(self.constraints)
         object.__setattr__(self, "constraints", constraints)
         object.__setattr__(self, "frictions", (*self.frictions, *frictions))
+        peaks = tuple(o for o in self.outputs if isinstance(o, Peak))
+        own = tuple(o for o in self.outputs if not isinstance(o, Peak))
+        object.__setattr__(self, "outputs", own)
+        object.__setattr__(self, "peaks", tuple(dict.fromkeys((*self.peaks, *peaks))))
         for name, value in in_si(self).items():
             object.__setattr__(self, name, value)
         problems = problems_of(self)

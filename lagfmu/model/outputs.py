@@ -10,7 +10,7 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
 from ..names import MULTIPLIER, RESERVED, read
-from .elements import NAME, Contact, Expr, ModelFields, Nonholonomic, name_of
+from .elements import NAME, Contact, Expr, ModelFields, Nonholonomic, Peak, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
 from .units import Unit, check_dimension, parse_unit, plain
 
@@ -20,6 +20,11 @@ HIGHEST = 2  # order of a derivative
 def check_outputs(model: ModelFields, problems: list[str]) -> None:
     """Names that cannot be, symbols that are none of the model's, quotients without a value."""
     _check_names(model, problems)
+    problems += [
+        f"{peak!r}, expected the name of an output of the FMU, as Peak('lambda.rod')"
+        for peak in model.peaks
+        if not isinstance(peak, Peak) or not isinstance(peak.of, str) or not peak.of
+    ]
     for o in model.outputs:
         what = f"output {o.name!r}"
         for expression in (o.expression, 0 if o.otherwise is None else o.otherwise):

@@ -45,6 +45,7 @@ GROUPS = (
     ("Energies", ""),
     ("Outputs of the model", "What they are made of stands among the equations."),
     ("Contacts", ""),
+    ("Extremes", "Of the continuous motion so far, between communication points too."),
     ("Friction", "Sticking, slip velocities, and what is left before a contact slips."),
     ("Solver", "Method, accuracy, and what was done."),
 )
@@ -53,6 +54,7 @@ TITLES = {  # by the kind of what a variable is of
     "energy": "Energies",
     "solver": "Solver",
     names.OWN: "Outputs of the model",
+    names.PEAK: "Extremes",
     names.FORCE: "Generalized forces of constraint",
     **dict.fromkeys((names.CONTACT, names.DEPARTURE, names.CLOSING), "Contacts"),
     **dict.fromkeys(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import reduce
 from ..mechanics.jumps import with_jumps
 from ..model.model import Contact, Model, name_of
-from ..model.scene import Scene
+from ..model.scene import EVERYTHING, Scene
 from ..model.selection import select
 from ..model.stuck import stuck
 from ..solver.system import System
@@ -106,6 +107,8 @@ def prepare(
     scene, form, outputs = _asked(equations, scene, problems, laid)
     if problems:
         raise RequestError(scene.name, problems)
+    _check_peaks(model, scene, (laid.table(Form(derived), scene), laid.table(form, scene)))
+    asked_for, outputs = outputs, _with_measured(outputs)
     if equations is not derived:
         may_open = {c.name for c in equations.constraints if isinstance(c, Contact)}
         every = Form(derived)
@@ -117,9 +120,9 @@ def prepare(
         reduction = form.reduction
         if reduction is not None and equations is not form.equations:
             reduction = reduce(equations)
-        asked_for = tuple(o for o in equations.outputs if o.name in outputs)
-        if asked_for != equations.outputs:
-            equations = replace(equations, outputs=asked_for)
+        own = tuple(o for o in equations.outputs if o.name in outputs)
+        if own != equations.outputs:
+            equations = replace(equations, outputs=own)
         form = replace(form, equations=equations, reduction=reduction)
         coded = replace(form, equations=prune.silent(equations, outputs))
         coded = prune.read_only(coded, outputs)
@@ -162,7 +165,7 @@ def prepare(
         form=form,
         coded=coded,
         whole=whole,
-        table=table.keeping(outputs),
+        table=table.keeping(asked_for),
         text=text,
         system=system,
         structure=structure,
@@ -225,7 +228,7 @@ def _asked(
             ignored: list[str] = []
             least = replace(scene, formulation="minimal")
             outputs = _outputs(laid.table(reduced, least), scene, ignored)
-            if prune.read_only(reduced, outputs) is not reduced and not ignored:
+            if prune.read_only(reduced, _with_measured(outputs)) is not reduced and not ignored:
                 return least, reduced, outputs
     return chosen, form, _outputs(laid.table(form, chosen), scene, problems)
 
@@ -245,6 +248,21 @@ def _refused_with_friction(eom: EquationsOfMotion, scene: Scene) -> list[str]:
             "sliding: leave `derivatives` out"
         )
     return problems
+
+
+def _with_measured(outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """With the quantities whose extremes are read, which are computed for that."""
+    measured = [names.measured(name) for name in outputs]
+    return tuple(dict.fromkeys((*outputs, *(name for name in measured if name))))
+
+
+def _check_peaks(model: Model, scene: Scene, tables: Iterable[VariableTable]) -> None:
+    """Each Peak is of a Real output of the FMU that has everything.  Raises ModelError."""
+    known = [v.name for table in tables for v in table.measurable]
+    problems: list[str] = []
+    select([peak.of for peak in model.peaks], known, "Peak: the Real output", problems)
+    if problems and tuple(scene.frictions) == EVERYTHING:
+        raise ModelError(model.name, problems)
 
 
 def _outputs(table: VariableTable, scene: Scene, problems: list[str]) -> tuple[str, ...]:

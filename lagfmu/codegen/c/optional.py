@@ -19,6 +19,7 @@ AT_CONTACTS = {
     "switch_contradicted": "switch.c",
 }
 BESIDE = ("after_step", "at_trial", "at_event", "inside")  # of companion.c
+PEAKS = ("peaks.c", "extreme.c")  # behind PEAKS
 COMPANION = ("bars.c", "companion.c")  # behind ERROR_BARS of variables.c
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
 FRICTION = (  # behind SLIDES
@@ -56,8 +57,10 @@ def held(scene: Scene, form: Form) -> tuple[str, ...]:
     return tuple(m for m in scene.integrators if m != "rattle" or apart)
 
 
-def optional_source(scene: Scene, system: System, found: tuple[str, ...]) -> str:
-    """C text that defines OPTIONAL; `found` are the integrators."""
+def optional_source(
+    scene: Scene, system: System, found: tuple[str, ...], peaks: bool = False
+) -> str:
+    """C text that defines OPTIONAL; `found` are the integrators; `peaks`: extremes are kept."""
     contacts = bool(system.contacts or system.frictions)
     menu = {m: m for m in found}
     if "auto" in scene.selectable:
@@ -72,6 +75,7 @@ def optional_source(scene: Scene, system: System, found: tuple[str, ...]) -> str
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .jumps = &JUMPS,\n"] if system.floors else []
+    rows += ["    .peaks = &PEAKS,\n"] if peaks else []
     rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
     if scene.error_bars:
         rows += [f"    .{part} = companion_{part},\n" for part in BESIDE]
@@ -90,13 +94,17 @@ def needs_tangents(scene: Scene, system: System) -> bool:
     return scene.differentiable or "radau5" in scene.integrators
 
 
-def files_left_out(scene: Scene, system: System, found: tuple[str, ...]) -> frozenset[str]:
-    """The runtime's files that the FMU does without; `found` are its integrators."""
+def files_left_out(
+    scene: Scene, system: System, found: tuple[str, ...], peaks: bool = False
+) -> frozenset[str]:
+    """The runtime's files that the FMU does without; as `optional_source`."""
     gone = {f"{m}.c" for m in INTEGRATORS if m not in found}
     if not system.frictions:
         gone |= {*FRICTION}
     if not scene.error_bars:
         gone |= {*COMPANION}
+    if not peaks:
+        gone |= {*PEAKS}
     if not system.floors:
         gone.add("jumps.c")
     if not system.prescribed:

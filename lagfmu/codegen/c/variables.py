@@ -5,7 +5,8 @@ Position = value reference.  Where a value lies follows from what the variable i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 from ... import names
 from ...interface.variables import Variable, VariableTable
@@ -34,6 +35,8 @@ const Variable VARIABLES[] = {{
 {rows}}};
 
 const int VARIABLE_COUNT = {count};
+const Variable *const PEAKED = {peaked};
+const int PEAK_COUNT = {peaks};
 const char *const MODEL_IDENTIFIER = {identifier};
 const char *const MODEL_GUID = LAGFMU_GUID;
 const double DEFAULT_TOLERANCE = {tolerance};
@@ -54,10 +57,12 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
     states = {str(s): j for j, s in enumerate((*stepped.q, *stepped.v))}
     position = {v.name: k for k, v in enumerate(table.variables)}
     number = {v.name: k for k, v in enumerate(v for v in table.variables if v.bar_of)}
+    peaks = {name: k for k, name in enumerate(table.measured)}
     rows = []
     for v in table.variables:
-        at = ("ERROR", position[v.bar_of], number[v.name]) if v.bar_of else place.of(v)
+        at = ("ERROR", position[v.bar_of], number[v.name]) if v.bar_of else place.of(v, peaks)
         rows.append(f"    {_row(v, at, states)},\n")
+    measured = [f"    {_row(v, place.of(v), states)},\n" for v in table.measured.values()]
     return HEAD.format(
         name=scene.name,
         rows="".join(rows),
@@ -67,6 +72,8 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
         method=scene.method.upper(),
         motions="&MOTIONS" if system.prescribed else "NULL",
         bars=WITH_BARS if scene.error_bars else NO_BARS,
+        peaked=f"(const Variable[]){{\n{''.join(measured)}}}" if measured else "NULL",
+        peaks=len(measured),
     )
 
 
@@ -111,9 +118,11 @@ class Places:
         self.values |= stepped | read if full.dynamics is not None else read | stepped
         self.own = {own.name: ("OUTPUT", k, NONE) for k, own in enumerate(full.outputs)}
 
-    def of(self, v: Variable) -> Place:
-        """Of one variable."""
+    def of(self, v: Variable, peaks: Mapping[str, int] = MappingProxyType({})) -> Place:
+        """Of one variable; `peaks` numbers the quantities whose extremes are kept."""
         of = v.of
+        if v.measured is not None:
+            return of.quantity.replace(".", "_").upper(), peaks[v.measured.name], NONE
         what, c, q, rate = of.quantity, of.constraint, of.coordinate, of.order
         if what in ALONE:
             return ALONE[what], 0, NONE

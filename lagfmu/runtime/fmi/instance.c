@@ -9,6 +9,7 @@
 #include "indicators.h"
 #include "flow.h"
 #include "magnitudes.h"
+#include "optional.h"
 #include "outputs.h"
 #include "prescribed.h"
 #include "thresholds.h"
@@ -20,8 +21,17 @@ static void *after(Arena *arena, char **base, size_t size) {
     return *base;
 }
 
+/* The quantities whose extremes are kept, at a state. */
+static Status measure(Solver *s, const Observed *o, double *values) {
+    for (int k = 0; k < PEAK_COUNT; k++)
+        if (instance_value(s, o, &PEAKED[k], &values[k]) != OK) return FAILED;
+    return OK;
+}
+
 void instance_layout(Instance *x, Arena *arena) {
     const System *system = MODEL_SYSTEM;
+    x->solver.peaks = PEAK_COUNT;
+    x->solver.measure = measure;
     Arena saved = {NULL, 0}, scratch = {NULL, 0};
     for (int pass = 0; pass < 2; pass++) {
         solver_layout(&x->solver, &saved, &scratch, system);
@@ -149,6 +159,10 @@ static int was_set(const Instance *x, const Variable *v, double *value) {
 static int ready(const Solver *s, const Variable *v, double *value) {
     const int embedded = s->system->full != NULL;
     if (is_of_event(v->place)) return ready_of_event(s, v, value);
+    if (v->place >= AT_PEAK_MAX && v->place <= AT_PEAK_MIN_TIME) {
+        *value = s->peak[PEAK_PARTS * v->index + (int)(v->place - AT_PEAK_MAX)];
+        return 1;
+    }
     switch (v->place) {
         case AT_Q:
             if (embedded) return 0;
@@ -386,6 +400,7 @@ Status instance_start(Instance *x) {
         magnitudes_complete(s, flow_instant(s, x->start_time), 1) != OK)
         return FAILED;
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
+    if (s->peaks > 0 && OPTIONAL.peaks->here(s, 1) != OK) return FAILED;
     x->started = 1;
     warn_of_shares(x);
     x->observed = x->evaluated = 0;

@@ -26,7 +26,7 @@ enum { FLAG, COUNT, SIZE, LIMIT, FINITE };
 
 /* How many of them there are; more than ONE stand behind a pointer. */
 enum {
-    ONE, N, TWICE_N, ROWS, CONTACTS, CONTACTS_N, FRICTIONS, FRICTIONS_N, INPUTS, LEVELS, PARAMETERS, WATCHED, DENSE
+    ONE, N, TWICE_N, ROWS, CONTACTS, CONTACTS_N, FRICTIONS, FRICTIONS_N, INPUTS, LEVELS, PARAMETERS, PEAKS_KEPT, WATCHED, DENSE
 };
 
 typedef struct {
@@ -109,6 +109,7 @@ static const Saved OF_SOLVER[] = {
     SOLVER("inputs", drive.first, FINITE, INPUTS),
     SOLVER("inputs", drive.second, FINITE, INPUTS),
     SOLVER("parameters", p, FINITE, PARAMETERS),
+    SOLVER("peaks", peak, FINITE, PEAKS_KEPT),
 };
 
 static const Saved OF_INSTANCE[] = {
@@ -162,6 +163,7 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
                         [INPUTS] = system->inputs,
                         [LEVELS] = system->jumps,
                         [PARAMETERS] = system->parameters,
+                        [PEAKS_KEPT] = peaks_saved(s->peaks),
                         [WATCHED] = indicators_count(system),
                         [DENSE] = now == NULL ? 0 : now->dense_arrays * ny};
     for (const Saved *row = list; row < list + rows; row++) {

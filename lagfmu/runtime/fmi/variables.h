@@ -32,6 +32,7 @@ typedef enum {
     AT_CLOSING_COUNT, AT_CLOSING_TIME, AT_CLOSING_Q, AT_CLOSING_V,
     AT_SLIPPING_COUNT, AT_SLIPPING_TIME, AT_SLIPPING_Q, AT_SLIPPING_V,
     AT_STICKING_COUNT, AT_STICKING_TIME, AT_STICKING_Q, AT_STICKING_V,
+    AT_PEAK_MAX, AT_PEAK_MIN, AT_PEAK_MAX_TIME, AT_PEAK_MIN_TIME, /* number of the quantity */
     AT_LOST,                                 /* energy dissipated */
     AT_ERROR           /* error bar number `contact`, of the variable at position `index` (bars.h) */
 } Place;
@@ -58,6 +59,8 @@ static inline int is_of_event(Place place) { return place >= AT_DEPARTURE_COUNT 
 
 extern const Variable VARIABLES[];
 extern const int VARIABLE_COUNT;
+extern const Variable *const PEAKED; /* (PEAK_COUNT) quantities whose extremes are kept, read or not; or NULL */
+extern const int PEAK_COUNT;
 extern const System *const MODEL_SYSTEM;       /* the system that is stepped */
 extern const char *const MODEL_IDENTIFIER, *const MODEL_GUID;
 extern const double DEFAULT_TOLERANCE;

@@ -89,7 +89,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     double *y1 = s->work_advance;
     if (flow_step(s, i, bound, longest) != OK) return FAILED;
     if (s->alike > 0) OPTIONAL.after_step(s, i);
-    if ((watch || i->t > t_end) && flow_prepare_dense(s, i) != OK) return FAILED;
+    if ((watch || s->peaks > 0 || i->t > t_end) && flow_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (flow_project(s, i->t, y1) != OK) return FAILED;
     if (flow_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
@@ -167,7 +167,7 @@ static Status put_between(Solver *s, double t) {
 
 /* Tables are looked at and work is summed at each communication point. */
 static int waits(const Solver *s) {
-    return s->on_demand && s->system->lookup_count == 0 && s->system->frictions == 0 && runs_ahead(s);
+    return s->on_demand && s->peaks == 0 && s->system->lookup_count == 0 && s->system->frictions == 0 && runs_ahead(s);
 }
 
 Status solver_arrive(Solver *s) {
@@ -214,6 +214,7 @@ static Status arrive(Solver *s, double t_end) {
         return FAILED;
     }
     if (s->system->frictions > 0 && lose(s, t_end) != OK) return FAILED;
+    if (s->peaks > 0 && OPTIONAL.peaks->pass(s, t_end, NULL) != OK) return FAILED;
     now->step = i->h_next;
     if (!runs_ahead(s)) now->ahead = 0;
     return OK;
@@ -228,6 +229,7 @@ static Status meet(Solver *s) {
     if (flow_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     if (s->alike > 0) OPTIONAL.at_event(s);
     put(s, t, y);
+    if (s->peaks > 0 && OPTIONAL.peaks->pass(s, t, y) != OK) return FAILED;
     s->state.now.step = i->t - i->t_old;
     if (s->state.now.choice.implicit) {
         s->state.now.step = fmin(s->state.now.step, s->state.now.choice.longest);
@@ -236,7 +238,9 @@ static Status meet(Solver *s) {
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
     if (s->system->jumps > 0) OPTIONAL.jumps->pass(s, s->state.left + s->system->contacts);
-    return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.switch_modes(s, s->state.left);
+    if (s->system->contacts + s->system->frictions > 0 && OPTIONAL.switch_modes(s, s->state.left) != OK)
+        return FAILED;
+    return s->peaks > 0 ? OPTIONAL.peaks->here(s, 0) : OK;
 }
 
 /* FAILED if the step just taken shows that t_end is too far off for steps of its kind. */
@@ -273,6 +277,7 @@ static Status travel(Solver *s, double t_end, double begun, int first, int *met)
             return meet(s);
         }
         if (s->integrator.t >= t_end) return arrive(s, t_end);
+        if (s->peaks > 0 && OPTIONAL.peaks->pass(s, s->integrator.t, NULL) != OK) return FAILED;
         if (take_step(s, t_end) != OK) return FAILED;
         if (check_headway(s, t_end, begun, first) != OK) return FAILED;
     }

@@ -17,5 +17,6 @@ const Optional OPTIONAL = {
     .switch_released = switch_released,
     .switch_contradicted = switch_contradicted,
     .jumps = &JUMPS,
+    .peaks = &PEAKS,
     .slides = &SLIDES,
 };

@@ -11,6 +11,7 @@
 #include "impact.h"
 #include "jumps.h"
 #include "landing.h"
+#include "peaks.h"
 #include "rattle.h"
 #include "slides.h"
 #include "switch.h"
@@ -41,6 +42,8 @@ typedef struct {
     Status (*switch_contradicted)(Solver *s);
     /* Of forces that jump; NULL where none do. */
     const Jumps *jumps;
+    /* Of quantities whose extremes are kept; NULL where there are none. */
+    const Peaks *peaks;
     /* What constraints that hold by friction need; NULL where there are none. */
     const Slides *slides;
 } Optional;

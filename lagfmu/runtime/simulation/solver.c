@@ -50,6 +50,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.first = arena_doubles(saved, system->inputs);
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
+    s->peak = arena_doubles(saved, peaks_saved(s->peaks));
     integrator_layout(&s->probe, scratch, scratch, 2 * n, OPTIONAL.methods, METHOD_COUNT);
     mechanism_layout(&s->stepped, scratch, system, &s->why,
                      OPTIONAL.slides != NULL ? OPTIONAL.slides->sliding : NULL);
@@ -72,6 +73,10 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_advance = arena_doubles(scratch, 4 * n);
     s->work_events =
         arena_doubles(scratch, indicators == 0 ? 0 : 6 * n + indicators + samples_doubles(indicators));
+    if (s->peaks > 0) {
+        observed_layout(&s->peak_seen, scratch, system);
+        s->work_peaks = arena_doubles(scratch, OPTIONAL.peaks->doubles(s->peaks, n));
+    }
     s->work_clearance = arena_doubles(scratch, clearance_doubles(system));
     const int frictions = system->frictions, some = frictions > 0;
     s->work_rub = arena_take(scratch, some ? OPTIONAL.slides->doubles(system) : 0, sizeof(double));

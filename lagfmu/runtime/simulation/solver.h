@@ -7,7 +7,21 @@
 #include "sensitivity.h"
 #include "state.h"
 
+/* What an importer can read at a state; arrays of the full system (n, m, entries). */
 typedef struct {
+    double *q, *v, *vdot;          /* (n) of the full system */
+    double *lambda, *residual;     /* (m) */
+    int *unique;                   /* (m) */
+    double *force, *share;         /* Q (n); one constraint's part of it (entries) */
+    double energy[2];              /* kinetic, potential */
+    double *own, *other;           /* (output_count) the model's own; where these are not finite */
+    double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
+    double *latest_q[EVENT_KINDS], *latest_v[EVENT_KINDS]; /* of an embedding: state.latest in full coordinates */
+    double *slip, *margin, *power; /* (2 frictions), (frictions), (frictions) */
+    int *sticks;                   /* (frictions) */
+} Observed;
+
+typedef struct Solver {
     const System *system;
     Settings settings;
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
@@ -23,6 +37,9 @@ typedef struct {
     double *scale;             /* (2 n) of errors, in the present step */
     double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
+    int peaks;                 /* how many quantities' extremes are kept (peaks.h); set before the layout */
+    Status (*measure)(struct Solver *s, const Observed *o, double *values); /* (peaks) of them at a state */
+    double *peak;              /* what is kept of them, saved behind the state's arrays */
     double *push;              /* (contacts) impulse of the impacts of the present instant [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
@@ -34,6 +51,8 @@ typedef struct {
     double *work_advance;      /* (4 n) of advance.c */
     double *work_events;       /* (6 n + indicators and all samples) of events.c */
     double *work_clearance;    /* of clearance.c */
+    Observed peak_seen;        /* of peaks.c, with */
+    double *work_peaks;
     double *work_rub;          /* of rubbing.c */
     int *iwork_rub;
     Slide *trial_slides;       /* (frictions) of rest.c, with */
@@ -85,20 +104,6 @@ int solver_pass(Solver *s, double t_end);
 
 /* The inputs were set: what was integrated ahead with the old ones is dropped. */
 void solver_inputs_changed(Solver *s);
-
-/* What an importer can read at a state; arrays of the full system (n, m, entries). */
-typedef struct {
-    double *q, *v, *vdot;          /* (n) of the full system */
-    double *lambda, *residual;     /* (m) */
-    int *unique;                   /* (m) */
-    double *force, *share;         /* Q (n); one constraint's part of it (entries) */
-    double energy[2];              /* kinetic, potential */
-    double *own, *other;           /* (output_count) the model's own; where these are not finite */
-    double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
-    double *latest_q[EVENT_KINDS], *latest_v[EVENT_KINDS]; /* of an embedding: state.latest in full coordinates */
-    double *slip, *margin, *power; /* (2 frictions), (frictions), (frictions) */
-    int *sticks;                   /* (frictions) */
-} Observed;
 
 void observed_layout(Observed *o, Arena *arena, const System *system);
 

@@ -1,0 +1,180 @@
+/* peaks.c -- the extremes of quantities over the motion so far.
+ *
+ * Each step is looked at at PIECES + 1 times, both ends included, where its dense output is projected and
+ * all is evaluated as it would be read there.  A quantity that is largest at one of them has its extreme
+ * between the neighbours; at an end, where the motion may go on otherwise, it has one inside if it grows on
+ * the way in.  Those that could pass the record are found by extreme.c; dense output knows less than a step
+ * does, so that the motion is integrated once more as far as there.  Differences of ROUNDING of the quantity
+ * say nothing. */
+#include "peaks.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "extreme.h"
+#include "flow.h"
+
+enum { PIECES = 8 };
+static const double INWARD = 1e-4;    /* of a piece: the way from an end on which growth is looked for */
+static const double PLACE = 1e-6;     /* of a bracket: how well the place of an extreme is found */
+static const double ROUNDING = 1e-13; /* of a quantity's values */
+
+/* A stretch of the step just taken. */
+typedef struct {
+    Solver *s;
+    int count;                /* of times */
+    const double *end;        /* (2 n) state at the last of them, or NULL */
+    double *t;                /* (PIECES + 1) */
+    double *values, *value;   /* a row of quantities for each time; one row more */
+    double *y;                /* (2 n) */
+    int quantity;             /* whose extreme is sought, ... */
+    double sense, from;       /* ... 1: largest, -1: smallest; [s] from which elapsed time counts */
+} Stretch;
+
+static int doubles(int peaks, int n) { return (PIECES + 2) * (1 + peaks) + 4 * n; }
+
+static double *reached(const Solver *s) { return s->peak + PEAK_PARTS * s->peaks; }
+
+/* Everything that is kept, at the state of now. */
+static Status measure(Solver *s, double *values) {
+    if (solver_observe(s, &s->peak_seen) != OK) return FAILED;
+    return s->measure(s, &s->peak_seen, values);
+}
+
+/* The same at (t, y); the state of now is lost. */
+static Status measure_there(Solver *s, double t, const double *y, double *values) {
+    const size_t n = (size_t)s->system->n;
+    memcpy(s->state.q, y, n * sizeof *y);
+    memcpy(s->state.v, y + n, n * sizeof *y);
+    s->state.now.t = t;
+    return measure(s, values);
+}
+
+/* The same at time t of the stretch. */
+static Status measure_at(Stretch *x, double t, double *values) {
+    Solver *s = x->s;
+    const Integrator *i = &s->integrator;
+    const double *y = t == i->t_old ? i->y_old : t == i->t ? i->y : x->y;
+    if (t == x->t[x->count - 1] && x->end != NULL) y = x->end;
+    if (y == x->y) {
+        i->method->dense(i, t, x->y);
+        if (flow_project(s, t, x->y) != OK) return FAILED;
+    }
+    return measure_there(s, t, y, values);
+}
+
+static Status height(void *context, double elapsed, double *value) {
+    Stretch *x = context;
+    if (measure_at(x, x->from + elapsed, x->value) != OK) return FAILED;
+    *value = x->sense * x->value[x->quantity];
+    return OK;
+}
+
+static double at(const Stretch *x, int j) { return x->sense * x->values[j * x->s->peaks + x->quantity]; }
+
+/* Of extremes that are the same to the tolerance the first one's time stays; one that is on the way up, before
+ * which nothing lies but what has counted since `begin`, goes along. */
+static void keep(Solver *s, int k, double sense, double begin, double t, double height) {
+    double *kept = s->peak + PEAK_PARTS * k;
+    const int way = sense > 0 ? PEAK_MAX : PEAK_MIN, when = sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME;
+    const double more = height - sense * kept[way];
+    if (!(more > 0)) return;
+    if (more > s->settings.tolerance * fabs(kept[way]) || kept[when] >= begin) kept[when] = t;
+    kept[way] = sense * height;
+}
+
+/* Could there be more than the record next to sample j, below which its neighbour i lies? */
+static int may_pass(const Stretch *x, int i, int j) {
+    const double record = x->sense * x->s->peak[PEAK_PARTS * x->quantity + (x->sense > 0 ? PEAK_MAX : PEAK_MIN)];
+    const double fall = at(x, j) - at(x, i);
+    return fall > ROUNDING * fabs(at(x, j)) && at(x, j) + fall > record;
+}
+
+/* The extreme between samples i and k, next to the time `elapsed` after the first, where it is `value`. */
+static Status polish(Stretch *x, int i, int k, double elapsed, double value) {
+    Solver *s = x->s;
+    const double span = x->t[k] - x->t[i];
+    x->from = x->t[i];
+    if (extreme_find(height, x, 0, span, PLACE * span, &elapsed, &value) != OK) return FAILED;
+    const double t = x->from + elapsed;
+    if (flow_reach(s, s->integrator.t_old, s->integrator.y_old, t, x->y) != OK) return FAILED;
+    if (measure_there(s, t, x->y, x->value) != OK) return FAILED;
+    keep(s, x->quantity, x->sense, x->t[0], t, x->sense * x->value[x->quantity]);
+    return OK;
+}
+
+/* At an end j, with its neighbour i inside: is there more on the way in? */
+static Status look_inward(Stretch *x, int i, int j) {
+    const int first = i < j ? i : j;
+    const double span = x->t[first + 1] - x->t[first], inward = j < i ? INWARD * span : (1 - INWARD) * span;
+    double value;
+    if (!may_pass(x, i, j)) return OK;
+    x->from = x->t[first];
+    if (height(x, inward, &value) != OK) return FAILED;
+    return value > at(x, j) ? polish(x, first, first + 1, inward, value) : OK;
+}
+
+static Status look(Stretch *x) {
+    const int last = x->count - 1;
+    keep(x->s, x->quantity, x->sense, x->t[0], x->t[0], at(x, 0));
+    keep(x->s, x->quantity, x->sense, x->t[0], x->t[last], at(x, last));
+    if (look_inward(x, 1, 0) != OK || look_inward(x, last - 1, last) != OK) return FAILED;
+    for (int j = 1; j < last; j++) {
+        if (at(x, j) < at(x, j - 1) || at(x, j) < at(x, j + 1)) continue;
+        if (!may_pass(x, at(x, j - 1) < at(x, j + 1) ? j - 1 : j + 1, j)) continue;
+        if (polish(x, j - 1, j + 1, x->t[j] - x->t[j - 1], at(x, j)) != OK) return FAILED;
+    }
+    return OK;
+}
+
+static Status look_at_all(Stretch *x, double t) {
+    Solver *s = x->s;
+    const double begin = *reached(s), step = s->integrator.t - s->integrator.t_old;
+    const int pieces = (int)fmin(fmax(ceil(PIECES * (t - begin) / step), 2), PIECES);
+    x->count = pieces + 1;
+    for (int j = 0; j <= pieces; j++) x->t[j] = j == pieces ? t : begin + (t - begin) * j / pieces;
+    for (int j = 0; j <= pieces; j++)
+        if (measure_at(x, x->t[j], x->values + j * s->peaks) != OK) return FAILED;
+    for (x->quantity = 0; x->quantity < s->peaks; x->quantity++)
+        for (x->sense = 1; x->sense >= -1; x->sense -= 2)
+            if (look(x) != OK) return FAILED;
+    *reached(s) = t;
+    return OK;
+}
+
+static Status pass(Solver *s, double t, const double *end) {
+    const size_t n = (size_t)s->system->n, bytes = n * sizeof(double);
+    const double now = s->state.now.t;
+    if (!(t > *reached(s))) return OK;
+    Stretch x = {.s = s, .end = end, .t = s->work_peaks};
+    x.values = x.t + PIECES + 1;
+    x.value = x.values + (PIECES + 1) * s->peaks;
+    x.y = x.value + s->peaks;
+    double *held = x.y + 2 * n;
+    memcpy(held, s->state.q, bytes);
+    memcpy(held + n, s->state.v, bytes);
+    const Status status = look_at_all(&x, t);
+    memcpy(s->state.q, held, bytes);
+    memcpy(s->state.v, held + n, bytes);
+    s->state.now.t = now;
+    return status;
+}
+
+static Status here(Solver *s, int first) {
+    const double t = s->state.now.t;
+    double *values = s->work_peaks;
+    if (measure(s, values) != OK) return FAILED;
+    for (int k = 0; k < s->peaks; k++) {
+        double *kept = s->peak + PEAK_PARTS * k;
+        if (first) {
+            kept[PEAK_MAX] = kept[PEAK_MIN] = values[k];
+            kept[PEAK_MAX_TIME] = kept[PEAK_MIN_TIME] = t;
+        }
+        keep(s, k, 1, t, t, values[k]);
+        keep(s, k, -1, t, t, -values[k]);
+    }
+    *reached(s) = t;
+    return OK;
+}
+
+const Peaks PEAKS = {doubles, here, pass};
