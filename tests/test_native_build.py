@@ -24,7 +24,7 @@ from typer.testing import CliRunner
 
 from lagfmu import Contact
 from lagfmu.cli.app import app
-from lagfmu.errors import BuildError, LagfmuError
+from lagfmu.errors import BuildError, LagfmuError, UsageError
 from lagfmu.fmu import compiler
 from lagfmu.fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
 from lagfmu.fmu.write import write
@@ -367,7 +367,7 @@ def test_platforms_are_chosen_by_name():
     assert [p.folder for p in chosen(["all"])] == list(NAMES)
     assert chosen(["host"]) == (host(),)
     assert [p.folder for p in chosen(["win64", "linux64"])] == ["linux64", "win64"]
-    with pytest.raises(BuildError, match=r"'beos' is unknown.*aarch64-linux"):
+    with pytest.raises(UsageError, match=r"'beos' is unknown.*aarch64-linux"):
         chosen(["beos"])
 
 
@@ -410,7 +410,7 @@ def test_the_compilers_first_error_is_told():
 
 def test_an_unknown_target_is_refused(prepared, tmp_path):
     """The known ones are named."""
-    with pytest.raises(BuildError, match="'fortran' is unknown, expected one of python, native"):
+    with pytest.raises(UsageError, match="'fortran' is unknown, expected one of python, native"):
         write(prepared("PendulumAngle"), tmp_path, target="fortran")
 
 
@@ -448,6 +448,25 @@ def test_rattle_is_refused_at_the_build_where_it_cannot_step(prepared, tmp_path)
     with pytest.raises(BuildError, match="native"):
         write(prepare(made.model, replace(made.scene, method="rattle")), tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_an_object_of_the_cache_that_is_not_whole_is_made_anew(tmp_path, monkeypatch):
+    """Half of it, nothing, or a bit that is another: the library has the same bytes as before, and so has
+    the object then."""
+    monkeypatch.setenv("LAGFMU_CACHE", str(tmp_path))
+    runtime = {"one.c": b"int one(void) { return 1; }\n"}
+
+    def library() -> bytes:
+        (made,) = compile_libraries("One", {}, runtime, (host(),)).values()
+        return made
+
+    expected = library()
+    (place,) = tmp_path.glob("one-*")
+    whole = place.read_bytes()
+    for spoilt in (whole[: len(whole) // 2], b"", whole[:-1] + bytes([whole[-1] ^ 1])):
+        place.write_bytes(spoilt)
+        assert library() == expected
+        assert place.read_bytes() == whole
 
 
 def test_an_empty_cache_folder_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

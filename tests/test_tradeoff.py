@@ -18,7 +18,7 @@ from scipy.special import ellipj, ellipk
 from test_cli import SMALL, lagfmu
 
 from lagfmu import Scene, simulate
-from lagfmu.errors import BuildError, SimulationError
+from lagfmu.errors import BuildError, SimulationError, UsageError
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
 from lagfmu.model.goal import Goal, parse
@@ -238,7 +238,7 @@ def test_the_table_fits_80_columns_whole(swing):
 @pytest.mark.parametrize("text", ["tight", "1e-6:", "0", "1e-20", "2"])
 def test_an_accuracy_that_means_nothing_is_refused(text):
     """An accuracy is a relative error between 1e-12 and 0.1, and names after a colon."""
-    with pytest.raises(BuildError, match="expected a relative error"):
+    with pytest.raises(UsageError, match="expected a relative error"):
         parse(text)
 
 

@@ -1,16 +1,28 @@
-"""The archive of an FMU: a zip file whose bytes depend on its contents only; and its files, unpacked."""
+"""The archive of an FMU: a zip file whose bytes depend on its contents only; and its files, read by one door
+that lets no damaged and no hostile archive in."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import io
+import re
 import shutil
+import stat
+import struct
 import tempfile
 import zipfile
-from collections.abc import Mapping
+import zlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from ..errors import TemporaryFolderError
+from ..errors import TemporaryFolderError, VerificationError
+
+LARGEST = 1 << 31  # bytes of all files of an FMU, unpacked
+MOST = 100_000  # files
+SHOWN = 3  # problems in a message
+DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, struct.error)
+OUTSIDE = re.compile(r"[/\\]|.*[:\\]|(.*/)?\.\.(/|\Z)", re.S)  # absolute, of a drive, or above
 
 
 def version() -> str:
@@ -34,17 +46,59 @@ def pack(contents: Mapping[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-def unpack(fmu: Path) -> str:
-    """A temporary folder with the files of an FMU, which the caller removes.  Raises TemporaryFolderError."""
-    import fmpy
+@contextlib.contextmanager
+def opened(fmu: Path) -> Iterator[zipfile.ZipFile]:
+    """An FMU's archive, to be read.
 
+    Raises VerificationError if the file is missing, is no zip archive, holds what an FMU does not (names
+    outside its folder, links, encrypted files, more than unpacked fits on a disk), or turns out to be
+    damaged while it is read.
+    """
+    if not fmu.is_file():
+        raise VerificationError(f"{str(fmu)!r}: there is no such file")
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            if problems := _problems(archive.infolist()):
+                raise VerificationError(f"{str(fmu)!r} is not unpacked: {'; '.join(problems)}")
+            yield archive
+    except (*DAMAGED, OSError) as error:
+        raise VerificationError(
+            f"{str(fmu)!r} is no FMU or damaged, expected a zip archive with modelDescription.xml ({error})"
+        ) from None
+
+
+def _problems(files: list[zipfile.ZipInfo]) -> list[str]:
+    found = []
+    for file in files:
+        if OUTSIDE.match(file.orig_filename) or OUTSIDE.match(file.filename):
+            found.append(f"its file {file.orig_filename!r} would be put outside its folder")
+        elif stat.S_ISLNK(file.external_attr >> 16):
+            found.append(f"its file {file.filename!r} is a link")
+        elif file.flag_bits & 1:
+            found.append(f"its file {file.filename!r} is encrypted")
+    if len(found) > SHOWN:
+        found[SHOWN:] = [f"and {len(found) - SHOWN} more"]
+    if len(files) > MOST:
+        found.append(f"it holds {len(files)} files, expected at most {MOST}")
+    if (size := sum(file.file_size for file in files)) > LARGEST:
+        found.append(f"its files have {size / 1e9:.3g} GB, expected at most {LARGEST / 1e9:.3g} GB")
+    return found
+
+
+def unpack(fmu: Path) -> str:
+    """A temporary folder with the files of an FMU, which the caller removes.
+
+    Raises VerificationError as `opened` does, and TemporaryFolderError.
+    """
     folder = ""
     try:
-        folder = tempfile.mkdtemp(prefix="lagfmu_")
-        fmpy.extract(str(fmu), unzipdir=folder)
-    except BaseException as error:
+        with opened(fmu) as archive:
+            try:
+                folder = tempfile.mkdtemp(prefix="lagfmu_")
+                archive.extractall(folder)
+            except OSError as error:
+                raise TemporaryFolderError(error) from None
+    except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
-        if isinstance(error, OSError):
-            raise TemporaryFolderError(error) from None
         raise
     return folder

@@ -210,10 +210,10 @@ def _library(
             if file.endswith(".h") or file in generated:
                 Path(folder, file).write_bytes(content)
         linked = []
-        for file, made in _objects(compiler, target, runtime).items():
+        for file, content in _objects(compiler, target, runtime).items():
             if file not in left_out and file not in generated:
                 linked.append(f"{file[:-2]}.o")
-                Path(folder, linked[-1]).write_bytes(made.read_bytes())
+                Path(folder, linked[-1]).write_bytes(content)
         for file in sorted(f for f in generated if f.endswith(".c")):
             _compile(compiler, target, file, f"{file[:-2]}.o", folder)
             linked.append(f"{file[:-2]}.o")
@@ -223,12 +223,14 @@ def _library(
         return Path(folder, library).read_bytes()
 
 
-def _objects(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> dict[str, Path]:
-    """C file of the runtime -> its object in the cache, compiled if it is not there yet."""
+def _objects(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> dict[str, bytes]:
+    """C file of the runtime -> its object, from the cache; compiled if it is not there whole."""
     places = _places(compiler, target, runtime)
-    wanted = [file for file, place in places.items() if not place.exists()]
+    found = {file: _cached(place) for file, place in places.items()}
+    objects = {file: content for file, content in found.items() if content is not None}
+    wanted = [file for file in places if file not in objects]
     if not wanted:
-        return places
+        return objects
     _cache().mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".lagfmu_", dir=str(_cache())) as folder:
         for file, content in runtime.items():
@@ -236,9 +238,21 @@ def _objects(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> d
         for file in wanted:
             made = f"{file[:-2]}.o"
             _compile(compiler, target, file, made, folder)
+            objects[file] = content = Path(folder, made).read_bytes()
+            Path(folder, made).write_bytes(hashlib.sha256(content).digest() + content)
             with contextlib.suppress(OSError):  # another process was faster
                 Path(folder, made).replace(places[file])
-    return places
+    return objects
+
+
+def _cached(place: Path) -> bytes | None:
+    """An object of the cache, behind its digest; None if it is not there, or not whole."""
+    try:
+        held = place.read_bytes()
+    except OSError:
+        return None
+    digest, content = held[:32], held[32:]
+    return content if hashlib.sha256(content).digest() == digest else None
 
 
 def _places(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> dict[str, Path]:
@@ -257,7 +271,7 @@ def _places(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> di
     for file in sorted(f for f in runtime if f.endswith(".c")):
         flags = map(str.encode, _flags(compiler, target, file))
         name = take(common.copy(), file.encode(), *flags, runtime[file])
-        places[file] = _cache() / f"{file[:-2]}-{target or 'host'}-{name}.o"
+        places[file] = _cache() / f"{file[:-2]}-{target or 'host'}-{name}.object"
     return places
 
 

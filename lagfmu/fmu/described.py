@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import VerificationError
+from .archive import opened
 
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
@@ -55,7 +55,7 @@ def units_of(variables: Sequence[Any]) -> dict[str, str | None]:
 
 def is_python(fmu: Path) -> bool:
     """True for a python FMU."""
-    with zipfile.ZipFile(fmu) as archive:
+    with opened(fmu) as archive:
         return "resources/slavemodule.txt" in archive.namelist()
 
 
@@ -73,15 +73,13 @@ def items_of(variable: Any) -> dict[str, int]:
 
 
 def read_description(path: Path) -> Any:
-    """fmpy's ModelDescription.  Raises VerificationError if the file is missing or no FMU."""
-    if not path.is_file():
-        raise VerificationError(f"{str(path)!r}: there is no such file")
+    """fmpy's ModelDescription.  Raises VerificationError if the file is missing, damaged or no FMU."""
+    with opened(path) as archive:
+        if "modelDescription.xml" not in archive.namelist():
+            raise VerificationError(f"{str(path)!r} is no FMU: it holds no modelDescription.xml")
+        archive.read("modelDescription.xml")  # whole, which zipfile tells
     try:
         return fmpy.read_model_description(str(path), validate=False)
-    except (zipfile.BadZipFile, KeyError, OSError) as error:
-        raise VerificationError(
-            f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
-        ) from None
     except Exception as error:
         raise VerificationError(
             f"{str(path)!r}: modelDescription.xml cannot be read ({error})"

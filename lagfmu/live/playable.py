@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,8 @@ from typing import Any
 
 from ..codegen.c.amalgam import SOURCE
 from ..errors import BuildError
+from ..fmu.archive import opened
+from ..fmu.described import read_description
 from ..fmu.native import IDENTITY, sources_of
 from ..fmu.write import PAGE
 from ..page import preset as presets
@@ -70,21 +71,17 @@ def _told_by_prepared(prepared: Prepared) -> Told:
 
 
 def _told_by_fmu(path: Path) -> Told:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = archive.namelist()
-            sources = {
-                Path(n).name: archive.read(n)
-                for n in names
-                if n.startswith("sources/") and n.endswith((".c", ".h"))
-            }
-            page = archive.read(PAGE) if PAGE in names else b""
-            picture = read_picture(archive.read(IN_FMU)) if IN_FMU in names else None
-            own = presets.IN_FMU
-            preset = presets.read_preset(archive.read(own)) if own in names else None
-            description = archive.read("modelDescription.xml")
-            return Told(description, equations_of(page), picture, preset, sources)
-    except (zipfile.BadZipFile, KeyError, OSError) as error:
-        raise BuildError(
-            f"{str(path)!r} is no FMU, expected a zip archive with modelDescription.xml ({error})"
-        ) from None
+    read_description(path)  # that it is an FMU
+    with opened(path) as archive:
+        names = archive.namelist()
+        sources = {
+            Path(n).name: archive.read(n)
+            for n in names
+            if n.startswith("sources/") and n.endswith((".c", ".h"))
+        }
+        page = archive.read(PAGE) if PAGE in names else b""
+        picture = read_picture(archive.read(IN_FMU)) if IN_FMU in names else None
+        own = presets.IN_FMU
+        preset = presets.read_preset(archive.read(own)) if own in names else None
+        description = archive.read("modelDescription.xml")
+        return Told(description, equations_of(page), picture, preset, sources)

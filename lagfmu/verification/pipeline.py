@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import LagfmuError, UsageError, UserInterruptError
 
-HOLDS, FAILS, WRONG_USAGE, NOT_RUN, INTERRUPTED = 0, 1, 2, 3, 130
+HOLDS, FAILS, WRONG_USAGE, NOT_RUN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 EXIT_CODES = {  # of every command
     HOLDS: "done; where something was judged, all of it holds",
     FAILS: "a statement fails, or a probe is wrong",
@@ -19,6 +19,7 @@ EXIT_CODES = {  # of every command
     NOT_RUN: "a file cannot be read or written, a model cannot be built, an FMU cannot be run; the others "
     "were",
     INTERRUPTED: "interrupted (Ctrl-C)",
+    TERMINATED: "terminated (SIGTERM)",
 }
 VERDICTS = ("pass", "fail", "wrong usage", "not run")
 

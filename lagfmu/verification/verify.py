@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import SettingError, VerificationError
+from ..fmu.archive import opened
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
 from ..fmu.described import Trajectory, experiment_of, numbers_of, read_description
 from .evaluate import evaluate
@@ -191,11 +192,8 @@ class Compared(Protocol):
 
 def is_ours(path: Path) -> bool:
     """Whether a file carries closed forms of lagfmu."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return RECORD in archive.namelist()
-    except (zipfile.BadZipFile, OSError):
-        return False
+    with opened(path) as archive:
+        return RECORD in archive.namelist()
 
 
 def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
@@ -209,16 +207,13 @@ def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
 def closed_forms_in(path: Path) -> list[CarriedForm]:
     """The closed forms that an FMU carries.  Raises VerificationError if it is none of lagfmu's."""
     variables = {v.name: v for v in read_description(path).modelVariables}
-    try:
-        with zipfile.ZipFile(path) as archive:
-            if RECORD not in archive.namelist():
-                raise VerificationError(
-                    f"{str(path)!r} carries no closed forms ({RECORD} is missing): it was not built "
-                    "by lagfmu, and there is nothing to hold it against: give it a --reference"
-                )
-            closed_forms = unpack_closed_forms(_record(archive), str(path))
-    except (zipfile.BadZipFile, OSError) as error:
-        raise VerificationError(f"{str(path)!r} cannot be read as an FMU ({error})") from None
+    with opened(path) as archive:
+        if RECORD not in archive.namelist():
+            raise VerificationError(
+                f"{str(path)!r} carries no closed forms ({RECORD} is missing): it was not built "
+                "by lagfmu, and there is nothing to hold it against: give it a --reference"
+            )
+        closed_forms = unpack_closed_forms(_record(archive), str(path))
     problems = []
     for closed_form in closed_forms:
         for name in sorted(closed_form.variables):

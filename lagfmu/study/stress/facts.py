@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ import sympy as sp
 
 from ... import names
 from ...errors import VerificationError
+from ...fmu.archive import opened
 from ...fmu.closed_forms import CarriedForm, tables_in, unpack_closed_forms
 from ...fmu.described import experiment_of, file_stem, is_python, read_description
 from ...model.elements import Expr
@@ -114,7 +114,7 @@ def facts_of(path: Path) -> Facts:
             f"{str(path)!r} was not built by lagfmu, or for a scene that leaves out what it would be "
             "judged by: stress the model's full FMU"
         )
-    with zipfile.ZipFile(path) as archive:
+    with opened(path) as archive:
         tables = tables_in(archive.read(RECORD), str(path))
     reals = [v for v in description.modelVariables if v.type == "Real"]
     bases = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...errors import SettingError, SimulationError
-from ...fmu.archive import unpack, version
+from ...fmu.archive import opened, unpack, version
 from ...fmu.described import Trajectory, experiment_of, read_description
 from ...fmu.session import TYPES, Plan, plug
 from ...fmu.write import as_fmu
@@ -184,7 +183,7 @@ def _check_fmu(path: Path, description: Any) -> None:
         raise SimulationError(
             f"{str(path)!r} has no co-simulation: a sweep steps FMUs by fmi2DoStep"
         )
-    with zipfile.ZipFile(path) as archive:
+    with opened(path) as archive:
         folders = [n.split("/")[1] for n in archive.namelist() if n.startswith("binaries/")]
     if fmpy.platform not in folders:
         found = ", ".join(dict.fromkeys(f for f in folders if f)) or "none"
