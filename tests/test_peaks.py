@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import EVERY, MODELS
 from instance import Instance, instance
+from runs import simulate_fmu
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -166,6 +167,44 @@ def test_both_sides_of_an_inputs_jump_count(tmp_path: Path) -> None:
         run(one, 0.2, 0.1)
         top = 5e-4 * np.sqrt((1 - np.cos(1.57)) ** 2 + np.sin(1.57) ** 2)
         assert peaks(one, "x")[0] == pytest.approx(top, rel=1e-6)
+
+
+def test_model_exchange_asks_for_an_event_after_an_extreme(peaked: Peaked) -> None:
+    """An importer's solver passes the bottom: the tension's largest value is told from the event after that
+    step on, as exactly as its steps are; while the tension grows there is no event."""
+    fmu = peaked("PendulumCartesian", Peak("tension"), Peak("der(x)"))
+    names = ["peak.tension.max", "peak.tension.max_time", "peak.velocity.x.min", "tension"]
+    run = simulate_fmu(
+        str(fmu),
+        fmi_type="ModelExchange",
+        stop_time=2.0,
+        output_interval=0.01,
+        relative_tolerance=1e-9,
+        output=names,
+    )
+    most, quarter = G * (3 - 2 * np.cos(1)), 0.53478439992
+    peak, time = run["peak.tension.max"], run["time"]
+    assert peak[-1] == pytest.approx(most, rel=1e-5)
+    assert run["peak.tension.max_time"][-1] == pytest.approx(quarter, abs=1e-3)
+    assert run["peak.velocity.x.min"][-1] == pytest.approx(
+        -np.sqrt(2 * G * (1 - np.cos(1))), rel=1e-5
+    )
+    assert (peak[time < 0.53] == peak[0]).all()
+    assert peak[0] == run["tension"][0]
+
+
+def test_both_sides_of_an_event_count_in_model_exchange(peaked: Peaked) -> None:
+    """The ball is fastest just before its first impact, and rises fastest just after it."""
+    run = simulate_fmu(
+        str(peaked("BouncingBall", Peak("der(y)"), Peak("y"))),
+        fmi_type="ModelExchange",
+        stop_time=1.0,
+        output_interval=0.1,
+        relative_tolerance=1e-9,
+        output=["peak.velocity.y.max", "peak.velocity.y.min", "peak.y.min"],
+    )
+    assert run["peak.velocity.y.max"][-1] == pytest.approx(0.7 * np.sqrt(2 * G), rel=1e-6)
+    assert run["peak.velocity.y.min"][-1] == pytest.approx(-np.sqrt(2 * G), rel=1e-6)
 
 
 def test_a_saved_state_holds_the_peaks(peaked: Peaked) -> None:

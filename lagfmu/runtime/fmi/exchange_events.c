@@ -92,7 +92,8 @@ static int are_close(const Linear *l) {
     return l->rung != RUNG_SCHUR || schur_of(l)->condition > CLOSE;
 }
 
-Status exchange_step_done(Instance *x, int *event) {
+/* Whether contacts, frictions or drift ask for an event. */
+static Status judge(Instance *x, int *event) {
     Solver *s = &x->solver;
     double worst;
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
@@ -110,6 +111,13 @@ Status exchange_step_done(Instance *x, int *event) {
     }
     *event = *event || any || worst > LIMIT;
     return OK;
+}
+
+Status exchange_step_done(Instance *x, int *event) {
+    if (judge(x, event) != OK) return FAILED;
+    if (x->solver.peaks == 0) return OK;
+    x->observed = x->evaluated = 0;
+    return OPTIONAL.peaks->step(&x->solver, event);
 }
 
 /* The levels of forces that jump; `changed`: 1 if one is not what it was. */
@@ -183,10 +191,19 @@ static Status moving(Instance *x, Status (*act)(Instance *)) {
     return OK;
 }
 
-Status exchange_enter_event(Instance *x) { return moving(x, come_back); }
+/* Extremes that are kept know both sides of an event. */
+static Status look(Instance *x) {
+    if (x->solver.peaks == 0) return OK;
+    x->observed = x->evaluated = 0;
+    return OPTIONAL.peaks->here(&x->solver, 0);
+}
+
+Status exchange_enter_event(Instance *x) {
+    return moving(x, come_back) == OK ? look(x) : FAILED;
+}
 
 Status exchange_event(Instance *x, int *moved) {
-    if (moving(x, pass) != OK) return FAILED;
+    if (moving(x, pass) != OK || look(x) != OK) return FAILED;
     *moved = x->moved;
     x->moved = 0;
     return exchange_find_gain(x);

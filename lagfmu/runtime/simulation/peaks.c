@@ -27,6 +27,8 @@ typedef struct {
     double *t;                /* (PIECES + 1) */
     double *values, *value;   /* a row of quantities for each time; one row more */
     double *y;                /* (2 n) */
+    void (*dense)(const Integrator *i, double t, double *y);
+    int exchange, passed;     /* 1: of an importer's step; a record was passed in it */
     int quantity;             /* whose extreme is sought, ... */
     double sense, from;       /* ... 1: largest, -1: smallest; [s] from which elapsed time counts */
 } Stretch;
@@ -57,7 +59,7 @@ static Status measure_at(Stretch *x, double t, double *values) {
     const double *y = t == i->t_old ? i->y_old : t == i->t ? i->y : x->y;
     if (t == x->t[x->count - 1] && x->end != NULL) y = x->end;
     if (y == x->y) {
-        i->method->dense(i, t, x->y);
+        x->dense(i, t, x->y);
         if (flow_project(s, t, x->y) != OK) return FAILED;
     }
     return measure_there(s, t, y, values);
@@ -74,13 +76,22 @@ static double at(const Stretch *x, int j) { return x->sense * x->values[j * x->s
 
 /* Of extremes that are the same to the tolerance the first one's time stays; one that is on the way up, before
  * which nothing lies but what has counted since `begin`, goes along. */
-static void keep(Solver *s, int k, double sense, double begin, double t, double height) {
+static int keep(Solver *s, int k, double sense, double begin, double t, double height) {
     double *kept = s->peak + PEAK_PARTS * k;
     const int way = sense > 0 ? PEAK_MAX : PEAK_MIN, when = sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME;
     const double more = height - sense * kept[way];
-    if (!(more > 0)) return;
+    if (!(more > 0)) return 0;
     if (more > s->settings.tolerance * fabs(kept[way]) || kept[when] >= begin) kept[when] = t;
     kept[way] = sense * height;
+    return 1;
+}
+
+/* The same of the stretch; while an importer integrates it changes by events alone, which tolerance asks for. */
+static void find(Stretch *x, double t, double height) {
+    Solver *s = x->s;
+    const double record = s->peak[PEAK_PARTS * x->quantity + (x->sense > 0 ? PEAK_MAX : PEAK_MIN)];
+    if (x->exchange && !(height - x->sense * record > s->settings.tolerance * fabs(record))) return;
+    x->passed |= keep(s, x->quantity, x->sense, x->t[0], t, height);
 }
 
 /* Could there be more than the record next to sample j, below which its neighbour i lies? */
@@ -97,9 +108,13 @@ static Status polish(Stretch *x, int i, int k, double elapsed, double value) {
     x->from = x->t[i];
     if (extreme_find(height, x, 0, span, PLACE * span, &elapsed, &value) != OK) return FAILED;
     const double t = x->from + elapsed;
+    if (x->exchange) {
+        find(x, t, value);
+        return OK;
+    }
     if (flow_reach(s, s->integrator.t_old, s->integrator.y_old, t, x->y) != OK) return FAILED;
     if (measure_there(s, t, x->y, x->value) != OK) return FAILED;
-    keep(s, x->quantity, x->sense, x->t[0], t, x->sense * x->value[x->quantity]);
+    find(x, t, x->sense * x->value[x->quantity]);
     return OK;
 }
 
@@ -111,13 +126,17 @@ static Status look_inward(Stretch *x, int i, int j) {
     if (!may_pass(x, i, j)) return OK;
     x->from = x->t[first];
     if (height(x, inward, &value) != OK) return FAILED;
-    return value > at(x, j) ? polish(x, first, first + 1, inward, value) : OK;
+    if (value > at(x, j)) return polish(x, first, first + 1, inward, value);
+    if (j == 0) find(x, x->t[0], at(x, 0)); /* from an importer's step to the next it is passed */
+    return OK;
 }
 
 static Status look(Stretch *x) {
     const int last = x->count - 1;
-    keep(x->s, x->quantity, x->sense, x->t[0], x->t[0], at(x, 0));
-    keep(x->s, x->quantity, x->sense, x->t[0], x->t[last], at(x, last));
+    if (!x->exchange) {
+        find(x, x->t[0], at(x, 0));
+        find(x, x->t[last], at(x, last));
+    }
     if (look_inward(x, 1, 0) != OK || look_inward(x, last - 1, last) != OK) return FAILED;
     for (int j = 1; j < last; j++) {
         if (at(x, j) < at(x, j - 1) || at(x, j) < at(x, j + 1)) continue;
@@ -142,22 +161,65 @@ static Status look_at_all(Stretch *x, double t) {
     return OK;
 }
 
-static Status pass(Solver *s, double t, const double *end) {
+/* The same with memory, and with the state of now put back. */
+static Status look_at(Stretch *x, double t) {
+    Solver *s = x->s;
     const size_t n = (size_t)s->system->n, bytes = n * sizeof(double);
     const double now = s->state.now.t;
-    if (!(t > *reached(s))) return OK;
-    Stretch x = {.s = s, .end = end, .t = s->work_peaks};
-    x.values = x.t + PIECES + 1;
-    x.value = x.values + (PIECES + 1) * s->peaks;
-    x.y = x.value + s->peaks;
-    double *held = x.y + 2 * n;
+    x->t = s->work_peaks;
+    x->values = x->t + PIECES + 1;
+    x->value = x->values + (PIECES + 1) * s->peaks;
+    x->y = x->value + s->peaks;
+    double *held = x->y + 2 * n;
     memcpy(held, s->state.q, bytes);
     memcpy(held + n, s->state.v, bytes);
-    const Status status = look_at_all(&x, t);
+    const Status status = look_at_all(x, t);
     memcpy(s->state.q, held, bytes);
     memcpy(s->state.v, held + n, bytes);
     s->state.now.t = now;
     return status;
+}
+
+static Status pass(Solver *s, double t, const double *end) {
+    Stretch x = {.s = s, .end = end};
+    if (!(t > *reached(s))) return OK;
+    x.dense = s->integrator.method->dense;
+    return look_at(&x, t);
+}
+
+/* Hermite's cubic between the ends of a step. */
+static void cubic(const Integrator *i, double t, double *y) {
+    const double h = i->t - i->t_old, a = (t - i->t_old) / h, b = 1 - a;
+    for (int j = 0; j < i->ny; j++)
+        y[j] = b * b * ((1 + 2 * a) * i->y_old[j] + a * h * i->f_old[j]) +
+               a * a * ((1 + 2 * b) * i->y[j] - b * h * i->f[j]);
+}
+
+/* Where an importer's next step begins: here, where the motion has just been measured. */
+static void begin_step(Solver *s) {
+    Integrator *i = &s->integrator;
+    const size_t n = (size_t)s->system->n, bytes = n * sizeof(double);
+    memcpy(i->y, s->state.q, bytes);
+    memcpy(i->y + n, s->state.v, bytes);
+    memcpy(i->f, s->state.v, bytes);
+    memcpy(i->f + n, s->stepped.vdot, bytes);
+    i->t = s->state.now.t_integrator = s->state.now.t;
+}
+
+static Status step(Solver *s, int *event) {
+    Integrator *i = &s->integrator;
+    const size_t bytes = (size_t)i->ny * sizeof(double);
+    Stretch x = {.s = s, .dense = cubic, .exchange = 1};
+    const double begin = s->state.now.t_integrator;
+    if (!(s->state.now.t > begin)) return OK;
+    memcpy(i->y_old, i->y, bytes);
+    memcpy(i->f_old, i->f, bytes);
+    i->t_old = s->state.now.t_old = *reached(s) = begin;
+    if (measure(s, s->work_peaks) != OK) return FAILED;
+    begin_step(s);
+    if (look_at(&x, i->t) != OK) return FAILED;
+    *event |= x.passed;
+    return OK;
 }
 
 static Status here(Solver *s, int first) {
@@ -173,8 +235,9 @@ static Status here(Solver *s, int first) {
         keep(s, k, 1, t, t, values[k]);
         keep(s, k, -1, t, t, -values[k]);
     }
-    *reached(s) = t;
+    *reached(s) = s->state.now.t_old = t;
+    begin_step(s);
     return OK;
 }
 
-const Peaks PEAKS = {doubles, here, pass};
+const Peaks PEAKS = {doubles, here, pass, step};

@@ -13,6 +13,9 @@ typedef struct {
     /* The step just taken counts from where it has done so as far as t; y (2 n): the state there, NULL where the
      * integrator says it.  The state of now stays. */
     Status (*pass)(Solver *s, double t, const double *y);
+    /* Model exchange: a step from where this was called last, or `here`, to the state of now.  Only extremes on the
+     * way count; `event` becomes 1 if one passed its record by more than the tolerance. */
+    Status (*step)(Solver *s, int *event);
 } Peaks;
 
 /* What is kept of quantity k, in s->peak. */
