@@ -15,6 +15,10 @@ from typer.testing import CliRunner
 
 from lagfmu.cli import film
 from lagfmu.cli.app import app
+from lagfmu.live import moving
+from lagfmu.live.playable import told_by
+from lagfmu.prepare.prepare import Prepared
+from lagfmu.verification.simulate import simulate
 
 Fmu = Callable[[str], Path]
 
@@ -43,11 +47,53 @@ def test_the_mass_falls_in_the_film(native_fmu: Fmu, tmp_path: Path) -> None:
         lowest = []
         for frame in (0, 20):
             image.seek(frame)
-            bob = places(image, film.BOB)
+            bob = places(image, moving.BOB)
             left = bob[bob[:, 1] < bob[:, 1].mean()]
             lowest.append(left[:, 0].max())
-            assert len(places(image, film.FORCE)) > 0
+            assert len(places(image, moving.FORCE)) > 0
         assert lowest[1] > lowest[0] + 10
+
+
+def test_a_film_is_cut_to_the_motion_and_tells_the_value_of_each_arrow(
+    native_fmu: Fmu, tmp_path: Path
+) -> None:
+    """The particle on the hemisphere: it and the surface take most of the picture; arrow and label are whole
+    in every frame, and below the title; on the curve beside, the dot goes right, and falls with lambda."""
+    out = tmp_path / "hemisphere.gif"
+    assert animate(native_fmu("Hemisphere"), out, "--stop-time", "1.6").exit_code == 0
+    dots = []
+    with Image.open(out) as image:
+        across = image.width - round(100 * film.BESIDE)
+        title = round(100 * film.TITLE)
+        for frame in range(0, image.n_frames, 5):
+            image.seek(frame)
+            panel = image.crop((0, 0, across, image.height))
+            force = places(panel, moving.FORCE)
+            assert force[:, 0].min() > title
+            assert force[:, 1].min() > 2
+            assert force[:, 1].max() < across - 3
+            label = force[:, 1].max() - force[:, 1].min()
+            assert label > 60  # pixels: a name and a value, beside the arrow, which is upright
+            drawn = places(panel, moving.INK)
+            drawn = drawn[drawn[:, 0] > title]
+            assert np.ptp(drawn[:, 1]) > 0.75 * across
+            beside = image.crop((across, 0, image.width, image.height))
+            dots.append(places(beside, moving.FORCE).mean(axis=0))
+    rows, columns = np.array(dots).T
+    assert (np.diff(columns) > 0).all()
+    assert rows[-1] > rows[0] + 60
+
+
+def test_a_film_without_a_title_is_a_thumbnail(
+    prepared: Callable[[str], Prepared], tmp_path: Path
+) -> None:
+    """The mechanism alone, at most 240 pixels wide and high, 4 s long, some kilobytes."""
+    run = simulate(prepared("Atwood"))
+    out = film.film(told_by(prepared("Atwood")), run, {}, tmp_path / "atwood.webp", "")
+    with Image.open(out) as image:
+        assert max(image.size) <= 240
+        assert 2 < image.n_frames <= film.SMALL_MOST + 1
+    assert out.stat().st_size < 100_000
 
 
 def test_a_recorded_run_plays_without_the_fmu(

@@ -29,8 +29,8 @@ from lagfmu import (
     Track,
     output,
 )
-from lagfmu.cli import film
 from lagfmu.errors import BuildError, ModelError
+from lagfmu.live.moving import Moving
 from lagfmu.live.playable import playable as playable_of
 from lagfmu.live.render import render
 from lagfmu.model.file import load
@@ -286,7 +286,7 @@ def test_a_slack_string_hangs(tmp_path: Path, browser: Any) -> None:
     assert picture is not None
     assert read_picture(as_bytes(picture)) == picture
     (string, _) = (
-        film._Moving(s, {"x": 0.3, "y": -0.5, "L": 1.0}.__getitem__, 1) for s in picture["shapes"]
+        Moving(s, {"x": 0.3, "y": -0.5, "L": 1.0}.__getitem__, 1) for s in picture["shapes"]
     )
     hung = np.array(string.points)[:, 0]
     assert np.hypot(*np.diff(hung, axis=0).T).sum() == pytest.approx(1.0, rel=1e-5)

@@ -13,11 +13,14 @@ from .render import Playable
 
 
 def recorded(told: Told, run: Any, given: Mapping[str, Any]) -> Playable:
-    """The page's parts with `run`, a structured array of time [s] and every output.
+    """The page's parts with `run`, a structured array of time [s] and outputs: those of which it tells.
 
     `given` are the parameters and start values that were set.
     """
     found = facts(told.description, told.picture, told.preset)
+    found["variables"] = [
+        v for v in found["variables"] if not v["column"] or v["name"] in run.dtype.names
+    ]
     for v in found["variables"]:
         if v["name"] in given and v["type"] != "String":
             v["start"] = float(given[v["name"]])

@@ -46,7 +46,7 @@ def simulate(
     csv: Annotated[Path | None, typer.Option(help="Write all outputs as a CSV file.")] = None,
     animate: Annotated[
         Path | None,
-        typer.Option(help="Write a film of the model's picture: .gif, .mp4 or .html."),
+        typer.Option(help="Write a film of the model's picture: .gif, .webp, .mp4 or .html."),
     ] = None,
     inputs: InputFile = None,
     error_bars: ErrorBars = None,
