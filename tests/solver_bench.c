@@ -22,6 +22,7 @@ void *bench_open(const System *system);
 void bench_close(Bench *b);
 const char *bench_why(const Bench *b);
 int bench_start(Bench *b, double t, const double *q, const double *v, double tolerance);
+int bench_advance(Bench *b, double t_end);
 int bench_observe(Bench *b);
 int bench_motion(Bench *b, double t, const double *q, const double *v, const int *active);
 int bench_project(Bench *b, double t, double *q, double *v, const int *active);
@@ -95,6 +96,8 @@ int bench_start(Bench *b, double t, const double *q, const double *v, double tol
     b->solver.drive.since = t;
     return solver_start(&b->solver, t, q, v, b->rank, moved, b);
 }
+
+int bench_advance(Bench *b, double t_end) { return solver_advance(&b->solver, t_end); }
 
 int bench_observe(Bench *b) { return solver_observe(&b->solver, &b->seen); }
 

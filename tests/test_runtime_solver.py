@@ -667,6 +667,22 @@ def test_projection_costs_two_evaluations_near_the_constraints(size, evaluations
     assert one.number("residuals") == residuals
 
 
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-8, 1e-11])
+def test_an_event_costs_as_much_as_ten_steps(tolerance, bench):
+    """A mass on a spring that rubs turns round at pi/omega: to find that, and to go on, takes no more
+    than ten steps of twelve evaluations do."""
+    turns = np.pi / 10
+    cost = {}
+    for end in (turns - 1e-3, turns + 1e-3):
+        one = bench("FrictionOscillator")
+        assert one.start([0.2], [0.0], tolerance=tolerance)
+        one.c.bench_count(one.handle)
+        assert one.c.bench_advance(one.handle, c_double(end)) == 0, one.why()
+        assert (one.array("state.v", 1)[0] > 0) == (end > turns)
+        cost[end > turns] = one.number("evaluations")
+    assert 12 < cost[True] - cost[False] <= 120
+
+
 def test_a_row_that_came_back_keeps_its_level(bench):
     """With the offset 0.01 m^2 the pendulum is projected to x^2 + y^2 = L^2 + 0.01 m^2, and what is
     reported as its residual is measured from there."""

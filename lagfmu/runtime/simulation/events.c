@@ -1,8 +1,9 @@
 /* events.c -- event location: indicators are watched (indicators.c), and where one leaves its range the time
  * is bracketed to rounding (root.c).
  *
- * Each trial time is reached by an integration from the last accepted point, so that the event does
- * not depend on the communication step (Hairer, Norsett & Wanner I, sect. II.6, with exact trials). */
+ * The time is seen on the dense output and polished by trials, each reached by an integration from the last
+ * accepted point, so that the event does not depend on the communication step (Hairer, Norsett & Wanner I,
+ * sect. II.6, with exact trials). */
 #include "events.h"
 
 #include <float.h>
@@ -14,6 +15,12 @@
 #include "samples.h"
 #include "root.h"
 
+static const double SEEN_NEAR = 0x1p-36;   /* of the time between two samples: how near a root is sought by sight */
+static const double SEEN_BESIDE = 0x1p-12; /* and how far beside it the slope is taken */
+static const double NEWTON_GAIN = 0.1; /* by which each step is shorter, at least, ... */
+static const double NEWTON_ROUNDING = 0x1p12 * DBL_EPSILON; /* ... and of the time since t0: what rounding of the
+                                                             * heights makes of one */
+
 /* The indicator whose time is sought, and the range that it leaves then. */
 typedef struct {
     Solver *s;
@@ -24,6 +31,11 @@ typedef struct {
     double *y, *values;
 } Sought;
 
+/* Two samples of a step, times since t0, with the heights there that are seen. */
+typedef struct {
+    double a, at_a, b, at_b;
+} Bracket;
+
 static Status height(void *context, double elapsed, double *value) {
     const Sought *x = context;
     const double t = x->t0 + elapsed;
@@ -33,37 +45,87 @@ static Status height(void *context, double elapsed, double *value) {
     return OK;
 }
 
-/* From a root to the next time at which the limit has been passed, rounding included. */
-static Status get_past(Sought *x, double b, double *elapsed) {
-    double value, step = DBL_EPSILON * b;
-    for (;; step *= 2) {
-        if (height(x, *elapsed, &value) != OK) return FAILED;
-        if (!(value > 0) || *elapsed >= b) return OK;
-        *elapsed = fmin(*elapsed + step, b);
+/* The same on the dense output of the step: next to nothing to look at, and as near as a step's error. */
+static Status seen_height(void *context, double elapsed, double *value) {
+    const Sought *x = context;
+    const Integrator *i = &x->s->integrator;
+    i->method->dense(i, x->t0 + elapsed, x->y);
+    if (indicators_at(x->s, x->t0 + elapsed, x->y, x->values) != OK) return FAILED;
+    *value = range_inside(x->range, x->values[x->indicator]);
+    return OK;
+}
+
+/* A trial time, the height there, and the step that leads to the limit. */
+typedef struct {
+    double elapsed, value, step;
+} Reached;
+
+/* Newton's method from the root that is seen on the dense output: one or two integrations where the limit is
+ * passed at a definite speed.  Else, where it is only grazed, say, found = 0. */
+static Status polish(Sought *x, Bracket seen, Reached *at, int *found) {
+    const double wide = seen.b - seen.a, beside = SEEN_BESIDE * wide;
+    double e, before, after, last = wide;
+    *found = 0;
+    if (!(seen.at_a > 0)) return OK;
+    if (root_find(seen_height, x, seen.a, seen.at_a, seen.b, seen.at_b, SEEN_NEAR * wide, &e) != OK ||
+        seen_height(x, e - beside, &before) != OK || seen_height(x, e + beside, &after) != OK)
+        return OK; /* beside the motion it may not be defined */
+    const double slope = (after - before) / (2 * beside);
+    for (;;) {
+        if (height(x, e, &at->value) != OK) return FAILED;
+        at->elapsed = e;
+        at->step = -at->value / slope;
+        if (!(slope < 0 && fabs(at->step) < NEWTON_GAIN * last)) return OK;
+        if (!(e + at->step > 0 && e + at->step < seen.b)) return OK;
+        *found = fabs(at->step) <= NEWTON_ROUNDING * seen.b;
+        if (*found) return OK;
+        last = fabs(at->step);
+        e += at->step;
     }
 }
 
-/* The time in [lo, hi] at which the indicator leaves the range; found = 0 if it only grazed, so that
- * within the tolerance there is no event. */
-static Status locate(Sought *x, double lo, double hi, double *time, int *found) {
-    const double starts[2] = {lo - x->t0, 0};
-    const double b = hi - x->t0;
+/* The time since t0 at which the indicator leaves the range, between two times at which integrations tell that it
+ * is inside and out; found = 0 if it only grazed, so that within the tolerance there is no event. */
+static Status bisect(Sought *x, Bracket seen, Reached *at, int *found) {
+    const double starts[2] = {seen.a, 0}, b = seen.b;
     double at_b;
     *found = 0;
     if (height(x, b, &at_b) != OK) return FAILED;
     if (at_b >= 0) return OK;
     *found = 1;
+    *at = (Reached){0, 0, 0};
     for (int k = 0; k < 2; k++) {
-        double at_a, elapsed;
+        double at_a;
         if (height(x, starts[k], &at_a) != OK) return FAILED;
         if (!(at_a > 0)) continue;
-        if (root_find(height, x, starts[k], at_a, b, at_b, DBL_EPSILON * b, &elapsed) != OK)
+        if (root_find(height, x, starts[k], at_a, b, at_b, DBL_EPSILON * b, &at->elapsed) != OK)
             return FAILED;
-        if (x->indicator >= x->s->system->contacts && get_past(x, b, &elapsed) != OK) return FAILED;
-        *time = x->t0 + elapsed;
-        return OK;
+        return height(x, at->elapsed, &at->value);
     }
-    *time = x->t0;
+    return OK;
+}
+
+/* From there to a time at which the limit has been passed, rounding included. */
+static Status get_past(Sought *x, double b, Reached *at) {
+    double step = fmax(2 * at->step, DBL_EPSILON * b);
+    for (; at->value > 0 && at->elapsed < b; step *= 2) {
+        at->elapsed = fmin(at->elapsed + step, b);
+        if (height(x, at->elapsed, &at->value) != OK) return FAILED;
+    }
+    return OK;
+}
+
+/* The time at which the indicator leaves the range. */
+static Status locate(Sought *x, Bracket seen, double *time, int *found) {
+    Reached at;
+    if (polish(x, seen, &at, found) != OK) return FAILED;
+    if (!*found && bisect(x, seen, &at, found) != OK) return FAILED;
+    if (!*found) return OK;
+    if (x->indicator < x->s->system->contacts)
+        at.elapsed += at.step;
+    else if (get_past(x, seen.b, &at) != OK)
+        return FAILED;
+    *time = x->t0 + at.elapsed;
     return OK;
 }
 
@@ -92,7 +154,9 @@ static Status first_of(Solver *s, Sought *x, const Samples *samples, int i, doub
         }
         int inside = k - 1;
         while (inside > 0 && !(range_inside(x->range, value[inside * width]) > 0)) inside--;
-        if (locate(x, samples->t[inside], samples->t[k], time, found) != OK) return FAILED;
+        const Bracket seen = {samples->t[inside] - x->t0, range_inside(x->range, value[inside * width]),
+                              samples->t[k] - x->t0, range_inside(x->range, value[k * width])};
+        if (locate(x, seen, time, found) != OK) return FAILED;
     }
     return OK;
 }
