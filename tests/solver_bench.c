@@ -177,7 +177,7 @@ double bench_number(const Bench *b, const char *name) {
     if (strcmp(name, "t") == 0) return now->t;
     if (strcmp(name, "rate") == 0) return now->rate;
     if (strcmp(name, "step") == 0) return now->step;
-    if (strcmp(name, "steps") == 0) return now->steps;
+    if (strcmp(name, "steps") == 0) return (double)now->steps;
     if (strcmp(name, "ahead") == 0) return now->ahead;
     if (strcmp(name, "fresh") == 0) return now->fresh;
     if (strcmp(name, "event_count") == 0) return now->event_count;

@@ -9,7 +9,7 @@ import struct
 import subprocess
 import sys
 import zlib
-from ctypes import c_double
+from ctypes import byref, c_double, c_int, c_size_t
 from pathlib import Path
 
 import pytest
@@ -166,6 +166,35 @@ def test_a_contact_is_open_or_closed(library):
         if one.call("SetFMUstate", state) != OK:
             said.append(one.log[-1][2])
     assert any("modes" in text for text in said)
+
+
+def steps_of(one: Single) -> int:
+    count = c_int()
+    one.does("GetInteger", one.references(["solver.steps"]), c_size_t(1), byref(count))
+    return count.value
+
+
+@pytest.mark.parametrize("steps", [2**30, 2**31 - 2, 2**40])
+def test_a_run_may_last(library, steps):
+    """The state of a run of so many internal steps (2^31 in 60 h at 1e-4 s) is one: it goes on from there and
+    saves itself again; `solver.steps` shows the most that an Integer holds."""
+    one = library("CartPendulum")().start()
+    while steps_of(one) < 137:
+        one.step(0.1)
+    before, saved = steps_of(one), one.bytes_of(one.saved())
+    word = struct.pack("=q", before)
+    places = [k for k in range(HEAD, len(saved) - 7, 8) if saved[k : k + 8] == word]
+    assert len(places) == 1
+    one.step(0.1)
+    more = steps_of(one) - before
+    assert more > 2
+    one.time -= 0.1
+    one.does("SetFMUstate", one.loaded(forged(saved, places[0], struct.pack("=q", steps))))
+    one.step(0.1)
+    assert steps_of(one) == min(steps + more, 2**31 - 1)
+    one.does("SetFMUstate", one.loaded(one.bytes_of(one.saved())))
+    one.step(0.1)
+    one.free()
 
 
 def test_a_coordinate_is_a_number(library):

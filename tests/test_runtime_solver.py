@@ -8,7 +8,7 @@ import ctypes
 import itertools
 import subprocess
 from collections.abc import Sequence
-from ctypes import byref, c_char_p, c_double, c_int, c_void_p
+from ctypes import byref, c_char_p, c_double, c_int, c_longlong, c_void_p
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -109,8 +109,8 @@ class Bench:
         n, m, c = self.system.n, self.system.m, len(self.system.contacts)
         sizes = {"q": n, "v": n, "offset": m, "scale": 2 * n, "size": n, "gap": c}
         found = {name: self.array(f"state.{name}", k).copy() for name, k in sizes.items()}
-        for name in ("closed", "armed", "count"):
-            found[name] = self.array(f"state.{name}", c, c_int).copy()
+        for name, kind in (("closed", c_int), ("armed", c_int), ("count", c_longlong)):
+            found[name] = self.array(f"state.{name}", c, kind).copy()
         return found
 
     def project(self, q: Any, v: Any, active: Sequence[int], t: float = 0.0) -> tuple[Any, Any]:
@@ -465,11 +465,11 @@ def test_a_moving_start_is_exact_at_any_time_and_input(bench):
 def test_a_start_is_a_state_without_a_past(bench):
     """Whatever the solver held before: no steps, no departures, nothing ahead, armed where open."""
     one = bench("Hemisphere")
-    one.array("state.count", 1, c_int)[:] = 7
+    one.array("state.count", 1, c_longlong)[:] = 7
     assert one.start([1.0, 0.3], [0.0, 0.0])
     for number, value in {"steps": 0, "ahead": 0, "fresh": 1, "step": 0, "event_count": 0}.items():
         assert one.number(number) == value
-    assert one.array("state.count", 1, c_int)[0] == 0
+    assert one.array("state.count", 1, c_longlong)[0] == 0
     assert one.observe()["departure.surface.r"] == 0
 
 
@@ -1096,7 +1096,7 @@ def test_an_embedding_is_seen_in_its_full_coordinates(bench):
     one.array("state.departure_v", 1)[:] = 2 * np.sqrt(5)
     seen = one.observe()
     assert seen["departure.stop.x"] == seen["departure.stop.velocity.y"] == 0
-    one.array("state.count", 1, c_int)[:] = 1
+    one.array("state.count", 1, c_longlong)[:] = 1
     seen = one.observe()
     assert seen["departure.stop.x"] == pytest.approx(2, rel=1e-15)
     assert seen["departure.stop.velocity.y"] == pytest.approx(2, rel=1e-15)

@@ -163,7 +163,7 @@ static int compare(Instance *x, const Variable *bar, int paired, double share, d
     *size = b->size[bar->contact];
     if (instance_value(&x->solver, &x->seen, of, &mine) != OK) return 0;
     if (is_of_event(of->place)) {
-        const int count = x->solver.state.latest[event_kind(of->place)].count[of->contact];
+        const Count count = x->solver.state.latest[event_kind(of->place)].count[of->contact];
         *size = count > 0 ? fmax(fabs(x->start_time), fabs(x->solver.state.now.t)) : 0;
     } else {
         *size = fmax(*size, fabs(mine));
@@ -213,7 +213,7 @@ static Status get(Instance *x, const Variable *v, double *value) {
     if (*b->lost) return OK;
     const int paired = companion_paired(&x->solver, &b->solver);
     if (!compare(x, v, paired, share_of(x), &worst, &size)) return OK;
-    const double steps = 1 + x->solver.state.now.steps;
+    const double steps = 1 + (double)x->solver.state.now.steps;
     *value = fmin(fmax(worst, BAR_ROUNDING * DBL_EPSILON * sqrt(steps) * size), INFINITE);
     return OK;
 }

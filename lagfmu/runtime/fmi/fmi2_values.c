@@ -1,6 +1,7 @@
 /* fmi2_values.c -- getting and setting variables (section 2.1.7). */
 #include "fmi2_component.h"
 
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -40,7 +41,7 @@ static fmi2Status get_whole(Component *c, const char *function, Type type,
         if (v == NULL) return component_unknown(c, function, vr[k], type);
         const fmi2Status status = read_value(c, function, v, &found);
         if (status != fmi2OK) return status;
-        value[k] = (int)found;
+        value[k] = (int)fmin(found, INT_MAX);
     }
     return fmi2OK;
 }

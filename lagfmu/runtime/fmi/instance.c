@@ -44,7 +44,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->begin = arena_doubles(&scratch, 2 * system->n);
         x->formula = arena_doubles(&scratch, system->started_count);
         for (int k = 0; k < EVENT_KINDS; k++)
-            x->before[k] = arena_ints(&scratch, event_count_of(system, (EventKind)k));
+            x->before[k] = arena_take(&scratch, (size_t)event_count_of(system, (EventKind)k), sizeof(Count));
         x->shared = arena_ints(&scratch, system->frictions);
         x->happened = arena_ints(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
@@ -125,7 +125,7 @@ static int ready_of_event(const Solver *s, const Variable *v, double *value) {
     const Latest *latest = &s->state.latest[event_kind(v->place)];
     const int at = v->contact * s->system->n + v->index;
     switch (event_part(v->place)) {
-        case AT_DEPARTURE_COUNT: *value = latest->count[v->contact]; return 1;
+        case AT_DEPARTURE_COUNT: *value = (double)latest->count[v->contact]; return 1;
         case AT_DEPARTURE_TIME: *value = latest->time[v->contact]; return 1;
         default: break;
     }
@@ -174,7 +174,7 @@ static int ready(const Solver *s, const Variable *v, double *value) {
             return 1;
         case AT_S: *value = s->state.q[v->index]; return 1;
         case AT_SDOT: *value = s->state.v[v->index]; return 1;
-        case AT_STEPS: *value = s->state.now.steps; return 1;
+        case AT_STEPS: *value = (double)s->state.now.steps; return 1;
         case AT_CONTACT: *value = s->state.closed[v->index]; return 1;
         case AT_IMPULSE: *value = s->state.impulse[v->index]; return 1;
         case AT_LOST: *value = s->state.now.lost; return 1;
@@ -460,7 +460,8 @@ static void report(Instance *x, EventKind kind, int i) {
     static const char *const DONE[] = {"opened", "closed", "began to slip", "began to stick"};
     const Solver *s = &x->solver;
     const Latest *latest = &s->state.latest[kind];
-    const int again = latest->count[i] - x->before[kind][i], struck = kind == CLOSING && s->state.impulse[i] > 0;
+    const Count again = latest->count[i] - x->before[kind][i];
+    const int struck = kind == CLOSING && s->state.impulse[i] > 0;
     const char *name = kind <= CLOSING ? s->system->rows[s->system->contact[i]].name : s->system->friction[i].name;
     const char *stays = struck && s->state.closed[i] ? ", and stays closed" : "";
     char impulse[80] = "", more[32] = "";
@@ -468,7 +469,7 @@ static void report(Instance *x, EventKind kind, int i) {
     if (struck)
         (void)snprintf(impulse, sizeof impulse, ", impulse %s (of its lambda times s)",
                        digits(s->state.impulse[i]).text);
-    if (again > 1) (void)snprintf(more, sizeof more, ", the latest of %d", again);
+    if (again > 1) (void)snprintf(more, sizeof more, ", the latest of %.0f", (double)again);
     (void)snprintf(x->note, sizeof x->note, "%s %s %s at t = %s s%s%s%s", SORT[kind], name,
                    struck ? "was struck" : DONE[kind], digits(latest->time[i]).text, impulse, more, stays);
     x->tell(x->context, NOTE_EVENT, x->note);
@@ -499,7 +500,7 @@ static int has_closed(const Instance *x) {
 static void remember_counts(Instance *x) {
     for (int k = 0; k < EVENT_KINDS; k++) {
         const int count = event_count_of(x->solver.system, (EventKind)k);
-        memcpy(x->before[k], x->solver.state.latest[k].count, (size_t)count * sizeof(int));
+        memcpy(x->before[k], x->solver.state.latest[k].count, (size_t)count * sizeof(Count));
     }
 }
 

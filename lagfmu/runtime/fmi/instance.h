@@ -40,7 +40,7 @@ typedef struct Instance {
     double *formula;        /* (started_count of the system) these */
     double *expected;       /* (inputs) values at the end of the latest step */
     int *set;               /* (inputs) 1: set since the latest step */
-    int *before[EVENT_KINDS]; /* (contacts, or frictions) how many events there were before a step */
+    Count *before[EVENT_KINDS]; /* (contacts, or frictions) how many events there were before a step */
     int *shared;            /* (frictions) 1: that its normal force is not unique has been told */
     int *happened;          /* (contacts) */
     double *pull;            /* (contacts) [of f/s^2] acceleration towards each, of exchange.c */

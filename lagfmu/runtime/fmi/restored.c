@@ -18,11 +18,12 @@
 #include "prescribed.h"
 #include "thresholds.h"
 
-enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased */
+enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased, ... */
+static const double ALL = 1 / DBL_EPSILON; /* ... and of what a run does: 2^52, in ten thousand years */
 
-/* What a number can be: an int that is 0 or 1, or counts; a double that is 0 or more, and may be infinite,
- * or any finite one. */
-enum { FLAG, COUNT, SIZE, LIMIT, FINITE };
+/* What a number can be: an int that is 0 or 1, or counts; a count of what a run does; a double that is 0 or
+ * more, and may be infinite, or any finite one. */
+enum { FLAG, COUNT, TALLY, SIZE, LIMIT, FINITE };
 
 /* How many of them there are; more than ONE stand behind a pointer. */
 enum {
@@ -38,7 +39,7 @@ typedef struct {
 #define NOW(name, member, sort) {name, offsetof(Solver, state.now.member), sort, ONE}
 #define SOLVER(name, member, sort, many) {name, offsetof(Solver, member), sort, many}
 #define LATEST(name, kind, many) \
-    SOLVER(name, state.latest[kind].count, COUNT, many), SOLVER(name, state.latest[kind].time, FINITE, many), \
+    SOLVER(name, state.latest[kind].count, TALLY, many), SOLVER(name, state.latest[kind].time, FINITE, many), \
         SOLVER(name, state.latest[kind].q, FINITE, many##_N), SOLVER(name, state.latest[kind].v, FINITE, many##_N)
 #define INSTANCE(name, member, sort, many) {name, offsetof(Instance, member), sort, many}
 
@@ -57,8 +58,8 @@ static const Saved OF_SOLVER[] = {
     NOW("time of stiffness", choice.time, FINITE),
     NOW("h rho", choice.product, LIMIT),
     NOW("rho / sigma", choice.ratio, LIMIT),
-    NOW("step count", steps, COUNT),
-    NOW("step count", tiny, COUNT),
+    NOW("step count", steps, TALLY),
+    NOW("step count", tiny, TALLY),
     NOW("mode of the step ahead", ahead, FLAG),
     NOW("mode of the step ahead", between, FLAG),
     NOW("mode of the step ahead", fresh, FLAG),
@@ -147,7 +148,8 @@ static int offered(MethodName method) {
 
 /* Each number of a list inside of `base`, by itself. */
 static Status each(Instance *x, const Solver *s, const void *base, const Saved *list, size_t rows) {
-    static const double LEAST[] = {0, 0, 0, 0, -DBL_MAX}, LARGEST[] = {1, MOST, DBL_MAX, HUGE_VAL, DBL_MAX};
+    static const double LEAST[] = {0, 0, 0, 0, 0, -DBL_MAX};
+    static const double LARGEST[] = {1, MOST, ALL, DBL_MAX, HUGE_VAL, DBL_MAX};
     const System *system = s->system;
     const Method *now = x->started ? OPTIONAL.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method]
                                    : NULL;
@@ -170,7 +172,9 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
         const void *where = (const char *)base + row->at;
         if (row->many != ONE) memcpy(&where, where, sizeof where);
         for (int j = 0; j < many[row->many]; j++) {
-            const double value = row->sort <= COUNT ? ((const int *)where)[j] : ((const double *)where)[j];
+            const double value = row->sort <= COUNT   ? ((const int *)where)[j]
+                                 : row->sort == TALLY ? (double)((const Count *)where)[j]
+                                                      : ((const double *)where)[j];
             if (!(value >= LEAST[row->sort] && value <= LARGEST[row->sort]))
                 return restored_none(x, row->name, value);
         }

@@ -63,16 +63,17 @@ void stiffness_explicit_step(Choice *c, const Integrator *i, const double *size)
     const double rho = stages.whole < stages.damped ? stages.whole : stages.damped;
     const double sigma = rates(n, size, i->y_old, i->f_old, i->y, i->f).whole;
     const double h = i->t - i->t_old;
+    const int enough = STIFF_STEPS << 2 * c->failures;
     const int slow = sigma > 0 && rho > SLOWER * price(i->ny) * sigma;
     if (!(h * rho > STABLE || (h * rho > BOUND && slow))) {
-        c->other += 1;
-        if (c->other >= STIFF_OTHER) c->stiff = 0;
+        c->other += c->other < STIFF_OTHER;
+        if (c->other == STIFF_OTHER) c->stiff = 0;
         return;
     }
     c->longest = c->stiff > 0 ? fmax(h, c->longest) : h;
-    c->stiff += 1;
+    c->stiff += c->stiff < enough;
     c->other = 0;
-    if (c->stiff < STIFF_STEPS << 2 * c->failures || i->ny > RADAU5_MOST_STATES) return;
+    if (c->stiff < enough || i->ny > RADAU5_MOST_STATES) return;
     c->turn = 1;
     if (c->product > 0) return;
     c->time = i->t;

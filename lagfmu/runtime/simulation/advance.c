@@ -244,14 +244,14 @@ static Status meet(Solver *s) {
 }
 
 /* FAILED if the step just taken shows that t_end is too far off for steps of its kind. */
-static Status check_headway(Solver *s, double t_end, double begun, int first) {
+static Status check_headway(Solver *s, double t_end, double begun, Count first) {
     Numbers *now = &s->state.now;
     const Integrator *i = &s->integrator;
     const double t = now->event_count > 0 ? now->event_time : i->t;
-    const double done = now->steps - first, gone = t - begun, most = s->settings.maximum_steps;
+    const double done = (double)(now->steps - first), gone = t - begun, most = s->settings.maximum_steps;
     const double h = t - i->t_old, pace = h * now->rate < HEADWAY ? magnitudes_pace(s) : now->rate;
     if (h * pace < HEADWAY) now->tiny += 1;
-    if (most > 0 && now->tiny > most)
+    if (most > 0 && (double)now->tiny > most)
         return fail(&s->why,
                     "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
                     "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
@@ -266,7 +266,7 @@ static Status check_headway(Solver *s, double t_end, double begun, int first) {
 }
 
 /* To t_end, or to the first event before it. */
-static Status travel(Solver *s, double t_end, double begun, int first, int *met) {
+static Status travel(Solver *s, double t_end, double begun, Count first, int *met) {
     Numbers *now = &s->state.now;
     flow_begin(s);
     *met = 0;
@@ -293,7 +293,7 @@ static Status complete_magnitudes(Solver *s, double span) {
 Status solver_advance(Solver *s, double t_end) {
     Numbers *now = &s->state.now;
     const double begun = now->t;
-    const int first = now->steps;
+    const Count first = now->steps;
     double since = begun;
     int events = 0;
     if (!(t_end > begun) || !(t_end < HUGE_VAL))

@@ -24,7 +24,7 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->left = arena_ints(saved, indicators);
     for (int k = 0; k < EVENT_KINDS; k++) {
         const int count = event_count_of(s, (EventKind)k);
-        x->latest[k].count = arena_ints(saved, count);
+        x->latest[k].count = arena_take(saved, (size_t)count, sizeof(Count));
         x->latest[k].time = arena_doubles(saved, count);
         x->latest[k].q = arena_doubles(saved, count * n);
         x->latest[k].v = arena_doubles(saved, count * n);

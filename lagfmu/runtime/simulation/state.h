@@ -39,6 +39,9 @@ typedef struct {
     double sum[2], most[2];
 } LocalErrors;
 
+/* How often, over a whole run, which may last for ever. */
+typedef long long Count;
+
 /* The numbers of a state (copied as a struct) ... */
 typedef struct {
     double t;            /* [s] the communication point */
@@ -46,8 +49,8 @@ typedef struct {
     int dependent;       /* 1: at the latest state on the constraints, rows that act depended on each other */
     double step;         /* [s] the step to try next */
     double span;         /* [s] the communication step that led to t; 0: none */
-    int steps;           /* internal steps taken so far */
-    int tiny;            /* those of the present communication step that make no headway */
+    Count steps;         /* internal steps taken so far */
+    Count tiny;          /* those of the present communication step that make no headway */
     int ahead;           /* 1: the integrator stands at integrator->t >= t, and dense output answers */
     int between;         /* 1: q and v are still to be taken from dense output at t: solver_arrive() */
     double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */
@@ -64,7 +67,7 @@ typedef struct {
  * begins to slip and to stick.  Of each kind: how often, and the time and the state of the latest. */
 typedef enum { DEPARTURE, CLOSING, SLIPPING, STICKING, EVENT_KINDS } EventKind;
 typedef struct {
-    int *count;
+    Count *count;
     double *time;   /* [s] */
     double *q, *v;  /* (n of each) */
 } Latest;
