@@ -35,6 +35,7 @@ COUNT_OF = {  # of the events whose latest time it is
 COUNTS = tuple(COUNT_OF.values())
 KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
+DISSIPATION = "der(energy.dissipated)"
 ENERGY, SOLVER = "energy", "solver"
 RATE = re.compile(r"der\((\w+)(?:,(\d+))?\)")
 ERROR = "error"  # how far off another variable may be: error.lambda.rod
@@ -108,7 +109,7 @@ def motion(coordinates: Iterable[str]) -> list[str]:
 def read(text: str) -> Subject:
     """What a variable of that name is of."""
     head, *rest = text.split(".")
-    if head in (ENERGY, SOLVER) and len(rest) == 1:
+    if text == DISSIPATION or (head in (ENERGY, SOLVER) and len(rest) == 1):
         return Subject(text)
     if head == ERROR and rest:
         of_velocity = rest[0] == "velocity" and len(rest) == 2

@@ -252,6 +252,8 @@ def test_an_fmu_with_error_bars_is_for_co_simulation(barred, target, tmp_path):
     path = barred("PendulumCartesian")
     description = fmpy.read_model_description(str(path))
     assert description.modelExchange is None
+    assert description.numberOfEventIndicators == 0
+    assert not [v.name for v in description.modelVariables if v.reinit]
     if target == "native":
         refused = Library(path, tmp_path)(kind=EXCHANGE)
         assert refused.handle.value is None

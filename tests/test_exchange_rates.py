@@ -71,7 +71,7 @@ def test_no_stabilization_is_quicker_than_the_motion(name, library):
         float(v.start) for v in variables.values() if v.causality == "parameter" and v.unit == "m"
     ]
     rates = [np.abs(own).max()]
-    for q in names[::2]:
+    for q in (n for n in names if not n.startswith(("der(", "energy."))):
         size = 1.0 if variables[q].unit == "rad" else max(lengths, default=np.inf)
         rates.append(np.sqrt(abs(one.get(f"der({q},2)")) / size))
         rates.append(abs(one.get(f"der({q})")) if variables[q].unit == "rad" else 0.0)

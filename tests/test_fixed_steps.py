@@ -51,6 +51,32 @@ def test_an_importer_that_brackets_events_to_a_step_converges(name, method, libr
     assert rows[-1][2] < 100, rows
 
 
+@pytest.mark.parametrize(
+    ("name", "stop"), [("BouncingBall", 1.6), ("Ladder", 1.2), ("FallingRod", 0.7)]
+)
+def test_what_is_lost_is_counted(name, stop, library):
+    """Runge's method conserves energy to the fourth order of its step, and so do energy.total and
+    energy.dissipated together: through impacts, slides, and all that is set back at an event."""
+    quantities = ["energy.total", "energy.dissipated"]
+    before = run(library(name), rk4, 0, stop, quantities)
+    after = run(library(name), rk4, 1000, stop, quantities)
+    assert before["energy.dissipated"] == 0
+    assert after["energy.dissipated"] > 0.005
+    assert sum(after.values.values()) == pytest.approx(before["energy.total"], rel=1e-9)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_each_bounce_takes_its_part_of_the_energy(e, native_fmu):
+    """m v^2/2 (1 - e^2) with the speed v before it, e^k sqrt(2 g h): of a ball from 1 m, two bounces
+    in a second leave e^4 of the energy."""
+    ours = simulate(native_fmu("BouncingBall"), 1.0, 0.01, start_values={"e": e})
+    expected = 9.81 * (1 - e**4)
+    assert ours["energy.dissipated"][-1] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert (np.diff(ours["energy.dissipated"]) >= -1e-14).all()
+    total = ours["energy.total"] + ours["energy.dissipated"]
+    np.testing.assert_allclose(total, 9.81, rtol=1e-9)
+
+
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-5, 1e-9])
 @pytest.mark.parametrize("name", ["HalfCar", "Ladder", "FallingRod"])
 def test_an_importers_integrator_counts_what_co_simulation_counts(name, tolerance, native_fmu):

@@ -70,6 +70,11 @@ def build(
     return pack(contents)
 
 
+def offers_exchange(prepared: Prepared) -> bool:
+    """Model exchange besides co-simulation: not where the FMU runs twice, or keeps points of an input."""
+    return not (prepared.system.estimated or prepared.scene.error_bars)
+
+
 def sources_of(prepared: Prepared) -> Sources:
     """The C files and the description.  Raises BuildError for a method that cannot step the model."""
     form, scene = prepared.coded, prepared.scene
@@ -99,23 +104,21 @@ def sources_of(prepared: Prepared) -> Sources:
         "providesDirectionalDerivative": "true" if differentiable else "false",
     }
     order = {"maxOutputDerivativeOrder": "1" if differentiable else "0"}
+    exchanged = offers_exchange(prepared)
+    watched = len(system.contacts) + len(system.floors) + 2 * len(system.frictions)
     description = model_description(
         table,
         scene,
         prepared.model,
         f"lagfmu {version()}",
         {
-            **(
-                {}
-                if system.estimated or scene.error_bars
-                else {"ModelExchange": {**common, **MODEL_EXCHANGE}}
-            ),
+            **({"ModelExchange": {**common, **MODEL_EXCHANGE}} if exchanged else {}),
             "CoSimulation": {**common, **CO_SIMULATION, **order},
         },
         b"".join(name.encode() + text for name, text in shipped.items()),
         sources=sorted(f for f in shipped if f.endswith(".c")),
-        event_indicators=len(system.contacts) + len(system.floors) + 2 * len(system.frictions),
-        reinitialized=table.states if system.rows else (),
+        event_indicators=watched if exchanged else 0,
+        reinitialized=table.states if exchanged and system.rows else (),
     )
     identity = {"identity.h": IDENTITY.format(guid=guid_of(description)).encode()}
     return Sources(description, runtime, generated | identity, shipped | identity)

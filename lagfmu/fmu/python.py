@@ -112,13 +112,16 @@ def offered(prepared: Prepared) -> VariableTable:
             f"scene {scene.name!r}: the method {scene.method!r} is one of native FMUs, expected one of "
             f"{', '.join(IN_PYTHON)}, or the target native"
         )
-    asked = [v.name for v in prepared.table.outputs if v.of.head in names.NATIVE]
+    native = {*names.NATIVE, names.DISSIPATION}
+    if not prepared.system.frictions:
+        native.add(names.DISSIPATED)
+    asked = [v.name for v in prepared.table.outputs if {v.of.head, v.of.quantity} & native]
     if asked and not scene.complete:
         raise BuildError(
             f"scene {scene.name!r}: native FMUs alone tell {', '.join(asked)}: leave them out of its "
             "outputs, or choose the target native"
         )
-    known = prepared.table.without(*names.NATIVE)
+    known = prepared.table.without(*native)
     return known.offering([m for m in scene.selectable if m in IN_PYTHON])
 
 

@@ -10,6 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from .. import names
 from ..errors import BuildError, SettingError, UsageError
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import load
@@ -18,6 +21,7 @@ from ..model.scene import Scene
 from ..page import picture as pictures
 from ..page import preset as presets
 from ..page.documentation import page, with_figures
+from ..prepare.consistency import values_at_start
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import check_given, tell
 from . import native, python
@@ -127,18 +131,33 @@ def _as_built(prepared: Prepared, target: str) -> Prepared:
     """With the nominal values of states; a python FMU has no model exchange and no native variables."""
     table = prepared.table if target == "native" else python.offered(prepared)
     table = table.with_nominals(_nominals(prepared))
-    return replace(
-        prepared, table=table if target == "native" else table.without_local_derivatives()
-    )
+    if target != "native" or not native.offers_exchange(prepared):
+        table = table.without_local_derivatives()
+    return replace(prepared, table=table)
 
 
 def _nominals(prepared: Prepared) -> dict[str, float]:
     """The sizes of coordinates at the described start, and times the natural rate those of velocities."""
     state = prepared.structure.start.state
-    states = prepared.whole.states  # a coordinate, its velocity, the next coordinate, ...
+    states = [n for n in prepared.whole.states if n != names.DISSIPATED]  # x, der(x), y, ...
     sizes = dict(zip(states[::2], state.size, strict=True))
     rates = {v: size * state.rate for v, size in zip(states[1::2], state.size, strict=True)}
-    return {n: float(f"{x:.1e}") for n, x in (sizes | rates).items() if x > SMALLEST_NOMINAL}
+    energy = (
+        {names.DISSIPATED: _energy(prepared)} if names.DISSIPATED in prepared.table.states else {}
+    )
+    found = sizes | rates | energy
+    return {n: float(f"{x:.1e}") for n, x in found.items() if x > SMALLEST_NOMINAL}
+
+
+def _energy(prepared: Prepared) -> float:
+    """Kinetic energy of coordinates that move through their sizes at the natural rate; 0 if not known."""
+    state, system, eom = prepared.structure.start.state, prepared.system, prepared.coded.equations
+    if system.n != len(state.size) or system.dynamics is None:
+        return 0.0
+    u, p = values_at_start(eom, prepared.whole, eom.numbers)
+    M, *_ = system.assemble(state.t, np.array(state.q), np.array(state.v), u, p)
+    speeds = np.maximum(np.array(state.size) * state.rate, np.abs(state.v))
+    return float(np.diag(M) @ speeds**2 / 2)
 
 
 def write_whole(path: Path, content: bytes) -> None:

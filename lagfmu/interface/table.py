@@ -231,6 +231,7 @@ class _Builder:
             *self.own_outputs(),
             *self.contact_outputs(),
             *self.friction_outputs(),
+            *self.losses(),
             self.output(Subject(names.STEPS), "internal steps taken so far", None, (), "Integer"),
         ]
         if self.scene.error_bars:
@@ -241,7 +242,15 @@ class _Builder:
         q = self.state_names[:n]
         derivatives = [derivative(c, k) for c in q for k in (1, 2)]
         states = [derivative(c, k) for c in q for k in (0, 1)]
+        if self.lost:
+            states.append(names.DISSIPATED)
+            derivatives.append(names.DISSIPATION)
         return VariableTable(tuple(variables), tuple(states), tuple(derivatives))
+
+    @property
+    def lost(self) -> bool:
+        """The energy dissipated is a state: there are frictions, and an importer may integrate."""
+        return bool(self.eom.frictions) and not self.scene.error_bars and not self.eom.estimated
 
     def displayed(self, v: Variable) -> DisplayUnit | None:
         """The unit in which the model gives what the variable is of."""
@@ -502,13 +511,27 @@ class _Builder:
             for events in (names.SLIPPING, names.STICKING):
                 what = f"start{{}} of {events} of {law.name}"
                 variables += self._event(events, law.name, what)
-        if self.eom.frictions:
-            text = (
-                "energy that frictions and impacts dissipated so far (Model Exchange: impacts alone; "
-                "the importer integrates power.* beside)"
-            )
-            variables.append(self.output(Subject(names.DISSIPATED), text, ENERGY, ()))
         return variables
+
+    def losses(self) -> list[Variable]:
+        """What frictions and impacts dissipate; with frictions a continuous state of model exchange."""
+        constraints = self.stepped.constraints
+        rubs, of = bool(self.eom.frictions), Subject(names.DISSIPATED)
+        if not rubs and not any(isinstance(c, Contact) for c in constraints):
+            return []
+        both = "frictions and impacts" if rubs else "impacts"
+        text = f"energy that {both} dissipated so far"
+        lost = self.output(of, text, ENERGY, (), discrete=not rubs)
+        if not self.lost:
+            return [lost]
+        behind = self.known.union(*(self.symbols(*law.expressions) for law in self.eom.frictions))
+        behind |= set().union(*(symbols for *_, symbols in self.groups))
+        what, text = Subject(names.DISSIPATION), "power that frictions dissipate"
+        power = self.output(what, text, POWER, behind, derivative_of=lost.name)
+        return [
+            dataclasses.replace(lost, depends=(lost.name,)),
+            dataclasses.replace(power, causality="local"),
+        ]
 
     def error_bars(self, variables: Iterable[Variable]) -> list[Variable]:
         """One for each lambda, Q, coordinate, velocity, own output, and time of an event."""

@@ -93,6 +93,8 @@ class VariableTable:
         were taken, which contacts are closed and which frictions stick, and how often that changed, for
         that says which closed form holds.
         """
+        if names.DISSIPATED in self.states and names.DISSIPATED not in outputs:
+            return self.without(names.DISSIPATED, names.DISSIPATION).keeping(outputs)
         moving = {*self.states, *self.derivatives}
         kept = []
         for v in self.variables:
@@ -106,10 +108,12 @@ class VariableTable:
         return VariableTable(tuple(kept), self.states, self.derivatives)
 
     def without(self, *heads: str) -> VariableTable:
-        """Without the variables of these kinds, and their error bars."""
-        gone = {v.name for v in self.variables if v.of.head in heads}
+        """Without the variables of these kinds, and their error bars; a state goes with its derivative."""
+        gone = {v.name for v in self.variables if {v.of.head, v.of.quantity}.intersection(heads)}
         kept = tuple(v for v in self.variables if v.name not in gone and v.bar_of not in gone)
-        return replace(self, variables=kept)
+        moving = [p for p in zip(self.states, self.derivatives, strict=True) if p[1] not in gone]
+        states, derivatives = (tuple(p[k] for p in moving) for k in (0, 1))
+        return VariableTable(kept, states, derivatives)
 
     @property
     def measurable(self) -> tuple[Variable, ...]:

@@ -143,6 +143,7 @@ def _of_frictions(eom: EquationsOfMotion) -> dict[str, tuple[Indices, Indices]]:
         own += [names.name(names.SLIP, name) for name in law.of]
         found |= dict.fromkeys(own, (NONE, rows)) | _event(eom, names.SLIPPING, law.name, rows)
         found |= _event(eom, names.STICKING, law.name, rows)
+    every |= {k for k, c in enumerate(eom.constraints) if isinstance(c, Contact)}
     if every:
         found[names.DISSIPATED] = NONE, every
     return found
@@ -224,8 +225,8 @@ def only(
 
 def silent(eom: EquationsOfMotion, outputs: Collection[str]) -> EquationsOfMotion:
     """Without the energies and outputs of the model's own that are not read."""
-    kinetic = bool({names.KINETIC, names.TOTAL} & set(outputs))
-    potential = bool({names.POTENTIAL, names.TOTAL} & set(outputs))
+    kinetic = bool({names.KINETIC, names.TOTAL, names.DISSIPATED} & set(outputs))
+    potential = bool({names.POTENTIAL, names.TOTAL, names.DISSIPATED} & set(outputs))
     return replace(
         eom,
         kinetic=eom.kinetic if kinetic else None,

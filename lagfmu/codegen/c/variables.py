@@ -41,6 +41,7 @@ const char *const MODEL_IDENTIFIER = {identifier};
 const char *const MODEL_GUID = LAGFMU_GUID;
 const double DEFAULT_TOLERANCE = {tolerance};
 const int DEFAULT_METHOD = {method};
+const int EXCHANGE_LOST = {lost};
 const Prescribed *const PRESCRIBED = {motions};
 {bars}"""
 NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
@@ -70,6 +71,7 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
         identifier=string(scene.name),
         tolerance=repr(float(scene.tolerance)),
         method=scene.method.upper(),
+        lost=int(names.DISSIPATED in table.states),
         motions="&MOTIONS" if system.prescribed else "NULL",
         bars=WITH_BARS if scene.error_bars else NO_BARS,
         peaked=f"(const Variable[]){{\n{''.join(measured)}}}" if measured else "NULL",
@@ -88,6 +90,7 @@ ALONE = {  # where a value lies of which there is one
     names.POTENTIAL: "POTENTIAL",
     names.TOTAL: "TOTAL",
     names.DISSIPATED: "LOST",
+    names.DISSIPATION: "LOST_RATE",
 }
 OF_ROW = {names.MULTIPLIER: "LAMBDA", names.UNIQUE: "UNIQUE", names.RESIDUAL: "RESIDUAL"}
 OF_CONTACT = {names.CONTACT: "CONTACT", names.IMPULSE: "IMPULSE"}

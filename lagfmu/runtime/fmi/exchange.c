@@ -17,6 +17,7 @@
 
 #include "indicators.h"
 #include "flow.h"
+#include "friction.h"
 #include "magnitudes.h"
 #include "optional.h"
 #include "schur.h"
@@ -45,6 +46,7 @@ Status exchange_get_states(Instance *x, double *states) {
         states[2 * j] = x->solver.state.q[j];
         states[2 * j + 1] = x->solver.state.v[j];
     }
+    if (EXCHANGE_LOST) states[2 * x->solver.system->n] = x->solver.state.now.lost;
     return OK;
 }
 
@@ -53,7 +55,20 @@ void exchange_set_states(Instance *x, const double *states) {
         x->solver.state.q[j] = states[2 * j];
         x->solver.state.v[j] = states[2 * j + 1];
     }
+    if (EXCHANGE_LOST) x->solver.state.now.lost = states[2 * x->solver.system->n];
     x->observed = x->evaluated = 0;
+}
+
+/* Kinetic energy [J] of coordinates that move through their sizes at the natural rate. */
+static double nominal_energy(const Solver *s) {
+    const System *system = s->system;
+    double energy = 0;
+    for (int e = 0; e < system->masses; e++) {
+        const int j = system->mass_row[e];
+        const double speed = fmax(s->state.size[j] * s->state.now.rate, fabs(s->state.v[j]));
+        if (system->mass_column[e] == j) energy += s->stepped.M[e] * speed * speed / 2;
+    }
+    return energy;
 }
 
 Status exchange_nominals(Instance *x, double *nominals) {
@@ -66,7 +81,8 @@ Status exchange_nominals(Instance *x, double *nominals) {
         nominals[2 * j] = scale[j];
         nominals[2 * j + 1] = scale[n + j];
     }
-    for (int j = 0; j < 2 * n; j++)
+    if (EXCHANGE_LOST) nominals[2 * n] = nominal_energy(&x->solver);
+    for (int j = 0; j < 2 * n + EXCHANGE_LOST; j++)
         if (!(nominals[j] > 0)) nominals[j] = 1;
     return OK;
 }
@@ -92,6 +108,15 @@ Status exchange_multipliers(Instance *x) {
     x->evaluated = 0;
     return mechanism_motion_near(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
                                  s->active, s->state.offset, s->state.size);
+}
+
+/* What frictions dissipate [W], of the latest motion. */
+static double friction_power(const Mechanism *b) {
+    const struct Frictions *f = b->friction;
+    double power = 0;
+    for (int i = 0; i < 2 * b->system->frictions; i++)
+        if (!f->slide[i / 2].sticks) power -= f->tangential[i] * f->slip[i];
+    return power;
 }
 
 /* Adds the accelerations that lead back onto the constraints. */
@@ -121,6 +146,7 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
         derivatives[2 * j] = s->state.v[j];
         derivatives[2 * j + 1] = b->vdot[j];
     }
+    if (EXCHANGE_LOST) derivatives[2 * system->n] = friction_power(b);
     return stabilize(x, derivatives);
 }
 

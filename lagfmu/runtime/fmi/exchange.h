@@ -1,6 +1,7 @@
 /* exchange.h -- an instance whose state is moved by an importer's integrator (Model Exchange).
  *
- * States are x = (q1, v1, q2, v2, ...) of the stepped system; an event indicator is lambda of a closed
+ * States are x = (q1, v1, q2, v2, ...) of the stepped system, and, where EXCHANGE_LOST says so, the energy that
+ * frictions and impacts have dissipated; an event indicator is lambda of a closed
  * contact, and f + gap of an open one. */
 #ifndef LAGFMU_EXCHANGE_H
 #define LAGFMU_EXCHANGE_H

@@ -13,6 +13,7 @@
 
 #include "indicators.h"
 #include "flow.h"
+#include "losses.h"
 #include "optional.h"
 #include "schur.h"
 
@@ -150,8 +151,7 @@ static Status project(Instance *x) {
     if (s->system->m == 0) return OK;
     flow_begin(s);
     x->observed = x->evaluated = 0;
-    return mechanism_project(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
-                             s->active, s->state.offset, s->state.size);
+    return losses_project(s, flow_instant(s, s->state.now.t), 1);
 }
 
 /* What an importer has done to its inputs until now belongs to the step; what it does after, to the event. */
@@ -172,7 +172,9 @@ static Status pass(Instance *x) {
         OPTIONAL.slides->stop(s, flow_instant(s, s->state.now.t),
                               x->happened + indicators_first_of_frictions(s->system)) != OK)
         return FAILED;
+    const double inside = losses_energy(s, flow_instant(s, s->state.now.t));
     if (OPTIONAL.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
+    s->state.now.lost += inside - losses_energy(s, flow_instant(s, s->state.now.t));
     if (OPTIONAL.switch_modes(s, x->happened) != OK) return FAILED;
     return choose_rows(x);
 }
@@ -185,9 +187,11 @@ static Status moving(Instance *x, Status (*act)(Instance *)) {
     if (instance_start(x) != OK) return FAILED;
     memcpy(q, s->state.q, bytes);
     memcpy(v, s->state.v, bytes);
+    const double lost = s->state.now.lost;
     x->observed = x->evaluated = 0;
     if (act(x) != OK) return FAILED;
     x->moved |= memcmp(q, s->state.q, bytes) != 0 || memcmp(v, s->state.v, bytes) != 0;
+    x->moved |= EXCHANGE_LOST && s->state.now.lost != lost;
     return OK;
 }
 

@@ -213,6 +213,10 @@ Status instance_value(Solver *s, const Observed *o, const Variable *v, double *v
         case AT_SLIP: *value = o->slip[v->index]; break;
         case AT_MARGIN: *value = o->margin[v->index]; break;
         case AT_POWER: *value = o->power[v->index]; break;
+        case AT_LOST_RATE:
+            *value = 0;
+            for (int i = 0; i < s->system->frictions; i++) *value -= o->power[i];
+            break;
         case AT_OUTPUT: *value = o->own[v->index]; break;
         default: return fail(&s->why, "%s has no value", v->name);
     }

@@ -33,7 +33,7 @@ typedef enum {
     AT_SLIPPING_COUNT, AT_SLIPPING_TIME, AT_SLIPPING_Q, AT_SLIPPING_V,
     AT_STICKING_COUNT, AT_STICKING_TIME, AT_STICKING_Q, AT_STICKING_V,
     AT_PEAK_MAX, AT_PEAK_MIN, AT_PEAK_MAX_TIME, AT_PEAK_MIN_TIME, /* number of the quantity */
-    AT_LOST,                                 /* energy dissipated */
+    AT_LOST, AT_LOST_RATE,                   /* energy dissipated, and its derivative by frictions */
     AT_ERROR           /* error bar number `contact`, of the variable at position `index` (bars.h) */
 } Place;
 
@@ -65,5 +65,6 @@ extern const System *const MODEL_SYSTEM;       /* the system that is stepped */
 extern const char *const MODEL_IDENTIFIER, *const MODEL_GUID;
 extern const double DEFAULT_TOLERANCE;
 extern const int DEFAULT_METHOD;               /* MethodName */
+extern const int EXCHANGE_LOST;                /* 1: the energy dissipated is the last continuous state */
 
 #endif

@@ -242,6 +242,7 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
         x.zero[j] = 0;
     }
     if (strike(&x, at, q, v, entering, plastic, &found, &soft) != OK) return FAILED;
+    s->state.now.lost -= gain(&x, &found, &found, 1);
     for (int j = 0; j < n; j++) v[j] += found.dv[j];
     return OK;
 }

@@ -187,7 +187,7 @@ static Status check_finite(Solver *s, const System *full, const Observed *o) {
         {o->slip, 2 * own->frictions, OF_SLIP, "slip.%s"},
         {o->margin, own->frictions, OF_FRICTION, "margin.%s"},
         {o->power, own->frictions, OF_FRICTION, "power.%s"},
-        {&s->state.now.lost, own->frictions > 0, OF_NONE, "energy.dissipated"},
+        {&s->state.now.lost, 1, OF_NONE, "energy.dissipated"},
     };
     int bad = 0;
     for (size_t k = 0; k < sizeof list / sizeof *list; k++)

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "flow.h"
+#include "losses.h"
 #include "rest.h"
 #include "slipping.h"
 #include "thresholds.h"
@@ -32,47 +33,15 @@ static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     return OK;
 }
 
-/* - Lambda . (s+ + s-)/2 = T- - T+ + Lambda . nu [J] of an impact M (v+ - v-) = G^T Lambda. */
-static Status lose(Solver *s, const double *arriving) {
-    const System *system = s->system;
-    Mechanism *b = &s->stepped;
-    const double *v = s->state.v;
-    double *jump = s->work_contacts, *push = jump + system->n, *c = push + system->n;
-    double *Lambda = c + system->m, any = 0, moving = 0;
-    for (int j = 0; j < system->n; j++) {
-        jump[j] = v[j] - arriving[j];
-        push[j] = 0;
-        any = fmax(any, fabs(jump[j]));
-    }
-    if (any == 0) return OK;
-    for (int e = 0; e < system->masses; e++) {
-        const int i = system->mass_row[e], j = system->mass_column[e];
-        push[i] += b->M[e] * jump[j];
-        if (i != j) push[j] += b->M[e] * jump[i];
-    }
-    for (int j = 0; j < system->n; j++) s->state.now.lost -= push[j] * (v[j] + arriving[j]) / 2;
-    for (int k = 0; k < system->m; k++) {
-        s->active[k] = 1;
-        moving = fmax(moving, fabs(b->nu[k]));
-        c[k] = mechanism_row(b, k, jump);
-    }
-    if (moving == 0) return OK;
-    if (linear_factor(&b->linear, b->M, b->G, s->active) != OK) return FAILED;
-    if (linear_solve(&b->linear, NULL, c, push, Lambda) != OK) return FAILED;
-    for (int k = 0; k < system->m; k++) s->state.now.lost += Lambda[k] * b->nu[k];
-    return OK;
-}
-
 static void note(Solver *s, EventKind kind, int i) {
     state_note(&s->state, kind, i, s->system->n, s->state.q, s->state.v);
 }
 
-static Status change(Solver *s, Instant at, const int *left, const double *arriving, int *closed,
-                     const int *touching, const int *leaving) {
+static Status change(Solver *s, Instant at, const int *left, int *closed, const int *touching,
+                     const int *leaving) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
-    if (arriving != NULL && lose(s, arriving) != OK) return FAILED;
     Rest x = rest_of(s, at);
     int *ended = s->iwork_slides + 3 * system->frictions;
     rest_renew_noise(s, x.slides);
@@ -110,8 +79,7 @@ static Status stop(Solver *s, Instant at, const int *left) {
     }
     if (!any) return OK;
     b->friction->slide = held;
-    const Status stopped = mechanism_project(b, at, s->state.q, s->state.v, s->active, s->state.offset,
-                                             s->state.size);
+    const Status stopped = losses_project(s, at, 1);
     b->friction->slide = s->state.slide;
     return stopped;
 }

@@ -18,10 +18,9 @@ typedef struct {
     size_t (*doubles)(const System *s), (*ints)(const System *s); /* workspace of `rub` */
     /* At the start, with the contacts as they would be without frictions: all modes together. */
     Status (*begin)(Solver *s, Instant at, int *closed, const int *touching);
-    /* At an event, `left` being the frictions' indicators: modes, levels, starts of slipping, what impacts
-     * have dissipated since the velocities were `arriving` (n; NULL: nothing). */
-    Status (*change)(Solver *s, Instant at, const int *left, const double *arriving, int *closed,
-                     const int *touching, const int *leaving);
+    /* At an event, `left` being the frictions' indicators: modes, levels, starts of slipping. */
+    Status (*change)(Solver *s, Instant at, const int *left, int *closed, const int *touching,
+                     const int *leaving);
     /* Where `left` says that a slip has ended, the state (q and v) is moved to where it is 0. */
     Status (*stop)(Solver *s, Instant at, const int *left);
     /* What of each friction the forces of now contradict, in `left` (2 frictions) as at an event; of the latest

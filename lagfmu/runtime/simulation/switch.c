@@ -10,6 +10,7 @@
 #include "impact.h"
 #include "indicators.h"
 #include "flow.h"
+#include "losses.h"
 #include "optional.h"
 #include "thresholds.h"
 
@@ -149,13 +150,11 @@ Status switch_modes(Solver *s, const int *happened) {
                flags + 4 * contacts};
     if (find_near(s, at, happened, &x) != OK || strike(s, at, happened, &x) != OK) return FAILED;
     if (settle(s, at, &x) != OK || set_levels(s, at, x.closed) != OK) return FAILED;
-    if (rubs && OPTIONAL.slides->change(s, at, happened + indicators_first_of_frictions(system), arriving,
-                                     x.closed, x.touching, x.leaving) != OK)
+    if (rubs && OPTIONAL.slides->change(s, at, happened + indicators_first_of_frictions(system),
+                                        x.closed, x.touching, x.leaving) != OK)
         return FAILED;
     system_active(system, x.closed, s->active);
-    if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                          s->state.size) != OK)
-        return FAILED;
+    if (losses_project(s, at, 0) != OK) return FAILED;
     note_closings(s, happened, x.closed, arriving);
     for (int c = 0; c < contacts; c++) {
         if (s->state.closed[c] && !x.closed[c]) note_departure(s, c);

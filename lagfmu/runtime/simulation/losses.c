@@ -1,0 +1,38 @@
+/* losses.c -- the energy that a projection takes.
+ *
+ * Velocities are moved by M dv = G^T Lambda onto G v = nu, where s+ = 0: as in an impact (impact.c) the rows take
+ * - Lambda . (s+ + s-)/2 = dv^T M dv/2 >= 0, whatever work moving surfaces do meanwhile.  Positions that an
+ * importer's integrator has carried off the constraints take the energy before less the energy after. */
+#include "losses.h"
+
+#include <string.h>
+
+double losses_energy(const Solver *s, Instant at) {
+    double energy[2] = {0, 0};
+    if (s->system->embed == NULL && s->system->energies != NULL)
+        s->system->energies(at.t, s->state.q, s->state.v, at.u, at.p, energy);
+    return energy[0] + energy[1];
+}
+
+Status losses_project(Solver *s, Instant at, int drifted) {
+    const System *system = s->system;
+    const Mechanism *b = &s->stepped;
+    const size_t bytes = (size_t)system->n * sizeof(double);
+    double *before = s->work_contacts, *after = before + system->n;
+    double lost = drifted ? losses_energy(s, at) : 0;
+    memcpy(before, s->state.v, bytes);
+    if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                          s->state.size) != OK)
+        return FAILED;
+    memcpy(after, s->state.v, bytes);
+    memcpy(s->state.v, before, bytes);
+    if (drifted) lost -= losses_energy(s, at);
+    memcpy(s->state.v, after, bytes);
+    for (int e = 0; e < system->masses; e++) {
+        const int i = system->mass_row[e], j = system->mass_column[e];
+        const double part = b->M[e] * (after[i] - before[i]) * (after[j] - before[j]);
+        lost += part != 0 ? (i == j ? part / 2 : part) : 0;
+    }
+    s->state.now.lost += lost;
+    return OK;
+}
