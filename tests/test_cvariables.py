@@ -137,6 +137,7 @@ def arrays(p: Prepared) -> dict[str, Any]:
     contacts = [system.rows[k].name for k in system.contacts]
     count = len(contacts)  # at the start nothing has closed
     seen |= {v.name: 0 for v in p.table.variables if v.of.head == "closing"}
+    seen |= {"energy.dissipated": 0.0}
     return {
         "seen": seen,
         "PARAMETER": parameters,
@@ -155,6 +156,7 @@ def arrays(p: Prepared) -> dict[str, Any]:
         "KINETIC": [seen["energy.kinetic"]],
         "POTENTIAL": [seen.get("energy.potential")],
         "TOTAL": [seen.get("energy.total")],
+        "LOST": [0.0],
         "OUTPUT": [seen[own.name] for own in full.outputs],
         "CONTACT": [seen[f"contact.{c}"] for c in contacts],
         "DEPARTURE_COUNT": [[seen[f"departure.{c}.count"]] for c in contacts],

@@ -51,11 +51,11 @@ Status exchange_get_states(Instance *x, double *states) {
 }
 
 void exchange_set_states(Instance *x, const double *states) {
+    if (EXCHANGE_LOST) x->solver.state.now.lost = states[2 * x->solver.system->n];
     for (int j = 0; j < x->solver.system->n; j++) {
         x->solver.state.q[j] = states[2 * j];
         x->solver.state.v[j] = states[2 * j + 1];
     }
-    if (EXCHANGE_LOST) x->solver.state.now.lost = states[2 * x->solver.system->n];
     x->observed = x->evaluated = 0;
 }
 
