@@ -143,6 +143,11 @@ def check_end(shown: dict[str, Any], expected: Run) -> None:
             assert end == pytest.approx(expected.values[n][-1], abs=bound, rel=0), n
 
 
+def test_a_page_is_small(name: str, page_file: Callable[[str], Path]) -> None:
+    """Solver, pictures, curves and equations in less than 300 kB."""
+    assert page_file(name).stat().st_size < 300_000
+
+
 def test_the_page_shows_the_native_fmus_run(page: Page, described: Run) -> None:
     """In Chromium, from disk, without a network: every lambda at the end is the native FMU's, and each event
     that has a time is listed at it."""

@@ -17,6 +17,11 @@ from ..fmu.described import experiment_of
 from ..model.units import for_reading
 from ..page.preset import SETTABLE
 
+BLANK: dict[str, Any] = {  # what most variables are
+    **dict.fromkeys(("unit", "description", "counted"), ""),
+    **dict.fromkeys(("start", "min", "max")),
+    **{"items": [], "discrete": False, "event": False, "type": "Real", "role": "output"},
+}
 NUMBERS = ("Real", "Integer", "Boolean")
 GROUPS = {  # by the kind of what a variable is of
     names.MULTIPLIER: "Multipliers λ",
@@ -61,6 +66,14 @@ def facts(
             "ranges": {n: ends for n, ends in given["ranges"].items() if n in settable},
         },
     }
+
+
+def lean(found: dict[str, Any]) -> dict[str, Any]:
+    """The facts as they stand in a page: a variable says only what differs from `blank` (web/api.js)."""
+    told = [
+        {k: x for k, x in v.items() if k not in BLANK or x != BLANK[k]} for v in found["variables"]
+    ]
+    return {**found, "variables": told, "blank": BLANK}
 
 
 def _variable(v: Any, named: set[str]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from typing import Any
 from markupsafe import Markup
 
 from ..page.template import template
+from .facts import lean
 from .markup import Section, as_json
 
 APPLICATION = (
@@ -36,6 +38,8 @@ APPLICATION = (
     "main.js",
 )
 WORKER = ("fmu.js", "worker.js")
+COMMENT = re.compile(r"^[ \t]*/\*.*?\*/[ \t]*\n", re.MULTILINE | re.DOTALL)
+INDENTATION = re.compile(r"^[ \t]+", re.MULTILINE)
 LIBRARY, LIBRARY_STYLE, LICENCE = "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"
 
 
@@ -64,13 +68,13 @@ def render(playable: Playable) -> str:
         description=playable.facts["description"],
         equations=playable.equations,
         picture=playable.facts["picture"] is not None,
-        facts=as_json(playable.facts),
+        facts=as_json(lean(playable.facts)),
         module=_packed(playable.module),
         recording=_packed(playable.recording),
-        style=Markup(_text("vendor", LIBRARY_STYLE) + _text("page.css")),
+        style=Markup(_text("vendor", LIBRARY_STYLE) + _lean(_text("page.css"))),
         library=Markup(library),
         application=Markup(application),
-        worker=Markup(_script(_joined(WORKER))),
+        worker=_packed(_joined(WORKER).encode()),
         hashes=" ".join(f"'sha256-{_hash(text)}'" for text in (library, application)),
     )
 
@@ -81,8 +85,13 @@ def _packed(content: bytes) -> str:
 
 def _joined(names: Sequence[str]) -> str:
     """Scripts that share one scope of their own."""
-    body = "\n".join(_text(name) for name in names)
+    body = "\n".join(_lean(_text(name)) for name in names)
     return f'\n(() => {{\n"use strict";\n{body}}})();\n'
+
+
+def _lean(text: str) -> str:
+    """Without comments that begin a line, and without indentation: a fifth of the scripts."""
+    return INDENTATION.sub("", COMMENT.sub("", text))
 
 
 def _script(text: str) -> str:

@@ -9,30 +9,32 @@
  * rows up to there. */
 
 const FACTS = JSON.parse(document.getElementById("facts").textContent);
+FACTS.variables = FACTS.variables.map((v) => ({ ...FACTS.blank, ...v }));
 
-async function inflated(base64) {
-  const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+/* What a script element holds, packed. */
+async function inflated(box) {
+  const bytes = Uint8Array.from(atob(box.textContent.trim()), (c) => c.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Response(stream).arrayBuffer();
 }
 
 class Computation {
   constructor() {
-    const text = document.getElementById("worker-source").textContent;
-    const url = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
-    this.worker = new Worker(url);
     this.waiting = new Map();
     this.count = 0;
+    this.loaded = this.load();
+  }
+
+  async load() {
+    const text = await inflated(document.getElementById("worker-source"));
+    const module = await inflated(document.getElementById("module"));
+    const url = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
+    this.worker = new Worker(url);
     this.worker.onmessage = ({ data }) => this.answered(data);
     this.worker.onerror = (event) => {
       for (const { reject } of this.waiting.values()) reject(new Error(event.message));
       this.waiting.clear();
     };
-    this.loaded = this.load();
-  }
-
-  async load() {
-    const module = await inflated(document.getElementById("module").textContent.trim());
     return this.ask({ kind: "load", module, variables: FACTS.variables }, [module]);
   }
 
@@ -65,12 +67,12 @@ class Computation {
 /* A run that was recorded, in place of one that is computed. */
 class Recording {
   constructor(box) {
-    this.loaded = this.load(box.textContent.trim());
+    this.loaded = this.load(box);
   }
 
   /* One number after the other: the times, then column by column. */
-  async load(base64) {
-    const numbers = new Float64Array(await inflated(base64));
+  async load(box) {
+    const numbers = new Float64Array(await inflated(box));
     const rows = numbers.length / (COLUMNS.length + 1);
     const part = (k) => numbers.slice(k * rows, (k + 1) * rows);
     const columns = COLUMNS.map((v, k) => part(k + 1));
