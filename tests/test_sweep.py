@@ -664,3 +664,19 @@ def test_a_scheduler_that_does_not_answer_is_told(hemisphere, monkeypatch):
         SimulationError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
     ):
         lagfmu.sweep(hemisphere, {"theta": [0.1]}, on="tcp://127.0.0.1:9")
+
+
+def test_extremes_do_not_depend_on_the_communication_step(native_fmu: Any) -> None:
+    """Of a model file the largest tension m g (3 - 2 cos(theta0)) is found between the points, which the
+    column says; of an FMU without peaks it is that of the points, which the column says too."""
+    file = MODELS / "pendulum.py"
+    start, keep = {"x": [np.sin(1.0)], "y": [-np.cos(1.0)]}, ["tension:max", "tension:time-of-max"]
+    options = {"keep": keep, "stop_time": 1.4, "step_size": 0.35, "tolerance": 1e-9}
+    ours = lagfmu.sweep(file, start, scene="PendulumCartesian", **options)
+    most, quarter = 9.81 * (3 - 2 * np.cos(1.0)), 0.53478439992
+    assert ours["tension:max"].item() == pytest.approx(most, rel=1e-8)
+    assert ours["tension:time-of-max"].item() == pytest.approx(quarter, abs=1e-4)
+    assert "continuous motion" in ours["tension:max"].attrs["description"]
+    points = lagfmu.sweep(native_fmu("PendulumCartesian"), start, **options)
+    assert points["tension:max"].item() < 0.99 * most
+    assert "communication points" in points["tension:max"].attrs["description"]

@@ -22,7 +22,7 @@ from ..page import picture as pictures
 from ..page import preset as presets
 from ..page.documentation import page, with_figures
 from ..prepare.consistency import values_at_start
-from ..prepare.prepare import Prepared, prepare
+from ..prepare.prepare import Prepared, prepare, with_peaks
 from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
@@ -90,9 +90,11 @@ def as_fmu(
     target: Model | str | os.PathLike[str],
     scene: Scene | str | None = None,
     closed_forms: Sequence[ClosedForm | Conserved] = (),
+    peaks: Sequence[str] = (),
 ) -> Iterator[Path]:
     """An FMU as it is; of a model, or a model file, one that is built (natively where a compiler is at hand)
-    into a folder that goes again.  `scene`: of a file also by name, else its first."""
+    into a folder that goes again.  `scene`: of a file also by name, else its first.  `peaks`: outputs whose
+    extremes a native FMU that is built shall tell."""
     if isinstance(target, Model):
         model, chosen = target, scene if isinstance(scene, Scene) else Scene(target.name)
     else:
@@ -115,7 +117,10 @@ def as_fmu(
             chosen = file.scenes[0 if scene is None else names.index(scene)]
     kind = "native" if find_compiler() is not None else "python"
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        yield write(prepare(model, chosen), folder, closed_forms, kind)
+        prepared = prepare(model, chosen)
+        if kind == "native":
+            prepared = with_peaks(prepared, peaks)
+        yield write(prepared, folder, closed_forms, kind)
 
 
 def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]] = ()) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from ..mechanics.equations import EquationsOfMotion, derive
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import reduce
 from ..mechanics.jumps import with_jumps
-from ..model.model import Contact, Model, name_of
+from ..model.model import Contact, Model, Peak, name_of
 from ..model.scene import EVERYTHING, Scene
 from ..model.selection import select
 from ..model.stuck import stuck
@@ -171,6 +171,19 @@ def prepare(
         structure=structure,
         derived=derived,
     )
+
+
+def with_peaks(prepared: Prepared, wanted: Sequence[str]) -> Prepared:
+    """The same with the extremes of those of its outputs that these names and patterns mean."""
+    more = select(wanted, [v.name for v in prepared.table.measurable], "", [])
+    if not more:
+        return prepared
+    model, asked = prepared.model, prepared.asked
+    model = replace(model, peaks=(*model.peaks, *map(Peak, more)))
+    if not asked.complete:
+        told = [names.name(quantity, "", name) for name in more for quantity in names.PEAKS]
+        asked = replace(asked, outputs=(*asked.outputs, *told))
+    return prepare(model, asked, replace(prepared.derived, model=model))
 
 
 def _with_numbers(form: Form, numbers: dict[Any, Any]) -> Form:

@@ -12,19 +12,31 @@ from ...verification.simulate import missing
 
 REDUCTIONS = {"last": LAST, "max": MAX, "min": MIN, "mean": MEAN, "time-of-max": TIME_OF_MAX}
 TRAJECTORY = "trajectory"
+PEAKS = {"max": "peak.max", "min": "peak.min", "time-of-max": "peak.max_time"}
+FOUND = {  # of the reductions that look for something: whether the FMU has found it
+    True: "of the continuous motion, found by the FMU itself",
+    False: "of the communication points, and of events between them",
+}
 
 
 @dataclass(frozen=True)
 class Kept:
-    """The reductions (variable, how) in the order asked for, and the variables kept at all points."""
+    """The reductions (variable, how) in the order asked for, and the variables kept at all points; `peaks`:
+    those of the reductions that the FMU tells itself, by its `peak.*`."""
 
     numbers: tuple[tuple[str, str], ...]
     trajectories: tuple[str, ...]
+    peaks: tuple[tuple[str, str], ...] = ()
 
     @property
     def extremes(self) -> bool:
-        """Whether anything is kept that is looked for at departures too."""
-        return any(how not in ("last", "mean") for _, how in self.numbers)
+        """Whether anything is kept that is looked for at events too."""
+        return any(how in PEAKS and (n, how) not in self.peaks for n, how in self.numbers)
+
+    def about(self, column: str) -> str:
+        """What a column NAME:HOW has been found in; empty where it is plain."""
+        name, _, how = column.rpartition(":")
+        return FOUND[(name, how) in self.peaks] if how in PEAKS else ""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -34,8 +46,19 @@ class Kept:
     @property
     def plan(self) -> tuple[tuple[str, int], ...]:
         """For the session: the numbers, then the variables whose trajectories are kept."""
-        found = [(name, REDUCTIONS[how]) for name, how in self.numbers]
+        found = [
+            (names.name(PEAKS[how], "", name), LAST)
+            if (name, how) in self.peaks
+            else (name, REDUCTIONS[how])
+            for name, how in self.numbers
+        ]
         return (*found, *((name, LAST) for name in self.trajectories))
+
+
+def peaked(texts: Sequence[str]) -> list[str]:
+    """The variables, or patterns of them, whose peaks are of use to what is to be kept."""
+    asked = [text.rpartition(":") for text in texts] or [("lambda.*", ":", "max")]
+    return list(dict.fromkeys(name for name, _, how in asked if how in PEAKS))
 
 
 def kept(texts: Sequence[str], known: Mapping[str, str], outputs: Sequence[str]) -> Kept:
@@ -70,4 +93,7 @@ def kept(texts: Sequence[str], known: Mapping[str, str], outputs: Sequence[str])
             numbers.append((name, how))
     if problems:
         raise SettingError("keep: " + "; ".join(problems))
-    return Kept(tuple(numbers), tuple(trajectories))
+    peaks = [
+        (n, how) for n, how in numbers if how in PEAKS and names.name(PEAKS[how], "", n) in known
+    ]
+    return Kept(tuple(numbers), tuple(trajectories), tuple(peaks))

@@ -31,6 +31,7 @@ from ...verification.simulate import (
 from .design import Design, Values, design
 from .engine import connected, distributed, local
 from .keep import kept as parsed
+from .keep import peaked
 from .table import Layout, Parts, dataset, write_rows
 
 MOST = 2000  # runs in a chunk
@@ -71,8 +72,9 @@ def sweep(
     `sampling` ('latin-hypercube' or 'sobol') with `seed`; `rows` is a table with a column a quantity (a
     pandas DataFrame, a structured array, or a dict of sequences).
 
-    `keep` are 'NAME:last', ':max', ':min', ':mean', ':time-of-max' (over communication points and departures)
-    or ':trajectory'; if empty, the largest multipliers, counts and times of departures and slips.  `out`:
+    `keep` are 'NAME:last', ':max', ':min', ':time-of-max' (of the continuous motion where the FMU has peaks,
+    as one that is built here, else of communication points and events), ':mean' or ':trajectory'; if empty,
+    the largest multipliers, counts and times of departures and slips.  `out`:
     .parquet or .csv for a row a run, .nc or .zarr for all, trajectories included; finished chunks stand in
     OUT.parts at once, and `resume` goes on from them.  `on` is a Dask scheduler's address or a
     `dask.distributed.Client`; without it `workers` processes of this machine do the runs (all cores).
@@ -83,7 +85,7 @@ def sweep(
     _require()
     path_out = None if out is None else Path(out)
     _check_options(workers, seed, tolerance, path_out, resume)
-    with as_fmu(target, scene) as path:
+    with as_fmu(target, scene, peaks=peaked(keep)) as path:
         varied = _design(vary, sample, runs, seed, sampling, rows)
         times = _times(path, stop_time, step_size)
         study = _study(path, varied, keep, times, tolerance, inputs, command)

@@ -51,6 +51,12 @@ class Layout:
             return "s"
         return self.units.get(column.rpartition(":")[0] or column, "") or self.units.get(column, "")
 
+    def about(self, column: str) -> dict[str, str]:
+        """The unit of a column and, of an extreme, what it has been found in."""
+        found = {"unit": "s" if column == "reached" else self.unit(column)}
+        text = self.kept.about(column)
+        return found | ({"description": text} if text else {})
+
     def part(self, first: int, outcome: Outcome) -> Any:
         """The runs from number `first` on as an Arrow table."""
         import pyarrow as pa
@@ -65,10 +71,7 @@ class Layout:
             ("reason", pa.array([outcome.reasons.get(k, "") for k in range(count)], pa.string())),
             ("reached", pa.array(outcome.reached)),
         ]
-        fields = [
-            pa.field(n, a.type, metadata={"unit": "s" if n == "reached" else self.unit(n)})
-            for n, a in columns
-        ]
+        fields = [pa.field(n, a.type, metadata=self.about(n)) for n, a in columns]
         schema = pa.schema(fields, metadata={"lagfmu": json.dumps(dict(self.facts))})
         return pa.table([a for _, a in columns], schema=schema)
 
@@ -180,6 +183,8 @@ def _metadata(name: str, schema: Any, facts: Mapping[str, str]) -> dict[str, Any
         column = {"name": quote(field.name), "titles": field.name, "datatype": kind}
         if unit := field.metadata[b"unit"].decode():
             column["schema:unitText"] = unit
+        if text := field.metadata.get(b"description", b"").decode():
+            column["dc:description"] = text
         columns.append(column)
     return {
         "@context": "http://www.w3.org/ns/csvw",
@@ -244,8 +249,9 @@ def dataset(
             coords[n] = ("run", layout.design.table[:, k], {"units": layout.unit(n)})
     data: dict[str, Any] = {}
     for n in (*layout.kept.columns, "reached"):
-        unit = "s" if n == "reached" else layout.unit(n)
-        data[n] = (dims, table[n].to_numpy().reshape(shape), {"units": unit})
+        about = layout.about(n)
+        about["units"] = about.pop("unit")
+        data[n] = (dims, table[n].to_numpy().reshape(shape), about)
     for n in ("status", "reason"):  # objects: of a fixed width, one long text would cost all runs
         data[n] = (dims, table[n].to_numpy().reshape(shape))
     if trajectories is not None:
