@@ -1,8 +1,9 @@
 """Models that cross features: a disk of four coordinates, to which each feature of a table adds its part.
 
 m, J; x, y, z its centre [m], phi its turn about y [rad]; gravity against z. Each feature is a function of the
-parts of a model; `model(features)` puts them together, `pairs()` are all pairs that can be, and `covering()`
-few models among which every pair stands in one at least.
+parts of a model; `model(features)` puts them together, with an output `drive`, the power of all forces that
+are no part of the Lagrangian; `pairs()` are all pairs that can be, and `covering()` few models among which
+every pair stands in one at least.
 """
 
 from __future__ import annotations
@@ -122,12 +123,14 @@ def _rheonomic(p: Parts) -> None:
 
 
 def _jump(p: Parts) -> None:
-    p.push(x, -k * d * Heaviside(x - d))
+    p.push(
+        x, k * d * Heaviside(x - d)
+    )  # away from its surface: one that holds a motion there is no jump
 
 
 def _blade(p: Parts) -> None:
     p.rows.append(Nonholonomic("blade", x.diff() * sin(phi) - y.diff() * cos(phi)))
-    p.start[phi] = 0.5
+    p.start |= {phi: 0.5, y.diff(): math.tan(0.5)}
 
 
 def _redundant(p: Parts) -> None:
@@ -136,6 +139,7 @@ def _redundant(p: Parts) -> None:
 
 def _rolls(p: Parts) -> None:
     p.rows.append(Nonholonomic("rolls", x.diff() - r * phi.diff(), while_closed="floor"))
+    p.start[phi.diff()] = 5.0
 
 
 def _nullspace(p: Parts) -> None:
@@ -145,7 +149,7 @@ def _nullspace(p: Parts) -> None:
 def _outputs(p: Parts) -> None:
     p.outputs += [
         Output("push", multiplier("floor"), "N"),
-        Output("work", x.diff() * z.diff(2), "m^2/s^3"),
+        Output("work", x.diff() * z.diff(t, 2), "m^2/s^3"),
     ]
 
 
@@ -231,6 +235,8 @@ def model(features: Iterable[str]) -> tuple[Model, Scene]:
         + J * phi.diff() ** 2 / 2
         - m * g * z
     )
+    power = sum(force * q.diff() for q, force in parts.forces.items())
+    outputs = [*parts.outputs, *([Output("drive", power, "W")] if power else [])]
     used = [e.free_symbols for e in (lagrangian, *parts.forces.values())]
     for row in rows:
         parts_of = [row.static, row.sliding] if isinstance(row, Friction) else [row.expression]
@@ -250,7 +256,7 @@ def model(features: Iterable[str]) -> tuple[Model, Scene]:
                 if s in set().union(*used)
             ],
             inputs=parts.inputs,
-            outputs=parts.outputs,
+            outputs=outputs,
             start=start | parts.start,
         ),
         Scene(name[:60], parts.formulation, stop_time=1.0, step_size=0.02),

@@ -165,7 +165,8 @@ class Flow:
         """Raises StepFailureError if the projection after an adaptive step from t0 to t moved the state by
         far more than its error can be: next to a singular configuration it leads to another branch."""
         far = max(FAR * self.settings.tolerance, LEAST_FAR)
-        unit = np.maximum(np.abs(y), np.concatenate([self.size, self.size * self.state.rate]))
+        size = np.concatenate([self.size, self.size * self.state.rate])
+        unit = np.maximum.reduce([np.abs(y), size, shared(self.system, self.scale, y)])
         moved = np.abs(projected - y)
         if self.settings.method == "rk4" or (moved <= far * unit).all():
             return

@@ -183,7 +183,8 @@ Status flow_check_projection(Solver *s, double t, const double *y, const double 
     for (int j = 0; j < 2 * n; j++) {
         const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
         const double moved = fabs(projected[j] - y[j]);
-        if (!(moved <= far * fmax(fabs(y[j]), size)) && !is_balanced(s, j, moved))
+        const double known = fmax(fmax(fabs(y[j]), size), s->scale[j]); /* as the step's error */
+        if (!(moved <= far * known) && !is_balanced(s, j, moved))
             return fail(&s->why,
                         "the integration stops at t = %.17g s, the projection onto the constraints "
                         "moves %s by %.3g: the configuration is singular, or nearly so",

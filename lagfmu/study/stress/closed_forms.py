@@ -34,6 +34,7 @@ from ...verification.verify import applies
 from .player import Run
 
 LEEWAY = 10.0
+SLOW = 1e-9  # of the fastest slip: one that has no direction yet
 Column = NDArray[np.float64]
 
 
@@ -90,6 +91,7 @@ class JudgedForm:
         chosen = applies(self.closed_form, run.rows, run.values)
         if not self.instantaneous:
             chosen = chosen & undisturbed
+        chosen = chosen & ~self._barely_slips(run)
         rows, result, values = run.rows[chosen], run.rows, run.values
         actual = self.actual.at(rows, result, values)
         if len(actual) == 0:
@@ -117,6 +119,16 @@ class JudgedForm:
         error = np.abs(actual - expected)
         worst = int(np.argmax(np.where(known, error / allowed, -1.0)))
         return float(error[worst]), float(allowed[worst]), int(known.sum())
+
+    def _barely_slips(self, run: Run) -> NDArray[np.bool_]:
+        """Where a slip of which it speaks is so slow, beside the fastest of the run, that rounding gives it
+        its direction: at the instant at which it begins, or turns round."""
+        when = sp.sympify(0 if self.closed_form.when is None else self.closed_form.when)
+        slips = [n for n in map(str, when.free_symbols) if names.read(n).quantity == names.SLIP]
+        if not slips:
+            return np.zeros(len(run.rows), dtype=bool)
+        speed = np.sqrt(sum(run.rows[n] ** 2 for n in slips))
+        return np.asarray(speed <= SLOW * speed.max(initial=0.0))
 
 
 def judged(

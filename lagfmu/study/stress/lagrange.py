@@ -33,12 +33,11 @@ from ...model.elements import Constraint, Expr
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
 from ...verification.verify import closed_forms_in
-from .closed_forms import magnitude
+from .closed_forms import SLOW, magnitude
 from .facts import ROUNDED, beside
 
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
-SLOW = 1e-9  # of its terms: a slip velocity that has no direction yet
 NOTHING = 2.0**-52  # of the forces on others: a force that is none, however light what it acts on
 LEAST = sp.Float(math.ulp(0.0))  # of a lambda: what is smaller is 0 to a double
 ON = 1e-12  # of the terms of a jump's surface: a motion that stands on it
@@ -162,7 +161,10 @@ def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
     )
     forms.append(
         ClosedForm(
-            f"heat of {law.name}", sp.Integer(0), heat, scale=force * speed, rounding=ROUNDING
+            *(f"heat of {law.name}", sp.Integer(0), heat),
+            scale=force * speed,
+            when=slips,
+            rounding=ROUNDING,
         )
     )
     margin, power = names.name(names.MARGIN, law.name), names.name(names.POWER, law.name)
