@@ -18,11 +18,12 @@ from fmi2 import EXCHANGE, Library
 from fmpy.fmi1 import FMICallException
 from instance import instance
 from scipy.special import ellipj, ellipk
+from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_forged_states import forged_text
 from typer.testing import CliRunner
 
-from lagfmu import Output, Scene, sweep
+from lagfmu import Model, Output, Parameter, Scene, sweep
 from lagfmu.cli.app import app
 from lagfmu.errors import SimulationError
 from lagfmu.fmu.compiler import find_compiler
@@ -62,11 +63,11 @@ def run(fmu: Path, stop: float, step: float, **options):
     )
 
 
-def multiplier(t: np.ndarray) -> np.ndarray:
-    """lambda of x^2 + y^2 = L^2 from rest at 1 rad: -T/(2 L), T = m g (3 cos theta - 2 cos theta0)."""
-    k = math.sin(0.5)
+def multiplier(t: np.ndarray, angle: float = 1.0) -> np.ndarray:
+    """lambda of x^2 + y^2 = L^2 from rest at an angle: -T/(2 L), T = m g (3 cos theta - 2 cos angle)."""
+    k = math.sin(angle / 2)
     sn = ellipj(math.sqrt(9.81) * t + ellipk(k**2), k**2)[0]
-    return -9.81 * (3 * (1 - 2 * (k * sn) ** 2) - 2 * math.cos(1.0)) / 2
+    return -9.81 * (3 * (1 - 2 * (k * sn) ** 2) - 2 * math.cos(angle)) / 2
 
 
 @pytest.mark.parametrize("name", ["PendulumCartesian", "PendulumNullspace"])
@@ -80,6 +81,42 @@ def test_the_multiplier_of_the_pendulum_lies_within_its_bar(barred, name):
         assert np.mean(true <= bar) >= 0.99
         assert (np.diff(bar) >= 0).all()
         assert bar[-1] < 1e4 * tolerance
+
+
+def test_no_point_of_a_run_misses_its_bar(barred, target):
+    """Runs count, and their first points most: 120 pendulums from rest at angles up to 2.5 rad, tolerances
+    from 1e-4 to 1e-11 and three communication steps, held against Jacobi's elliptic functions (rounding of
+    these: 1e-13).  In 99 of 100 runs no bar is missed, and half of the bars are less than 100 errors."""
+    if target == "python":
+        pytest.skip("the python target has its own companion")
+    chance, held, sharp = np.random.default_rng(11), [], []
+    for step in (0.02, 0.1, 0.3):
+        angle, tolerance = chance.uniform(0.1, 2.5, 40), 10 ** chance.uniform(-11, -4, 40)
+        rows = {"x": np.sin(angle), "y": -np.cos(angle), "solver.tolerance": tolerance}
+        names = ["lambda.rod", "error.lambda.rod"]
+        keep = [f"{n}:trajectory" for n in names]
+        found = sweep(
+            barred("PendulumCartesian"), rows=rows, keep=keep, stop_time=12 * step, step_size=step
+        )
+        value, bar = (found[n].values for n in names)
+        true = np.array([multiplier(step * np.arange(13), a) for a in angle])
+        error = np.maximum(np.abs(value - true) - 1e-13, 0)
+        held += [*(error <= bar).all(axis=1)]
+        sharp += [*(bar[error > 0] / error[error > 0])]
+    assert np.mean(held) >= 0.99
+    assert np.median(sharp) < 100
+
+
+def test_the_first_point_of_a_run_lies_within_its_bar(barred, target):
+    """A pendulum from 98 degrees after one communication step of 0.1 s, where one or two steps decide."""
+    if target == "python":
+        pytest.skip("the python target has its own companion")
+    angle = 1.7041670222167058
+    with instance(barred("PendulumCartesian")) as one:
+        one.start({"x": math.sin(angle), "y": -math.cos(angle)}, tolerance=2.334e-7)
+        one.step(0.1)
+        off = abs(one.get("lambda.rod") - multiplier(np.array([0.1]), angle)[0])
+        assert 1e-10 < off <= one.get("error.lambda.rod") < 100 * off
 
 
 def test_the_time_of_departure_lies_within_its_bar(barred):
@@ -122,7 +159,7 @@ def test_the_time_at_which_slipping_starts_lies_within_its_bar(barred, target):
 
 
 def test_rattle_has_bars_by_the_step_halved(barred, target):
-    """Of order 6: the run of half the step is off by a 63rd of the difference, which is the bar."""
+    """Of order 6: the companion of half the step is off by a 64th of the delivered run's error."""
     if target == "python":
         pytest.skip("rattle is in native FMUs alone")
     with instance(barred("PendulumCartesian")) as one:
@@ -131,9 +168,7 @@ def test_rattle_has_bars_by_the_step_halved(barred, target):
             one.step(0.1)
         off = abs(one.get("lambda.rod") - multiplier(np.array([one.time]))[0])
         assert 0 < off <= one.get("error.lambda.rod") < 200 * off
-        assert one.get("solver.steps") == 80
-        told = [text for status, _, text in one.log if status == 1]
-        assert any("0.025 s in place of 0.05 s" in text for text in told), one.log
+        assert one.get("solver.steps") == 40
 
 
 def test_a_run_is_the_same_with_error_bars_and_without(barred, fmu):
@@ -186,17 +221,19 @@ def test_reading_bars_does_not_change_them(barred):
         assert one.outputs() == other.outputs()
 
 
-def test_a_fixed_step_is_halved_and_that_is_said(barred):
-    """rk4 of order 4: the run of half the step is off by a fifteenth of the difference, and says so."""
+def test_a_fixed_step_has_bars_by_the_step_halved(barred, target):
+    """rk4 of order 4: the run of half the step is off by a fifteenth of the difference.  The native target's
+    companion takes it; the python target delivers it, and says so."""
     with instance(barred("PendulumCartesian")) as one:
         one.start({"solver.method": "rk4", "solver.step": 0.02}, tolerance=1e-6)
         for _ in range(20):
             one.step(0.1)
         off = abs(one.get("lambda.rod") - multiplier(np.array([one.time]))[0])
         assert off <= one.get("error.lambda.rod") < 100 * off
-        assert one.get("solver.steps") == 200
+        assert one.get("solver.steps") == {"native": 100, "python": 200}[target]
         told = [text for status, _, text in one.log if status == 1]
-        assert any("0.01 s in place of 0.02 s" in text for text in told), one.log
+        halved = any("0.01 s in place of 0.02 s" in text for text in told)
+        assert halved == (target == "python"), one.log
 
 
 def test_only_what_has_a_bar_has_one_and_bars_go_with_their_outputs(prepared):
@@ -234,17 +271,43 @@ def test_between_the_two_departures_the_bars_are_infinite(barred):
     assert max(seen[-1]) < 1
 
 
-def test_a_companion_that_cannot_follow_is_told_and_the_run_goes_on(barred, target):
-    """A double pendulum at a tolerance of 0.1: ten is none at all, and the log says so once."""
-    with instance(barred("DoublePendulum")) as one:
-        one.start(tolerance=0.1)
-        for _ in range(8):
-            one.step(0.5)
-        assert one.get("error.x1") == INFINITE
-        assert all(abs(one.get(n)) < 1e3 for n in ("x1", "y2", "lambda.upper"))
+@pytest.fixture(scope="module")
+def root(target: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A mass on a spring by rk4, and an output that is not defined beyond x = d: two steps from x = 1 to the
+    middle end 5 mm short of it, the four of the companion 0.3 mm."""
+    if target == "python":
+        pytest.skip("the python target has its own companion")
+    if find_compiler() is None:
+        pytest.skip("no C compiler on this machine")
+    x, (m, k, d) = dynamicsymbols("x"), symbols("m k d", positive=True)
+    model = Model(
+        name="Root",
+        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
+        coordinates={x: "m"},
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1.0, "N/m"), Parameter(d, 2e-3, "m")],
+        outputs=[Output("root", sqrt((x - d) / d), "1")],
+        start={x: 1.0},
+    )
+    half = math.pi / 2
+    scene = Scene(
+        "Root", stop_time=half, step_size=half, method="rk4", step=half / 2, error_bars=True
+    )
+    return write(prepare(model, scene), tmp_path_factory.mktemp("root"), target=target)
+
+
+def test_a_companion_that_cannot_follow_is_told_and_the_run_goes_on(root):
+    """Where the companion cannot be read and the delivered run can all bars are infinite, and the log says so
+    once."""
+    with instance(root) as one:
+        one.start(tolerance=1e-6)
+        one.step(math.pi / 2)
+        assert 0 < one.get("x") < 1e-2
+        assert one.get("error.x") == one.get("error.root") == INFINITE
+        one.step(1e-3)
         told = [text for status, _, text in one.log if status == 1 and "error bars" in text]
         assert len(told) == 1
-        assert "tolerance 10.0 cannot follow" in told[0]
+        assert "cannot follow" in told[0]
+        assert "root" in told[0]
 
 
 def test_an_fmu_with_error_bars_is_for_co_simulation(barred, target, tmp_path):
@@ -328,9 +391,8 @@ def test_simulate_gives_the_bars_of_the_fmu_and_plots_them_as_bands(prepared, ba
     assert said[3] == "der(theta,2)"
 
 
-def test_bars_of_many_runs_are_kept_as_any_output(barred, target, tmp_path):
-    """A sweep keeps the largest bar of each run, and the true errors lie within; where the companion is lost
-    its bar is infinite, and is printed so."""
+def test_bars_of_many_runs_are_kept_as_any_output(barred):
+    """A sweep keeps the largest bar of each run, and the true errors lie within."""
     path = barred("PendulumCartesian")
     of = "lambda.rod"
     options = {"stop_time": 3.0, "step_size": 0.1}
@@ -343,12 +405,16 @@ def test_bars_of_many_runs_are_kept_as_any_output(barred, target, tmp_path):
     assert (np.abs(found[of].values - exact[of].values) <= bars).mean() >= 0.99
     assert (found[f"{bar_of(of)}:max"].values == bars.max(axis=1)).all()
     assert found[bar_of(of)].attrs["units"] == found[of].attrs["units"]
+
+
+def test_an_infinite_bar_is_printed_so(root, tmp_path):
+    """In the table of a sweep, where the companion is lost."""
     said = CliRunner().invoke(
         app,
-        ["sweep", str(barred("DoublePendulum")), "--vary", "solver.tolerance=0.1,1e-6", "--stop-time", "4",
-         "--step-size", "0.5", "--keep", "error.x1:max", "--plot", str(tmp_path / "bars.svg")],
+        ["sweep", str(root), "--vary", "d=0.002,0.0001", "--keep", "error.x:max", "--plot",
+         str(tmp_path / "bars.svg")],
     ).output  # fmt: skip
-    assert "0.1 infinite" in " ".join(said.split()), said
+    assert "0.002 infinite" in " ".join(said.split()), said
 
 
 def test_a_run_whose_fixed_step_is_halved_warns(prepared):

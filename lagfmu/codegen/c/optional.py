@@ -18,9 +18,7 @@ AT_CONTACTS = {
     "switch_released": "switch.c",
     "switch_contradicted": "switch.c",
 }
-BESIDE = ("after_step", "at_trial", "at_event", "inside")  # of companion.c
 PEAKS = ("peaks.c", "extreme.c")  # behind PEAKS
-COMPANION = ("bars.c", "companion.c")  # behind ERROR_BARS of variables.c
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
 FRICTION = (  # behind SLIDES
     *("friction.c", "painleve.c", "rest.c", "rubbing.c", "share.c", "slides.c", "slipping.c"),
@@ -68,17 +66,12 @@ def optional_source(
     rows = [
         f"    .methods[{place.upper()}] = &{menu[place]},\n" for place in METHODS if place in menu
     ]
-    rows += [
-        f"    .{method}_{part} = {method}_{part},\n"
-        for method, part in _own(found, scene.error_bars)
-    ]
+    rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .jumps = &JUMPS,\n"] if system.floors else []
     rows += ["    .peaks = &PEAKS,\n"] if peaks else []
     rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
-    if scene.error_bars:
-        rows += [f"    .{part} = companion_{part},\n" for part in BESIDE]
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""
@@ -102,7 +95,7 @@ def files_left_out(
     if not system.frictions:
         gone |= {*FRICTION}
     if not scene.error_bars:
-        gone |= {*COMPANION}
+        gone.add("bars.c")  # behind ERROR_BARS of variables.c
     if not peaks:
         gone |= {*PEAKS}
     if not system.floors:
@@ -118,11 +111,6 @@ def files_left_out(
     return frozenset(gone)
 
 
-def _own(found: tuple[str, ...], error_bars: bool) -> list[tuple[str, str]]:
+def _own(found: tuple[str, ...]) -> list[tuple[str, str]]:
     """Functions of one method that the others do not have."""
-    parts = [
-        ("rk4", "error"),
-        ("rattle", "step"),
-        *([("dop853", "error"), ("dop853", "inside")] * error_bars),
-    ]
-    return [(m, part) for m, part in parts if m in found]
+    return [(m, part) for m, part in (("rk4", "error"), ("rattle", "step")) if m in found]

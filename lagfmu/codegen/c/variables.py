@@ -12,7 +12,6 @@ from ... import names
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.form import Form
 from ...model.scene import Scene
-from ...solver.bars import COARSER, FEW, MARGIN, ROUNDING
 from ...solver.system import System
 from .printer import string
 
@@ -45,10 +44,7 @@ const int EXCHANGE_LOST = {lost};
 const Prescribed *const PRESCRIBED = {motions};
 {bars}"""
 NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
-WITH_BARS = f"""const ErrorBars *const ERROR_BARS = &BARS;
-const double BAR_COARSER = {COARSER!r}, BAR_MARGIN = {MARGIN!r}, BAR_FEW = {FEW!r},
-             BAR_ROUNDING = {ROUNDING!r};
-"""
+WITH_BARS = "const ErrorBars *const ERROR_BARS = &BARS;\n"
 
 
 def variables_source(table: VariableTable, form: Form, scene: Scene, system: System) -> str:

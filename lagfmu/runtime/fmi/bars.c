@@ -1,8 +1,8 @@
-/* bars.c -- error bars by a companion run at a coarser tolerance; see bars.h.
+/* bars.c -- error bars by a companion run at a finer tolerance; see bars.h.
  *
  * Events pair by their count: while one of the runs has met an event that the other has not, a difference
- * says nothing and the bar is infinite, for which the largest double stands.  A method of fixed steps
- * delivers twice as many steps as were asked for, and its companion takes those that were. */
+ * says nothing and the bar is infinite, for which the largest double stands.  Beside a method of fixed
+ * steps the companion takes twice as many. */
 #include "bars.h"
 
 #include <float.h>
@@ -10,14 +10,18 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "companion.h"
 #include "digits.h"
 #include "instance.h"
 #include "flow.h"
+#include "magnitudes.h"
 #include "optional.h"
 #include "restored.h"
 
 static const double INFINITE = DBL_MAX;
+/* Of bars.h; MARGIN, SPREAD, ESTIMATE and ROUNDING are calibrated: benchmarks/error_bars.py --drawn. */
+static const double FINER = 0.1;    /* the companion's tolerance, in that of the delivered run */
+static const double SHORTER = 0.7;  /* its first and its longest step, in the delivered run's */
+static const double MARGIN = 6, SPREAD = 0.03, ESTIMATE = 2, ROUNDING = 16;
 
 /* ------------------------------------------------------------------ memory */
 
@@ -37,9 +41,10 @@ static void layout(Instance *x, Arena *saved, Arena *scratch) {
     solver_layout(&b->solver, saved, scratch, MODEL_SYSTEM);
     b->solver.p = x->solver.p;
     b->solver.on_demand = 1;
-    b->solver.alike = companion_alike(BAR_COARSER);
-    x->solver.alike = HUGE_VAL;
     observed_layout(&b->seen, scratch, MODEL_SYSTEM);
+    b->state = arena_doubles(scratch, 2 * MODEL_SYSTEM->n);
+    b->scale = arena_doubles(scratch, 2 * MODEL_SYSTEM->n);
+    b->push = arena_doubles(scratch, (MODEL_SYSTEM->full != NULL ? MODEL_SYSTEM->full : MODEL_SYSTEM)->n);
     b->kept = arena_take(saved, 1, sizeof *b->kept);
     b->worst = arena_doubles(saved, count);
     b->size = arena_doubles(saved, count);
@@ -59,7 +64,8 @@ static void share(Instance *x) {
     c->drive = x->solver.drive;
     c->stop_time = x->solver.stop_time;
     c->settings = x->solver.settings;
-    c->settings.tolerance *= BAR_COARSER;
+    c->settings.tolerance *= FINER;
+    c->limit = has_fixed_step(x) ? 0 : SHORTER * x->solver.taken;
     if (has_fixed_step(x)) c->settings.step = step;
 }
 
@@ -69,16 +75,6 @@ static double asked_step(const Instance *x, double span) {
     const int known = s->state.now.rate > 0 && isfinite(s->state.now.rate);
     if (x->given.step > 0) return x->given.step;
     return known ? flow_natural_step(s) : span / flow_fewest_steps(s);
-}
-
-static void tell_halved(Instance *x) {
-    const double step = asked_step(x, 0);
-    if (!(step > 0)) return;
-    (void)snprintf(x->note, sizeof x->note,
-                   "error bars: %s delivers a run of half the step, %s s in place of %s s, which the "
-                   "companion takes",
-                   METHOD_NAMES[x->solver.settings.method], digits(step / 2).text, digits(step).text);
-    x->tell(x->context, x->given.step > 0 ? NOTE_WARNING : NOTE_EVENT, x->note);
 }
 
 /* ------------------------------------------------------------------ a run */
@@ -94,7 +90,6 @@ static void start(Instance *x) {
     memset(b->size, 0, bars);
     *b->lost = 0;
     b->observed = 0;
-    if (has_fixed_step(x)) tell_halved(x);
 }
 
 static void lose(Instance *x, const char *why) {
@@ -113,6 +108,8 @@ static void follow(Instance *x, double t_end) {
     b->observed = 0;
     if (*b->lost) return;
     share(x);
+    if (b->solver.state.now.steps == 0 && !has_fixed_step(x))
+        b->solver.state.now.step = SHORTER * x->solver.first; /* both may choose the same first step */
     if (solver_pass(&b->solver, t_end)) return;
     if (solver_advance(&b->solver, t_end) != OK) lose(x, b->solver.why.text);
 }
@@ -132,11 +129,50 @@ static void turn(Instance *x) {
 
 /* ------------------------------------------------------------------ bars */
 
+static int slides_paired(const Slide *a, const Slide *b) {
+    const double turn = a->direction[0] * b->direction[0] + a->direction[1] * b->direction[1];
+    return a->sticks == b->sticks && (a->sticks || (a->sign == b->sign && turn >= 0));
+}
+
+/* Have both runs met the same events, and stand in the same modes? */
+static int have_met_the_same(const Solver *a, const Solver *b) {
+    const System *s = a->system;
+    const State *x = &a->state, *y = &b->state;
+    int paired = 1;
+    for (int k = 0; k < EVENT_KINDS; k++)
+        for (int i = 0; i < event_count_of(s, (EventKind)k); i++)
+            paired &= x->latest[k].count[i] == y->latest[k].count[i];
+    for (int c = 0; c < s->contacts; c++) paired &= x->closed[c] == y->closed[c];
+    for (int k = 0; k < s->jumps; k++) paired &= x->level[k] == y->level[k];
+    for (int k = 0; k < s->frictions; k++) paired &= slides_paired(&x->slide[k], &y->slide[k]);
+    return paired;
+}
+
 /* The time of an event pairs by the count of its own kind. */
 static int is_paired_for(const Variable *of, const Solver *a, const Solver *b, int all) {
     if (!is_of_event(of->place)) return all;
     const EventKind kind = event_kind(of->place);
     return a->state.latest[kind].count[of->contact] == b->state.latest[kind].count[of->contact];
+}
+
+/* Of what is looked at: scales, the forces that may cancel, and how far the two motions are apart. */
+static void measure(Instance *x) {
+    Bars *b = x->bars;
+    const System *own = x->solver.system, *full = own->full != NULL ? own->full : own;
+    const State *state = &x->solver.state, *other = &b->solver.state;
+    const size_t n = (size_t)own->n;
+    memcpy(b->state, state->q, n * sizeof *b->state);
+    memcpy(b->state + n, state->v, n * sizeof *b->state);
+    magnitudes_shared(&x->solver, b->state, b->scale);
+    for (int j = 0; j < full->n; j++) b->push[j] = fabs(x->seen.applied[j]);
+    for (int e = 0; e < full->entries; e++) b->push[full->entry_column[e]] += fabs(x->seen.share[e]);
+    b->paired = have_met_the_same(&x->solver, &b->solver);
+    b->apart = ESTIMATE * state->now.estimated;
+    for (int j = 0; j < 2 * own->n && b->paired; j++) {
+        const double off = b->state[j] - (j < own->n ? other->q[j] : other->v[j - own->n]);
+        const double size = fmax(fabs(b->state[j]), b->scale[j]);
+        if (off != 0) b->apart = fmax(b->apart, fmin(fabs(off) / size, 1));
+    }
 }
 
 /* Both runs can be read at the present state and inputs. */
@@ -145,17 +181,43 @@ static Status look(Instance *x) {
     if (instance_observe(x) != OK) return FAILED;
     if (*b->lost || b->observed) return OK;
     share(x);
-    if (solver_arrive(&b->solver) == OK && solver_observe(&b->solver, &b->seen) == OK)
+    if (solver_arrive(&b->solver) == OK && solver_observe(&b->solver, &b->seen) == OK) {
         b->observed = 1;
-    else
+        measure(x);
+    } else {
         lose(x, b->solver.why.text);
+    }
     return OK;
+}
+
+/* Below what it rounds: of a state the scale of the motion, of a force that of the forces that may cancel in
+ * it, of a multiplier that of all that acts on a coordinate on which it does. */
+static double natural_size(const Instance *x, const Variable *of) {
+    const System *own = x->solver.system, *full = own->full != NULL ? own->full : own;
+    const Observed *o = &x->seen;
+    const double *push = x->bars->push;
+    double size = HUGE_VAL;
+    if (of->state >= 0) return x->bars->scale[of->state];
+    if (of->place == AT_FORCE) return push[of->index];
+    if (of->place == AT_SHARE) return push[full->entry_column[of->index]];
+    if (of->place != AT_LAMBDA) return 0;
+    for (int e = 0; e < full->entries; e++)
+        if (full->entry_row[e] == of->index && o->share[e] != 0)
+            size = fmin(size, push[full->entry_column[e]] * fabs(o->lambda[of->index] / o->share[e]));
+    return size < HUGE_VAL ? size : 0;
+}
+
+/* What a variable that is as large as `size` rounds: the place of a body has the digits of its surroundings. */
+static double rounding(const Instance *x, const Variable *of, double size) {
+    const State *s = &x->solver.state;
+    const int n = x->solver.system->n;
+    if (of->state >= 0) size = fmax(size, s->size[of->state % n] * (of->state < n ? 1 : s->now.rate));
+    return ROUNDING * DBL_EPSILON * sqrt(1 + (double)s->now.steps) * size;
 }
 
 /* The bar that differences ask for and the magnitude of a variable so far, with the present ones; 0 if there
  * is no difference to take. */
-static int compare(Instance *x, const Variable *bar, int paired, double share, double *worst,
-                   double *size) {
+static int compare(Instance *x, const Variable *bar, double *worst, double *size) {
     Bars *b = x->bars;
     const Variable *of = &VARIABLES[bar->index];
     double mine = 0, other = 0;
@@ -166,43 +228,34 @@ static int compare(Instance *x, const Variable *bar, int paired, double share, d
         const Count count = x->solver.state.latest[event_kind(of->place)].count[of->contact];
         *size = count > 0 ? fmax(fabs(x->start_time), fabs(x->solver.state.now.t)) : 0;
     } else {
-        *size = fmax(*size, fabs(mine));
-        if (of->state >= 0) *size = fmax(*size, x->solver.state.scale[of->state]);
+        *size = fmax(*size, fmax(fabs(mine), natural_size(x, of)));
     }
-    if (!is_paired_for(of, &x->solver, &b->solver, paired)) return 0;
+    if (!is_paired_for(of, &x->solver, &b->solver, b->paired)) return 0;
     if (instance_value(&b->solver, &b->seen, of, &other) != OK) return 0;
-    const double off = fabs(mine - other), part = fmax(share, fmin(1, share + off / *size));
-    *worst = fmin(fmax(*worst, part * off), INFINITE);
+    if (mine == other) return 1; /* of no coordinate, or known exactly */
+    const double off = fmax(fabs(mine - other), SPREAD * b->apart * *size);
+    *worst = fmin(fmax(*worst, MARGIN * off), INFINITE);
     return 1;
-}
-
-/* The part of a difference that is the bar: all of it where a fixed step is halved. */
-static double share_of(const Instance *x) {
-    if (has_fixed_step(x)) return 1;
-    return companion_share(&x->solver, &x->bars->solver, BAR_MARGIN, BAR_FEW);
 }
 
 static void widen(Instance *x) {
     Bars *b = x->bars;
     if (*b->lost || look(x) != OK || *b->lost) return;
-    const int paired = companion_paired(&x->solver, &b->solver);
-    const double part = share_of(x);
     for (int k = b->first; k < b->end; k++) {
         const Variable *bar = &VARIABLES[k];
         double worst, size;
-        (void)compare(x, bar, paired, part, &worst, &size);
+        (void)compare(x, bar, &worst, &size);
         b->worst[bar->contact] = worst;
         b->size[bar->contact] = size;
     }
 }
 
-/* Of fixed steps, n to t_end for the companion and 2 n for the delivered run. */
+/* Of fixed steps, n to t_end for the delivered run and 2 n for the companion. */
 static void begin_step(Instance *x, double t_end) {
     const double span = t_end - x->solver.state.now.t;
     if (!has_fixed_step(x) || !(span > 0) || !isfinite(span)) return;
     const double steps = fmax(ceil(span / asked_step(x, span) * (1 - 1e-12)), 1);
-    x->bars->solver.settings.step = span / steps;
-    x->solver.settings.step = span / (2 * steps);
+    x->bars->solver.settings.step = span / (2 * steps);
 }
 
 static Status get(Instance *x, const Variable *v, double *value) {
@@ -211,10 +264,8 @@ static Status get(Instance *x, const Variable *v, double *value) {
     if (look(x) != OK) return FAILED;
     *value = INFINITE;
     if (*b->lost) return OK;
-    const int paired = companion_paired(&x->solver, &b->solver);
-    if (!compare(x, v, paired, share_of(x), &worst, &size)) return OK;
-    const double steps = 1 + (double)x->solver.state.now.steps;
-    *value = fmin(fmax(worst, BAR_ROUNDING * DBL_EPSILON * sqrt(steps) * size), INFINITE);
+    if (!compare(x, v, &worst, &size)) return OK;
+    *value = fmin(fmax(worst, rounding(x, &VARIABLES[v->index], size)), INFINITE);
     return OK;
 }
 

@@ -1,15 +1,17 @@
 /* bars.h -- error bars: how far the values of this run may be off, estimated by a companion run beside it.
  *
- * The companion steps the same equations from the same consistent start under the same inputs, at a
- * tolerance that is BAR_COARSER times the delivered one's.  With x of the delivered run and y of the
- * companion, at the communication points t_k so far,
+ * The companion steps the same equations from the same consistent start under the same inputs, at the
+ * tolerance FINER tol, with steps no longer than SHORTER times the delivered one's longest.  With x of the
+ * delivered run and y of the companion, at the communication points t_k so far,
  *
- *   bar = max( max_k s_k d_k ,  rounding of max_k |x(t_k)| ) ,   d_k = |x(t_k) - y(t_k)| ,
- *   s_k = min(1, BAR_MARGIN / r_k) (1 + BAR_FEW / N_k) :
+ *   bar = max( MARGIN max_k max( d_k, SPREAD a_k X_k ),  ROUNDING eps sqrt(steps) X ) ,
+ *   d = |x - y| ,   a = max( max_j |q_j - q'_j| / scale_j, the same of v,  ESTIMATE max err tol ) :
  *
- * d is the companion's error, which is r times the delivered one's if local errors were all there is: r is the
- * ratio of the sums of h^(p + 1) of both, N the companion's sum in its largest part (companion.h).  Where d is
- * no longer small beside |x| the motions part, and s is at least min(1, s + d / max |x|) (docs/error_bars.md).
+ * d is the delivered run's error but for the companion's own, which is smaller.  Early in a run d may be small
+ * by chance: then what counts is how far the two states are apart, or what the method itself estimates of
+ * its largest step, err tol; X is the largest magnitude of x so far, no smaller than what it is made of (the
+ * forces that cancel in it, the scale of the motion).  What is the same in both runs depends on neither
+ * (docs/error_bars.md).
  *
  * All of it is reached by one pointer, NULL in an FMU without error bars. */
 #ifndef LAGFMU_BARS_H
@@ -22,7 +24,11 @@ struct Instance;
 
 typedef struct {
     Solver solver;    /* the companion; its inputs and parameters are the delivered run's own */
-    Observed seen;    /* what can be read at its state, while `observed` is 1 */
+    Observed seen;    /* what can be read at its state, while `observed` is 1, and then: */
+    double *state, *scale; /* (2 n) q, v of the delivered run, and below which rounding of them is absolute */
+    double *push;     /* (n of the full system) of the magnitudes of all constraints' forces */
+    double apart;     /* the largest relative difference of the two states */
+    int paired;       /* both runs have met the same events */
     int observed;
     int first, end;   /* the bars' positions among the variables, where they stand together */
     /* saved with the instance: */
@@ -56,6 +62,5 @@ typedef struct {
 
 extern const ErrorBars BARS;
 extern const ErrorBars *const ERROR_BARS; /* of variables.c: &BARS, or NULL */
-extern const double BAR_COARSER, BAR_MARGIN, BAR_FEW, BAR_ROUNDING; /* of variables.c: solver/bars.py */
 
 #endif

@@ -77,14 +77,7 @@ static const Saved OF_SOLVER[] = {
     NOW("energy dissipated", lost, FINITE),
     NOW("energy dissipated", lost_old, FINITE),
     NOW("energy dissipated", lost_ahead, FINITE),
-    NOW("sum of local errors", local.sum[0], SIZE),
-    NOW("sum of local errors", local.sum[1], SIZE),
-    NOW("largest local error", local.most[0], SIZE),
-    NOW("largest local error", local.most[1], SIZE),
-    NOW("sum of local errors", local_old.sum[0], SIZE),
-    NOW("sum of local errors", local_old.sum[1], SIZE),
-    NOW("largest local error", local_old.most[0], SIZE),
-    NOW("largest local error", local_old.most[1], SIZE),
+    NOW("estimated error", estimated, SIZE),
     SOLVER("coordinates", state.q, FINITE, N),
     SOLVER("velocities", state.v, FINITE, N),
     SOLVER("levels of jumps", state.level, FINITE, LEVELS),
@@ -215,9 +208,6 @@ static Status together_in_solver(Instance *x, const Solver *s) {
     if (now->ahead && now->event_count > 0 &&
         !(now->event_time >= now->t_old && now->event_time <= now->t_integrator))
         return restored_none(x, "time of the event", now->event_time);
-    for (int k = 0; k < 2; k++)
-        if (!(now->local.most[k] <= now->local.sum[k] && now->local_old.most[k] <= now->local_old.sum[k]))
-            return restored_none(x, "largest local error", now->local.most[k]);
     return OK;
 }
 

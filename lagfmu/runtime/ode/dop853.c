@@ -163,20 +163,6 @@ static double error_norm(const Integrator *i, const Control *control, double h, 
     return denominator == 0 ? 0 : square5 / sqrt(denominator * n);
 }
 
-/* Of the two estimates, of order 5 and 3, one of order 8 (eq. II.10.17), of one component. */
-double dop853_error(const Integrator *i, int j) {
-    const int n = i->ny;
-    const double h = i->t - i->t_old, *k1 = i->f_old, *k6 = i->dense, *k7 = k6 + n, *k8 = k7 + n;
-    const double *k9 = k8 + n, *k10 = k9 + n, *k11 = k10 + n, *k12 = k11 + n;
-    const double fifth = h * (e1 * k1[j] + e6 * k6[j] + e7 * k7[j] + e8 * k8[j] + e9 * k9[j] +
-                              e10 * k10[j] + e11 * k11[j] + e12 * k12[j]);
-    const double third = h * ((b1 - bh1) * k1[j] + b6 * k6[j] + b7 * k7[j] + b8 * k8[j] +
-                              (b9 - bh9) * k9[j] + b10 * k10[j] + b11 * k11[j] +
-                              (b12 - bh12) * k12[j]);
-    const double both = hypot(fifth, 0.1 * third);
-    return both > 0 ? fifth * (fabs(fifth) / both) : 0;
-}
-
 /* h_new / h = 0.9 err^(-1/8), within limits (eq. II.4.13). */
 static double step_factor(double error) {
     if (!isfinite(error)) return RETREAT;
@@ -203,6 +189,7 @@ static Status dop853_step(Integrator *i, const Ode *ode, const Control *control,
                 i->dense[KEPT * n + j] = last[j];
                 i->dense[(KEPT + 1) * n + j] = k[10 * n + j];
             }
+            i->error = error;
             trial_accept(&trial, i, y1, factor);
             return OK;
         }
@@ -270,12 +257,6 @@ static void dop853_dense(const Integrator *i, double t, double *y) {
         double tail = r4[j] + s * (r5[j] + z * (r6[j] + s * r7[j]));
         y[j] = i->y_old[j] + s * (z * r2[j] + s * (r1[j] + z * (r3[j] + z * tail)));
     }
-}
-
-/* The last term of the polynomial, beyond which its error begins, of one component at t. */
-double dop853_inside(const Integrator *i, double t, int j) {
-    const double s = (t - i->t_old) / (i->t - i->t_old), z = 1 - s;
-    return (s * s) * (s * s) * (z * z * z) * i->dense[6 * i->ny + j];
 }
 
 static int dop853_doubles(int ny) {

@@ -26,7 +26,7 @@ void integrator_start(Integrator *i, const Method *method, double t, const doubl
     i->method = method;
     i->t_old = i->t = t;
     i->h_next = h;
-    i->error_old = 0;
+    i->error_old = i->error = 0;
     i->fresh = 1;
     i->fixed_left = 0;
     for (int j = 0; j < i->ny; j++) {

@@ -36,6 +36,7 @@ typedef struct {
     double t_old, t;   /* the step just taken went from t_old to t */
     double h_next;     /* the step to try next; 0: to be chosen from the problem */
     double error_old;  /* memory of the step-size controller */
+    double error;      /* estimated local error of the step just taken, in units of the tolerance; 0: of fixed steps */
     double *y, *f;     /* (ny) state at t and f(t, y) there; f is valid when `fresh` is 0 */
     double *y_old, *f_old; /* (ny) at t_old */
     double *dense;     /* (method->dense_arrays * ny) what the dense output needs */
@@ -72,12 +73,6 @@ extern const Method dop853, rk4, radau5;
 
 /* rk4: estimate of the error of one component in the step just taken. */
 double rk4_error(const Integrator *i, int component);
-
-/* dop853: the same, before prepare_dense. */
-double dop853_error(const Integrator *i, int component);
-
-/* dop853: estimate of the error of one component by dense output at t. */
-double dop853_inside(const Integrator *i, double t, int component);
 
 /* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
  * f_old, dense) come from `saved`, the scratch from `scratch`. */

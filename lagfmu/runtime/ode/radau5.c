@@ -220,6 +220,7 @@ static void accept(Integrator *i, const Trial *trial, Work x, double error, doub
     trial_accept(trial, i, x.y, factor);
     combine(n, P, x.z, i->dense);
     i->error_old = fmax(LEAST_ERROR, error);
+    i->error = error;
 }
 
 static Status radau5_step(Integrator *i, const Ode *ode, const Control *control, double t_bound) {

@@ -88,7 +88,9 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     const int watch = indicators_count(s->system) > 0;
     double *y1 = s->work_advance;
     if (flow_step(s, i, bound, longest) != OK) return FAILED;
-    if (s->alike > 0) OPTIONAL.after_step(s, i);
+    if (!(s->taken > 0)) s->first = i->t - i->t_old;
+    s->taken = fmax(s->taken, i->t - i->t_old);
+    s->state.now.estimated = fmax(s->state.now.estimated, i->error * s->settings.tolerance);
     if ((watch || s->peaks > 0 || i->t > t_end) && flow_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (flow_project(s, i->t, y1) != OK) return FAILED;
@@ -159,7 +161,6 @@ static Status put_between(Solver *s, double t) {
     const Integrator *i = &s->integrator;
     double *y = s->work_advance;
     i->method->dense(i, t, y);
-    if (s->alike > 0) OPTIONAL.inside(s, i, t, y);
     if (flow_project(s, t, y) != OK) return FAILED;
     put(s, t, y);
     return OK;
@@ -182,6 +183,7 @@ int solver_pass(Solver *s, double t_end) {
     if (!(now->ahead && now->t_integrator > t_end && t_end > now->t)) return 0;
     if ((now->event_count > 0 && now->event_time <= t_end) || !waits(s)) return 0;
     now->tiny = 0;
+    s->taken = now->t_integrator - now->t_old;
     now->step = now->h_next;
     now->span = t_end - now->t;
     now->t = t_end;
@@ -227,7 +229,6 @@ static Status meet(Solver *s) {
     double *y = s->work_advance;
     if (s->system->frictions > 0 && lose(s, t) != OK) return FAILED;
     if (flow_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
-    if (s->alike > 0) OPTIONAL.at_event(s);
     put(s, t, y);
     if (s->peaks > 0 && OPTIONAL.peaks->pass(s, t, y) != OK) return FAILED;
     s->state.now.step = i->t - i->t_old;
@@ -300,6 +301,7 @@ Status solver_advance(Solver *s, double t_end) {
         return fail(&s->why, "a communication step must end after t = %.17g s, got %.17g s", begun,
                     t_end);
     now->tiny = 0;
+    s->taken = now->ahead ? now->t_integrator - now->t_old : 0;
     resume(s);
     if (solver_follow(s) != OK) return FAILED;
     if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;

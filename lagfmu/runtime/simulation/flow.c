@@ -98,6 +98,7 @@ double flow_natural_step(const Solver *s) {
 static Control control(const Solver *s, const Integrator *i, double longest) {
     const Settings *set = &s->settings;
     const double fixed = set->step > 0 ? set->step : flow_natural_step(s);
+    if (s->limit > 0) longest = fmin(longest, s->limit);
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
     if (!s->integrator.method->fixed) magnitudes_shared(s, i->y, s->scale);
     return (Control){SAFETY * set->tolerance, s->scale, longest < HUGE_VAL ? longest : 0,
@@ -196,13 +197,10 @@ Status flow_check_projection(Solver *s, double t, const double *y, const double 
 Status flow_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
     Integrator *i = &s->probe;
     memcpy(y, y0, 2 * (size_t)s->system->n * sizeof *y);
-    memset(&s->local_trial, 0, sizeof s->local_trial);
     if (!(t1 > t0)) return OK;
     integrator_start(i, s->integrator.method, t0, y0, t1 - t0);
-    while (i->t < t1) {
+    while (i->t < t1)
         if (flow_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
-        if (s->alike > 0) OPTIONAL.at_trial(s, i);
-    }
     memcpy(y, i->y, 2 * (size_t)s->system->n * sizeof *y);
     return flow_project(s, t1, y);
 }

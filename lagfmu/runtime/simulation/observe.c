@@ -68,6 +68,7 @@ static void observe_forces(const Mechanism *b, Observed *o) {
     memcpy(o->vdot, b->vdot, (size_t)s->n * sizeof *o->vdot);
     memcpy(o->lambda, b->lambda, (size_t)s->m * sizeof *o->lambda);
     memcpy(o->unique, b->linear.unique, (size_t)s->m * sizeof *o->unique);
+    memcpy(o->applied, b->F, (size_t)s->n * sizeof *o->applied);
     for (int j = 0; j < s->n; j++) o->force[j] = 0;
     for (int e = 0; e < s->entries; e++) {
         o->share[e] = b->G[e] * b->lambda[s->entry_row[e]];

@@ -5,7 +5,6 @@
 #ifndef LAGFMU_OPTIONAL_H
 #define LAGFMU_OPTIONAL_H
 
-#include "companion.h"
 #include "contacts.h"
 #include "events.h"
 #include "impact.h"
@@ -20,13 +19,6 @@ typedef struct {
     /* Integrators by MethodName, that of AUTO being the explicit one; NULL where it is left out. */
     const Method *methods[METHOD_COUNT];
     double (*rk4_error)(const Integrator *i, int component);
-    /* Of error bars; NULL without. */
-    double (*dop853_error)(const Integrator *i, int component);
-    double (*dop853_inside)(const Integrator *i, double t, int component);
-    void (*after_step)(Solver *s, Integrator *i);
-    void (*at_trial)(Solver *s, Integrator *i);
-    void (*at_event)(Solver *s);
-    void (*inside)(const Solver *s, const Integrator *i, double t, double *y);
     Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *level,
                           const double *u, const double *p, const Control *control,
                           double t_bound);

@@ -108,6 +108,7 @@ void observed_layout(Observed *o, Arena *arena, const System *system) {
     o->unique = arena_ints(arena, m);
     o->force = arena_doubles(arena, n);
     o->share = arena_doubles(arena, full->entries);
+    o->applied = arena_doubles(arena, n);
     o->own = arena_doubles(arena, full->output_count);
     o->other = arena_doubles(arena, full->output_count);
     o->s = arena_doubles(arena, stepped);

@@ -13,6 +13,7 @@ typedef struct {
     double *lambda, *residual;     /* (m) */
     int *unique;                   /* (m) */
     double *force, *share;         /* Q (n); one constraint's part of it (entries) */
+    double *applied;               /* F (n), of the unconstrained motion */
     double energy[2];              /* kinetic, potential */
     double *own, *other;           /* (output_count) the model's own; where these are not finite */
     double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
@@ -26,8 +27,8 @@ typedef struct Solver {
     Settings settings;
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
-    double alike;              /* with error bars, else 0: see companion.h */
-    LocalErrors local_trial;   /* of the latest trial of an event's time */
+    double limit;              /* [s] of a step, of the companion of error bars (bars.h); 0: none */
+    double first, taken;       /* [s] the first and the longest step that led to the communication point */
     State state;
     Drive drive;
     double *p;                 /* (parameters) */

@@ -34,11 +34,6 @@ typedef struct {
 /* u at time t.  */
 void drive_at(const System *s, const Drive *drive, double t, double *u);
 
-/* Of error bars: local errors of explicit and of implicit steps, each a number, summed up, and the largest. */
-typedef struct {
-    double sum[2], most[2];
-} LocalErrors;
-
 /* How often, over a whole run, which may last for ever. */
 typedef long long Count;
 
@@ -60,7 +55,7 @@ typedef struct {
     Choice choice;       /* of the method `auto` */
     double lost;         /* [J] that frictions and impacts have dissipated, ... */
     double lost_old, lost_ahead; /* ... and so far where the integrator began its step, and stands */
-    LocalErrors local, local_old; /* so far, and without the latest step */
+    double estimated;    /* the largest estimated relative error of a step so far, by the tolerance */
 } Numbers;
 
 /* What happens again and again: to a contact, which opens and is closed or struck, and to a friction, which
