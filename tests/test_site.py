@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from browser import Page
 from once import once
+from PIL import Image
 
 REPOSITORY = Path(__file__).parent.parent
 
@@ -52,6 +53,34 @@ def test_the_site_builds_strictly(site: Path) -> None:
     assert 'href="hemisphere.html"' in (site / "gallery" / "index.html").read_text(encoding="utf-8")
     assert (site / "tutorial.ipynb").is_file()
     assert 'href="../tutorial.ipynb"' in (site / "tutorial" / "index.html").read_text("utf-8")
+
+
+SHOWN = """() => [...document.querySelectorAll("picture img")].map((e) => [
+    e.currentSrc.split("/").at(-1), e.naturalWidth > 100, new URL(e.closest("a").href).pathname])"""
+
+
+@pytest.mark.parametrize("wish", ["no-preference", "reduce"])
+@pytest.mark.parametrize(
+    ("name", "files"), [("", ["landing"]), ("gallery/", ["belt", "hemisphere"])]
+)
+def test_mechanisms_move_unless_the_reader_wants_none(
+    wish: str, name: str, files: list[str], site: Path, browser: Any
+) -> None:
+    """The first page and each model of the gallery have a film of many frames, which opens the live page; who
+    asks for less motion has one picture in its place."""
+    page = Page(browser, site / name / "index.html", reduced_motion=wish)
+    page.until("[...document.querySelectorAll('picture img')].every((e) => e.complete)")
+    shown = page.tab.evaluate(SHOWN)
+    page.close()
+    assert [file.split(".")[0] for file, *_ in shown] == files or wish == "reduce"
+    assert len(shown) == len(files)
+    for file, drawn, target in shown:
+        assert drawn
+        assert Path(target).is_file()
+        assert file.endswith(".webp") == (wish != "reduce")
+        if wish != "reduce":
+            with Image.open(site / name / file) as film:
+                assert film.n_frames > 10
 
 
 @pytest.mark.parametrize("name", ["", "gallery/", "tutorial/", "live/"])
