@@ -610,3 +610,27 @@ def test_a_foot_too_far_out_for_a_double_is_refused_by_name(tmp_path, target):
         told = " ".join(text for _, _, text in one.log)
     assert "derivative of 1e+300" in told
     assert "choose larger units" in told
+
+
+def test_walls_that_meet_are_named(tmp_path):
+    """A ball that loses nothing between walls x = +-(w - c t) gains 2 c at each impact: it is struck without
+    end before they meet at t = w/c = 1 s."""
+    w, c = symbols("w c", positive=True)
+    t = dynamicsymbols._t
+    model = Model(
+        name="Meet",
+        lagrangian=kinetic(x),
+        coordinates={x: "m"},
+        constraints=[
+            Contact("left", w - c * t + x, restitution=1),
+            Contact("right", w - c * t - x, restitution=1),
+        ],
+        parameters=[MASS, Parameter(w, 1.0, "m"), Parameter(c, 1.0, "m/s")],
+        start={x.diff(): 3.0},
+    )
+    with instance(build_fmu(model, tmp_path, target="native", check=False)) as one:
+        one.start({"solver.maximum_steps": 50})
+        with pytest.raises(FMICallException):
+            one.step(1.5)
+        cause = next(text for status, _, text in one.log if status == 2)
+        assert "contact 'left', contact 'right' change without end: do surfaces meet" in cause

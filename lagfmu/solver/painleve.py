@@ -20,6 +20,11 @@ from .instant import Instant
 from .system import Matrix, Vector
 from .thresholds import PAINLEVE_OPENED, PAINLEVE_ROWS, PAINLEVE_SAFE
 
+NEVER_SLIPS = (
+    "if it is meant never to slip, leave the friction out and let its constraints act with the contact "
+    "(while_closed)"
+)
+
 
 def paradox(at: Instant, frictions: Sequence[int], value: float) -> StepFailureError:
     """The refusal of a sliding problem without one solution."""
@@ -27,7 +32,7 @@ def paradox(at: Instant, frictions: Sequence[int], value: float) -> StepFailureE
     return StepFailureError(
         f"friction {names}: sliding has no acceleration, or several, at t = {float(at.t)!r} s (Painleve's "
         f"paradox: the normal force would drive itself, 1 + A = {value:.3g}, expected above 0): use a "
-        "smaller coefficient of friction, or let the bodies deform (a spring in the contact)"
+        f"smaller coefficient of friction, or let the bodies deform (a spring in the contact); {NEVER_SLIPS}"
     )
 
 

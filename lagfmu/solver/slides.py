@@ -16,6 +16,7 @@ from .flow import Flow
 from .friction import heading, loaded, slip_velocity
 from .instant import Instant, Motion
 from .motion import motion
+from .painleve import NEVER_SLIPS
 from .ranges import first_of_frictions
 from .rest import Now, Rest, signed
 from .state import Departure, Slide, State
@@ -166,7 +167,7 @@ def _check_rest(
                 f"friction {f.name!r}: at rest it has several accelerations at t = {float(at.t)!r} s: it "
                 "sticks, or its contact opens (Painleve's paradox: in one direction of slip the normal "
                 "force would drive itself): use a smaller coefficient of friction, or let the bodies "
-                "deform (a spring in the contact)"
+                f"deform (a spring in the contact); {NEVER_SLIPS}"
             )
 
 

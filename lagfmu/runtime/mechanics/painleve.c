@@ -19,7 +19,8 @@ Status friction_paradox(const Mechanism *b, double t, const int *which, int coun
     why_append(b->why,
                ": sliding has no acceleration, or several, at t = %s s (Painleve's paradox: the normal "
                "force would drive itself, 1 + A = %.3g, expected above 0): use a smaller coefficient of "
-               "friction, or let the bodies deform (a spring in the contact)",
+               "friction, or let the bodies deform (a spring in the contact); if it is meant never to slip, "
+               "leave the friction out and let its constraints act with the contact (while_closed)",
                digits(t).text, value);
     return FAILED;
 }

@@ -244,6 +244,26 @@ static Status meet(Solver *s) {
     return s->peaks > 0 ? OPTIONAL.peaks->here(s, 0) : OK;
 }
 
+/* Which contacts and frictions have changed again and again since a time [s]: their names are told. */
+static Status tell_of_chatter(Solver *s, double since) {
+    const System *system = s->system;
+    const char *begin = ": ";
+    for (int i = 0; i < system->contacts + system->frictions; i++) {
+        const int friction = i - system->contacts, which = friction < 0 ? i : friction;
+        const Latest *on = &s->state.latest[friction < 0 ? CLOSING : STICKING];
+        const Latest *off = &s->state.latest[friction < 0 ? DEPARTURE : SLIPPING];
+        if (!(on->count[which] > 0 && on->time[which] >= since) &&
+            !(off->count[which] > 0 && off->time[which] >= since))
+            continue;
+        why_append(&s->why, "%s%s '%s'", begin, friction < 0 ? "contact" : "friction",
+                   friction < 0 ? system->rows[system->contact[i]].name : system->friction[friction].name);
+        begin = ", ";
+    }
+    why_append(&s->why, begin[0] == ':' ? ": is there a force that jumps to and fro?"
+                                        : " change without end: do surfaces meet, or does a force jump to and fro?");
+    return FAILED;
+}
+
 /* FAILED if the step just taken shows that t_end is too far off for steps of its kind. */
 static Status check_headway(Solver *s, double t_end, double begun, Count first) {
     Numbers *now = &s->state.now;
@@ -252,12 +272,14 @@ static Status check_headway(Solver *s, double t_end, double begun, Count first) 
     const double done = (double)(now->steps - first), gone = t - begun, most = s->settings.maximum_steps;
     const double h = t - i->t_old, pace = h * now->rate < HEADWAY ? magnitudes_pace(s) : now->rate;
     if (h * pace < HEADWAY) now->tiny += 1;
-    if (most > 0 && (double)now->tiny > most)
-        return fail(&s->why,
-                    "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
-                    "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
-                    "motion's natural time: is there a force that jumps to and fro?",
-                    t_end, t, most, HEADWAY / pace, HEADWAY);
+    if (most > 0 && (double)now->tiny > most) {
+        (void)fail(&s->why,
+                   "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
+                   "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
+                   "motion's natural time",
+                   t_end, t, most, HEADWAY / pace, HEADWAY);
+        return tell_of_chatter(s, t - most * HEADWAY / pace);
+    }
     if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone)
         return fail(&s->why,
                     "the communication step to t = %.17g s would need about %.0e internal "
@@ -314,11 +336,10 @@ Status solver_advance(Solver *s, double t_end) {
             events = 0;
         }
         events += 1;
-        if (events == CHATTER)
-            return fail(&s->why,
-                        "%d events in %.1g s at t = %.17g s: contacts chatter without end, or a "
-                        "force jumps to and fro",
-                        CHATTER, now->t - since, now->t);
+        if (events == CHATTER) {
+            (void)fail(&s->why, "%d events in %.1g s at t = %.17g s", CHATTER, now->t - since, now->t);
+            return tell_of_chatter(s, since);
+        }
     }
     now->span = t_end - begun;
     keep(s);

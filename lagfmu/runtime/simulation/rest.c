@@ -406,7 +406,8 @@ static Status check_rest(Rest *x, const int *closed, const int *touching, const 
                         "friction '%s': at rest it has several accelerations at t = %s s: it sticks, or "
                         "its contact opens (Painleve's paradox: in one direction of slip the normal "
                         "force would drive itself): use a smaller coefficient of friction, or let the "
-                        "bodies deform (a spring in the contact)",
+                        "bodies deform (a spring in the contact); if it is meant never to slip, leave the "
+                        "friction out and let its constraints act with the contact (while_closed)",
                         system->friction[i].name, digits(x->at.t).text);
         (void)s->stepped.sliding->acting(&s->stepped, x->active); /* what is loaded */
         any = 1;
