@@ -7,41 +7,43 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from ..errors import UserInterruptError
 from .terminal import console
 
-QUIET = (
-    5.0  # [s] at least, and a hundredth of the runs, between lines of progress without a terminal
-)
+FIRST, QUIET = (
+    2.0,
+    10.0,
+)  # [s] until the first line, and between lines, of progress without a terminal
 
 
 @contextmanager
-def told(out: Path | None) -> Iterator[Callable[[int, int, int], None]]:
-    """Progress with rate and remaining time; after an interruption, what is left and how to go on."""
+def told(out: Path | None, workers: int | None) -> Iterator[Callable[[int, int, int], None]]:
+    """Progress with rate, remaining time and what a run costs on one of the `workers`; after an interruption,
+    what is left and how to go on."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("runs"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(compact=True),
-        TextColumn("{task.fields[refused]}"),
+        TextColumn("{task.fields[pace]}"),
     )
     shown = console.is_terminal
-    latest, said = time.monotonic(), 0
+    begun, due, first = time.monotonic(), FIRST, -1
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
-        task = progress.add_task("runs", total=None, rate="", refused="")
+        task = progress.add_task("", total=None, pace="")
 
         def tell(done: int, total: int, refused: int) -> None:
-            nonlocal latest, said
-            spent = progress.tasks[0].elapsed or 0.0
-            rate = f"{done / spent:.3g}/s" if spent > 0 else ""
-            more = f"{refused} refused" if refused else ""
-            progress.update(task, completed=done, total=total, rate=rate, refused=more)
-            if not shown and time.monotonic() - latest > QUIET and done >= said + 0.01 * total:
-                latest, said = time.monotonic(), done
-                console.print(f"{done} of {total} runs {more}".rstrip(), highlight=False)
+            nonlocal begun, due, first
+            now = time.monotonic()
+            if first < 0:  # those of the sweep that goes on cost nothing here
+                begun, first = now, done
+            pace = _pace(done - first, total - done, now - begun, workers)
+            pace += f", {refused} refused" if refused else ""
+            progress.update(task, completed=done, total=total, pace=pace)
+            if not shown and now - begun > due and done < total:
+                due = now - begun + QUIET
+                console.print(f"{done} of {total} runs: {pace}", highlight=False, soft_wrap=True)
 
         try:
             yield tell
@@ -52,3 +54,22 @@ def told(out: Path | None) -> Iterator[Callable[[int, int, int], None]]:
                 else f"interrupted: what is finished is in {out}.parts; go on with the same command and "
                 "--resume"
             ) from None
+
+
+def _pace(done: int, left: int, spent: float, workers: int | None) -> str:
+    """Runs a second, the time that the rest will take, and what one costs a worker."""
+    if not done or spent <= 0:
+        return f"none done after {spent:.0f} s"
+    rate = done / spent
+    cost = "" if workers is None else f", {_time(workers / rate)} a run"
+    return f"{rate:.3g}/s{cost}, {_time(left / rate)} left"
+
+
+def _time(seconds: float) -> str:
+    """With the unit in which it is read."""
+    if seconds < 1:
+        return f"{1e3 * seconds:.3g} ms"
+    if seconds < 100:
+        return f"{seconds:.2g} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{seconds / 3600:.1f} h"

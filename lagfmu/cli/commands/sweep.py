@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Iterator, Mapping
@@ -69,6 +70,10 @@ def sweep(
     workers: Annotated[
         int | None, typer.Option(help="Processes of this machine (default: its cores).")
     ] = None,
+    timeout: Annotated[
+        float | None,
+        typer.Option(help="A run that takes longer [s] is given up; its row says so."),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on where an interrupted sweep stopped.")
     ] = False,
@@ -92,7 +97,7 @@ def sweep(
         if rows is not None:
             names, values = from_file(rows)
             table = {n: values[:, k] for k, n in enumerate(names)}
-        with told(out) as tell:
+        with told(out, (workers or os.cpu_count() or 1) if on is None else None) as tell:
             found = run(
                 target,
                 axes,
@@ -111,6 +116,7 @@ def sweep(
                 on=on,
                 workers=workers,
                 resume=resume,
+                timeout=timeout,
                 progress=tell,
                 command=shlex.join(["lagfmu", *sys.argv[1:]]),
             )

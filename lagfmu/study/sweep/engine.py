@@ -7,14 +7,17 @@ loads the FMU's binary: host processes do.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import hashlib
 import io
 import itertools
+import logging
 import os
+import signal
 import threading
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,52 +26,86 @@ from ...errors import SimulationError
 from ...fmu.archive import version
 from ...fmu.session import Outcome, Plan, Plug
 from .design import Values
-from .host import Host
+from .host import Host, HostEndedError
 
 PATIENCE = 15  # [s] for a scheduler to answer, and to have a worker
 TRIES = 20  # of a chunk whose workers die, after Dask's own
+BEAT = 0.5  # [s] between looks at how far it is
 AHEAD = 3  # chunks a core that are under way or wait
 
 Chunks = Sequence[tuple[int, Values]]  # number, rows
 
 
-def local(plug: Plug, plan: Plan, chunks: Chunks, workers: int) -> Iterator[tuple[int, Outcome]]:
-    """Chunks as they are done, on `workers` host processes of this machine."""
+@contextlib.contextmanager
+def asked_to_stop() -> Iterator[threading.Event]:
+    """Ctrl-C, and SIGINT from anywhere, set the event, so that what is finished can be kept first; the second
+    one raises KeyboardInterrupt.  In another thread than the main one the event is never set."""
+    stop = threading.Event()
+
+    def heard(*_: Any) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    before = signal.signal(signal.SIGINT, heard)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def local(
+    plug: Plug,
+    plan: Plan,
+    chunks: Chunks,
+    workers: int,
+    limit: float | None,
+    stop: threading.Event,
+    beat: Callable[[int], None],
+) -> Generator[tuple[int, Outcome], None, None]:
+    """Chunks as they are done, on `workers` host processes of this machine, until they are asked to stop.
+
+    `limit`: of the time of a run [s]; `beat` hears in between how many runs of unfinished chunks are done.
+    """
     hosts: list[Host] = []
     own = threading.local()
+    under_way: dict[int, int] = {}
+    over = threading.Event()
 
-    def run(values: Values) -> Outcome:
+    def run(number: int, values: Values) -> Outcome:
         if not hasattr(own, "host"):
-            own.host = Host(plug)
+            own.host = Host(plug, limit)
             hosts.append(own.host)
-        found: Outcome = own.host.run(plan, values)
+        if over.is_set():
+            raise HostEndedError
+        found: Outcome = own.host.run(plan, values, lambda n: under_way.update({number: n}))
         return found
 
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            yield from _windowed(lambda values: pool.submit(run, values), chunks, AHEAD * workers)
-        finally:
-            for host in hosts:
-                host.close()  # what waits for an answer gets none
-            pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _windowed(
-    submit: Callable[[Values], Future[Outcome]], chunks: Chunks, width: int
-) -> Iterator[tuple[int, Outcome]]:
-    """Results as they come, with at most `width` chunks under way."""
     waiting = iter(chunks)
     pending: dict[Future[Outcome], int] = {}
-    while True:
-        for number, values in waiting:
-            pending[submit(values)] = number
-            if len(pending) >= width:
-                break
-        if not pending:
-            return
-        done, _ = wait(pending, return_when=FIRST_COMPLETED)
-        for future in done:
-            yield pending.pop(future), future.result()
+    with contextlib.ExitStack() as last, ThreadPoolExecutor(workers) as pool:
+        try:
+            while not stop.is_set():
+                for number, values in itertools.islice(waiting, AHEAD * workers - len(pending)):
+                    pending[pool.submit(run, number, values)] = number
+                if not pending:
+                    return
+                done, _ = wait(pending, BEAT, FIRST_COMPLETED)
+                for future in done:
+                    number = pending.pop(future)
+                    under_way.pop(number, None)
+                    yield number, future.result()
+                if not done:
+                    beat(sum(under_way.values()))
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            over.set()
+            for host in hosts:
+                host.end()  # what waits for an answer gets none
+                last.callback(host.close)
 
 
 def connected(on: Any) -> tuple[Any, bool]:
@@ -84,6 +121,7 @@ def connected(on: Any) -> tuple[Any, bool]:
         ) from None
     if not isinstance(on, str):
         return on, False
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what it says, we raise
     try:
         client = Client(on, timeout=PATIENCE, set_as_default=False)
     except Exception as error:
@@ -101,9 +139,15 @@ def connected(on: Any) -> tuple[Any, bool]:
     return client, True
 
 
+def closed(client: Any) -> None:
+    """Close a client, also one whose scheduler is gone."""
+    with contextlib.suppress(Exception):
+        client.close(timeout=1)
+
+
 def distributed(
-    client: Any, fmu: Path, plug: Plug, plan: Plan, chunks: Chunks
-) -> Iterator[tuple[int, Outcome]]:
+    client: Any, fmu: Path, plug: Plug, plan: Plan, chunks: Chunks, limit: float | None
+) -> Generator[tuple[int, Outcome], None, None]:
     """Chunks as they are done on a cluster.  The FMU is a task of its own: it goes to each worker once, and
     is made again where the workers that had it died."""
     from dask import distributed as dask
@@ -117,7 +161,7 @@ def distributed(
 
     def submit(number: int) -> Any:
         future = client.submit(
-            work, archive, digest, plug, plan, rows[number], retries=TRIES, pure=False
+            work, archive, digest, plug, plan, rows[number], limit, retries=TRIES, pure=False
         )
         known[future] = number
         return future
@@ -135,6 +179,11 @@ def distributed(
         except SimulationError:
             raise
         except Exception as error:  # the workers that had it died, too often for Dask
+            if client.status != "running" or isinstance(error, (CancelledError, OSError)):
+                raise SimulationError(
+                    f"the Dask scheduler at {client.scheduler.address!r} is gone ({type(error).__name__}): "
+                    "start one with `dask scheduler`, and go on with resume (--resume)"
+                ) from None
             tries[number] += 1
             if tries[number] > TRIES or "KilledWorker" not in type(error).__name__:
                 raise SimulationError(
@@ -154,7 +203,9 @@ _unpacked: set[str] = set()  # folders
 _hosts = threading.local()
 
 
-def work(content: bytes, digest: str, plug: Plug, plan: Plan, values: Values) -> Outcome:
+def work(
+    content: bytes, digest: str, plug: Plug, plan: Plan, values: Values, limit: float | None = None
+) -> Outcome:
     """One chunk in a Dask worker: its thread keeps a host process with the FMU."""
     from dask.distributed import get_worker
 
@@ -166,9 +217,9 @@ def work(content: bytes, digest: str, plug: Plug, plan: Plan, values: Values) ->
                 packed.extractall(place)
             _unpacked.add(place)
     host: Host | None = getattr(_hosts, "host", None)
-    if host is None or host.plug.folder != place:
+    if host is None or host.plug.folder != place or host.limit != limit:
         if host is not None:
             host.close()
-        host = _hosts.host = Host(replace(plug, folder=place))
+        host = _hosts.host = Host(replace(plug, folder=place), limit)
         atexit.register(host.close)
     return host.run(plan, values)

@@ -11,6 +11,9 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
+import time
+from collections.abc import Callable
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -19,31 +22,66 @@ from numpy.typing import NDArray
 from ...errors import SimulationError
 from ...fmu.session import Outcome, Plan, Plug, RefusalError, Session
 
-CRASHED = 6  # status of a run whose process died; fmi2Status ends at 5
+CRASHED, TIMED_OUT = 6, 7  # status of a run whose process died, was killed; fmi2Status ends at 5
+SLICE = 0.5  # [s] of work in one order: how far it has come is known in between
 
 
 class HostDiedError(Exception):
     """The process ended while it was at work; how, in words."""
 
+    status = CRASHED
+
+
+class HostLateError(HostDiedError):
+    """The process was ended, because it worked longer than it may."""
+
+    status = TIMED_OUT
+
+
+class HostEndedError(Exception):
+    """Nobody waits for the answer any more."""
+
 
 class Host:
-    """A process with one instance of an FMU; started when it is first needed, and again after a crash."""
+    """A process with one instance of an FMU; started when it is first needed, and again after a crash, or
+    after a run that took longer than `limit` [s]."""
 
-    def __init__(self, plug: Plug) -> None:
-        self.plug = plug
+    def __init__(self, plug: Plug, limit: float | None = None) -> None:
+        self.plug, self.limit = plug, limit
         self.process: subprocess.Popen[bytes] | None = None
+        self.pace = np.inf  # [s] that a run took
+        self.ended = False
 
-    def run(self, plan: Plan, values: NDArray[np.float64]) -> Outcome:
-        """All runs; where the process dies, each is tried by itself, and those that kill it are told.
+    def run(
+        self, plan: Plan, values: NDArray[np.float64], tell: Callable[[int], None] = lambda _: None
+    ) -> Outcome:
+        """All runs; `tell` hears how many are done.  Where the process dies, each is tried by itself, and
+        those that kill it, or take too long, are told.
 
-        Raises SimulationError if the FMU cannot be loaded at all.
+        Raises SimulationError if the FMU cannot be loaded at all, and HostEndedError after `end`.
         """
+        found, first = [], 0
+        while first < len(values):
+            spell = SLICE if self.limit is None else min(SLICE, self.limit / 4)
+            count = max(1, int(spell / self.pace))
+            found.append(self._runs(plan, values[first : first + count]))
+            first += count
+            tell(min(first, len(values)))
+        return joined(found)
+
+    def _runs(self, plan: Plan, values: NDArray[np.float64]) -> Outcome:
         try:
             return self._ask(plan, values)
         except HostDiedError as died:
             if len(values) == 1:
-                return _crashed(plan, str(died))
-        return joined([self.run(plan, row[None, :]) for row in values])
+                return _failed(plan, died)
+        return joined([self._runs(plan, row[None, :]) for row in values])
+
+    def end(self) -> None:
+        """End the process for good, from another thread than that which waits for it."""
+        self.ended = True
+        if self.process is not None:
+            self.process.kill()
 
     def close(self) -> None:
         """End the process."""
@@ -61,25 +99,49 @@ class Host:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+                start_new_session=True,  # Ctrl-C is for the client, which keeps what is finished
             )
             self._exchange(self.plug)
-        answer: Outcome = self._exchange((plan, values))
+        begun = time.monotonic()
+        answer: Outcome = self._exchange((plan, values), self.limit)
+        self.pace = (time.monotonic() - begun) / max(len(values), 1)
         return answer
 
-    def _exchange(self, order: Any) -> Any:
-        process = self.process
+    def _exchange(self, order: Any, limit: float | None = None) -> Any:
+        process, late = self.process, threading.Event()
+
+        def stop() -> None:
+            late.set()
+            if process is not None:
+                process.kill()
+
+        timer = threading.Timer(limit, stop) if limit is not None else None
         assert process is not None
         assert process.stdin is not None
         assert process.stdout is not None
         try:
+            if self.ended:
+                raise EOFError
+            if timer is not None:
+                timer.start()
             pickle.dump(order, process.stdin)
             process.stdin.flush()
             answer = pickle.load(process.stdout)
         except (OSError, EOFError, pickle.UnpicklingError):
+            if self.ended:
+                self.close()
+                raise HostEndedError from None
             code = process.wait()
             self.close()
+            if late.is_set():
+                raise HostLateError(
+                    f"the run took longer than the {limit:g} s of --timeout"
+                ) from None
             how = f"signal {-code}" if code < 0 else f"exit code {code}"
             raise HostDiedError(f"the FMU took its process down ({how})") from None
+        finally:
+            if timer is not None:
+                timer.cancel()
         if isinstance(answer, SimulationError):
             self.close()
             raise answer
@@ -88,6 +150,8 @@ class Host:
 
 def joined(outcomes: list[Outcome]) -> Outcome:
     """Outcomes one after another."""
+    if len(outcomes) == 1:
+        return outcomes[0]
     reasons: dict[int, str] = {}
     first = 0
     for o in outcomes:
@@ -103,10 +167,10 @@ def joined(outcomes: list[Outcome]) -> Outcome:
     )
 
 
-def _crashed(plan: Plan, how: str) -> Outcome:
+def _failed(plan: Plan, how: HostDiedError) -> Outcome:
     whole = np.full((1, len(plan.times), len(plan.keep)), np.nan) if plan.whole else None
-    status, reached = np.array([CRASHED], dtype=np.int32), np.array([np.nan])
-    return Outcome(np.full((1, len(plan.keep)), np.nan), whole, status, reached, {0: how})
+    status, reached = np.array([how.status], dtype=np.int32), np.array([np.nan])
+    return Outcome(np.full((1, len(plan.keep)), np.nan), whole, status, reached, {0: str(how)})
 
 
 def main(orders: BinaryIO, answers: BinaryIO) -> None:

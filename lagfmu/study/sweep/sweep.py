@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import shutil
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,10 +31,11 @@ from ...verification.simulate import (
     missing,
 )
 from .design import Design, Values, design
-from .engine import connected, distributed, local
+from .engine import asked_to_stop, closed, connected, distributed, local
 from .keep import kept as parsed
 from .keep import peaked
-from .table import Layout, Parts, dataset, write_rows
+from .parts import Parts
+from .table import Layout, dataset, write_rows
 
 MOST = 2000  # runs in a chunk
 FEWEST = 100  # chunks, of a large sweep
@@ -62,6 +65,7 @@ def sweep(
     on: Any = None,
     workers: int | None = None,
     resume: bool = False,
+    timeout: float | None = None,
     progress: Progress | None = None,
     command: str = "",
 ) -> Any:
@@ -78,13 +82,14 @@ def sweep(
     .parquet or .csv for a row a run, .nc or .zarr for all, trajectories included; finished chunks stand in
     OUT.parts at once, and `resume` goes on from them.  `on` is a Dask scheduler's address or a
     `dask.distributed.Client`; without it `workers` processes of this machine do the runs (all cores).
+    A run that takes longer than `timeout` [s] is given up: its status is 'timeout', its process is replaced.
 
     Returns an xarray.Dataset over the crossed quantities, or over `run`; a run that is refused has NaN, its
     `status` and `reason`.  Raises SimulationError with what was expected.
     """
     _require()
     path_out = None if out is None else Path(out)
-    _check_options(workers, seed, tolerance, path_out, resume)
+    _check_options(workers, seed, tolerance, path_out, resume, timeout)
     with as_fmu(target, scene, peaks=peaked(keep)) as path:
         varied = _design(vary, sample, runs, seed, sampling, rows)
         times = _times(path, stop_time, step_size)
@@ -96,7 +101,9 @@ def sweep(
         folder = None if path_out is None else path_out.with_name(f"{path_out.name}.parts")
         parts = Parts(folder, study.identity, resume)
         try:
-            _run(study, parts, on, workers, progress)
+            if resume:
+                parts.check(study.rows, study.points)
+            _run(study, parts, on, workers, timeout, progress)
             found = _assembled(study, parts, path_out)
         except BaseException:
             if parts.temporary:
@@ -123,6 +130,23 @@ class Study:
         found = {k: facts[k] for k in ("fmu_sha256", "stop_time", "step_size", "tolerance")}
         found |= {"design": self.layout.design.digest, "keep": repr(self.layout.kept)}
         return found | {"inputs": driven, "chunk": str(self.chunk)}
+
+    @property
+    def rows(self) -> dict[int, dict[str, Any]]:
+        """Of each chunk the numbers of its runs, and what varies in them."""
+        design, size = self.layout.design, self.chunk
+        found: dict[int, dict[str, Any]] = {}
+        for first in range(0, len(design), size):
+            table = design.table[first : first + size]
+            found[first // size] = {"run": np.arange(first, first + len(table))}
+            found[first // size] |= {n: table[:, k] for k, n in enumerate(design.names)}
+        return found
+
+    @property
+    def points(self) -> tuple[int, ...] | None:
+        """The shape of a run's trajectories, None where none are kept."""
+        count = len(self.layout.kept.trajectories)
+        return (len(self.plan.times), count) if count else None
 
 
 def _study(
@@ -209,9 +233,14 @@ def _assembled(study: Study, parts: Parts, out: Path | None) -> Any:
 
 
 def _run(
-    study: Study, parts: Parts, on: Any, workers: int | None, progress: Progress | None
+    study: Study,
+    parts: Parts,
+    on: Any,
+    workers: int | None,
+    limit: float | None,
+    progress: Progress | None,
 ) -> None:
-    """What is not yet there."""
+    """What is not yet there.  Raises KeyboardInterrupt, when all that is finished is kept."""
     layout, chunk = study.layout, study.chunk
     total, done, refused = len(layout.design), parts.done, 0
     table = layout.design.table
@@ -219,27 +248,35 @@ def _run(
         (n, table[n * chunk : (n + 1) * chunk]) for n in range(-(-total // chunk)) if n not in done
     ]
     finished = total - sum(len(v) for _, v in left)
-    folder = unpack(study.path)
-    plugged = plug(study.path, read_description(study.path), folder)
-    if progress is not None:
-        progress(finished, total, 0)
-    client, ours = (None, False) if on is None else connected(on)
-    try:
-        if client is None:
-            results = local(plugged, study.plan, left, workers or os.cpu_count() or 1)
-        else:
-            results = distributed(client, study.path, plugged, study.plan, left)
-        for number, outcome in results:
-            first = number * chunk
-            parts.write(number, layout.part(first, outcome), layout.trajectories(outcome))
-            refused += len(outcome.reasons)
-            finished += len(outcome.status)
-            if progress is not None:
-                progress(finished, total, refused)
-    finally:
+
+    def tell(under_way: int = 0) -> None:
+        if progress is not None:
+            progress(finished + under_way, total, refused)
+
+    with contextlib.ExitStack() as stack:
+        client, ours = (None, False) if on is None else connected(on)
         if client is not None and ours:
-            client.close()
-        shutil.rmtree(folder, ignore_errors=True)
+            stack.callback(closed, client)
+        folder = unpack(study.path)
+        stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        plugged = plug(study.path, read_description(study.path), folder)
+        tell()
+        if client is None:
+            stop = stack.enter_context(asked_to_stop())
+            cores = workers or os.cpu_count() or 1
+            results = local(plugged, study.plan, left, cores, limit, stop, tell)
+        else:
+            stop = threading.Event()
+            results = distributed(client, study.path, plugged, study.plan, left, limit)
+        with contextlib.closing(results):
+            for number, outcome in results:
+                first = number * chunk
+                parts.write(number, layout.part(first, outcome), layout.trajectories(outcome))
+                refused += len(outcome.reasons)
+                finished += len(outcome.status)
+                tell()
+        if stop.is_set() and finished < total:
+            raise KeyboardInterrupt
 
 
 def memory() -> float:
@@ -285,7 +322,12 @@ def _times(path: Path, stop_time: float | None, step_size: float | None) -> NDAr
 
 
 def _check_options(
-    workers: int | None, seed: int, tolerance: float | None, out: Path | None, resume: bool
+    workers: int | None,
+    seed: int,
+    tolerance: float | None,
+    out: Path | None,
+    resume: bool,
+    timeout: float | None,
 ) -> None:
     """All problems at once."""
     problems = []
@@ -295,6 +337,8 @@ def _check_options(
         problems.append(f"seed = {seed}, expected a whole number from 0")
     if tolerance is not None and (problem := tolerance_problem(tolerance)):
         problems.append(problem)
+    if timeout is not None and not 0 < timeout < float("inf"):
+        problems.append(f"timeout = {timeout!r} s, expected a positive number")
     if resume and out is None:
         problems.append("resume needs the out of the sweep that was interrupted")
     if out is not None and out.suffix not in SUFFIXES:

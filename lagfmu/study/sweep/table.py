@@ -1,17 +1,15 @@
-"""The results of a study: parts on disk as they are done, one Parquet file of all runs, an xarray Dataset.
+"""The results of a study: an Arrow table a part, one file of all runs, an xarray Dataset.
 
-A run is a row: its number, what varied, what was kept, `status` (ok, discard, error, fatal, crashed),
-`reason` and the time that it reached.
+A run is a row: its number, what varied, what was kept, `status` (ok, discard, error, fatal, crashed,
+timeout), `reason` and the time that it reached.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import shutil
 import sys
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,20 +18,21 @@ from urllib.parse import quote
 import numpy as np
 
 from ... import names
-from ...errors import SettingError, SimulationError
+from ...errors import SimulationError
 from ...fmu.session import STATUS, Outcome
 from .design import Design
-from .host import CRASHED
+from .host import CRASHED, TIMED_OUT
 from .keep import Kept
+from .parts import Parts, synchronize
 
-RECORD = "sweep.json"
 INFINITE = sys.float_info.max  # stands for infinity where an FMU's Real must be finite: error bars
 METADATA = "-metadata.json"  # of a CSV file, behind its name: W3C's tabular metadata
 
 
 def status_name(status: int) -> str:
-    """ok, discard, error, fatal or crashed."""
-    return "crashed" if status == CRASHED else "ok" if status < 2 else STATUS[status]
+    """ok, discard, error, fatal, crashed or timeout."""
+    beyond = {CRASHED: "crashed", TIMED_OUT: "timeout"}
+    return beyond.get(status) or ("ok" if status < 2 else STATUS[status])
 
 
 @dataclass(frozen=True)
@@ -82,75 +81,6 @@ class Layout:
         return outcome.trajectory[:, :, len(self.kept.numbers) :]
 
 
-class Parts:
-    """The finished chunks of a sweep, each a file: what a client that stops leaves behind."""
-
-    def __init__(self, folder: Path | None, identity: Mapping[str, Any], resume: bool) -> None:
-        self.temporary = folder is None
-        self.folder = Path(tempfile.mkdtemp(prefix="lagfmu_")) if folder is None else folder
-        record = self.folder / RECORD
-        if folder is not None and self.folder.exists() and any(self.folder.iterdir()):
-            try:
-                found = json.loads(record.read_text(encoding="utf-8"))
-            except (OSError, ValueError):
-                raise SettingError(
-                    f"{str(folder)!r} is not the folder of a sweep ({RECORD} is missing): choose another "
-                    "--out"
-                ) from None
-            differ = sorted(k for k in identity if found.get(k) != identity[k])
-            if differ:
-                raise SettingError(
-                    f"{str(folder)!r} belongs to another sweep ({', '.join(differ)} differ): finish that "
-                    "one, delete its folder, or choose another --out"
-                )
-            if not resume:
-                raise SettingError(
-                    f"{len(self.done)} finished chunks of this sweep are in {str(folder)!r}: go on with "
-                    "--resume, or delete the folder"
-                )
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            record.write_text(json.dumps(identity, indent=1), encoding="utf-8")
-        except OSError as error:
-            raise SimulationError(f"cannot write {str(record)!r}: {error.strerror}") from None
-
-    @property
-    def done(self) -> set[int]:
-        """Numbers of the finished chunks."""
-        return {int(p.stem.split("_")[1]) for p in self.folder.glob("part_*.parquet")}
-
-    def write(self, number: int, table: Any, trajectories: np.ndarray[Any, Any] | None) -> None:
-        """Keep a chunk, at once or not at all."""
-        import pyarrow.parquet as pq
-
-        if trajectories is not None:
-            self._whole(f"part_{number:08d}.npy", lambda path: np.save(path, trajectories))
-        self._whole(f"part_{number:08d}.parquet", lambda path: pq.write_table(table, path))
-
-    def _whole(self, name: str, write: Any) -> None:
-        unfinished = self.folder / f"unfinished_{name}"
-        try:
-            write(unfinished)
-            os.replace(unfinished, self.folder / name)
-        except OSError as error:
-            raise SimulationError(f"cannot write {str(self.folder / name)!r}: {error}") from None
-
-    def tables(self) -> Iterator[Any]:
-        """Arrow tables in the order of the design."""
-        import pyarrow.parquet as pq
-
-        for path in sorted(self.folder.glob("part_*.parquet")):
-            yield pq.read_table(path)
-
-    def trajectories(self) -> np.ndarray[Any, Any]:
-        """(runs, points, variables)."""
-        return np.concatenate([np.load(p) for p in sorted(self.folder.glob("part_*.npy"))])
-
-    def remove(self) -> None:
-        """When all is assembled."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-
 def write_rows(parts: Parts, path: Path, layout: Layout) -> None:
     """One .parquet or .csv file of all runs, written part by part; it replaces what was there when it is
     whole.  What a CSV file cannot say of itself stands beside it: see `_metadata`."""
@@ -169,6 +99,7 @@ def write_rows(parts: Parts, path: Path, layout: Layout) -> None:
                     path.with_name(path.name + METADATA).write_text(about, encoding="utf-8")
             writer.write_table(table)
         writer.close()
+        synchronize(unfinished)
         os.replace(unfinished, path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
@@ -258,5 +189,6 @@ def dataset(
         coords["time"] = ("time", times, {"units": "s"})
         for k, n in enumerate(layout.kept.trajectories):
             values = trajectories[:, :, k].reshape((*shape, len(times)))
-            data[n] = ((*dims, "time"), values, {"units": layout.unit(n)})
+            called = f"{n}:trajectory" if n in coords else n  # its start value is what varies
+            data[called] = ((*dims, "time"), values, {"units": layout.unit(n)})
     return xr.Dataset(data, coords, dict(layout.facts))
