@@ -27,7 +27,7 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter, derive
 from lagfmu.codegen.c.equations import model_source
 from lagfmu.codegen.c.function import BLOCK
-from lagfmu.codegen.c.printer import identifiers
+from lagfmu.codegen.c.printer import identifiers, number
 from lagfmu.codegen.py.equations import lower
 from lagfmu.errors import DerivationError
 from lagfmu.mechanics.differential import Differential
@@ -741,6 +741,13 @@ def test_functions_without_counterpart_are_refused(expression: Any, word: str) -
     with pytest.raises(DerivationError, match=word) as caught:
         model_source(Form(eom))
     assert "cannot be written as numeric code" in str(caught.value)
+
+
+def test_a_zero_may_be_a_float() -> None:
+    """A coefficient of restitution of 0.0 is 0; what only rounds to 0 is no double."""
+    assert number(sp.Float(0.0)) == "0.0"
+    with pytest.raises(DerivationError, match="outside the range"):
+        number(sp.Rational(1, 10**400))
 
 
 def test_symbols_that_are_not_declared_real(tmp_path: Path) -> None:

@@ -160,7 +160,8 @@ def _energy(prepared: Prepared) -> float:
     if system.n != len(state.size) or system.dynamics is None:
         return 0.0
     u, p = values_at_start(eom, prepared.whole, eom.numbers)
-    M, *_ = system.assemble(state.t, np.array(state.q), np.array(state.v), u, p)
+    at = [*u, *state.levels]
+    M, *_ = system.assemble(state.t, np.array(state.q), np.array(state.v), at, p)
     speeds = np.maximum(np.array(state.size) * state.rate, np.abs(state.v))
     return float(np.diag(M) @ speeds**2 / 2)
 

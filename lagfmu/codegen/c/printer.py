@@ -151,7 +151,7 @@ def number(value: Expr) -> str:
         nearest = int(value.p) / int(value.q) if value.is_Rational else float(value)
     except OverflowError:
         nearest = math.inf
-    if not math.isfinite(nearest) or (nearest == 0 and value != 0):
+    if not math.isfinite(nearest) or (nearest == 0 and not value.is_zero):
         shown = str(value)
         shown = shown if len(shown) < 40 else f"{shown[:12]}... ({len(shown)} characters)"
         raise DerivationError(
