@@ -50,6 +50,7 @@ def build_fmu(
     check: bool = True,
     reference: bool = False,
     page: bool = False,
+    sources: bool = True,
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
@@ -61,6 +62,8 @@ def build_fmu(
     is simulated only if it has a binary for this machine.  With `reference` it carries the results of its
     default experiment at a tolerance of 1e-12 (FMI-LS-REF).
 
+    Without `sources` a native FMU carries no C files: it is smaller, and cannot be compiled anew.
+
     With `page` its documentation holds the page in which it runs (documentation/play.html), which needs
     ziglang.
 
@@ -69,7 +72,9 @@ def build_fmu(
     """
     scene, choice = settled(model, scene or Scene(model.name), target)
     prepared = prepare(model, scene)
-    built = package(prepared, out, closed_forms, target, platforms, choice, check, reference, page)
+    built = package(
+        prepared, out, closed_forms, target, platforms, choice, check, reference, page, sources
+    )
     found = built.verification
     if found is not None and not found.passed:
         failed = "; ".join(str(c) for c in found.checks if c.failed)
@@ -133,10 +138,11 @@ def package(
     check: bool = True,
     reference: bool = False,
     page: bool = False,
+    sources: bool = True,
 ) -> Built:
     """What `prepare` made as an FMU: built once, verified once, its figures put in."""
     live = render(playable(prepared)) if page else ""
-    path = write(prepared, out, closed_forms, target, platforms, choice, live)
+    path = write(prepared, out, closed_forms, target, platforms, choice, live, sources)
     runs_here = target == "python" or host() in chosen(platforms)
     found = verify_fmu(path) if check and runs_here else None
     more = layered(path, found) if reference and runs_here else {}

@@ -116,3 +116,44 @@ def test_what_a_header_defines_is_defined_nowhere_else() -> None:
     for path in ROOT.glob("runtime/*/*.c"):
         twice = set(defined.findall(path.read_text())) & shared.keys()
         assert not twice, (path.name, twice)
+
+
+TOKENS = re.compile(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|/\*.*?\*/', re.DOTALL)
+OWN_NAMES = (  # functions and values, types, numbers
+    re.compile(r"^static [^;{(]*?\b(\w+)(?:\[\w*\])*(?: =|;|\()", re.MULTILINE),
+    re.compile(r"^(?!typedef|enum|return)\w[\w \*]*?\b(\w+)(?:\[\w*\])*(?: =|\()", re.MULTILINE),
+    re.compile(r"^\} (\w+);", re.MULTILINE),
+)
+NUMBERS = re.compile(r"^(?:static const \w+ (\w+ = [^;]*);|enum \{([^}]*)\})", re.MULTILINE)
+
+
+def names_of(text: str) -> set[str]:
+    """What a C file defines outside of functions."""
+    bare = TOKENS.sub(lambda m: "" if m[0].startswith("/*") else '""', text)
+    found = {name for pattern in OWN_NAMES for name in pattern.findall(bare)}
+    for several in NUMBERS.findall(bare):
+        found |= {part.split("=")[0].strip() for one in several for part in one.split(",")}
+    return found - {""}
+
+
+def test_a_name_of_the_runtime_stands_in_one_file() -> None:
+    """An FMU's all.c includes its C files one behind the other: no two of them define the same name."""
+    places: dict[str, list[str]] = {}
+    for path in sorted(ROOT.joinpath("runtime").rglob("*.c")):
+        for name in names_of(path.read_text(encoding="utf-8")):
+            places.setdefault(name, []).append(path.name)
+    for path in sorted(ROOT.joinpath("runtime").rglob("*.h")):
+        for name in OWN_NAMES[0].findall(TOKENS.sub("", path.read_text(encoding="utf-8"))):
+            places.setdefault(name, []).append(path.name)
+    assert {name: files for name, files in places.items() if len(files) > 1} == {}
+
+
+def test_what_files_of_the_runtime_share_is_declared_so() -> None:
+    """SHARED makes it static where one file includes all: only the functions of FMI are exported."""
+    plain = re.compile(
+        r"^(?!typedef|static|return|#|SHARED|FMI2_EXPORT)[A-Za-z][\w \*]*\(", re.MULTILINE
+    )
+    for path in sorted(ROOT.joinpath("runtime").rglob("*.h")):
+        bare = TOKENS.sub("", path.read_text(encoding="utf-8"))
+        assert plain.findall(bare) == [], path.name
+        assert "extern" not in bare or path.name in ("fmi2.h", "linkage.h"), path.name

@@ -3,7 +3,6 @@ uninitialized, nothing undefined, nothing left behind, in a life with everything
 
 from __future__ import annotations
 
-import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -17,6 +16,7 @@ from test_jumps import MODELS as JUMPS
 
 from lagfmu import Scene, build_fmu
 from lagfmu.fmu.compiler import find_compiler
+from lagfmu.fmu.native import GENERATED
 from lagfmu.model.file import load
 
 pytestmark = [
@@ -84,8 +84,9 @@ def program(folder: Path, name: str, flags: tuple[str, ...]) -> Path:
     """scenario.c with the FMU's generated sources and what it holds of the runtime, which is the same for
     every FMU."""
     sources = folder / "sources"
-    held = re.findall(r"^/\* (\w+\.c) \*/$", (sources / "lagfmu.c").read_text(), re.MULTILINE)
-    generated = [str(p) for p in sorted(sources.glob("*.c")) if p.name != "lagfmu.c"]
+    carried = sorted(p for p in sources.glob("*.c") if p.name != "all.c")
+    held = [p.name for p in carried if p.name not in GENERATED]
+    generated = [str(p) for p in carried if p.name in GENERATED]
     target = folder / f"{name}_{len(flags)}"
     linked = objects([SCENARIO, *(RUNTIME_FILES[file] for file in held)], flags)
     command = [compiler(), *FLAGS, *flags, "-Werror", f"-I{sources}", "-o", str(target)]

@@ -51,7 +51,6 @@ HOT = {  # where the time of a step and of a communication point goes; all else 
     *("linear.c", "schur.c", "ldlt.c", "lu.c", "painleve.c"),
     *("dop853.c", "rk4.c", "radau5.c", "rattle.c", "integrator.c"),
     *("flow.c", "state.c", "observe.c", "clearance.c", "system.c"),
-    "lagfmu.c",  # the runtime in one file
 }
 
 SHARED = ("-shared", "-s", "-Os")  # -Os is for what the compiler adds of its own

@@ -43,10 +43,12 @@ def write(
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
     live: str = "",
+    sources: bool = True,
 ) -> Path:
     """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
 
-    `choice` is HTML on how the solver settings were chosen, `live` the page in which the FMU runs.  For
+    `choice` is HTML on how the solver settings were chosen, `live` the page in which the FMU runs; without
+    `sources` a native FMU carries no C files.  For
     the rest see api.build_fmu.  Warns of each start value that is moved onto the constraints.  Raises
     ModelError if one in the model's `start` moves by more than 1e-6 of its coordinate's size.
     """
@@ -75,7 +77,7 @@ def write(
     if (preset := presets.preset_of(prepared)) is not None:
         extra[presets.IN_FMU] = presets.as_bytes(preset)
     if target == "native":
-        content = native.build(prepared, extra, platforms)
+        content = native.build(prepared, extra, platforms, sources)
     else:
         content = python.build(prepared, extra)
     path = Path(out)

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..codegen.c.amalgam import SOURCE
 from ..errors import BuildError
 from ..fmu.archive import opened
 from ..fmu.described import read_description
-from ..fmu.native import IDENTITY, sources_of
+from ..fmu.native import GENERATED, IDENTITY, sources_of
 from ..fmu.write import PAGE
 from ..page import preset as presets
 from ..page.documentation import mathml
@@ -49,7 +48,7 @@ def playable(target: Prepared | Path) -> Playable:
     Raises BuildError without ziglang, and for an FMU that holds no C sources.
     """
     told = told_by(target)
-    if not {"model.c", "variables.c", SOURCE} <= told.sources.keys():
+    if not {*GENERATED} <= told.sources.keys():
         raise BuildError(
             f"{str(target)!r} holds no C sources of lagfmu, which a page is compiled from: build it with "
             "--target native, or make the page from the model file"

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.resources import files
 
-from ..codegen.c.amalgam import HEADER, SOURCE, with_one_header
 from ..errors import BuildError
 from ..fmu.compiler import WASM, compile_libraries, find_compiler
-from ..fmu.native import runtime_files
+from ..fmu.native import ALL, GENERATED
 
 IMPORTER = "importer.c"
 
@@ -26,8 +25,7 @@ def compile_module(name: str, sources: Mapping[str, bytes]) -> bytes:
             "a page needs ziglang, which compiles the FMU's C sources to WebAssembly, and it is not "
             "installed: pip install lagfmu[native]"
         )
-    runtime = {file: sources[file] for file in (HEADER, SOURCE)}
-    own = {file: text for file, text in sources.items() if file not in runtime}
-    importer = files("lagfmu").joinpath("live/web", IMPORTER).read_bytes()
-    own[IMPORTER] = with_one_header(importer, runtime_files())
+    own = {file: text for file, text in sources.items() if file in GENERATED}
+    runtime = {file: text for file, text in sources.items() if file not in own and file != ALL}
+    own[IMPORTER] = files("lagfmu").joinpath("live/web", IMPORTER).read_bytes()
     return compile_libraries(name, own, runtime, [WASM])[WASM.folder]

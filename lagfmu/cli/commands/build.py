@@ -63,6 +63,10 @@ def build(
         bool,
         typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
     ] = False,
+    sources: Annotated[
+        bool,
+        typer.Option(help="Whether a native FMU carries its C files, to be compiled anew."),
+    ] = True,
     *,
     needs: Needs,
     add_output: AddOutput = None,
@@ -107,6 +111,7 @@ def build(
                     check,
                     reference,
                     page_,
+                    sources,
                 )
             path, found = built.path, built.verification
             console.print(

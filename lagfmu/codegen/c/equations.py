@@ -96,7 +96,7 @@ def _index(what: str, names: Sequence[Any]) -> str:
 
 
 def _pointer(name: str) -> str:
-    return f"\nconst System *const MODEL_SYSTEM = &{name};\n"
+    return f"\nSHARED_VALUE const System *const MODEL_SYSTEM = &{name};\n"
 
 
 def _real(symbols: Sequence[Expr]) -> dict[Expr, Expr]:

@@ -30,21 +30,22 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include "variables.h"
 
 /* name, type, role, place, index, contact, state, start, min, max, positive, given */
-const Variable VARIABLES[] = {{
+static const Variable TABLE[] = {{
 {rows}}};
 
-const int VARIABLE_COUNT = {count};
-const Variable *const PEAKED = {peaked};
-const int PEAK_COUNT = {peaks};
-const char *const MODEL_IDENTIFIER = {identifier};
-const char *const MODEL_GUID = LAGFMU_GUID;
-const double DEFAULT_TOLERANCE = {tolerance};
-const int DEFAULT_METHOD = {method};
-const int EXCHANGE_LOST = {lost};
-const Prescribed *const PRESCRIBED = {motions};
+SHARED_VALUE const Variable *const VARIABLES = TABLE;
+SHARED_VALUE const int VARIABLE_COUNT = {count};
+SHARED_VALUE const Variable *const PEAKED = {peaked};
+SHARED_VALUE const int PEAK_COUNT = {peaks};
+SHARED_VALUE const char *const MODEL_IDENTIFIER = {identifier};
+SHARED_VALUE const char *const MODEL_GUID = LAGFMU_GUID;
+SHARED_VALUE const double DEFAULT_TOLERANCE = {tolerance};
+SHARED_VALUE const int DEFAULT_METHOD = {method};
+SHARED_VALUE const int EXCHANGE_LOST = {lost};
+SHARED_VALUE const Prescribed *const PRESCRIBED = {motions};
 {bars}"""
-NO_BARS = "const ErrorBars *const ERROR_BARS = NULL;\n"
-WITH_BARS = "const ErrorBars *const ERROR_BARS = &BARS;\n"
+NO_BARS = "SHARED_VALUE const ErrorBars *const ERROR_BARS = NULL;\n"
+WITH_BARS = "SHARED_VALUE const ErrorBars *const ERROR_BARS = &BARS;\n"
 
 
 def variables_source(table: VariableTable, form: Form, scene: Scene, system: System) -> str:

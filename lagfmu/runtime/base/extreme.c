@@ -8,12 +8,12 @@
 #include <math.h>
 
 static const double GOLDEN = 0.3819660112501051; /* (3 - sqrt 5)/2 */
-enum { MOST = 60 };
+enum { MOST_LOOKS = 60 };
 
 Status extreme_find(Height height, void *context, double a, double b, double tolerance, double *best,
                     double *at_best) {
     double x = *best, w = x, v = x, fx = *at_best, fw = fx, fv = fx, step = 0, before = 0;
-    for (int round = 0; round < MOST; round++) {
+    for (int round = 0; round < MOST_LOOKS; round++) {
         const double middle = (a + b) / 2, near = 2 * tolerance - (b - a) / 2;
         if (fabs(x - middle) <= near) break;
         const double r = (x - w) * (fx - fv), q = (x - v) * (fx - fw);

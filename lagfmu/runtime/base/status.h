@@ -2,6 +2,8 @@
 #ifndef LAGFMU_STATUS_H
 #define LAGFMU_STATUS_H
 
+#include "linkage.h"
+
 typedef enum { OK = 0, FAILED = 1 } Status;
 
 enum { WHY_LENGTH = 1024 };
@@ -12,9 +14,9 @@ typedef struct {
 } Why;
 
 /* Writes the cause (printf's format, cut to the buffer) and returns FAILED. */
-Status fail(Why *why, const char *format, ...);
+SHARED Status fail(Why *why, const char *format, ...);
 
 /* Appends to the cause, cut to the buffer. */
-void why_append(Why *why, const char *format, ...);
+SHARED void why_append(Why *why, const char *format, ...);
 
 #endif

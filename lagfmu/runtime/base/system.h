@@ -10,6 +10,7 @@
 #define LAGFMU_SYSTEM_H
 
 #include "interval.h"
+#include "linkage.h"
 #include "plan.h"
 
 typedef enum { HOLONOMIC, NONHOLONOMIC, CONTACT } Kind;
@@ -138,6 +139,6 @@ struct System {
 
 /* 1 where a row acts while the contacts stand as in `closed` (one entry a contact); 0 for rows that hold by
  * friction alone, which friction.c adds where they stick. */
-void system_active(const System *s, const int *closed, int *active);
+SHARED void system_active(const System *s, const int *closed, int *active);
 
 #endif

@@ -21,7 +21,7 @@ static const double INFINITE = DBL_MAX;
 /* Of bars.h; MARGIN, SPREAD, ESTIMATE and ROUNDING are calibrated: benchmarks/error_bars.py --drawn. */
 static const double FINER = 0.1;    /* the companion's tolerance, in that of the delivered run */
 static const double SHORTER = 0.7;  /* its first and its longest step, in the delivered run's */
-static const double MARGIN = 6, SPREAD = 0.03, ESTIMATE = 2, ROUNDING = 16;
+static const double MARGIN = 6, SPREAD = 0.03, ESTIMATE = 2, BAR_ROUNDING = 16;
 
 /* ------------------------------------------------------------------ memory */
 
@@ -32,7 +32,7 @@ static void find_bars(Bars *b) {
     while (b->first > 0 && VARIABLES[b->first - 1].place == AT_ERROR) b->first -= 1;
 }
 
-static void layout(Instance *x, Arena *saved, Arena *scratch) {
+static void layout_bars(Instance *x, Arena *saved, Arena *scratch) {
     Bars counted, *b = arena_take(scratch, 1, sizeof *b);
     x->bars = b;
     if (b == NULL) b = memset(&counted, 0, sizeof counted);
@@ -58,7 +58,7 @@ static int has_fixed_step(const Instance *x) {
 }
 
 /* What the companion shares with the delivered run, but for the tolerance. */
-static void share(Instance *x) {
+static void share_settings(Instance *x) {
     Solver *c = &x->bars->solver;
     const double step = c->settings.step;
     c->drive = x->solver.drive;
@@ -79,11 +79,11 @@ static double asked_step(const Instance *x, double span) {
 
 /* ------------------------------------------------------------------ a run */
 
-static void start(Instance *x) {
+static void start_bars(Instance *x) {
     Bars *b = x->bars;
     const size_t bars = (size_t)(b->end - b->first) * sizeof *b->worst;
     b->solver.settings.step = 0;
-    share(x);
+    share_settings(x);
     b->solver.state.now = x->solver.state.now;
     memcpy(b->solver.state.block, x->solver.state.block, x->solver.state.block_size);
     memset(b->worst, 0, bars);
@@ -92,7 +92,7 @@ static void start(Instance *x) {
     b->observed = 0;
 }
 
-static void lose(Instance *x, const char *why) {
+static void lose_bars(Instance *x, const char *why) {
     Bars *b = x->bars;
     *b->lost = 1;
     (void)snprintf(x->note, sizeof x->note,
@@ -103,15 +103,15 @@ static void lose(Instance *x, const char *why) {
     x->tell(x->context, NOTE_WARNING, x->note);
 }
 
-static void follow(Instance *x, double t_end) {
+static void follow_delivered(Instance *x, double t_end) {
     Bars *b = x->bars;
     b->observed = 0;
     if (*b->lost) return;
-    share(x);
+    share_settings(x);
     if (b->solver.state.now.steps == 0 && !has_fixed_step(x))
         b->solver.state.now.step = SHORTER * x->solver.first; /* both may choose the same first step */
     if (solver_pass(&b->solver, t_end)) return;
-    if (solver_advance(&b->solver, t_end) != OK) lose(x, b->solver.why.text);
+    if (solver_advance(&b->solver, t_end) != OK) lose_bars(x, b->solver.why.text);
 }
 
 static void inputs_changed(Instance *x) {
@@ -123,7 +123,7 @@ static void turn(Instance *x) {
     Bars *b = x->bars;
     b->observed = 0;
     if (*b->lost) return;
-    share(x);
+    share_settings(x);
     *b->lost = solver_look(&b->solver) != OK;
 }
 
@@ -156,7 +156,7 @@ static int is_paired_for(const Variable *of, const Solver *a, const Solver *b, i
 }
 
 /* Of what is looked at: scales, the forces that may cancel, and how far the two motions are apart. */
-static void measure(Instance *x) {
+static void measure_difference(Instance *x) {
     Bars *b = x->bars;
     const System *own = x->solver.system, *full = own->full != NULL ? own->full : own;
     const State *state = &x->solver.state, *other = &b->solver.state;
@@ -176,16 +176,16 @@ static void measure(Instance *x) {
 }
 
 /* Both runs can be read at the present state and inputs. */
-static Status look(Instance *x) {
+static Status observe_both(Instance *x) {
     Bars *b = x->bars;
     if (instance_observe(x) != OK) return FAILED;
     if (*b->lost || b->observed) return OK;
-    share(x);
+    share_settings(x);
     if (solver_arrive(&b->solver) == OK && solver_observe(&b->solver, &b->seen) == OK) {
         b->observed = 1;
-        measure(x);
+        measure_difference(x);
     } else {
-        lose(x, b->solver.why.text);
+        lose_bars(x, b->solver.why.text);
     }
     return OK;
 }
@@ -212,7 +212,7 @@ static double rounding(const Instance *x, const Variable *of, double size) {
     const State *s = &x->solver.state;
     const int n = x->solver.system->n;
     if (of->state >= 0) size = fmax(size, s->size[of->state % n] * (of->state < n ? 1 : s->now.rate));
-    return ROUNDING * DBL_EPSILON * sqrt(1 + (double)s->now.steps) * size;
+    return BAR_ROUNDING * DBL_EPSILON * sqrt(1 + (double)s->now.steps) * size;
 }
 
 /* The bar that differences ask for and the magnitude of a variable so far, with the present ones; 0 if there
@@ -240,7 +240,7 @@ static int compare(Instance *x, const Variable *bar, double *worst, double *size
 
 static void widen(Instance *x) {
     Bars *b = x->bars;
-    if (*b->lost || look(x) != OK || *b->lost) return;
+    if (*b->lost || observe_both(x) != OK || *b->lost) return;
     for (int k = b->first; k < b->end; k++) {
         const Variable *bar = &VARIABLES[k];
         double worst, size;
@@ -251,17 +251,17 @@ static void widen(Instance *x) {
 }
 
 /* Of fixed steps, n to t_end for the delivered run and 2 n for the companion. */
-static void begin_step(Instance *x, double t_end) {
+static void begin_bars(Instance *x, double t_end) {
     const double span = t_end - x->solver.state.now.t;
     if (!has_fixed_step(x) || !(span > 0) || !isfinite(span)) return;
     const double steps = fmax(ceil(span / asked_step(x, span) * (1 - 1e-12)), 1);
     x->bars->solver.settings.step = span / (2 * steps);
 }
 
-static Status get(Instance *x, const Variable *v, double *value) {
+static Status get_bar(Instance *x, const Variable *v, double *value) {
     Bars *b = x->bars;
     double worst, size;
-    if (look(x) != OK) return FAILED;
+    if (observe_both(x) != OK) return FAILED;
     *value = INFINITE;
     if (*b->lost) return OK;
     if (!compare(x, v, &worst, &size)) return OK;
@@ -281,10 +281,10 @@ static void restore(Instance *x) {
     b->observed = 0;
 }
 
-static Status restored(Instance *x) {
+static Status restored_bars(Instance *x) {
     const Bars *b = x->bars;
     if (!x->started) return OK;
-    share(x);
+    share_settings(x);
     if (*b->lost != 0 && *b->lost != 1) return restored_none(x, "companion", *b->lost);
     for (int k = 0; k < b->end - b->first; k++) {
         if (!(b->worst[k] >= 0 && b->worst[k] <= DBL_MAX))
@@ -298,5 +298,5 @@ static Status restored(Instance *x) {
     return restored_solver(x, &b->solver);
 }
 
-const ErrorBars BARS = {layout,         start, widen, begin_step, follow,
-                        inputs_changed, turn,  get,   save,       restore, restored};
+SHARED_VALUE const ErrorBars BARS = {layout_bars,         start_bars, widen, begin_bars, follow_delivered,
+                        inputs_changed, turn,  get_bar,   save,       restore, restored_bars};

@@ -17,6 +17,7 @@
 #ifndef LAGFMU_BARS_H
 #define LAGFMU_BARS_H
 
+#include "linkage.h"
 #include "solver.h"
 #include "variables.h"
 
@@ -60,7 +61,7 @@ typedef struct {
     Status (*restored)(struct Instance *x);
 } ErrorBars;
 
-extern const ErrorBars BARS;
-extern const ErrorBars *const ERROR_BARS; /* of variables.c: &BARS, or NULL */
+SHARED const ErrorBars BARS;
+SHARED const ErrorBars *const ERROR_BARS; /* of variables.c: &BARS, or NULL */
 
 #endif

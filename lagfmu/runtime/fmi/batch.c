@@ -14,7 +14,7 @@ static fmi2Status set(fmi2Component c, fmi2ValueReference reference, int type, d
     }
 }
 
-static fmi2Status get(fmi2Component c, fmi2ValueReference reference, int type, double *value) {
+static fmi2Status get_value(fmi2Component c, fmi2ValueReference reference, int type, double *value) {
     fmi2Integer whole = 0;
     fmi2Status status = fmi2OK;
     switch (type) {
@@ -32,7 +32,7 @@ static double departures(fmi2Component c, const Batch *b, double *latest) {
     *latest = -HUGE_VAL;
     for (size_t k = 0; k < b->events; k++) {
         double count = 0, time = 0;
-        if (get(c, b->count[k], BATCH_INTEGER, &count) > fmi2Warning || count == 0) continue;
+        if (get_value(c, b->count[k], BATCH_INTEGER, &count) > fmi2Warning || count == 0) continue;
         if (fmi2GetReal(c, &b->when[k], 1, &time) > fmi2Warning) continue;
         sum += count;
         if (time > *latest) *latest = time;
@@ -45,7 +45,7 @@ static fmi2Status observe(fmi2Component c, const Batch *b, double *result, doubl
                           double *before, long point, double t) {
     for (size_t k = 0; k < b->kept; k++) {
         double x = 0, *kept = &result[k];
-        const fmi2Status status = get(c, b->keep[k], b->keep_type[k], &x);
+        const fmi2Status status = get_value(c, b->keep[k], b->keep_type[k], &x);
         if (status > fmi2Warning) return status;
         const int first = point == 0;
         switch (b->keep_what[k]) {
@@ -70,7 +70,7 @@ static fmi2Status observe(fmi2Component c, const Batch *b, double *result, doubl
     return fmi2OK;
 }
 
-static fmi2Status start(fmi2Component c, const Batch *b) {
+static fmi2Status start_run(fmi2Component c, const Batch *b) {
     const double *values = b->values + b->current * b->varied;
     fmi2Status status = fmi2SetupExperiment(c, b->tolerance > 0, b->tolerance, b->times[0], fmi2True,
                                             b->times[b->points - 1]);
@@ -104,7 +104,7 @@ static fmi2Status run(fmi2Component c, const Batch *b, fmi2FMUstate *earlier, do
                       double *before) {
     double *result = b->result + b->current * b->kept, *reached = &b->reached[b->current];
     double latest = 0;
-    fmi2Status status = start(c, b);
+    fmi2Status status = start_run(c, b);
     *reached = b->times[0];
     if (status <= fmi2Warning) status = observe(c, b, result, largest, before, 0, *reached);
     double count = b->events > 0 && status <= fmi2Warning ? departures(c, b, &latest) : 0;

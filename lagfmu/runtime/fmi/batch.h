@@ -34,6 +34,8 @@ typedef struct {
     size_t current;                   /* the run under way, for whoever reads the log */
 } Batch;
 
+#define lagfmu_batch FMI2_NAME(lagfmu_batch)
+
 /* fmi2OK if every run was tried; what became of each stands in `status`.  fmi2Fatal if the instance can no
  * longer be reset: the runs from `current` on were not tried. */
 FMI2_EXPORT fmi2Status lagfmu_batch(fmi2Component c, Batch *batch);

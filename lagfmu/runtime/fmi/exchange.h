@@ -7,31 +7,32 @@
 #define LAGFMU_EXCHANGE_H
 
 #include "instance.h"
+#include "linkage.h"
 
 /* The start is over.  Prescribed motions go on by their rates until the importer sets an input. */
-void exchange_begin(Instance *x);
+SHARED void exchange_begin(Instance *x);
 
-void exchange_set_time(Instance *x, double t);
-Status exchange_get_states(Instance *x, double *states);
-void exchange_set_states(Instance *x, const double *states);
-Status exchange_derivatives(Instance *x, double *derivatives);
-Status exchange_indicators(Instance *x, double *indicators);
-Status exchange_nominals(Instance *x, double *nominals);
+SHARED void exchange_set_time(Instance *x, double t);
+SHARED Status exchange_get_states(Instance *x, double *states);
+SHARED void exchange_set_states(Instance *x, const double *states);
+SHARED Status exchange_derivatives(Instance *x, double *derivatives);
+SHARED Status exchange_indicators(Instance *x, double *indicators);
+SHARED Status exchange_nominals(Instance *x, double *nominals);
 
 /* After a step of the importer's integrator; `event`: 1 if the state should be projected. */
-Status exchange_step_done(Instance *x, int *event);
+SHARED Status exchange_step_done(Instance *x, int *event);
 
 /* At an event: the state that has drifted comes back onto the constraints, before inputs are set anew; then
  * contacts open or are struck, and frictions slip or hold, where their indicators say so.  `moved`: 1 if the
  * continuous states changed in either. */
-Status exchange_enter_event(Instance *x);
-Status exchange_event(Instance *x, int *moved);
+SHARED Status exchange_enter_event(Instance *x);
+SHARED Status exchange_event(Instance *x, int *moved);
 
 /* How quickly drift dies, x->gain [1/s], for the motion from this state on. */
-Status exchange_find_gain(Instance *x);
+SHARED Status exchange_find_gain(Instance *x);
 
 /* Accelerations and multipliers at the state; the multipliers of all rows, those too that depend on others. */
-Status exchange_evaluate(Instance *x);
-Status exchange_multipliers(Instance *x);
+SHARED Status exchange_evaluate(Instance *x);
+SHARED Status exchange_multipliers(Instance *x);
 
 #endif

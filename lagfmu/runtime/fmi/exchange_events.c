@@ -19,7 +19,7 @@
 
 static const double SHORT = 1e-2; /* natural time in which a contact closes what drift has opened */
 static const double CLOSE = 10;   /* condition of rows that stand for all, beyond which they are chosen anew */
-static const double LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
+static const double DRIFT_LIMIT = 1e-3; /* residual, relative to a constraint's size, that is projected */
 
 /* Which rows stand for all from here on. */
 static Status choose_rows(Instance *x) {
@@ -94,7 +94,7 @@ static int are_close(const Linear *l) {
 }
 
 /* Whether contacts, frictions or drift ask for an event. */
-static Status judge(Instance *x, int *event) {
+static Status judge_step(Instance *x, int *event) {
     Solver *s = &x->solver;
     double worst;
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
@@ -110,12 +110,12 @@ static Status judge(Instance *x, int *event) {
         memcpy(y + s->system->n, s->state.v, (size_t)s->system->n * sizeof *y);
         if (OPTIONAL.slides->turn(s, s->state.now.t, y) != OK) return FAILED;
     }
-    *event = *event || any || worst > LIMIT;
+    *event = *event || any || worst > DRIFT_LIMIT;
     return OK;
 }
 
 Status exchange_step_done(Instance *x, int *event) {
-    if (judge(x, event) != OK) return FAILED;
+    if (judge_step(x, event) != OK) return FAILED;
     if (x->solver.peaks == 0) return OK;
     x->observed = x->evaluated = 0;
     return OPTIONAL.peaks->step(&x->solver, event);
@@ -156,11 +156,11 @@ static Status project(Instance *x) {
 
 /* What an importer has done to its inputs until now belongs to the step; what it does after, to the event. */
 static Status come_back(Instance *x) {
-    if (release(x, LIMIT) != OK || project(x) != OK) return FAILED;
+    if (release(x, DRIFT_LIMIT) != OK || project(x) != OK) return FAILED;
     return choose_rows(x);
 }
 
-static Status pass(Instance *x) {
+static Status pass_event(Instance *x) {
     Solver *s = &x->solver;
     int any, jumped;
     if (release(x, 0) != OK) return FAILED;
@@ -196,18 +196,18 @@ static Status moving(Instance *x, Status (*act)(Instance *)) {
 }
 
 /* Extremes that are kept know both sides of an event. */
-static Status look(Instance *x) {
+static Status look_for_extreme(Instance *x) {
     if (x->solver.peaks == 0) return OK;
     x->observed = x->evaluated = 0;
     return OPTIONAL.peaks->here(&x->solver, 0);
 }
 
 Status exchange_enter_event(Instance *x) {
-    return moving(x, come_back) == OK ? look(x) : FAILED;
+    return moving(x, come_back) == OK ? look_for_extreme(x) : FAILED;
 }
 
 Status exchange_event(Instance *x, int *moved) {
-    if (moving(x, pass) != OK || look(x) != OK) return FAILED;
+    if (moving(x, pass_event) != OK || look_for_extreme(x) != OK) return FAILED;
     *moved = x->moved;
     x->moved = 0;
     return exchange_find_gain(x);

@@ -19,9 +19,10 @@
 
 #include "flow.h"
 #include "magnitudes.h"
+#include "numbers.h"
 
 static const double GAIN = 3; /* in units of the motion's own rate */
-enum { ROUNDS = 24, SETTLED = 8 }; /* products, and how many of them only turn the vector */
+enum { ROUNDS = 24, GAIN_SETTLED = 8 }; /* products, and how many of them only turn the vector */
 static const double PART = 0x1p-20; /* of the coordinates' sizes: how far they are displaced */
 
 /* The state that is displaced: sizes and direction (2 n), in which direction[j] = 1 is one size. */
@@ -36,12 +37,6 @@ static Status move(Solver *s, double *vdot) {
     s->stepped.stage = 0;
     memcpy(vdot, s->stepped.vdot, (size_t)s->system->n * sizeof *vdot);
     return status;
-}
-
-static double largest(int count, const double *x) {
-    double most = 0;
-    for (int i = 0; i < count; i++) most = fmax(most, fabs(x[i]));
-    return most;
 }
 
 /* direction <- the linearization's product with it, and its length after one that was 1; 0 if it vanishes. */
@@ -76,9 +71,9 @@ static double own_rate(const Tried *x) {
     for (int round = 0; round < ROUNDS; round++) {
         if (multiply(x, &length) != OK) return HUGE_VAL;
         if (!(length > 0)) return 0;
-        if (round >= SETTLED) logarithm += log(length);
+        if (round >= GAIN_SETTLED) logarithm += log(length);
     }
-    return exp(logarithm / (ROUNDS - SETTLED));
+    return exp(logarithm / (ROUNDS - GAIN_SETTLED));
 }
 
 /* The largest rate that an acceleration gives to a coordinate whose size a parameter tells; an angle's is 1 rad. */

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-const char *const CATEGORIES[LOG_CATEGORIES] = {
+SHARED_VALUE const char *const CATEGORIES[LOG_CATEGORIES] = {
     "logStatusWarning", "logStatusDiscard", "logStatusError",
     "logStatusFatal",   "logEvents",        "logAll"};
 

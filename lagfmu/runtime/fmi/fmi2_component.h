@@ -7,6 +7,7 @@
 
 #include "fmi2.h"
 #include "instance.h"
+#include "linkage.h"
 
 enum {
     INSTANTIATED = 1,
@@ -24,7 +25,7 @@ enum {
 
 /* Categories of the log: one bit each in `logging`. */
 enum { LOG_WARNINGS, LOG_DISCARDS, LOG_ERRORS, LOG_FATALS, LOG_EVENTS, LOG_ALL, LOG_CATEGORIES };
-extern const char *const CATEGORIES[LOG_CATEGORIES];
+SHARED const char *const CATEGORIES[LOG_CATEGORIES];
 
 typedef struct {
     fmi2CallbackFunctions callbacks;
@@ -48,20 +49,20 @@ static inline const Variable *component_variable(fmi2ValueReference vr, Type typ
 }
 
 /* To the importer's log: before there is an instance, of one, and as instance.h calls it. */
-void component_send(const fmi2CallbackFunctions *callbacks, const char *name, fmi2Status status,
-                    int category, const char *text);
-void component_message(Component *c, fmi2Status status, int category, const char *text);
-void component_told(void *context, Note note, const char *text);
+SHARED void component_send(const fmi2CallbackFunctions *callbacks, const char *name, fmi2Status status,
+                           int category, const char *text);
+SHARED void component_message(Component *c, fmi2Status status, int category, const char *text);
+SHARED void component_told(void *context, Note note, const char *text);
 
 /* The call returns fmi2Error, and why: the text; the cause that a numerical function left; a function that
  * may not be called now; a pointer that is missing; a value reference of no such variable; a value or a
  * derivative that there is not. */
-fmi2Status component_refuse(Component *c, const char *text);
-fmi2Status component_failed(Component *c, fmi2Status status);
-fmi2Status component_forbidden(Component *c, const char *function);
-fmi2Status component_missing(Component *c, const char *function);
-fmi2Status component_unknown(Component *c, const char *function, fmi2ValueReference vr, Type type);
-fmi2Status component_no_value(Component *c);
-fmi2Status component_no_derivative(Component *c, const char *function, const Variable *v);
+SHARED fmi2Status component_refuse(Component *c, const char *text);
+SHARED fmi2Status component_failed(Component *c, fmi2Status status);
+SHARED fmi2Status component_forbidden(Component *c, const char *function);
+SHARED fmi2Status component_missing(Component *c, const char *function);
+SHARED fmi2Status component_unknown(Component *c, const char *function, fmi2ValueReference vr, Type type);
+SHARED fmi2Status component_no_value(Component *c);
+SHARED fmi2Status component_no_derivative(Component *c, const char *function, const Variable *v);
 
 #endif

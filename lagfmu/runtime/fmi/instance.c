@@ -22,7 +22,7 @@ static void *after(Arena *arena, char **base, size_t size) {
 }
 
 /* The quantities whose extremes are kept, at a state. */
-static Status measure(Solver *s, const Observed *o, double *values) {
+static Status measure_peaked(Solver *s, const Observed *o, double *values) {
     for (int k = 0; k < PEAK_COUNT; k++)
         if (instance_value(s, o, &PEAKED[k], &values[k]) != OK) return FAILED;
     return OK;
@@ -31,7 +31,7 @@ static Status measure(Solver *s, const Observed *o, double *values) {
 void instance_layout(Instance *x, Arena *arena) {
     const System *system = MODEL_SYSTEM;
     x->solver.peaks = PEAK_COUNT;
-    x->solver.measure = measure;
+    x->solver.measure = measure_peaked;
     Arena saved = {NULL, 0}, scratch = {NULL, 0};
     for (int pass = 0; pass < 2; pass++) {
         solver_layout(&x->solver, &saved, &scratch, system);

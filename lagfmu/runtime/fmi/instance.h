@@ -6,6 +6,7 @@
 #define LAGFMU_INSTANCE_H
 
 #include "bars.h"
+#include "linkage.h"
 #include "rates.h"
 #include "sensitivity.h"
 #include "solver.h"
@@ -53,49 +54,49 @@ typedef struct Instance {
 } Instance;
 
 /* Takes all memory from the arena; with base = NULL it is counted. */
-void instance_layout(Instance *x, Arena *arena);
+SHARED void instance_layout(Instance *x, Arena *arena);
 
 /* Puts the values of the description into an instance that was laid out. */
-void instance_reset(Instance *x);
+SHARED void instance_reset(Instance *x);
 
 /* The value of a variable.  FAILED, the cause in x->solver.why, if it cannot be calculated. */
-Status instance_get(Instance *x, const Variable *v, double *value);
+SHARED Status instance_get(Instance *x, const Variable *v, double *value);
 
 /* The same of what lies in a state that `o` was observed at: of this instance, or of a companion. */
-Status instance_value(Solver *s, const Observed *o, const Variable *v, double *value);
+SHARED Status instance_value(Solver *s, const Observed *o, const Variable *v, double *value);
 
 /* The value of a variable that is not an output, as it was set. */
-double instance_setting(const Instance *x, const Variable *v);
+SHARED double instance_setting(const Instance *x, const Variable *v);
 
 /* Sets a variable that is not an output, and whose value has been checked. */
-void instance_set(Instance *x, const Variable *v, double value);
+SHARED void instance_set(Instance *x, const Variable *v, double value);
 
 /* The inputs are others than those under which the runs have stepped ahead. */
-void instance_inputs_changed(Instance *x);
+SHARED void instance_inputs_changed(Instance *x);
 
 /* Sets the derivative of an input with respect to time; order 1 or 2. */
-void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value);
+SHARED void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value);
 
 /* The consistent start, unless it is known already. */
-Status instance_start(Instance *x);
+SHARED Status instance_start(Instance *x);
 
 /* What can be read at the state, unless it is known already. */
-Status instance_observe(Instance *x);
+SHARED Status instance_observe(Instance *x);
 
 /* To t_end [s].  FAILED: everything is as it was before. */
-Status instance_step(Instance *x, double t_end);
+SHARED Status instance_step(Instance *x, double t_end);
 
 /* How everything changes along a direction of time, stepped coordinates (n), velocities (n) and inputs;
  * then how one variable changes with it.  FAILED: it cannot be said, the cause is in x->solver.why. */
-Status instance_differentiate(Instance *x, Direction d);
-Status instance_change(const Instance *x, const Variable *v, Direction d, double *change);
+SHARED Status instance_differentiate(Instance *x, Direction d);
+SHARED Status instance_change(const Instance *x, const Variable *v, Direction d, double *change);
 
 /* The same along the motion: the derivative of a variable with respect to time. */
-Status instance_rates(Instance *x, Direction *d);
+SHARED Status instance_rates(Instance *x, Direction *d);
 
 /* Saved states: `instance_record_size` bytes that hold no pointer. */
-size_t instance_record_size(const Instance *x);
-void instance_save(Instance *x, char *record);
-void instance_restore(Instance *x, const char *record);
+SHARED size_t instance_record_size(const Instance *x);
+SHARED void instance_save(Instance *x, char *record);
+SHARED void instance_restore(Instance *x, const char *record);
 
 #endif

@@ -14,7 +14,7 @@ static int is_estimated(const System *s, int k) {
     return 0;
 }
 
-static int was_set(const Instance *x) {
+static int motion_was_set(const Instance *x) {
     const System *s = x->solver.system;
     for (int i = 0; i < s->estimated_count; i++)
         for (int order = 0; order <= 2; order++)
@@ -31,7 +31,7 @@ static int order(const Instance *x, int k) {
     return -1;
 }
 
-static double rate(const Instance *x, int k, int place) {
+static double rate_of_motion(const Instance *x, int k, int place) {
     const int last = is_estimated(x->solver.system, k - place) ? 3 : 2;
     return place < last ? x->solver.drive.value[k + 1] : x->solver.drive.first[k];
 }
@@ -79,13 +79,13 @@ static void warn_of_rates(Instance *x) {
     x->warned |= 1;
 }
 
-static void begin_step(Instance *x) {
+static void begin_motions(Instance *x) {
     estimate(x);
     warn_of_rates(x);
 }
 
 /* The points that rates are estimated from go back in time. */
-static Status restored(Instance *x) {
+static Status restored_motions(Instance *x) {
     for (int i = 0; i < x->solver.system->estimated_count; i++) {
         const Past *past = &x->past[i];
         if (past->count < 0 || past->count > RATES_KEPT || !(fabs(past->rate) <= DBL_MAX))
@@ -98,4 +98,4 @@ static Status restored(Instance *x) {
     return OK;
 }
 
-const Prescribed MOTIONS = {was_set, estimate, order, rate, begin_step, restored};
+SHARED_VALUE const Prescribed MOTIONS = {motion_was_set, estimate, order, rate_of_motion, begin_motions, restored_motions};

@@ -6,6 +6,7 @@
 #define LAGFMU_PRESCRIBED_H
 
 #include "instance.h"
+#include "linkage.h"
 
 typedef struct {
     /* 1: a motion whose rates are estimated was set since the latest step; estimates them. */
@@ -22,7 +23,7 @@ typedef struct {
     Status (*restored)(Instance *x);
 } Prescribed;
 
-extern const Prescribed MOTIONS;
-extern const Prescribed *const PRESCRIBED; /* of variables.c: &MOTIONS, or NULL */
+SHARED const Prescribed MOTIONS;
+SHARED const Prescribed *const PRESCRIBED; /* of variables.c: &MOTIONS, or NULL */
 
 #endif

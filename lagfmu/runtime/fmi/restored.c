@@ -19,7 +19,7 @@
 #include "thresholds.h"
 
 enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased, ... */
-static const double ALL = 1 / DBL_EPSILON; /* ... and of what a run does: 2^52, in ten thousand years */
+static const double MOST_EVER = 1 / DBL_EPSILON; /* ... and of what a run does: 2^52, in ten thousand years */
 
 /* What a number can be: an int that is 0 or 1, or counts; a count of what a run does; a double that is 0 or
  * more, and may be infinite, or any finite one. */
@@ -142,7 +142,7 @@ static int offered(MethodName method) {
 /* Each number of a list inside of `base`, by itself. */
 static Status each(Instance *x, const Solver *s, const void *base, const Saved *list, size_t rows) {
     static const double LEAST[] = {0, 0, 0, 0, 0, -DBL_MAX};
-    static const double LARGEST[] = {1, MOST, ALL, DBL_MAX, HUGE_VAL, DBL_MAX};
+    static const double LARGEST[] = {1, MOST, MOST_EVER, DBL_MAX, HUGE_VAL, DBL_MAX};
     const System *system = s->system;
     const Method *now = x->started ? OPTIONAL.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method]
                                    : NULL;
@@ -239,7 +239,7 @@ static Status slides(Instance *x, const Solver *s) {
 }
 
 /* What the importer has set is inside of the bounds that the description states. */
-static Status bounds(Instance *x) {
+static Status check_bounds(Instance *x) {
     for (int k = 0; k < VARIABLE_COUNT; k++) {
         const Variable *v = &VARIABLES[k];
         if (v->type != TYPE_REAL || (v->role != ROLE_PARAMETER && v->role != ROLE_SOLVER)) continue;
@@ -260,6 +260,6 @@ Status instance_restored(Instance *x) {
     if (together(x) != OK) return FAILED;
     if (each(x, &x->solver, x, OF_INSTANCE, sizeof OF_INSTANCE / sizeof *OF_INSTANCE) != OK) return FAILED;
     if (restored_solver(x, &x->solver) != OK) return FAILED;
-    if (bounds(x) != OK || (PRESCRIBED != NULL && PRESCRIBED->restored(x) != OK)) return FAILED;
+    if (check_bounds(x) != OK || (PRESCRIBED != NULL && PRESCRIBED->restored(x) != OK)) return FAILED;
     return ERROR_BARS != NULL ? ERROR_BARS->restored(x) : OK;
 }

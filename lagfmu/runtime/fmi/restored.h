@@ -3,13 +3,14 @@
 #define LAGFMU_RESTORED_H
 
 #include "instance.h"
+#include "linkage.h"
 
 /* Looks at everything that instance_restore() has just put into the instance.  FAILED: it is no state
  * of this FMU, the cause is in x->solver.why; nothing of it must be used. */
-Status instance_restored(Instance *x);
+SHARED Status instance_restored(Instance *x);
 
 /* The same of one solver of it alone; and why a state is none. */
-Status restored_solver(Instance *x, const Solver *s);
-Status restored_none(Instance *x, const char *name, double value);
+SHARED Status restored_solver(Instance *x, const Solver *s);
+SHARED Status restored_none(Instance *x, const char *name, double value);
 
 #endif

@@ -3,6 +3,7 @@
 #ifndef LAGFMU_VARIABLES_H
 #define LAGFMU_VARIABLES_H
 
+#include "linkage.h"
 #include "state.h"
 
 typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN, TYPE_STRING } Type;
@@ -57,14 +58,14 @@ static inline Place event_part(Place place) {
 }
 static inline int is_of_event(Place place) { return place >= AT_DEPARTURE_COUNT && place <= AT_STICKING_V; }
 
-extern const Variable VARIABLES[];
-extern const int VARIABLE_COUNT;
-extern const Variable *const PEAKED; /* (PEAK_COUNT) quantities whose extremes are kept, read or not; or NULL */
-extern const int PEAK_COUNT;
-extern const System *const MODEL_SYSTEM;       /* the system that is stepped */
-extern const char *const MODEL_IDENTIFIER, *const MODEL_GUID;
-extern const double DEFAULT_TOLERANCE;
-extern const int DEFAULT_METHOD;               /* MethodName */
-extern const int EXCHANGE_LOST;                /* 1: the energy dissipated is the last continuous state */
+SHARED const Variable *const VARIABLES; /* (VARIABLE_COUNT) */
+SHARED const int VARIABLE_COUNT;
+SHARED const Variable *const PEAKED; /* (PEAK_COUNT) quantities whose extremes are kept, read or not; or NULL */
+SHARED const int PEAK_COUNT;
+SHARED const System *const MODEL_SYSTEM;       /* the system that is stepped */
+SHARED const char *const MODEL_IDENTIFIER, *const MODEL_GUID;
+SHARED const double DEFAULT_TOLERANCE;
+SHARED const int DEFAULT_METHOD;               /* MethodName */
+SHARED const int EXCHANGE_LOST;                /* 1: the energy dissipated is the last continuous state */
 
 #endif

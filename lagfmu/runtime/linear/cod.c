@@ -8,11 +8,11 @@
 
 #include <math.h>
 
-static int smaller(int a, int b) { return a < b ? a : b; }
+static int fewer(int a, int b) { return a < b ? a : b; }
 
 size_t cod_doubles(int rows, int columns) {
     size_t r = (size_t)rows, c = (size_t)columns;
-    return r * c + (size_t)smaller(rows, columns) * c + 2 * c + r;
+    return r * c + (size_t)fewer(rows, columns) * c + 2 * c + r;
 }
 
 int cod_ints(int rows, int columns) { return rows + columns; }
@@ -31,7 +31,7 @@ void cod_place(Cod *c, int rows, int columns, double *doubles, int *ints) {
 }
 
 /* The largest element of v (n) without overflow or underflow in the squares, and || v ||. */
-static double norm(int n, const double *v) {
+static double euclidean_norm(int n, const double *v) {
     double largest = 0, sum = 0;
     for (int i = 0; i < n; i++) largest = fmax(largest, fabs(v[i]));
     if (!(largest > 0)) return 0;
@@ -41,7 +41,7 @@ static double norm(int n, const double *v) {
 
 /* v (n) <- [alpha; the Householder vector's rest], its first element being 1; returns tau. */
 static double reflector(int n, double *v) {
-    double size = norm(n, v);
+    double size = euclidean_norm(n, v);
     if (!(size > 0)) return 0;
     double alpha = v[0] > 0 ? -size : size;
     double head = v[0] - alpha;
@@ -95,11 +95,11 @@ static void exchange_columns(Cod *c, int j, int k) {
 static void triangularize(Cod *c, double threshold) {
     double first = 0;
     for (int j = 0; j < c->columns; j++) c->column[j] = j;
-    for (c->rank = 0; c->rank < smaller(c->rows, c->columns); c->rank++) {
+    for (c->rank = 0; c->rank < fewer(c->rows, c->columns); c->rank++) {
         int k = c->rank, best = k;
         double largest = -1;
         for (int j = k; j < c->columns; j++) {
-            double rest = norm(c->rows - k, c->A + j * c->rows + k);
+            double rest = euclidean_norm(c->rows - k, c->A + j * c->rows + k);
             if (rest > largest) {
                 largest = rest;
                 best = j;

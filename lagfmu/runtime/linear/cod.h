@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#include "linkage.h"
+
 /* Pi A P = Q [T^T 0; 0 0] Z^T: Q (rows, rows) and Z (columns, columns) orthogonal, kept as
  * Householder vectors, T (rank, rank) upper triangular, Pi and P permutations. */
 typedef struct {
@@ -15,25 +17,25 @@ typedef struct {
     int *row, *column;   /* (rows), (columns): which row and column of A comes i-th */
 } Cod;
 
-size_t cod_doubles(int rows, int columns);
-int cod_ints(int rows, int columns);
+SHARED size_t cod_doubles(int rows, int columns);
+SHARED int cod_ints(int rows, int columns);
 
 /* Places the arrays in `doubles` and `ints`; A is then to be filled. */
-void cod_place(Cod *c, int rows, int columns, double *doubles, int *ints);
+SHARED void cod_place(Cod *c, int rows, int columns, double *doubles, int *ints);
 
 /* Columns of R whose rest is at most `threshold` times the first count as dependent. */
-void cod_factor(Cod *c, double threshold);
+SHARED void cod_factor(Cod *c, double threshold);
 
 /* y (rows) <- Q^T Pi y ;  y <- Pi^T Q y */
-void cod_to_range(const Cod *c, double *y);
-void cod_from_range(const Cod *c, double *y);
+SHARED void cod_to_range(const Cod *c, double *y);
+SHARED void cod_from_range(const Cod *c, double *y);
 
 /* w (columns) <- Z^T P^T w ;  w <- P Z w.  `work` of the Cod is not used; `spare` (columns). */
-void cod_to_rows(const Cod *c, double *w, double *spare);
-void cod_from_rows(const Cod *c, double *w, double *spare);
+SHARED void cod_to_rows(const Cod *c, double *w, double *spare);
+SHARED void cod_from_rows(const Cod *c, double *w, double *spare);
 
 /* z (rank) <- T^-1 z ;  z <- T^-T z */
-void cod_solve(const Cod *c, double *z);
-void cod_solve_transposed(const Cod *c, double *z);
+SHARED void cod_solve(const Cod *c, double *z);
+SHARED void cod_solve_transposed(const Cod *c, double *z);
 
 #endif

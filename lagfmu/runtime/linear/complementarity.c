@@ -79,7 +79,7 @@ static int join(Problem *p, int j) {
 }
 
 /* w, 0 on the set; the row that violates w >= 0 most. */
-static int worst(const Problem *p, double *w) {
+static int most_violated(const Problem *p, double *w) {
     int least = 0;
     for (int i = 0; i < p->n; i++) w[i] = gap(p, i);
     for (int a = 0; a < p->count; a++) w[p->held[a]] = 0;
@@ -98,7 +98,7 @@ int complementarity_solve(int n, double *A, double *b, double *z, double *w, dou
         floor = fmax(floor, LCP_ZERO * fabs(b[i]));
     }
     for (int round = 0; round < 50 * (n + 1); round++) {
-        const int j = worst(&p, w);
+        const int j = most_violated(&p, w);
         if (n == 0 || w[j] >= -floor) {
             for (int i = 0; i < n; i++) {
                 z[i] /= d[i];

@@ -7,7 +7,7 @@
 
 #include <math.h>
 
-static double norm(int n, const double *x) {
+static double sum_norm(int n, const double *x) {
     double sum = 0;
     for (int i = 0; i < n; i++) sum += fabs(x[i]);
     return sum;
@@ -17,7 +17,7 @@ double inverse_norm(int n, void (*solve)(void *context, double *x), void *contex
     double *x = work, *gradient = work + n;
     for (int i = 0; i < n; i++) x[i] = 1.0 / n;
     solve(context, x);
-    double estimate = norm(n, x);
+    double estimate = sum_norm(n, x);
     for (int step = 0; step < 4 && n > 1; step++) {
         for (int i = 0; i < n; i++) gradient[i] = x[i] < 0 ? -1 : 1;
         solve(context, gradient);
@@ -26,13 +26,13 @@ double inverse_norm(int n, void (*solve)(void *context, double *x), void *contex
             if (fabs(gradient[i]) > fabs(gradient[corner])) corner = i;
         for (int i = 0; i < n; i++) x[i] = i == corner;
         solve(context, x);
-        double higher = norm(n, x);
+        double higher = sum_norm(n, x);
         if (!(higher > estimate)) break;
         estimate = higher;
     }
     for (int i = 0; i < n; i++) x[i] = (i % 2 ? -1 : 1) * (1 + i / (n > 1 ? n - 1.0 : 1.0));
     solve(context, x); /* against cancellation in the gradient: Higham's extra vector */
-    double alternating = 2 * norm(n, x) / (3.0 * n);
+    double alternating = 2 * sum_norm(n, x) / (3.0 * n);
     if (alternating > estimate) estimate = alternating;
     return isfinite(estimate) && isfinite(alternating) ? estimate : HUGE_VAL;
 }

@@ -6,17 +6,16 @@
 #include "cod.h"
 #include "leastnorm.h"
 #include "nullspace.h"
+#include "numbers.h"
 #include "orthogonal.h"
 #include "weighted.h"
 
-static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
-
 static size_t doubles(int n, int m) {
-    return larger(weighted_doubles(n, m), least_norm_doubles(n, m));
+    return larger_size(weighted_doubles(n, m), least_norm_doubles(n, m));
 }
 
 static size_t ints(int n, int m) {
-    return larger((size_t)weighted_ints(n, m), (size_t)least_norm_ints(n, m));
+    return larger_size((size_t)weighted_ints(n, m), (size_t)least_norm_ints(n, m));
 }
 
 static int factor_nullspace(Linear *l) {
@@ -26,7 +25,7 @@ static int factor_nullspace(Linear *l) {
 }
 
 /* In the metric of M light coordinates hide what the others are held by; in the KKT matrix they do not. */
-static Status factor(Linear *l) {
+static Status factor_rows(Linear *l) {
     int doubtful;
     l->rung = RUNG_ORTHOGONAL;
     if (orthogonal_factor(l, &doubtful)) {
@@ -44,7 +43,7 @@ static Status factor(Linear *l) {
     return least_norm_factor(l);
 }
 
-static Status solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
+static Status solve_rows(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     if (l->rung == RUNG_ORTHOGONAL) return orthogonal_solve(l, b, c, x, lambda);
     if (l->rung == RUNG_LEAST_NORM) return least_norm_solve(l, b, c, x, lambda);
     nullspace_solve(l, b, c, x, lambda);
@@ -79,5 +78,5 @@ static int basis(Linear *l, int *rows) {
     return w.cod.rank < w.acting;
 }
 
-static const Dependent ALL = {doubles, ints, factor_nullspace, factor, solve, basis};
-const Dependent *const DEPENDENT = &ALL;
+static const Dependent ALL = {doubles, ints, factor_nullspace, factor_rows, solve_rows, basis};
+SHARED_VALUE const Dependent *const DEPENDENT = &ALL;

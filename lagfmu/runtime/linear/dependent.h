@@ -4,6 +4,7 @@
 #define LAGFMU_DEPENDENT_H
 
 #include "linear.h"
+#include "linkage.h"
 
 typedef struct {
     /* Doubles and ints that they need in Linear.dense and Linear.pivots. */
@@ -20,6 +21,6 @@ typedef struct {
 } Dependent;
 
 /* NULL in an FMU without constraints: its optional.c says so, and dependent.c is not there. */
-extern const Dependent *const DEPENDENT;
+SHARED const Dependent *const DEPENDENT;
 
 #endif

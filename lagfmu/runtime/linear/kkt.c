@@ -123,7 +123,7 @@ static void solve_lu(void *context, double *x) {
     lu_solve(k->size, k->A, k->pivots, x);
 }
 
-static int factor(Linear *l, double least, int to_masses) {
+static int factor_scaled(Linear *l, double least, int to_masses) {
     Kkt k = view(l);
     if (!equilibrate(l, &k, to_masses)) return 0;
     kkt_matrix(l, k.scale, k.place, k.A);
@@ -141,11 +141,11 @@ static int factor(Linear *l, double least, int to_masses) {
  * no unit of mass counts beside the constraints, but masses that differ much cost digits.  From masses of 1 on
  * also off the constraints, where it is asked how nearly rows depend on each other. */
 int kkt_factor(Linear *l, double least) {
-    if (least > 0 && schur_of(l)->definite) return factor(l, least, 1);
-    return factor(l, least, 0) || (!schur_of(l)->definite && factor(l, least, 1));
+    if (least > 0 && schur_of(l)->definite) return factor_scaled(l, least, 1);
+    return factor_scaled(l, least, 0) || (!schur_of(l)->definite && factor_scaled(l, least, 1));
 }
 
-static void substitute(Linear *l, const double *b, const double *c, double *x, double *lambda) {
+static void substitute_scaled(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     Kkt k = view(l);
     int n = l->system->n, m = l->system->m;
     for (int i = 0; i < n; i++) k.z[i] = (b != NULL ? b[i] : 0) * k.scale[i];
@@ -158,6 +158,6 @@ static void substitute(Linear *l, const double *b, const double *c, double *x, d
 }
 
 void kkt_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
-    substitute(l, b, c, x, lambda);
-    refine(l, substitute, b, c, x, lambda);
+    substitute_scaled(l, b, c, x, lambda);
+    refine(l, substitute_scaled, b, c, x, lambda);
 }

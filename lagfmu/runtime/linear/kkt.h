@@ -3,18 +3,19 @@
 #define LAGFMU_KKT_H
 
 #include "linear.h"
+#include "linkage.h"
 
 /* Doubles and ints that it needs in Linear.dense and Linear.pivots, N = n + m. */
-size_t kkt_doubles(int n, int m);
-int kkt_ints(int n, int m);
+SHARED size_t kkt_doubles(int n, int m);
+SHARED int kkt_ints(int n, int m);
 
 /* Writes scale * K * scale (N, N), K = [[M, G^T], [G, 0]] of the rows that act, to A; row k of G
  * stands at place[k].  Returns N. */
-int kkt_matrix(const Linear *l, const double *scale, const int *place, double *A);
+SHARED int kkt_matrix(const Linear *l, const double *scale, const int *place, double *A);
 
 /* 1 if the matrix is regular to working precision. */
-int kkt_factor(Linear *l, double least);
+SHARED int kkt_factor(Linear *l, double least);
 
-void kkt_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+SHARED void kkt_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef LAGFMU_LDLT_H
 #define LAGFMU_LDLT_H
 
+#include "linkage.h"
 #include "plan.h"
 
 /* What is known of the condition of a matrix that was factored. */
@@ -14,12 +15,12 @@ typedef struct {
 /* In place: on entry L holds A's elements below the diagonal in the pattern of L and D its
  * diagonal, in the order of elimination; on return L, and 1 / D.  `row_size` and `row` are scratch
  * (size), `row` zero on entry and return. */
-Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row);
+SHARED Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row);
 
 /* y <- L^-1 y */
-void ldlt_forward(const Elimination *e, const double *L, double *y);
+SHARED void ldlt_forward(const Elimination *e, const double *L, double *y);
 
 /* y <- L^-T y */
-void ldlt_backward(const Elimination *e, const double *L, double *y);
+SHARED void ldlt_backward(const Elimination *e, const double *L, double *y);
 
 #endif

@@ -13,6 +13,7 @@
 
 #include "cod.h"
 #include "kkt.h"
+#include "numbers.h"
 #include "residual.h"
 #include "thresholds.h"
 
@@ -29,12 +30,6 @@ size_t least_norm_doubles(int n, int m) {
 }
 
 int least_norm_ints(int n, int m) { return cod_ints(n + m, n + m) + m + 1; }
-
-static double largest(int n, const double *a) {
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(a[i]));
-    return most;
-}
 
 static Whole whole_view(const Linear *l) {
     int n = l->system->n, m = l->system->m, size = n;
@@ -109,7 +104,7 @@ static double right(const Linear *l, const Whole *w, const double *b, const doub
     return most;
 }
 
-static void substitute(Linear *l, const double *b, const double *c, double *x, double *lambda) {
+static void substitute_least(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     Whole w = whole_view(l);
     right(l, &w, b, c);
     cod_solve_transposed(&w.cod, w.z);
@@ -126,7 +121,7 @@ Status least_norm_solve(Linear *l, const double *b, const double *c, double *x, 
     for (int i = w.cod.rank; i < w.cod.rows && !l->nearest && !(l->off > ON_CONSTRAINTS); i++)
         if (fabs(w.z[i]) > CONSISTENT * most)
             return linear_contradicted(l);
-    substitute(l, b, c, x, lambda);
-    refine(l, substitute, b, c, x, lambda);
+    substitute_least(l, b, c, x, lambda);
+    refine(l, substitute_least, b, c, x, lambda);
     return OK;
 }

@@ -10,11 +10,10 @@
 
 #include "dependent.h"
 #include "kkt.h"
+#include "numbers.h"
 #include "schur.h"
 #include "stiffened.h"
 #include "thresholds.h"
-
-static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
 
 double linear_rank_threshold(const Linear *l) {
     return fmax(RANK, fmin(RANK_TURNED * l->off, RANK_LOOSEST));
@@ -45,8 +44,8 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     if (n + m > DENSE_MOST) return;
     size_t doubles = kkt_doubles(n, m), ints = (size_t)kkt_ints(n, m);
     if (DEPENDENT != NULL) {
-        doubles = larger(doubles, DEPENDENT->doubles(n, m));
-        ints = larger(ints, DEPENDENT->ints(n, m));
+        doubles = larger_size(doubles, DEPENDENT->doubles(n, m));
+        ints = larger_size(ints, DEPENDENT->ints(n, m));
     }
     l->dense = arena_take(arena, doubles, sizeof(double));
     l->pivots = arena_take(arena, ints, sizeof(int));

@@ -10,6 +10,7 @@
 #define LAGFMU_LINEAR_H
 
 #include "arena.h"
+#include "linkage.h"
 #include "status.h"
 #include "system.h"
 
@@ -40,34 +41,34 @@ typedef struct {
 enum { DENSE_MOST = 600 }; /* n + m up to which the dense rungs are there */
 
 /* Takes the workspace for `s` from the arena. */
-void linear_layout(Linear *l, Arena *arena, const System *s, Why *why);
+SHARED void linear_layout(Linear *l, Arena *arena, const System *s, Why *why);
 
 /* Factors for the rows in `active`.  FAILED, with the cause in `why`: a value is not finite, or the
  * mass matrix is singular on the constraint surface. */
-Status linear_factor(Linear *l, const double *M, const double *G, const int *active);
+SHARED Status linear_factor(Linear *l, const double *M, const double *G, const int *active);
 
 /* x (n) and lambda (m; 0 where a row does not act).  c is read where rows act; b may be NULL (zero).
  * lambda may be NULL.  FAILED: dependent rows contradict each other, or the result overflows. */
-Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+SHARED Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
 /* x (n) of least size in the metric of M with G x = c, for a projection.  Where dependent rows
  * contradict each other, as those of c do that is nothing but rounding, c is met as nearly as can be
  * (least squares in rows of comparable units). */
-Status linear_nearest(Linear *l, const double *c, double *x);
+SHARED Status linear_nearest(Linear *l, const double *c, double *x);
 
 /* Factors and does that at once; a coordinate that has neither mass nor a constraint stays. */
-Status linear_project(Linear *l, const double *M, const double *G, const int *active,
-                      const double *c, double *x);
+SHARED Status linear_project(Linear *l, const double *M, const double *G, const int *active,
+                             const double *c, double *x);
 
 /* How far rows of unit norm have to stand out to count as independent: rows that depend on each other on
  * the constraints are at angles of the order of `off` away from them. */
-double linear_rank_threshold(const Linear *l);
+SHARED double linear_rank_threshold(const Linear *l);
 
 /* 1 if the rows that were factored last depend on each other.  basis (m): then as many of them as are
  * independent, otherwise all.  Factors are lost. */
-int linear_basis(Linear *l, int *basis);
+SHARED int linear_basis(Linear *l, int *basis);
 
 /* FAILED: rows that depend on each other ask for different accelerations; the cause names them. */
-Status linear_contradicted(Linear *l);
+SHARED Status linear_contradicted(Linear *l);
 
 #endif

@@ -4,10 +4,11 @@
 #define LAGFMU_NULLSPACE_H
 
 #include "linear.h"
+#include "linkage.h"
 
 /* 1 if M is safely definite and the rows that act, at least one, are safely independent. */
-int nullspace_factor(Linear *l);
+SHARED int nullspace_factor(Linear *l);
 
-void nullspace_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+SHARED void nullspace_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
 #endif

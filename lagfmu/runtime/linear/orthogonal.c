@@ -7,6 +7,7 @@
 
 #include <math.h>
 
+#include "numbers.h"
 #include "residual.h"
 #include "thresholds.h"
 #include "weighted.h"
@@ -22,12 +23,6 @@ int orthogonal_factor(Linear *l, int *doubtful) {
             if (!(fabs(w.w[i]) < VANISHES)) l->unique[w.rows[i]] = 0;
     }
     return 1;
-}
-
-static double largest(int n, const double *a) {
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(a[i]));
-    return most;
 }
 
 /* Whether the dependent rows agree, measured by the terms of W^T z = c: c, y and z. */

@@ -18,6 +18,7 @@
 #include <math.h>
 
 #include "ldlt.h"
+#include "numbers.h"
 #include "residual.h"
 
 static const double EXACT = 4e3;    /* condition up to which lambda is right to 1e-12 as it is */
@@ -26,8 +27,6 @@ static const double PLAIN = 1e6;    /* up to which residuals in working precisio
 static const double DOUBLED = 1e10; /* up to which refinement is tried if KKT is at hand */
 static const double PIVOT = 1e-8;   /* smallest pivot of M relative to its diagonal */
 static const double SETTLED = 1e-9; /* a correction so small is followed by one below rounding */
-
-static double larger(double a, double b) { return a > b ? a : b; }
 
 void schur_layout(Linear *l, Arena *arena) {
     const System *s = l->system;
@@ -232,8 +231,8 @@ static void constrain(const Linear *l, const double *c, double *y, double *lambd
     }
 }
 
-static void substitute(const Linear *l, const double *b, const double *c, double *x,
-                       double *lambda) {
+static void substitute_schur(const Linear *l, const double *b, const double *c, double *x,
+                             double *lambda) {
     int diagonal = l->system->plan->diagonal;
     double *y = diagonal ? x : schur_of(l)->y;
     if (b != NULL) {
@@ -275,7 +274,7 @@ static void refine_once(Linear *l, int doubled, const double *b, const double *c
                          own->g);
     else
         linear_residual(l, b, c, x, lambda, own->r, own->g);
-    substitute(l, own->r, own->g, own->dx, own->dlambda);
+    substitute_schur(l, own->r, own->g, own->dx, own->dlambda);
     if (doubled) {
         doubled_move(s->n, x, own->x_low, own->dx);
         doubled_move(s->m, lambda, own->lambda_low, own->dlambda);
@@ -288,7 +287,7 @@ static void refine_once(Linear *l, int doubled, const double *b, const double *c
 int schur_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     const System *s = l->system;
     Schur *own = schur_of(l);
-    substitute(l, b, c, x, lambda);
+    substitute_schur(l, b, c, x, lambda);
     if (own->trust == SCHUR_EXACT) return 1;
     int doubled = own->trust == SCHUR_DOUBLED;
     for (int i = 0; i < s->n && doubled; i++) own->x_low[i] = 0;

@@ -3,6 +3,7 @@
 #define LAGFMU_SCHUR_H
 
 #include "linear.h"
+#include "linkage.h"
 
 /* How far the factors can be trusted. */
 typedef enum {
@@ -36,20 +37,20 @@ typedef struct {
 
 static inline Schur *schur_of(const Linear *l) { return (Schur *)(void *)l->sparse; }
 
-void schur_layout(Linear *l, Arena *arena);
+SHARED void schur_layout(Linear *l, Arena *arena);
 
 /* M = L D L^T, W, D^-1 W and the diagonal of S.  1; 0 if M is not safely positive definite or a row
  * of G that acts is zero (`zero_rows`: allowed). */
-int schur_masses(Linear *l, int zero_rows);
+SHARED int schur_masses(Linear *l, int zero_rows);
 
 /* The same and S = L' D' L'^T, judged.  1 if it can be trusted. */
-int schur_factor(Linear *l);
+SHARED int schur_factor(Linear *l);
 
 /* y (n) in the order of elimination: D^-1 L^-1 P b, and back: x = P^T L^-T y. */
-void schur_half(const Linear *l, const double *b, double *y);
-void schur_back(const Linear *l, double *y, double *x);
+SHARED void schur_half(const Linear *l, const double *b, double *y);
+SHARED void schur_back(const Linear *l, double *y, double *x);
 
 /* x and lambda (not NULL), refined as the trust asks for.  0 if the refinement does not settle. */
-int schur_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+SHARED int schur_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
 #endif

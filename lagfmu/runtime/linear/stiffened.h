@@ -3,20 +3,21 @@
 #define LAGFMU_STIFFENED_H
 
 #include "linear.h"
+#include "linkage.h"
 
 /* Which rows may do that: those whose coordinates the mass matrix couples each with each. */
-void stiffened_layout(Linear *l, Arena *arena);
+SHARED void stiffened_layout(Linear *l, Arena *arena);
 
 /* l->M <- M + sum_k sigma_k g_k g_k^T over such rows that act; 0 if there are none. */
-int stiffened_masses(Linear *l);
+SHARED int stiffened_masses(Linear *l);
 
 /* b + sum_k sigma_k g_k c_k (n; lost at the next call), with which x and lambda are those of b and M. */
-const double *stiffened_forces(const Linear *l, const double *b, const double *c);
+SHARED const double *stiffened_forces(const Linear *l, const double *b, const double *c);
 
 /* 1 if lambda keeps its digits beside sigma_k c_k, from which it was had, or is none beside other forces. */
-int stiffened_tells(const Linear *l, const double *b, const double *c, const double *lambda);
+SHARED int stiffened_tells(const Linear *l, const double *b, const double *c, const double *lambda);
 
 /* M as it was given, which is not definite: for a rung that needs nothing added. */
-void stiffened_undo(Linear *l);
+SHARED void stiffened_undo(Linear *l);
 
 #endif

@@ -5,6 +5,7 @@
 
 #include "cod.h"
 #include "linear.h"
+#include "linkage.h"
 
 /* W (n, rows that act), its columns of unit norm. */
 typedef struct {
@@ -19,24 +20,24 @@ typedef struct {
 } Weighted;
 
 /* Doubles and ints that it needs in Linear.dense and Linear.pivots. */
-size_t weighted_doubles(int n, int m);
-int weighted_ints(int n, int m);
+SHARED size_t weighted_doubles(int n, int m);
+SHARED int weighted_ints(int n, int m);
 
 /* Columns that stand out by at most `threshold` count as dependent.  0 if M is not safely positive
  * definite. */
-int weighted_factor(Linear *l, double threshold, Weighted *w);
+SHARED int weighted_factor(Linear *l, double threshold, Weighted *w);
 
 /* The decomposition that weighted_factor() left. */
-Weighted weighted_view(const Linear *l);
+SHARED Weighted weighted_view(const Linear *l);
 
 /* y (n) <- Q^T D^-1/2 L^-1 P b ;  x <- P^T L^-T D^-1/2 Q y (y is lost) */
-void weighted_to(const Linear *l, const Weighted *w, const double *b, double *y);
-void weighted_from(const Linear *l, const Weighted *w, double *y, double *x);
+SHARED void weighted_to(const Linear *l, const Weighted *w, const double *b, double *y);
+SHARED void weighted_from(const Linear *l, const Weighted *w, double *y, double *x);
 
 /* w->w <- T^-1 Z1^T c above Z2^T c, c being scaled as the columns of W. */
-void weighted_rows(const Weighted *w, const double *c);
+SHARED void weighted_rows(const Weighted *w, const double *c);
 
 /* x, and the lambda of least norm. */
-void weighted_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+SHARED void weighted_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
 #endif

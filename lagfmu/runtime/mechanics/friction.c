@@ -16,7 +16,7 @@
 #include "digits.h"
 #include "thresholds.h"
 
-static void layout(Mechanism *b, Arena *arena) {
+static void layout_sliding(Mechanism *b, Arena *arena) {
     const System *s = b->system;
     const int n = s->n, m = s->m, count = s->frictions;
     struct Frictions *f = arena_take(arena, 1, sizeof *f), counted;
@@ -203,8 +203,8 @@ static void hold(Mechanism *b) {
     }
 }
 
-static Status motion(Mechanism *b, Instant at, const double *q, const double *v,
-                     const int *active) {
+static Status motion_with_friction(Mechanism *b, Instant at, const double *q, const double *v,
+                                   const int *active) {
     const System *s = b->system;
     struct Frictions *f = b->friction;
     int sliding = 0, sticking = 0;
@@ -231,4 +231,4 @@ static int presses_uniquely(Mechanism *b, int i) {
     return !b->friction->loaded[i] || share_presses_uniquely(b, i);
 }
 
-const Sliding SLIDING = {layout, acting, motion, presses_uniquely};
+SHARED_VALUE const Sliding SLIDING = {layout_sliding, acting, motion_with_friction, presses_uniquely};

@@ -7,6 +7,7 @@
 #ifndef LAGFMU_FRICTION_H
 #define LAGFMU_FRICTION_H
 
+#include "linkage.h"
 #include "mechanism.h"
 
 /* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
@@ -40,35 +41,35 @@ struct Frictions {
 };
 
 /* What a Mechanism with frictions does besides (optional.h); NULL in an FMU without. */
-extern const Sliding SLIDING;
+SHARED const Sliding SLIDING;
 
 /* G_t v - nu_t of friction i at the state that was evaluated last. */
-void friction_slip(const Mechanism *b, int i, const double *v, double s[2]);
+SHARED void friction_slip(const Mechanism *b, int i, const double *v, double s[2]);
 
 /* load + c lambda of friction i. */
-double friction_normal(const Mechanism *b, int i, const double *lambda);
+SHARED double friction_normal(const Mechanism *b, int i, const double *lambda);
 
 /* The unit vector of the slip velocity s; beyond a stop it goes on as before, so that the equations of a
  * flow stay smooth there. */
-void friction_heading(const Slide *slide, const double s[2], double e[2]);
+SHARED void friction_heading(const Slide *slide, const double s[2], double e[2]);
 
 /* painleve.c -- the refusal of a sliding problem that has no acceleration, or several. */
-Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value);
+SHARED Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value);
 
 /* FAILED where that is so with some of the contacts open; `determinant` of 1 + A, which is in f->minor, of
  * the `count` frictions that slip. */
-Status friction_opened(Mechanism *b, double t, int count, double determinant);
+SHARED Status friction_opened(Mechanism *b, double t, int count, double determinant);
 
 /* Gauss's elimination with row exchanges of A x = right, (size, size); the determinant. */
-double friction_eliminate(int size, double *A, double *right);
+SHARED double friction_eliminate(int size, double *A, double *right);
 
 /* share.c -- redundant sticking: of the multipliers that hold the same motion, b->lambda becomes the one of
  * least norm within the cones, or the nearest to it; `best` (m): those of the largest least reserve. */
-size_t share_doubles(const System *s);
-void share_best(Mechanism *b, double *best);
+SHARED size_t share_doubles(const System *s);
+SHARED void share_best(Mechanism *b, double *best);
 
 /* 0 if the normal force of friction i is not the only one with the motion that was evaluated last: rows that
  * depend on each other share it. */
-int share_presses_uniquely(Mechanism *b, int i);
+SHARED int share_presses_uniquely(Mechanism *b, int i);
 
 #endif

@@ -35,7 +35,7 @@ static inline double zero(int count, const double *x) {
     return sum;
 }
 
-static int all_finite(int count, const double *x) { return zero(count, x) == 0; }
+static int holds_no_nan(int count, const double *x) { return zero(count, x) == 0; }
 
 static Status not_evaluated(Mechanism *b, Instant at, const char *what) {
     Digits t = digits(at.t);
@@ -50,26 +50,26 @@ static Status check_values(Mechanism *b, Instant at) {
             zero(s->m, b->gamma) ==
         0)
         return OK;
-    if (!(all_finite(s->masses, b->M) & all_finite(s->n, b->F)))
+    if (!(holds_no_nan(s->masses, b->M) & holds_no_nan(s->n, b->F)))
         return not_evaluated(b, at, "a mass or a force is");
     return not_evaluated(b, at, "a constraint or its derivative is");
 }
 
-static void evaluate(Mechanism *b, Instant at, const double *q, const double *v) {
+static void evaluate_functions(Mechanism *b, Instant at, const double *q, const double *v) {
     b->system->dynamics(at.t, q, v, at.u, at.p, b->M, b->F, b->G, b->nu, b->gamma);
 }
 
 Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v) {
-    evaluate(b, at, q, v);
+    evaluate_functions(b, at, q, v);
     return check_values(b, at);
 }
 
 Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f) {
     const System *s = b->system;
     s->residual(at.t, q, at.u, at.p, f);
-    if (all_finite(s->m, f)) return OK;
+    if (holds_no_nan(s->m, f)) return OK;
     int k = 0;
-    while (all_finite(1, &f[k])) k++;
+    while (holds_no_nan(1, &f[k])) k++;
     Digits t = digits(at.t);
     return fail(b->why, "the constraints cannot be evaluated at t = %s s ('%s' is not finite)",
                 t.text, s->rows[k].name);
@@ -77,7 +77,7 @@ Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f) 
 
 Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                         const int *active) {
-    evaluate(b, at, q, v);
+    evaluate_functions(b, at, q, v);
     if (b->sliding != NULL) {
         if (b->sliding->motion(b, at, q, v, active) == OK) return OK;
     } else if (linear_factor(&b->linear, b->M, b->G, active) == OK &&

@@ -6,6 +6,7 @@
 
 #include "arena.h"
 #include "linear.h"
+#include "linkage.h"
 #include "status.h"
 #include "system.h"
 
@@ -46,8 +47,8 @@ struct Mechanism {
 };
 
 /* `sliding`: what a system with frictions needs, not used without. */
-void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
-                      const Sliding *sliding);
+SHARED void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
+                             const Sliding *sliding);
 
 /* sum_j G_kj x_j for the row k of the G that was evaluated last. */
 static inline double mechanism_row(const Mechanism *b, int k, const double *x) {
@@ -73,25 +74,25 @@ static inline double mechanism_row_size(const Mechanism *b, int k, const double 
 }
 
 /* M, F, G, nu, gamma at a state.  FAILED if one is not finite. */
-Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v);
+SHARED Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v);
 
 /* f (m).  FAILED if one is not finite. */
-Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
+SHARED Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
 
 /* evaluate, factor, solve: b->vdot (n) and b->lambda (m), 0 where a row does not act. */
-Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
-                        const int *active);
+SHARED Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
+                               const int *active);
 
 /* The same for a state off the constraints: what depends on each other on them does so here, and is not
  * asked to agree.  `offset` (m), `size` (n) as below. */
-Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
-                             const int *active, const double *offset, const double *size);
+SHARED Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
+                                    const int *active, const double *offset, const double *size);
 
 /* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
  * v are moved in place.  For states that are nearly consistent; initial.c deals with the others.
  * `size` (n) are the coordinates' magnitudes, which say what rounding is.  On failure q and v are
  * untouched. */
-Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,
-                         const double *offset, const double *size);
+SHARED Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,
+                                const double *offset, const double *size);
 
 #endif

@@ -59,7 +59,7 @@ double friction_eliminate(int size, double *A, double *right) {
 
 /* The contacts that are closed, then what acts only while they are; 0 if they are less than two, or too
  * many. */
-static int find_rows(const Mechanism *b, int *rows, int *contacts) {
+static int find_sliding_rows(const Mechanism *b, int *rows, int *contacts) {
     const System *s = b->system;
     const int *acting = b->friction->acting;
     int count = 0;
@@ -110,8 +110,8 @@ static double minor(const double *X, int count, const int *which) {
 }
 
 /* Column r of K^-1 and of B^-1: multipliers to a unit acceleration of row r. */
-static Status respond(Mechanism *b, int sliding, const int *rows, int count, int r, double *K,
-                      double *B) {
+static Status respond_to_row(Mechanism *b, int sliding, const int *rows, int count, int r, double *K,
+                             double *B) {
     const System *s = b->system;
     struct Frictions *f = b->friction;
     f->zero[rows[r]] = 1;
@@ -136,9 +136,9 @@ static Status respond(Mechanism *b, int sliding, const int *rows, int count, int
 Status friction_opened(Mechanism *b, double t, int sliding, double determinant) {
     double K[PAINLEVE_ROWS * PAINLEVE_ROWS], B[PAINLEVE_ROWS * PAINLEVE_ROWS];
     int rows[PAINLEVE_ROWS], which[PAINLEVE_ROWS], contacts;
-    const int count = find_rows(b, rows, &contacts);
+    const int count = find_sliding_rows(b, rows, &contacts);
     for (int r = 0; r < count; r++)
-        if (respond(b, sliding, rows, count, r, K, B) != OK) return FAILED;
+        if (respond_to_row(b, sliding, rows, count, r, K, B) != OK) return FAILED;
     for (unsigned mask = 1; count > 0 && mask < 1u << contacts; mask++) {
         for (int r = 0; r < count; r++) which[r] = opens(b, rows[r], rows, contacts, mask);
         const double left = determinant * minor(B, count, which) / minor(K, count, which);

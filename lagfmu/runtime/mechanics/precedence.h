@@ -4,6 +4,7 @@
 #ifndef LAGFMU_PRECEDENCE_H
 #define LAGFMU_PRECEDENCE_H
 
+#include "linkage.h"
 #include "mechanism.h"
 
 /* Nobody said it; the model's `start` does; the importer did. */
@@ -11,13 +12,13 @@ typedef enum { OMITTED, GIVEN, SET } Rank;
 enum { RANKS = 3 };
 
 /* The first rank from `stage` on that a coordinate has, of `rank` (n); RANKS if there is none. */
-int precedence_stage(const System *s, const Rank *rank, int stage);
+SHARED int precedence_stage(const System *s, const Rank *rank, int stage);
 
 /* own (m): of `rows` those that hold a coordinate that is free in this stage; returns whether all do. */
-int precedence_rows(const System *s, const Rank *rank, int stage, const int *rows, int *own);
+SHARED int precedence_rows(const System *s, const Rank *rank, int stage, const int *rows, int *own);
 
 /* b->dq (n), zero where nothing is free, with G dq = c (m) as nearly as can be on the rows `own`.  M and G
  * of the mechanism are lost: they are to be evaluated again. */
-Status precedence_nearest(Mechanism *b, const Rank *rank, int stage, const int *own, const double *c);
+SHARED Status precedence_nearest(Mechanism *b, const Rank *rank, int stage, const int *own, const double *c);
 
 #endif

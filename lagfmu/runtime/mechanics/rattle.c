@@ -15,7 +15,7 @@
 
 #include <string.h>
 
-enum { STAGES = 9, ITERATIONS = 100 };
+enum { STAGES = 9, RATTLE_ITERATIONS = 100 };
 static const double gamma_r[STAGES] = {
     0.39216144400731413928,  0.33259913678935943860, -0.70624617255763935981,
     0.082213596293550800231, 0.79854399093482996340, 0.082213596293550800231,
@@ -43,7 +43,7 @@ static Status onto_constraints(Mechanism *b, Instant at, const int *active, cons
     double before = HUGE_VAL;
     for (int k = 0; k < b->system->m; k++)
         b->lambda[k] = mechanism_row_size(b, k, q1) + mechanism_row_size(b, k, step) + DBL_MIN;
-    for (int count = 0; count < ITERATIONS; count++) {
+    for (int count = 0; count < RATTLE_ITERATIONS; count++) {
         double largest;
         if (distance(b, at, active, level, q1, &largest) != OK) return FAILED;
         if (largest == 0 || (largest > before / 2 && largest < SMALL)) return OK;
@@ -59,8 +59,8 @@ static Status onto_constraints(Mechanism *b, Instant at, const int *active, cons
 }
 
 /* M, F, G at (q, v), and their factors. */
-static Status evaluate(Mechanism *b, Instant at, const int *active, const double *q,
-                       const double *v) {
+static Status evaluate_forces(Mechanism *b, Instant at, const int *active, const double *q,
+                              const double *v) {
     if (mechanism_evaluate(b, at, q, v) != OK) return FAILED;
     return linear_factor(&b->linear, b->M, b->G, active);
 }
@@ -78,7 +78,7 @@ static Status basic_step(Mechanism *b, Instant *at, double t_new, double h, cons
     }
     if (onto_constraints(b, *at, active, level, q, step) != OK) return FAILED;
     for (int j = 0; j < n; j++) v[j] = step[j] / h;
-    if (evaluate(b, *at, active, q, v) != OK) return FAILED;
+    if (evaluate_forces(b, *at, active, q, v) != OK) return FAILED;
     for (int j = 0; j < n; j++) b->trial[j] = 0.5 * h * b->F[j];
     for (int k = 0; k < m; k++) b->f[k] = active[k] ? b->nu[k] - mechanism_row(b, k, v) : 0;
     if (linear_solve(&b->linear, b->trial, b->f, b->dq, NULL) != OK) return FAILED;
@@ -91,7 +91,7 @@ static Status composed_step(Mechanism *b, Instant at, double t_new, double h, co
     const int n = b->system->n;
     const double t = at.t;
     double part = 0;
-    if (evaluate(b, at, active, y, y + n) != OK) return FAILED;
+    if (evaluate_forces(b, at, active, y, y + n) != OK) return FAILED;
     for (int r = 0; r < STAGES; r++) {
         part += gamma_r[r];
         double next = r == STAGES - 1 ? t_new : t + part * h;
@@ -165,7 +165,7 @@ static int rattle_ints(int ny) {
     return 0;
 }
 
-const Method rattle = {
+SHARED_VALUE const Method rattle = {
     .name = "rattle",
     .dense_arrays = 2,
     .scratch_doubles = rattle_doubles,

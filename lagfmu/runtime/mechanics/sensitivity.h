@@ -3,6 +3,7 @@
 #define LAGFMU_SENSITIVITY_H
 
 #include "arena.h"
+#include "linkage.h"
 #include "mechanism.h"
 
 /* A direction: the change of time, coordinates (n), velocities (n) and inputs. */
@@ -21,24 +22,24 @@ typedef struct {
     double *down, *dother;   /* (output_count) changes of these */
 } Sensitivity;
 
-void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
+SHARED void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
 
 /* Changes along a direction of everything that `mechanism_motion` found at (at, q, v), which must be
  * the latest that was done with `b`. */
-Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
-                         const double *v, Direction d);
+SHARED Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
+                                const double *v, Direction d);
 
 /* Changes of the energies along a direction, of a system of which coordinates are only read. */
-void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
-                             const double *v, Direction d);
+SHARED void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
+                                    const double *v, Direction d);
 
 /* The change of row k's residual: df, or of G v - nu for a nonholonomic row. */
-double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,
-                            const double *dv);
+SHARED double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,
+                                   const double *dv);
 
 /* J = d(y')/dy (2n * 2n, row by row) and d(y')/dt (2n) for y = [q; v], y' = [v; vdot], with the inputs
  * held and the rows in `active` acting. */
-Status sensitivity_jacobian(Sensitivity *w, Mechanism *b, Instant at, const int *active,
-                            const double *y, double *J, double *dfdt);
+SHARED Status sensitivity_jacobian(Sensitivity *w, Mechanism *b, Instant at, const int *active,
+                                   const double *y, double *J, double *dfdt);
 
 #endif

@@ -33,7 +33,7 @@ static double dot(int count, const double *a, const double *b) {
     return sum;
 }
 
-static void add(int count, double part, const double *a, double *to) {
+static void add_part(int count, double part, const double *a, double *to) {
     for (int i = 0; i < count; i++) to[i] += part * a[i];
 }
 
@@ -41,7 +41,7 @@ static void orthonormalize(Share *x) {
     const int m = x->b->system->m;
     for (int i = 0; i < x->count; i++) {
         double *z = x->Z + i * m;
-        for (int j = 0; j < i; j++) add(m, -dot(m, x->Z + j * m, z), x->Z + j * m, z);
+        for (int j = 0; j < i; j++) add_part(m, -dot(m, x->Z + j * m, z), x->Z + j * m, z);
         const double norm = sqrt(dot(m, z, z));
         for (int k = 0; k < m; k++) z[k] /= norm;
     }
@@ -66,8 +66,8 @@ static void find_null_space(Share *x, double *basis, double *made, double *rest)
         for (int round = 0; round < 2; round++)
             for (int i = 0; i < kept; i++) {
                 const double part = dot(n, basis + i * n, rest);
-                add(n, -part, basis + i * n, rest);
-                add(m, -part, made + i * m, of);
+                add_part(n, -part, basis + i * n, rest);
+                add_part(m, -part, made + i * m, of);
             }
         const double left = sqrt(dot(n, rest, rest));
         if (!(left > SHARE_DEPENDENT * norm)) {
@@ -82,7 +82,7 @@ static void find_null_space(Share *x, double *basis, double *made, double *rest)
 }
 
 /* By how much the normal force of friction i grows along z, relative to its coefficients. */
-static double press(const Mechanism *b, int i, const double *z) {
+static double press_row(const Mechanism *b, int i, const double *z) {
     const Friction *law = &b->system->friction[i];
     double sum = 0, most = 0;
     for (int k = law->first; k < law->first + law->normals; k++) {
@@ -97,26 +97,26 @@ static void keep_normal(Share *x, int i) {
     const int m = x->b->system->m;
     int pivot = 0;
     for (int j = 0; j < x->count; j++) {
-        x->slope[j] = press(x->b, i, x->Z + j * m);
+        x->slope[j] = press_row(x->b, i, x->Z + j * m);
         if (fabs(x->slope[j]) > fabs(x->slope[pivot])) pivot = j;
     }
     if (x->count == 0 || !(fabs(x->slope[pivot]) > SHARE_DEPENDENT)) return;
     for (int j = 0; j < x->count; j++)
-        if (j != pivot) add(m, -x->slope[j] / x->slope[pivot], x->Z + pivot * m, x->Z + j * m);
+        if (j != pivot) add_part(m, -x->slope[j] / x->slope[pivot], x->Z + pivot * m, x->Z + j * m);
     x->count -= 1;
     memcpy(x->Z + pivot * m, x->Z + x->count * m, (size_t)m * sizeof *x->Z);
     orthonormalize(x);
 }
 
 /* The least reserve at part * y [N]; its slope in y. */
-static double worst(Share *x, double part, const double *y) {
+static double worst_cone(Share *x, double part, const double *y) {
     const Mechanism *b = x->b;
     const System *s = b->system;
     const struct Frictions *f = b->friction;
     const int m = s->m;
     double least = HUGE_VAL;
     memcpy(x->there, b->lambda, (size_t)m * sizeof *x->there);
-    for (int i = 0; i < x->count; i++) add(m, part * y[i], x->Z + i * m, x->there);
+    for (int i = 0; i < x->count; i++) add_part(m, part * y[i], x->Z + i * m, x->there);
     for (int i = 0; i < s->frictions; i++) {
         const Friction *law = &s->friction[i];
         if (!f->loaded[i] || !f->slide[i].sticks) continue;
@@ -143,11 +143,11 @@ static void note_best(Share *x, double value, double *top) {
 }
 
 static void bisect(Share *x, double wide) {
-    double low = -wide, high = wide, zero = 0, top = worst(x, 0, &zero);
+    double low = -wide, high = wide, zero = 0, top = worst_cone(x, 0, &zero);
     x->best[0] = 0;
     for (int round = 0; round < 2 * SHARE_ROUNDS; round++) {
         x->y[0] = (low + high) / 2;
-        note_best(x, worst(x, 1, x->y), &top);
+        note_best(x, worst_cone(x, 1, x->y), &top);
         if (x->slope[0] > 0)
             low = x->y[0];
         else
@@ -164,12 +164,12 @@ static void shrink_ellipsoid(Share *x, double wide) {
     for (int i = 0; i < count * count; i++) x->P[i] = 0;
     for (int i = 0; i < count; i++) x->P[i * count + i] = wide * wide;
     for (int round = 0; round < SHARE_ROUNDS * count * count; round++) {
-        note_best(x, worst(x, 1, x->y), &top);
+        note_best(x, worst_cone(x, 1, x->y), &top);
         for (int i = 0; i < count; i++) x->Pg[i] = dot(count, x->P + i * count, x->slope);
         const double size = dot(count, x->slope, x->Pg);
         if (!(size > 0)) return;
         for (int i = 0; i < count; i++) x->g[i] = x->Pg[i] / sqrt(size);
-        add(count, 1 / (n + 1), x->g, x->y);
+        add_part(count, 1 / (n + 1), x->g, x->y);
         for (int i = 0; i < count; i++)
             for (int j = 0; j <= i; j++) /* symmetric to the bit: what is not grows with each round */
                 x->P[j * count + i] = x->P[i * count + j] =
@@ -198,7 +198,7 @@ static Share share_of(Mechanism *b) {
 int share_presses_uniquely(Mechanism *b, int i) {
     const Share x = share_of(b);
     for (int j = 0; j < x.count; j++)
-        if (fabs(press(b, i, x.Z + j * b->system->m)) > SHARE_DEPENDENT) return 0;
+        if (fabs(press_row(b, i, x.Z + j * b->system->m)) > SHARE_DEPENDENT) return 0;
     return 1;
 }
 
@@ -217,18 +217,18 @@ void share_best(Mechanism *b, double *best) {
         bisect(&x, SHARE_WIDE * wide);
     else
         shrink_ellipsoid(&x, SHARE_WIDE * wide);
-    if (worst(&x, 0, x.best) < 0) {
+    if (worst_cone(&x, 0, x.best) < 0) {
         for (int round = 0; round < SHARE_ROUNDS; round++) {
             const double middle = (low + high) / 2;
-            if (worst(&x, middle, x.best) < 0)
+            if (worst_cone(&x, middle, x.best) < 0)
                 low = middle;
             else
                 high = middle;
         }
         low = high;
     }
-    (void)worst(&x, 1, x.best);
+    (void)worst_cone(&x, 1, x.best);
     memcpy(best, x.there, (size_t)m * sizeof *best);
-    (void)worst(&x, low, x.best);
+    (void)worst_cone(&x, low, x.best);
     memcpy(b->lambda, x.there, (size_t)m * sizeof *best);
 }

@@ -8,6 +8,7 @@
  *
  * f(t + h, y1) is no stage of the step itself: it is evaluated when the next step or the dense
  * output needs it, after a projection only for the latter. */
+#include "restrict.h"
 #include "step_size.h"
 
 /* clang-format off */
@@ -82,15 +83,15 @@ static const double
 
 static const double SAFETY = 0.9, LEAST_FACTOR = 1.0 / 3, LARGEST_FACTOR = 6, RETREAT = 0.1;
 
-enum { KEPT = 7 }; /* stages 6 to 12, which the dense output needs */
+enum { DENSE_STAGES = 7 }; /* stages 6 to 12, which the dense output needs */
 
 /* k_2 to k_12, one after the other in k, y1, sum = (y1 - y) / h, and the argument of k_12. */
-static Status stages(const Integrator *i, const Ode *ode, double h, double t_new,
-                     double *restrict k, double *restrict y1, double *restrict sum,
-                     double *restrict last) {
+static Status dop853_stages(const Integrator *i, const Ode *ode, double h, double t_new,
+                            double *RESTRICT k, double *RESTRICT y1, double *RESTRICT sum,
+                            double *RESTRICT last) {
     const int n = i->ny;
     const double t = i->t;
-    const double *restrict y = i->y, *restrict k1 = i->f;
+    const double *RESTRICT y = i->y, *RESTRICT k1 = i->f;
     double *k2 = k, *k3 = k2 + n, *k4 = k3 + n, *k5 = k4 + n, *k6 = k5 + n, *k7 = k6 + n;
     double *k8 = k7 + n, *k9 = k8 + n, *k10 = k9 + n, *k11 = k10 + n, *k12 = k11 + n;
     for (int j = 0; j < n; j++)
@@ -142,10 +143,10 @@ static Status stages(const Integrator *i, const Ode *ode, double h, double t_new
 
 /* The error in units of the tolerance; not a number if y1 is not finite. */
 static double error_norm(const Integrator *i, const Control *control, double h, const double *k,
-                         const double *restrict y1, const double *restrict sum) {
+                         const double *RESTRICT y1, const double *RESTRICT sum) {
     const int n = i->ny;
     const double tolerance = step_size_tolerance(control);
-    const double *restrict y = i->y, *restrict scale = control->scale, *restrict k1 = i->f;
+    const double *RESTRICT y = i->y, *RESTRICT scale = control->scale, *RESTRICT k1 = i->f;
     const double *k6 = k + 4 * n, *k7 = k6 + n, *k8 = k7 + n, *k9 = k8 + n, *k10 = k9 + n;
     const double *k11 = k10 + n, *k12 = k11 + n;
     double square5 = 0, square3 = 0;
@@ -178,16 +179,16 @@ static Status dop853_step(Integrator *i, const Ode *ode, const Control *control,
     Status status = trial_begin(&trial, i, ode, control, t_bound, 7);
     while (status == OK) {
         double error = HUGE_VAL;
-        if (stages(i, ode, trial.h, trial.t_new, k, y1, sum, last) == OK)
+        if (dop853_stages(i, ode, trial.h, trial.t_new, k, y1, sum, last) == OK)
             error = error_norm(i, control, trial.h, k, y1, sum);
         else
             trial.unevaluated = 1;
         double factor = step_factor(error);
         if (error <= 1) {
-            for (int j = 0; j < KEPT * n; j++) i->dense[j] = k[4 * n + j];
+            for (int j = 0; j < DENSE_STAGES * n; j++) i->dense[j] = k[4 * n + j];
             for (int j = 0; j < n; j++) {
-                i->dense[KEPT * n + j] = last[j];
-                i->dense[(KEPT + 1) * n + j] = k[10 * n + j];
+                i->dense[DENSE_STAGES * n + j] = last[j];
+                i->dense[(DENSE_STAGES + 1) * n + j] = k[10 * n + j];
             }
             i->error = error;
             trial_accept(&trial, i, y1, factor);
@@ -268,10 +269,10 @@ static int dop853_ints(int ny) {
     return 0;
 }
 
-const Method dop853 = {
+SHARED_VALUE const Method dop853 = {
     .name = "dop853",
-    .dense_arrays = KEPT + 2,
-    .last_stage = KEPT,
+    .dense_arrays = DENSE_STAGES + 2,
+    .last_stage = DENSE_STAGES,
     .scratch_doubles = dop853_doubles,
     .scratch_ints = dop853_ints,
     .step = dop853_step,

@@ -8,6 +8,7 @@
 #define LAGFMU_INTEGRATOR_H
 
 #include "arena.h"
+#include "linkage.h"
 #include "status.h"
 
 typedef struct {
@@ -69,20 +70,20 @@ struct Method {
 
 enum { RADAU5_MOST_STATES = 800 }; /* for which radau5 keeps dense matrices */
 
-extern const Method dop853, rk4, radau5;
+SHARED const Method dop853, rk4, radau5;
 
 /* rk4: estimate of the error of one component in the step just taken. */
-double rk4_error(const Integrator *i, int component);
+SHARED double rk4_error(const Integrator *i, int component);
 
 /* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
  * f_old, dense) come from `saved`, the scratch from `scratch`. */
-void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
-                       const Method *const *methods, int count);
+SHARED void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
+                              const Method *const *methods, int count);
 
 /* Puts the integrator at (t, y); h: step to try first, 0: to be chosen. */
-void integrator_start(Integrator *i, const Method *method, double t, const double *y, double h);
+SHARED void integrator_start(Integrator *i, const Method *method, double t, const double *y, double h);
 
 /* Replaces the state at the end of the step just taken (after a projection). */
-void integrator_move(Integrator *i, const double *y);
+SHARED void integrator_move(Integrator *i, const double *y);
 
 #endif

@@ -18,7 +18,7 @@
 
 #define SQRT6 2.4494897427831780982 /* literals, so that the tables below are constants */
 
-static const double c1 = (4 - SQRT6) / 10, c2 = (4 + SQRT6) / 10;
+static const double node1 = (4 - SQRT6) / 10, node2 = (4 + SQRT6) / 10;
 static const double g = 3.6378342527444957322, a = 2.6810828736277521339,
                     b = 3.0504301992474105694;
 static const double T[3][3] = {
@@ -35,10 +35,10 @@ static const double P[3][3] = {
     {-(23 + 22 * SQRT6) / 3, -(23 - 22 * SQRT6) / 3, -8.0 / 3},
     {(10 + 15 * SQRT6) / 3, (10 - 15 * SQRT6) / 3, 10.0 / 3}};
 
-static const double SAFETY = 0.9, LEAST_FACTOR = 1.0 / 5, LARGEST_FACTOR = 8;
+static const double RADAU_SAFETY = 0.9, RADAU_LEAST_FACTOR = 1.0 / 5, RADAU_LARGEST_FACTOR = 8;
 static const double LEAST_ERROR = 1e-2; /* that the predictive controller remembers */
 enum {
-    ITERATIONS = 7 /* of Newton's method, at most */
+    NEWTON_ITERATIONS = 7 /* of Newton's method, at most */
 };
 
 /* Where things lie in the scratch. */
@@ -87,7 +87,7 @@ static double polynomial(const Integrator *i, int j, double s, double s0) {
 static void predict(const Integrator *i, Work x, double h) {
     const int n = i->ny;
     const double ratio = i->error_old > 0 ? h / (i->t - i->t_old) : 0;
-    const double c[3] = {c1, c2, 1};
+    const double c[3] = {node1, node2, 1};
     for (int k = 0; k < 3; k++)
         for (int j = 0; j < n; j++)
             x.z[k * n + j] = ratio > 0 ? polynomial(i, j, 1 + c[k] * ratio, 1) : 0;
@@ -110,9 +110,9 @@ static int factor_matrices(int n, Work x, double h) {
 }
 
 /* r = T^-1 F(t + c h, y + Z) - (L/h) W; FAILED if a stage cannot be evaluated. */
-static Status residual(const Integrator *i, const Ode *ode, Work x, const Trial *trial) {
+static Status stage_residual(const Integrator *i, const Ode *ode, Work x, const Trial *trial) {
     const int n = i->ny;
-    const double h = trial->h, c[3] = {c1, c2, 1};
+    const double h = trial->h, c[3] = {node1, node2, 1};
     for (int k = 0; k < 3; k++) {
         for (int j = 0; j < n; j++) x.y[j] = i->y[j] + x.z[k * n + j];
         const double t = k == 2 ? trial->t_new : i->t + c[k] * h;
@@ -128,7 +128,7 @@ static Status residual(const Integrator *i, const Ode *ode, Work x, const Trial 
     return OK;
 }
 
-static double norm(int n, int blocks, const double *x, const double *weight) {
+static double weighted_mean(int n, int blocks, const double *x, const double *weight) {
     double sum = 0;
     for (int k = 0; k < blocks; k++)
         for (int j = 0; j < n; j++) {
@@ -140,17 +140,17 @@ static double norm(int n, int blocks, const double *x, const double *weight) {
 
 /* Solves for Z to a part `enough` of the tolerance.  The iterations that it took; 0: it diverges,
  * is too slow, or a stage cannot be evaluated. */
-static int newton(const Integrator *i, const Ode *ode, Work x, Trial *trial, double enough) {
+static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *trial, double enough) {
     const int n = i->ny;
     double before = 0, theta = 0, eta = 1;
-    for (int count = 1; count <= ITERATIONS; count++) {
-        if (residual(i, ode, x, trial) != OK) {
+    for (int count = 1; count <= NEWTON_ITERATIONS; count++) {
+        if (stage_residual(i, ode, x, trial) != OK) {
             trial->unevaluated = 1;
             return 0;
         }
         lu_solve(n, x.real, x.pivots, x.r);
         lu_solve_complex(n, x.re, x.im, x.pivots_complex, x.r + n, x.r + 2 * n);
-        double size = norm(n, 3, x.r, x.weight);
+        double size = weighted_mean(n, 3, x.r, x.weight);
         if (!isfinite(size)) return 0;
         if (count > 1) {
             double ratio = size / before;
@@ -158,7 +158,7 @@ static int newton(const Integrator *i, const Ode *ode, Work x, Trial *trial, dou
             if (!(theta < 0.99)) return 0;
             eta = theta / (1 - theta);
             double last = eta * size;
-            for (int k = count; k < ITERATIONS; k++) last *= theta;
+            for (int k = count; k < NEWTON_ITERATIONS; k++) last *= theta;
             if (last > enough) return 0;
         }
         for (int j = 0; j < 3 * n; j++) x.w[j] += x.r[j];
@@ -171,8 +171,8 @@ static int newton(const Integrator *i, const Ode *ode, Work x, Trial *trial, dou
 
 /* err in units of the tolerance; evaluated anew at y + err where a first estimate is too large:
  * that damps what is infinitely stiff (eq. IV.8.20). */
-static double error_norm(const Integrator *i, const Ode *ode, Work x, double h, double tolerance,
-                         const double *scale, int twice) {
+static double implicit_error_norm(const Integrator *i, const Ode *ode, Work x, double h, double tolerance,
+                                  const double *scale, int twice) {
     const int n = i->ny;
     for (int j = 0; j < n; j++) {
         double end = i->y[j] + x.z[2 * n + j];
@@ -182,17 +182,17 @@ static double error_norm(const Integrator *i, const Ode *ode, Work x, double h, 
         x.error[j] = i->f[j] + x.defect[j];
     }
     lu_solve(n, x.real, x.pivots, x.error);
-    double size = norm(n, 1, x.error, x.weight);
+    double size = weighted_mean(n, 1, x.error, x.weight);
     if (!twice || !(size >= 1)) return size;
     for (int j = 0; j < n; j++) x.y[j] = i->y[j] + x.error[j];
     if (ode->rate(ode->context, i->t, x.y, x.error) != OK) return size;
     for (int j = 0; j < n; j++) x.error[j] += x.defect[j];
     lu_solve(n, x.real, x.pivots, x.error);
-    return norm(n, 1, x.error, x.weight);
+    return weighted_mean(n, 1, x.error, x.weight);
 }
 
 static double limit(double factor) {
-    return fmax(LEAST_FACTOR, fmin(LARGEST_FACTOR, factor));
+    return fmax(RADAU_LEAST_FACTOR, fmin(RADAU_LARGEST_FACTOR, factor));
 }
 
 static double fourth_root(double x) {
@@ -200,8 +200,8 @@ static double fourth_root(double x) {
 }
 
 /* h_new / h from the error alone, a little less after many iterations. */
-static double step_factor(double error, int count) {
-    double safety = SAFETY * (1 + 2 * ITERATIONS) / (count + 2 * ITERATIONS);
+static double implicit_step_factor(double error, int count) {
+    double safety = RADAU_SAFETY * (1 + 2 * NEWTON_ITERATIONS) / (count + 2 * NEWTON_ITERATIONS);
     return limit(safety / fourth_root(fmax(error, 1e-10)));
 }
 
@@ -209,11 +209,11 @@ static double step_factor(double error, int count) {
 static double predictive_factor(const Integrator *i, double h, double error, double factor) {
     if (!(i->error_old > 0)) return factor;
     double now = fmax(error, 1e-10);
-    double trend = h / (i->t - i->t_old) * fourth_root(i->error_old / (now * now)) * SAFETY;
+    double trend = h / (i->t - i->t_old) * fourth_root(i->error_old / (now * now)) * RADAU_SAFETY;
     return fmin(factor, limit(trend));
 }
 
-static void accept(Integrator *i, const Trial *trial, Work x, double error, double factor) {
+static void accept_trial(Integrator *i, const Trial *trial, Work x, double error, double factor) {
     const int n = i->ny;
     factor = predictive_factor(i, trial->h, error, factor);
     for (int j = 0; j < n; j++) x.y[j] = i->y[j] + x.z[2 * n + j];
@@ -243,14 +243,14 @@ static Status radau5_step(Integrator *i, const Ode *ode, const Control *control,
         predict(i, x, trial.h);
         for (int j = 0; j < n; j++)
             x.weight[j] = step_size_weight(tolerance, i->y[j], i->y[j], control->scale[j]);
-        if (factor_matrices(n, x, trial.h)) count = newton(i, ode, x, &trial, enough);
+        if (factor_matrices(n, x, trial.h)) count = newton_on_stages(i, ode, x, &trial, enough);
         if (count > 0) {
             int first = trial.rejected > 0 || !(i->error_old > 0);
             double error =
-                error_norm(i, ode, x, trial.h, tolerance, control->scale, first);
-            factor = isfinite(error) ? step_factor(error, count) : LEAST_FACTOR;
+                implicit_error_norm(i, ode, x, trial.h, tolerance, control->scale, first);
+            factor = isfinite(error) ? implicit_step_factor(error, count) : RADAU_LEAST_FACTOR;
             if (error < 1) {
-                accept(i, &trial, x, error, factor);
+                accept_trial(i, &trial, x, error, factor);
                 return OK;
             }
             if (first && trial.rejected == 0) factor = 0.1;
@@ -273,7 +273,7 @@ static int radau5_ints(int ny) {
     return 2 * ny;
 }
 
-const Method radau5 = {
+SHARED_VALUE const Method radau5 = {
     .name = "radau5",
     .dense_arrays = 3,
     .scratch_doubles = radau5_doubles,

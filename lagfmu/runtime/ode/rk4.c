@@ -6,16 +6,17 @@
  *
  * Error estimate: the difference to the method of order 3 that has f(t + h, y1) instead of k4.
  * Dense output: cubic Hermite interpolation. */
+#include "restrict.h"
 #include "step_size.h"
 
-enum { ERROR, DIFFERENCE, SLOPE, KEPT }; /* rows of i->dense: h/6 (k4 - f1), y1 - y0, h f1 */
+enum { ERROR, DIFFERENCE, SLOPE, ROWS_KEPT }; /* rows of i->dense: h/6 (k4 - f1), y1 - y0, h f1 */
 
 /* k2, k3, k4, f1, y1 one after the other in k. */
-static Status stages(const Integrator *i, const Ode *ode, double h, double t_new,
-                     double *restrict k) {
+static Status rk4_stages(const Integrator *i, const Ode *ode, double h, double t_new,
+                         double *RESTRICT k) {
     const int n = i->ny;
     const double t = i->t;
-    const double *restrict y = i->y, *restrict k1 = i->f;
+    const double *RESTRICT y = i->y, *RESTRICT k1 = i->f;
     double *k2 = k, *k3 = k2 + n, *k4 = k3 + n, *f1 = k4 + n, *y1 = f1 + n;
     for (int j = 0; j < n; j++) y1[j] = y[j] + 0.5 * h * k1[j];
     if (ode->rate(ode->context, t + 0.5 * h, y1, k2) != OK) return FAILED;
@@ -34,7 +35,7 @@ static Status rk4_step(Integrator *i, const Ode *ode, const Control *control, do
     double *k4 = i->scratch + 2 * n, *f1 = k4 + n, *y1 = f1 + n;
     if (!(fabs(h) > 0)) return step_size_stop(ode->why, i->t, "no step leads to the bound", 0);
     if (step_size_rate(i, ode) != OK) return FAILED;
-    if (stages(i, ode, h, step.t_new, i->scratch) != OK)
+    if (rk4_stages(i, ode, h, step.t_new, i->scratch) != OK)
         return step_size_stop(ode->why, i->t, "a stage cannot be evaluated", 1);
     if (!step_size_finite(2 * n, f1))
         return step_size_stop(ode->why, i->t, "the state is not finite", 0);
@@ -77,9 +78,9 @@ static int rk4_ints(int ny) {
     return 0;
 }
 
-const Method rk4 = {
+SHARED_VALUE const Method rk4 = {
     .name = "rk4",
-    .dense_arrays = KEPT,
+    .dense_arrays = ROWS_KEPT,
     .scratch_doubles = rk4_doubles,
     .scratch_ints = rk4_ints,
     .fixed = 1,

@@ -4,6 +4,7 @@
 #define LAGFMU_STEP_SIZE_H
 
 #include "integrator.h"
+#include "linkage.h"
 
 #include <float.h>
 #include <math.h>
@@ -22,10 +23,10 @@ static inline double step_size_weight(double tolerance, double y, double y_new, 
 }
 
 /* x^(1/k) for x > 0, by arithmetic alone: the same on every platform. */
-double step_size_root(double x, int k);
+SHARED double step_size_root(double x, int k);
 
 /* f(t, y) in i->f, evaluated if it is not there yet. */
-Status step_size_rate(Integrator *i, const Ode *ode);
+SHARED Status step_size_rate(Integrator *i, const Ode *ode);
 
 /* A step that is being tried: from i->t to t_new = i->t + h. */
 typedef struct {
@@ -38,19 +39,19 @@ typedef struct {
 
 /* The first trial: f(t, y) is evaluated, and if i->h_next = 0 a step is chosen whose error, of a
  * method whose estimate is of the given order, is about 0.01 of the tolerance. */
-Status trial_begin(Trial *trial, Integrator *i, const Ode *ode, const Control *control,
-                   double t_bound, int order);
+SHARED Status trial_begin(Trial *trial, Integrator *i, const Ode *ode, const Control *control,
+                          double t_bound, int order);
 
 /* The next trial, with a step smaller by `factor` < 1.  FAILED: step size underflow. */
-Status trial_reject(Trial *trial, const Integrator *i, const Ode *ode, double factor);
+SHARED Status trial_reject(Trial *trial, const Integrator *i, const Ode *ode, double factor);
 
 /* The trial becomes the step: y_old, f_old, t_old, t, h_next; y <- y_new, where f is not known. */
-void trial_accept(const Trial *trial, Integrator *i, const double *y_new, double factor);
+SHARED void trial_accept(const Trial *trial, Integrator *i, const double *y_new, double factor);
 
-int step_size_finite(int n, const double *x);
+SHARED int step_size_finite(int n, const double *x);
 
 /* FAILED: "the integration stops at t, REASON", followed by what `why` says if has_cause. */
-Status step_size_stop(Why *why, double t, const char *reason, int has_cause);
+SHARED Status step_size_stop(Why *why, double t, const char *reason, int has_cause);
 
 /* The next of the steps that divide the way to t_bound evenly, none longer than fixed_step
  * (backwards in time if t_bound < t); `left`: how many follow it. */
@@ -59,6 +60,6 @@ typedef struct {
     int left;
 } Fixed;
 
-Fixed step_size_fixed(double t, double t_bound, double fixed_step);
+SHARED Fixed step_size_fixed(double t, double t_bound, double fixed_step);
 
 #endif

@@ -3,6 +3,7 @@
 #define LAGFMU_STIFFNESS_H
 
 #include "integrator.h"
+#include "linkage.h"
 
 enum {
     STIFFNESS_MOST_FAILURES = 8, /* times that the stiff steps asked for are made four times as many */
@@ -26,22 +27,22 @@ typedef struct {
 } Choice;
 
 /* 1 if the step that dop853 has just taken is to be judged: one in three, each from a stiff one on. */
-int stiffness_due(Choice *c);
+SHARED int stiffness_due(Choice *c);
 
 /* Judges the step that dop853 has just taken; f at its end is known.  `size`: (ny / 2) magnitudes of
  * the coordinates. */
-void stiffness_explicit_step(Choice *c, const Integrator *i, const double *size);
+SHARED void stiffness_explicit_step(Choice *c, const Integrator *i, const double *size);
 
 /* Judges the step that radau5 has just taken. */
-void stiffness_implicit_step(Choice *c, const Integrator *i);
+SHARED void stiffness_implicit_step(Choice *c, const Integrator *i);
 
 /* dop853 comes back: at an event, or because radau5 did not pay, or failed. */
-void stiffness_explicit(Choice *c, int paid);
+SHARED void stiffness_explicit(Choice *c, int paid);
 
 /* 1 if the other method takes over now. */
-int stiffness_turn(Choice *c);
+SHARED int stiffness_turn(Choice *c);
 
 /* What there is to say when radau5 takes over for the first time. */
-void stiffness_message(const Choice *c, char *text, size_t size);
+SHARED void stiffness_message(const Choice *c, char *text, size_t size);
 
 #endif

@@ -126,7 +126,7 @@ static Status try_step(Solver *s, double t_end) {
 }
 
 /* Of `auto`: the step that dop853 took is judged, and the other method takes over if it is due. */
-static void choose(Solver *s) {
+static void choose_method(Solver *s) {
     Integrator *i = &s->integrator;
     Choice *choice = &s->state.now.choice;
     if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && flow_rate(s, i) == OK)
@@ -139,7 +139,7 @@ static void choose(Solver *s) {
 
 /* Where radau5 fails, dop853 goes on. */
 static Status take_step(Solver *s, double t_end) {
-    if (s->settings.method == AUTO) choose(s);
+    if (s->settings.method == AUTO) choose_method(s);
     const double t = s->integrator.t;
     const Status status = try_step(s, t_end);
     if (status == OK || !s->state.now.choice.implicit) return status;
@@ -192,7 +192,7 @@ int solver_pass(Solver *s, double t_end) {
 }
 
 /* What frictions have dissipated at t, within the step just taken. */
-static Status lose(Solver *s, double t) {
+static Status count_loss(Solver *s, double t) {
     Numbers *now = &s->state.now;
     const Integrator *i = &s->integrator;
     double lost;
@@ -215,7 +215,7 @@ static Status arrive(Solver *s, double t_end) {
     } else if (put_between(s, t_end) != OK) {
         return FAILED;
     }
-    if (s->system->frictions > 0 && lose(s, t_end) != OK) return FAILED;
+    if (s->system->frictions > 0 && count_loss(s, t_end) != OK) return FAILED;
     if (s->peaks > 0 && OPTIONAL.peaks->pass(s, t_end, NULL) != OK) return FAILED;
     now->step = i->h_next;
     if (!runs_ahead(s)) now->ahead = 0;
@@ -227,7 +227,7 @@ static Status meet(Solver *s) {
     Integrator *i = &s->integrator;
     const double t = s->state.now.event_time;
     double *y = s->work_advance;
-    if (s->system->frictions > 0 && lose(s, t) != OK) return FAILED;
+    if (s->system->frictions > 0 && count_loss(s, t) != OK) return FAILED;
     if (flow_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     put(s, t, y);
     if (s->peaks > 0 && OPTIONAL.peaks->pass(s, t, y) != OK) return FAILED;

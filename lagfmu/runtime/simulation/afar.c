@@ -14,8 +14,7 @@
 #include "magnitudes.h"
 #include "thresholds.h"
 
-enum { HALVINGS = 25 };
-static const double EPS = DBL_EPSILON;
+enum { STEP_HALVINGS = 25 };
 
 Status afar_refused(Solver *s) {
     Why cause = s->why;
@@ -28,7 +27,7 @@ static void find_allowed(const Start *x, const double *q, const double *least, d
     const System *s = x->s->system;
     for (int j = 0; j < s->n; j++) reach[j] = fmax(fabs(q[j]), least[j]);
     for (int k = 0; k < s->m; k++)
-        allowed[k] = factor * EPS * mechanism_row_size(&x->s->stepped, k, reach);
+        allowed[k] = factor * DBL_EPSILON * mechanism_row_size(&x->s->stepped, k, reach);
 }
 
 static int arrived(const System *s, const int *rows, const double *f, const double *allowed) {
@@ -38,8 +37,8 @@ static int arrived(const System *s, const int *rows, const double *f, const doub
 }
 
 /* |f| on the rows in units of what may be left; of f0 where nothing may. */
-static double norm(const System *s, const int *rows, const double *f, const double *allowed,
-                   const double *f0) {
+static double norm_of_misses(const System *s, const int *rows, const double *f, const double *allowed,
+                             const double *f0) {
     double sum = 0;
     for (int k = 0; k < s->m; k++) {
         double unit = allowed[k] > 0 ? allowed[k] : f0[k] != 0 ? fabs(f0[k]) : 1;
@@ -49,10 +48,10 @@ static double norm(const System *s, const int *rows, const double *f, const doub
 }
 
 /* The largest f of the rows relative to its terms; allowed (m): 1e3 roundings of these. */
-static double find_off(const System *s, const int *rows, const double *f, const double *allowed) {
+static double find_far_off(const System *s, const int *rows, const double *f, const double *allowed) {
     double off = 0;
     for (int k = 0; k < s->m; k++)
-        if (rows[k] && allowed[k] > 0) off = fmax(off, 1e3 * EPS * fabs(f[k]) / allowed[k]);
+        if (rows[k] && allowed[k] > 0) off = fmax(off, 1e3 * DBL_EPSILON * fabs(f[k]) / allowed[k]);
     return off < AFAR_NEAR ? off : 0;
 }
 
@@ -82,7 +81,7 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
  * It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
  * since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
  * of at the start (`size`).  While it falls on and on, there is nothing to arrive at. */
-static Status newton(const Start *x, int stage, double *q, const int *rows) {
+static Status newton_from_afar(const Start *x, int stage, double *q, const int *rows) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
     double *trial = x->s->work_initial, *least = trial + s->n, *f = least + s->n;
@@ -99,20 +98,20 @@ static Status newton(const Start *x, int stage, double *q, const int *rows) {
         find_allowed(x, q, x->s->state.size, 1e3, trial, allowed);
         if (!all && arrived(s, own, f, allowed)) break; /* what is left is not for these coordinates */
         for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
-        b->linear.off = find_off(s, own, f, allowed);
+        b->linear.off = find_far_off(s, own, f, allowed);
         const Status status = precedence_nearest(b, x->rank_q, stage, own, f_trial);
         b->linear.off = 0;
         if (status == FAILED) break;
         double damping = 1;
         int halvings = 0;
-        for (; halvings < HALVINGS; halvings++, damping /= 2) {
+        for (; halvings < STEP_HALVINGS; halvings++, damping /= 2) {
             for (int j = 0; j < s->n; j++) trial[j] = q[j] + damping * b->dq[j];
             if (mechanism_residual(b, x->at, trial, f_trial) == FAILED) continue;
-            if (norm(s, own, f_trial, allowed, f) <
-                (1 - 0.1 * damping) * norm(s, own, f, allowed, f))
+            if (norm_of_misses(s, own, f_trial, allowed, f) <
+                (1 - 0.1 * damping) * norm_of_misses(s, own, f, allowed, f))
                 break;
         }
-        if (halvings == HALVINGS) break;
+        if (halvings == STEP_HALVINGS) break;
         memcpy(q, trial, (size_t)s->n * sizeof *q);
         memcpy(f, f_trial, (size_t)s->m * sizeof *f);
     }
@@ -173,7 +172,7 @@ Status afar_positions(const Start *x, double *q, int *rows) {
     memcpy(given, q, bytes);
     for (int stage = 0; (stage = precedence_stage(s, x->rank_q, stage)) < RANKS; stage++) {
         memcpy(q, given, bytes);
-        if (newton(x, stage, q, rows) == OK) return OK;
+        if (newton_from_afar(x, stage, q, rows) == OK) return OK;
         if (stage == OMITTED && check_all_omissions(x, given, rows) == FAILED) return FAILED;
     }
     return FAILED;

@@ -2,6 +2,7 @@
 #ifndef LAGFMU_AFAR_H
 #define LAGFMU_AFAR_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* The start of a simulation: the state that is being found, where it began, and who said that. */
@@ -13,13 +14,13 @@ typedef struct {
 } Start;
 
 /* "the start is refused: " before the cause. */
-Status afar_refused(Solver *s);
+SHARED Status afar_refused(Solver *s);
 
 /* f = 0 on the rows: q (n) is moved.  `rows` (m) loses those that are nonholonomic. */
-Status afar_positions(const Start *x, double *q, int *rows);
+SHARED Status afar_positions(const Start *x, double *q, int *rows);
 
 /* G v = nu at q on the rows: v (n), from x->v0, as near as can be.  least (n) >= 0: speeds below which
  * nothing counts. */
-Status afar_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v);
+SHARED Status afar_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v);
 
 #endif

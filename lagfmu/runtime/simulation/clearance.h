@@ -2,6 +2,7 @@
 #ifndef LAGFMU_CLEARANCE_H
 #define LAGFMU_CLEARANCE_H
 
+#include "linkage.h"
 #include "samples.h"
 
 /* What is known between the samples k and k + 1. */
@@ -12,7 +13,7 @@ typedef enum {
 } Clearance;
 
 /* y (3 * 2 n): scratch. */
-Clearance clearance_between(Solver *s, const Samples *samples, int k, double *y);
+SHARED Clearance clearance_between(Solver *s, const Samples *samples, int k, double *y);
 
 /* Doubles of its boxes. */
 static inline int clearance_doubles(const System *s) {

@@ -44,7 +44,7 @@ static Status find_force_scale(Solver *solver, int k, const double *forces, doub
 
 /* For each coordinate its acceleration, or the one that the forces at work could give it if they
  * did not balance: what |vdot| is the rounding of. */
-static void accelerations_at_work(const Mechanism *b, const double *forces, double *reach) {
+static void accelerations_of_forces(const Mechanism *b, const double *forces, double *reach) {
     const System *s = b->system;
     for (int j = 0; j < s->n; j++) reach[j] = fabs(b->vdot[j]);
     for (int e = 0; e < s->masses; e++) {
@@ -63,7 +63,7 @@ static Status most_wrong(Solver *s, Instant at, const double *q, const double *v
     system_active(s->system, modes, active);
     if (mechanism_motion(b, at, q, v, active) == FAILED) return FAILED;
     forces_at_work(b, forces);
-    accelerations_at_work(b, forces, reach);
+    accelerations_of_forces(b, forces, reach);
     for (int c = 0; c < s->system->contacts; c++) {
         int k = s->system->contact[c];
         if (modes[c]) {
@@ -88,8 +88,8 @@ static Status most_wrong(Solver *s, Instant at, const double *q, const double *v
 
 /* The active set.  It is a map from modes to modes: where it goes in a circle it meets `mark`,
  * which is put forward after 1, 2, 4, ... changes (Brent 1980).  `settled`: it ended. */
-static Status follow(Solver *s, Instant at, const double *q, const double *v, int *modes, int *mark,
-                     const int *touching, const int *leaving, int *settled) {
+static Status follow_modes(Solver *s, Instant at, const double *q, const double *v, int *modes, int *mark,
+                           const int *touching, const int *leaving, int *settled) {
     size_t bytes = (size_t)s->system->contacts * sizeof *modes;
     unsigned count = 0, power = 1;
     memcpy(mark, modes, bytes);
@@ -109,8 +109,8 @@ static Status follow(Solver *s, Instant at, const double *q, const double *v, in
 }
 
 /* All combinations of the contacts that touch, closed before open. */
-static Status try_all(Solver *s, Instant at, const double *q, const double *v, const int *closed,
-                      int *modes, const int *touching, const int *leaving, int *settled) {
+static Status try_all_modes(Solver *s, Instant at, const double *q, const double *v, const int *closed,
+                            int *modes, const int *touching, const int *leaving, int *settled) {
     const int contacts = s->system->contacts;
     int undecided = 0;
     for (int c = 0; c < contacts; c++) undecided += touching[c];
@@ -130,7 +130,7 @@ static Status try_all(Solver *s, Instant at, const double *q, const double *v, c
     return OK;
 }
 
-static Status no_modes(Solver *s, Instant at, const int *touching) {
+static Status no_contact_modes(Solver *s, Instant at, const int *touching) {
     const char *comma = "";
     fail(&s->why, "no combination of open and closed contacts ");
     for (int c = 0; c < s->system->contacts; c++)
@@ -149,10 +149,10 @@ Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, i
     size_t bytes = (size_t)contacts * sizeof *closed;
     int *modes = s->iwork_contacts + s->system->m, *mark = modes + contacts, settled = 0;
     memcpy(modes, closed, bytes);
-    if (follow(s, at, q, v, modes, mark, touching, leaving, &settled) == FAILED) return FAILED;
-    if (!settled && try_all(s, at, q, v, closed, modes, touching, leaving, &settled) == FAILED)
+    if (follow_modes(s, at, q, v, modes, mark, touching, leaving, &settled) == FAILED) return FAILED;
+    if (!settled && try_all_modes(s, at, q, v, closed, modes, touching, leaving, &settled) == FAILED)
         return FAILED;
-    if (!settled) return no_modes(s, at, touching);
+    if (!settled) return no_contact_modes(s, at, touching);
     memcpy(closed, modes, bytes);
     return OK;
 }

@@ -2,6 +2,7 @@
 #ifndef LAGFMU_CONTACTS_H
 #define LAGFMU_CONTACTS_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* Modes, one a contact, with lambda > 0 where closed and d2f/dt2 >= 0 where open and touching.
@@ -9,7 +10,7 @@
  * that is leaving was opened right now because its multiplier passed through zero: there f and its
  * first two derivatives vanish, and the sign of what rounding leaves of them must not close it
  * again. `leaving` may be NULL.  FAILED: no modes fit; `closed` is untouched. */
-Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, int *closed,
-                      const int *touching, const int *leaving);
+SHARED Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, int *closed,
+                             const int *touching, const int *leaving);
 
 #endif

@@ -86,7 +86,7 @@ static Status polish(Sought *x, Bracket seen, Reached *at, int *found) {
 
 /* The time since t0 at which the indicator leaves the range, between two times at which integrations tell that it
  * is inside and out; found = 0 if it only grazed, so that within the tolerance there is no event. */
-static Status bisect(Sought *x, Bracket seen, Reached *at, int *found) {
+static Status bisect_crossing(Sought *x, Bracket seen, Reached *at, int *found) {
     const double starts[2] = {seen.a, 0}, b = seen.b;
     double at_b;
     *found = 0;
@@ -119,7 +119,7 @@ static Status get_past(Sought *x, double b, Reached *at) {
 static Status locate(Sought *x, Bracket seen, double *time, int *found) {
     Reached at;
     if (polish(x, seen, &at, found) != OK) return FAILED;
-    if (!*found && bisect(x, seen, &at, found) != OK) return FAILED;
+    if (!*found && bisect_crossing(x, seen, &at, found) != OK) return FAILED;
     if (!*found) return OK;
     if (x->indicator < x->s->system->contacts)
         at.elapsed += at.step;
@@ -161,7 +161,7 @@ static Status first_of(Solver *s, Sought *x, const Samples *samples, int i, doub
     return OK;
 }
 
-static void note(State *x, int width, int i, double time, int way) {
+static void note_crossing(State *x, int width, int i, double time, int way) {
     Numbers *now = &x->now;
     if (now->event_count > 0 && time > now->event_time) return;
     if (now->event_count == 0 || time < now->event_time) {
@@ -195,7 +195,7 @@ Status events_find(Solver *s, const double *y1) {
         double time;
         int found, way;
         if (first_of(s, &x, &samples, k, &time, &found, &way) != OK) return FAILED;
-        if (found) note(&s->state, width, k, time, way);
+        if (found) note_crossing(&s->state, width, k, time, way);
     }
     if (s->state.now.event_count > 0) return OK;
     arm(s, &samples);

@@ -2,12 +2,13 @@
 #ifndef LAGFMU_EVENTS_H
 #define LAGFMU_EVENTS_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* Looks through the step of s->integrator (dense output prepared, y not yet projected), which ends at
  * the projected y1.  If an indicator leaves its range, state.now.event_time and
  * state.left say when and which; event_count is 0 otherwise, and the contacts that have risen above
  * their gap are armed.  state.indicator moves on to the end of the step. */
-Status events_find(Solver *s, const double *y1);
+SHARED Status events_find(Solver *s, const double *y1);
 
 #endif

@@ -13,7 +13,7 @@
 #include "thresholds.h"
 
 static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
-static const double SAFETY = 0.25; /* of the tolerance: errors of many steps add up */
+static const double TOLERANCE_SHARE = 0.25; /* of the tolerance: errors of many steps add up */
 
 void flow_begin(Solver *s) {
     system_active(s->system, s->state.closed, s->active);
@@ -42,7 +42,7 @@ Status flow_motion(Solver *s, Instant at, const double *q, const double *v) {
                                     : mechanism_motion(&s->stepped, at, q, v, flow_rows(s));
 }
 
-static Status rate(void *context, double t, const double *y, double *dydt) {
+static Status rate_of_state(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
     s->stepped.stage = 1;
@@ -60,7 +60,7 @@ static Status rate(void *context, double t, const double *y, double *dydt) {
 static Status plain_rate(void *context, double t, const double *y, double *dydt) {
     const Solver *s = context;
     const int n = s->system->n;
-    if (!s->system->accelerate(t, y, y + n, s->u, s->p, dydt + n)) return rate(context, t, y, dydt);
+    if (!s->system->accelerate(t, y, y + n, s->u, s->p, dydt + n)) return rate_of_state(context, t, y, dydt);
     for (int j = 0; j < n; j++) dydt[j] = y[n + j];
     return OK;
 }
@@ -81,10 +81,10 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
 }
 
 /* The equations at the times of a step from t on. */
-static Ode equations(Solver *s, double t) {
+static Ode equations_at(Solver *s, double t) {
     const int plain = is_plain(s);
     if (plain) (void)flow_instant(s, t); /* levels of jumps, which stay */
-    return (Ode){s, plain ? plain_rate : rate, jacobian, &s->why};
+    return (Ode){s, plain ? plain_rate : rate_of_state, jacobian, &s->why};
 }
 
 double flow_fewest_steps(const Solver *s) {
@@ -101,7 +101,7 @@ static Control control(const Solver *s, const Integrator *i, double longest) {
     if (s->limit > 0) longest = fmin(longest, s->limit);
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
     if (!s->integrator.method->fixed) magnitudes_shared(s, i->y, s->scale);
-    return (Control){SAFETY * set->tolerance, s->scale, longest < HUGE_VAL ? longest : 0,
+    return (Control){TOLERANCE_SHARE * set->tolerance, s->scale, longest < HUGE_VAL ? longest : 0,
                      fixed};
 }
 
@@ -142,18 +142,18 @@ Status flow_step(Solver *s, Integrator *i, double t_bound, double longest) {
                                  t_bound);
     }
     if (accept(s, i) != OK) return FAILED;
-    const Ode ode = equations(s, i->t);
+    const Ode ode = equations_at(s, i->t);
     if (i->method->step(i, &ode, &c, t_bound) != OK) return FAILED;
     return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;
 }
 
 Status flow_rate(Solver *s, Integrator *i) {
-    const Ode ode = equations(s, i->t);
+    const Ode ode = equations_at(s, i->t);
     return step_size_rate(i, &ode);
 }
 
 Status flow_prepare_dense(Solver *s, Integrator *i) {
-    const Ode ode = equations(s, i->t);
+    const Ode ode = equations_at(s, i->t);
     return i->method->prepare_dense == NULL ? OK : i->method->prepare_dense(i, &ode);
 }
 

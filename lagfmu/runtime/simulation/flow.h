@@ -6,47 +6,48 @@
 #ifndef LAGFMU_FLOW_H
 #define LAGFMU_FLOW_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* The rows that act in the present modes. */
-void flow_begin(Solver *s);
+SHARED void flow_begin(Solver *s);
 
 /* The fixed step [s] that the motion's natural rate says where solver.step does not, and how many of them
  * there are in a natural time. */
-double flow_natural_step(const Solver *s);
-double flow_fewest_steps(const Solver *s);
+SHARED double flow_natural_step(const Solver *s);
+SHARED double flow_fewest_steps(const Solver *s);
 
 /* Where `stepped` was solved for all rows that act, on the constraints: which of them depend on others is
  * remembered; factors are lost. */
-void flow_choose_rows(Solver *s);
+SHARED void flow_choose_rows(Solver *s);
 
 /* (m) The rows for states off the constraints: those that act, as many of them as are independent. */
-const int *flow_rows(const Solver *s);
+SHARED const int *flow_rows(const Solver *s);
 
 /* Time t with the inputs then, and the levels of jumps behind them (kept in s->u). */
-Instant flow_instant(Solver *s, double t);
+SHARED Instant flow_instant(Solver *s, double t);
 
 /* The motion at a state that may lie off the constraints: by those rows, but by all that act where there are
  * frictions, for the normal force is that of the multipliers of least norm. */
-Status flow_motion(Solver *s, Instant at, const double *q, const double *v);
+SHARED Status flow_motion(Solver *s, Instant at, const double *q, const double *v);
 
 /* One accepted step towards t_bound, none longer than `longest` [s]. */
-Status flow_step(Solver *s, Integrator *i, double t_bound, double longest);
+SHARED Status flow_step(Solver *s, Integrator *i, double t_bound, double longest);
 
 /* The rate of change at the integrator's state. */
-Status flow_rate(Solver *s, Integrator *i);
+SHARED Status flow_rate(Solver *s, Integrator *i);
 
 /* Completes the dense output of the step just taken. */
-Status flow_prepare_dense(Solver *s, Integrator *i);
+SHARED Status flow_prepare_dense(Solver *s, Integrator *i);
 
 /* y (2 n) moved onto the constraints. */
-Status flow_project(Solver *s, double t, double *y);
+SHARED Status flow_project(Solver *s, double t, double *y);
 
 /* FAILED if the projection after an adaptive step moved the state by far more than the step's error
  * can be: next to a singular configuration the constraints lead to another branch. */
-Status flow_check_projection(Solver *s, double t, const double *y, const double *projected);
+SHARED Status flow_check_projection(Solver *s, double t, const double *y, const double *projected);
 
 /* y at t1, integrated from (t0, y0) and projected. */
-Status flow_reach(Solver *s, double t0, const double *y0, double t1, double *y);
+SHARED Status flow_reach(Solver *s, double t0, const double *y0, double t1, double *y);
 
 #endif

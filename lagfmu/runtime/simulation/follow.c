@@ -18,12 +18,12 @@ static Status carry(Solver *s) {
                              s->state.size);
 }
 
-static Status settle_modes(Solver *s) {
+static Status follow_contacts(Solver *s) {
     return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.switch_contradicted(s);
 }
 
 /* What rests on a surface at which forces jump may be about to leave it. */
-static Status settle_jumps(Solver *s, int *changed) {
+static Status follow_jumps(Solver *s, int *changed) {
     const Instant at = flow_instant(s, s->state.now.t);
     *changed = 0;
     if (s->system->jumps == 0) return OK;
@@ -40,8 +40,8 @@ Status solver_follow(Solver *s) {
     if (s->system->prescribed_count > 0 && carry(s) != OK) return FAILED;
     if (s->system->frictions > 0 && OPTIONAL.slides->renew(s) != OK) return FAILED;
     if (!s->drive.turned) return OK;
-    if (settle_modes(s) != OK || settle_jumps(s, &changed) != OK) return FAILED;
-    return changed ? settle_modes(s) : OK;
+    if (follow_contacts(s) != OK || follow_jumps(s, &changed) != OK) return FAILED;
+    return changed ? follow_contacts(s) : OK;
 }
 
 Status solver_look(Solver *s) {

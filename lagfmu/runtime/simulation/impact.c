@@ -47,7 +47,7 @@ static int acts_with(const System *system, int contact) {
 }
 
 /* Rows of one impact may miss each other by rounding: they are met as nearly as can be. */
-static Status solve(Struck *x, const double *right, double *dv, double *Lambda) {
+static Status solve_impact(Struck *x, const double *right, double *dv, double *Lambda) {
     Linear *l = &x->b->linear;
     l->nearest = 1;
     const Status status = linear_solve(l, NULL, right, dv, Lambda);
@@ -56,12 +56,12 @@ static Status solve(Struck *x, const double *right, double *dv, double *Lambda) 
 }
 
 /* A (k, k) and c (k): s+ + e s- = A Lambda + c on the contacts, the base rows taken care of. */
-static Status reduce(Struck *x, const Impulse *scratch) {
+static Status reduce_impact(Struck *x, const Impulse *scratch) {
     const System *system = x->s->system;
     Mechanism *b = x->b;
     if (linear_factor(&b->linear, b->M, b->G, x->active) != OK) return FAILED;
     for (int j = 0; j < system->m; j++) x->right[j] = -x->slip[j];
-    if (solve(x, x->right, scratch->dv, scratch->Lambda) != OK) return FAILED;
+    if (solve_impact(x, x->right, scratch->dv, scratch->Lambda) != OK) return FAILED;
     for (int i = 0; i < x->k; i++) {
         const int row = row_of(x, i);
         x->c[i] = (1 + x->e[row]) * x->slip[row] + mechanism_row(b, row, scratch->dv);
@@ -102,7 +102,7 @@ static Status no_velocities(Struck *x, double time) {
 
 /* Velocities from the rows that were found, solved once more together.  Lambda of dependent rows is that
  * of least norm, if that pushes; else the one that was found. */
-static Status finish(Struck *x, const Impulse *found) {
+static Status finish_impact(Struck *x, const Impulse *found) {
     const System *system = x->s->system;
     Mechanism *b = x->b;
     for (int j = 0; j < system->m; j++) x->right[j] = -x->slip[j];
@@ -115,7 +115,7 @@ static Status finish(Struck *x, const Impulse *found) {
             x->right[row] = -(1 + x->e[row]) * x->slip[row];
         }
         if (linear_factor(&b->linear, b->M, b->G, x->active) != OK) return FAILED;
-        if (solve(x, x->right, found->dv, found->Lambda) != OK) return FAILED;
+        if (solve_impact(x, x->right, found->dv, found->Lambda) != OK) return FAILED;
         for (int j = 0; j < system->m; j++) most = fmax(most, fabs(found->Lambda[j]));
         for (int i = 0; i < x->k; i++) least = fmin(least, found->Lambda[row_of(x, i)]);
         if (least >= -IMPACT_PULL * most) break;
@@ -124,13 +124,13 @@ static Status finish(Struck *x, const Impulse *found) {
 }
 
 /* The law.  A row that acts with a contact does so unless the others lift the contact off. */
-static Status newton(Struck *x, double time, const Impulse *found) {
+static Status newton_impact(Struck *x, double time, const Impulse *found) {
     const System *system = x->s->system;
     memset(x->holding, 0, (size_t)system->contacts * sizeof *x->holding);
     for (int i = 0; i < x->k; i++) x->holding[x->contact[i]] = 1;
     for (int lifted = 1; lifted;) {
         set_base(x);
-        if (reduce(x, found) != OK) return FAILED;
+        if (reduce_impact(x, found) != OK) return FAILED;
         if (!complementarity_solve(x->k, x->A, x->c, x->z, x->w, x->work, x->iwork)) {
             if (!rebounds(x)) return no_velocities(x, time);
             memset(x->e, 0, (size_t)system->m * sizeof *x->e);
@@ -144,17 +144,17 @@ static Status newton(Struck *x, double time, const Impulse *found) {
             lifted |= acts_with(system, c);
         }
     }
-    return finish(x, found);
+    return finish_impact(x, found);
 }
 
 /* Energy gained in the contacts' own frame [J], Lambda^T (s+ + s-) / 2, on the way from the plastic
  * impact (part = 0) to Newton's (part = 1). */
-static double gain(const Struck *x, const Impulse *plastic, const Impulse *newton, double part) {
+static double gain(const Struck *x, const Impulse *plastic, const Impulse *newton_impact, double part) {
     double sum = 0;
     for (int j = 0; j < x->s->system->m; j++) {
         const double from = mechanism_row(x->b, j, plastic->dv);
-        const double to = mechanism_row(x->b, j, newton->dv);
-        const double Lambda = plastic->Lambda[j] + part * (newton->Lambda[j] - plastic->Lambda[j]);
+        const double to = mechanism_row(x->b, j, newton_impact->dv);
+        const double Lambda = plastic->Lambda[j] + part * (newton_impact->Lambda[j] - plastic->Lambda[j]);
         if (Lambda != 0) sum += Lambda * (2 * x->slip[j] + from + part * (to - from)) / 2;
     }
     return sum;
@@ -187,7 +187,7 @@ static Status bound(Struck *x, double time, const Impulse *found, const Impulse 
     for (int i = 0; i < x->k; i++) any |= acts_with(system, x->contact[i]);
     if (!any || !(gain(x, found, found, 1) > 0)) return OK;
     memset(x->e, 0, (size_t)system->m * sizeof *x->e);
-    if (newton(x, time, plastic) != OK) return FAILED;
+    if (newton_impact(x, time, plastic) != OK) return FAILED;
     blend(x, found, plastic);
     return OK;
 }
@@ -198,8 +198,8 @@ static void set_restitution(Struck *x, int plastic) {
 }
 
 /* The law without friction, and then with it where it can be found. */
-static Status strike(Struck *x, Instant at, const double *q, const double *v, const int *entering,
-                     int is_plastic, const Impulse *found, const Impulse *plastic) {
+static Status strike_together(Struck *x, Instant at, const double *q, const double *v, const int *entering,
+                              int is_plastic, const Impulse *found, const Impulse *plastic) {
     int done = 0;
     if (x->s->system->frictions > 0) {
         set_restitution(x, is_plastic);
@@ -211,7 +211,7 @@ static Status strike(Struck *x, Instant at, const double *q, const double *v, co
         return OK;
     }
     set_restitution(x, is_plastic);
-    return newton(x, at.t, found) != OK ? FAILED : bound(x, at.t, found, plastic);
+    return newton_impact(x, at.t, found) != OK ? FAILED : bound(x, at.t, found, plastic);
 }
 
 Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
@@ -241,7 +241,7 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
         if (fabs(x.slip[j]) <= IMPACT_ROUNDING * terms) x.slip[j] = 0;
         x.zero[j] = 0;
     }
-    if (strike(&x, at, q, v, entering, plastic, &found, &soft) != OK) return FAILED;
+    if (strike_together(&x, at, q, v, entering, plastic, &found, &soft) != OK) return FAILED;
     s->state.now.lost -= gain(&x, &found, &found, 1);
     for (int j = 0; j < n; j++) v[j] += found.dv[j];
     return OK;

@@ -3,6 +3,7 @@
 #define LAGFMU_IMPACT_H
 
 #include "complementarity.h"
+#include "linkage.h"
 #include "solver.h"
 
 /* Doubles and ints of workspace for n coordinates, m rows and so many contacts. */
@@ -21,15 +22,15 @@ typedef struct {
 /* All impacts of an instant; v (n) is replaced by the velocities after them.  `touching`: flags, the
  * contacts that an impact can reach; `slow` (m): speeds that count as none; `struck`: flags, set for the
  * contacts that took an impulse, which is in s->push.  FAILED: no velocities satisfy the contacts. */
-Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching,
-               const double *slow, int *struck);
+SHARED Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching,
+                      const double *slow, int *struck);
 
 /* One impact on the contacts flagged in `entering`, approached or at rest, together; `plastic`: e = 0.
  * Lambda (m): the impulses, 0 where a row did not act. */
-Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
-              double *Lambda);
+SHARED Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
+                     double *Lambda);
 
 /* FAILED if a coefficient of restitution is not between 0 and 1. */
-Status impact_check(Solver *s);
+SHARED Status impact_check(Solver *s);
 
 #endif

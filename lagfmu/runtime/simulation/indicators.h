@@ -11,6 +11,7 @@
 #ifndef LAGFMU_INDICATORS_H
 #define LAGFMU_INDICATORS_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* Where an indicator may lie.  It has left the range when it is outside by more than `slack`; the time is
@@ -21,16 +22,16 @@ typedef struct {
 } Range;
 
 /* How many are watched. */
-int indicators_count(const System *s);
+SHARED int indicators_count(const System *s);
 
 /* The number of the first that belongs to a friction. */
-int indicators_first_of_frictions(const System *s);
+SHARED int indicators_first_of_frictions(const System *s);
 
 /* All values at (t, y), in the present modes. */
-Status indicators_at(Solver *s, double t, const double *y, double *values);
+SHARED Status indicators_at(Solver *s, double t, const double *y, double *values);
 
 /* The range of one of them in the present modes. */
-Range indicators_range(const Solver *s, int indicator);
+SHARED Range indicators_range(const Solver *s, int indicator);
 
 /* How far inside its range a value lies, negative outside. */
 static inline double range_inside(Range r, double value) {

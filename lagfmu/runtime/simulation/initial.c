@@ -14,7 +14,6 @@
 #include "optional.h"
 #include "thresholds.h"
 
-static const double EPS = DBL_EPSILON;
 
 /* An angle whose neighbouring numbers are no neighbouring directions is refused. */
 static Status check_angles(const Start *x) {
@@ -70,7 +69,7 @@ static Status find_positions(const Start *x) {
         if (afar_positions(x, moved, rows) == FAILED) return FAILED;
         int still = 1;
         for (int j = 0; j < s->n; j++)
-            still &= fabs(moved[j] - state->q[j]) <= 4 * EPS * state->size[j];
+            still &= fabs(moved[j] - state->q[j]) <= 4 * DBL_EPSILON * state->size[j];
         if (still) break;
         memcpy(state->q, moved, (size_t)s->n * sizeof *moved);
     }
@@ -208,7 +207,7 @@ static Status find_magnitudes(const Start *x) {
     return magnitudes_complete(s, x->at, 0);
 }
 
-static void tell_moved(const Start *x, Moved moved, void *context) {
+static void tell_each_moved(const Start *x, Moved moved, void *context) {
     const State *state = &x->s->state;
     const int n = x->s->system->n;
     for (int i = 0; i < 2 * n; i++) {
@@ -217,14 +216,14 @@ static void tell_moved(const Start *x, Moved moved, void *context) {
         double used = is_velocity ? state->v[j] : state->q[j];
         double unit = fmax(is_velocity ? state->scale[i] : state->size[j], fabs(given));
         /* a velocity that is rounding of the motion's own has not moved */
-        double rounding = 4 * EPS * state->size[j] * (is_velocity ? state->now.rate : 1);
+        double rounding = 4 * DBL_EPSILON * state->size[j] * (is_velocity ? state->now.rate : 1);
         if (fabs(given - used) > fmax(1e-12 * unit, rounding))
             moved(context, x->s->system->coordinates[j], is_velocity, given, used,
                   is_velocity ? x->rank_v[j] : x->rank_q[j]);
     }
 }
 
-static Status check_finite(Solver *s, const double *q0, const double *v0) {
+static Status check_start_finite(Solver *s, const double *q0, const double *v0) {
     for (int j = 0; j < s->system->n; j++) {
         int is_velocity = fabs(q0[j]) <= DBL_MAX;
         if (is_velocity && fabs(v0[j]) <= DBL_MAX) continue;
@@ -247,7 +246,7 @@ static void clear(Solver *s, double t) {
 
 Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
                     Moved moved, void *context) {
-    if (check_finite(s, q0, v0) == FAILED) return FAILED;
+    if (check_start_finite(s, q0, v0) == FAILED) return FAILED;
     clear(s, t);
     const Start x = {s, flow_instant(s, t), q0, v0, rank, rank + s->system->n};
     if (s->system->jumps > 0) OPTIONAL.jumps->settle(s, x.at, q0, v0, NULL, NULL);
@@ -260,6 +259,6 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
     if (find_modes(&x) == FAILED) return FAILED;
     for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];
     if (find_magnitudes(&x) == FAILED) return FAILED;
-    if (moved != NULL) tell_moved(&x, moved, context);
+    if (moved != NULL) tell_each_moved(&x, moved, context);
     return OK;
 }

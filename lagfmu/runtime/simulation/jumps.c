@@ -23,8 +23,8 @@ static void look_ahead(Solver *s, Instant at, const double *q, const double *v, 
 
 static int is_on(double h, int is_floor) { return is_floor ? h == floor(h) : h == 0; }
 
-static void settle(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
-                   int *changed) {
+static void settle_levels(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
+                          int *changed) {
     const System *system = s->system;
     double *h = s->work_jumps, *ahead = h + system->jumps;
     int any = 0;
@@ -51,7 +51,7 @@ static int stale(Solver *s, Instant at, const double *q) {
     return 0;
 }
 
-static void pass(Solver *s, const int *way) {
+static void pass_surface(Solver *s, const int *way) {
     for (int k = 0; k < s->system->jumps; k++) {
         double *level = &s->state.level[k];
         if (way[k] != 0) *level = s->system->floors[k] ? *level + way[k] : way[k];
@@ -64,4 +64,4 @@ static Range range(const Solver *s, int k) {
     return (Range){level >= 0 ? 0 : -HUGE_VAL, level <= 0 ? 0 : HUGE_VAL, 0, 0};
 }
 
-const Jumps JUMPS = {settle, stale, pass, range};
+SHARED_VALUE const Jumps JUMPS = {settle_levels, stale, pass_surface, range};

@@ -11,6 +11,7 @@
 #define LAGFMU_JUMPS_H
 
 #include "indicators.h"
+#include "linkage.h"
 #include "solver.h"
 
 /* Reached by OPTIONAL (optional.h) where there are jumps. */
@@ -28,6 +29,6 @@ typedef struct {
     Range (*range)(const Solver *s, int k);
 } Jumps;
 
-extern const Jumps JUMPS;
+SHARED const Jumps JUMPS;
 
 #endif

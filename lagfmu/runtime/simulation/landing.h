@@ -2,10 +2,11 @@
 #ifndef LAGFMU_LANDING_H
 #define LAGFMU_LANDING_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* Contacts that lie inside (f < 0), the open ones and those flagged in `happened`, go back to f = 0
  * together.  `pull` (contacts): the acceleration towards each of them. */
-Status landing_lift(Solver *s, const int *happened, const double *pull);
+SHARED Status landing_lift(Solver *s, const int *happened, const double *pull);
 
 #endif

@@ -2,13 +2,14 @@
 #ifndef LAGFMU_LOSSES_H
 #define LAGFMU_LOSSES_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* s->state moved onto the rows in s->active (mechanism_project); what that takes counts as dissipated: of its
  * velocities, and, if `drifted`, of its positions, which an integrator has carried off the constraints. */
-Status losses_project(Solver *s, Instant at, int drifted);
+SHARED Status losses_project(Solver *s, Instant at, int drifted);
 
 /* Kinetic and potential energy [J] of the state; 0 where the equations do not say it. */
-double losses_energy(const Solver *s, Instant at);
+SHARED double losses_energy(const Solver *s, Instant at);
 
 #endif

@@ -26,12 +26,11 @@
 #include "magnitudes.h"
 
 #include "flow.h"
+#include "numbers.h"
 #include "thresholds.h"
 
 #include <float.h>
 #include <string.h>
-
-static double larger(double a, double b) { return a > b ? a : b; }
 
 static double positive(double x) { return x > 0 ? x : STILL; }
 
@@ -58,7 +57,7 @@ void magnitudes_sizes(Solver *s, const double *q) {
         if (system->dimension[j] == system->angles) size[j] = turn;
 }
 
-static void share(double *shared, int j, double value) { shared[j] = larger(shared[j], value); }
+static void share_largest(double *shared, int j, double value) { shared[j] = larger(shared[j], value); }
 
 /* What coordinate i has, for others. */
 static double own_magnitude(const Solver *s, const double *y, int i) {
@@ -80,8 +79,8 @@ static void share_row(const Solver *s, const double *y, int k, int e, double *sh
     for (int d = e; d < system->row_start[k + 1]; d++) {
         const int i = system->entry_column[d];
         if (system->dimension[i] != system->dimension[first]) continue;
-        share(shared, i, q);
-        share(shared, n + i, v);
+        share_largest(shared, i, q);
+        share_largest(shared, n + i, v);
     }
 }
 
@@ -96,10 +95,10 @@ void magnitudes_shared(const Solver *s, const double *y, double *shared) {
         const int i = system->mass_row[e], j = system->mass_column[e];
         if (i == j || system->dimension[i] != system->dimension[j]) continue;
         if (system->dimension[i] == system->angles) continue;
-        share(shared, i, own_magnitude(s, y, j));
-        share(shared, j, own_magnitude(s, y, i));
-        share(shared, n + i, own_magnitude(s, y, n + j));
-        share(shared, n + j, own_magnitude(s, y, n + i));
+        share_largest(shared, i, own_magnitude(s, y, j));
+        share_largest(shared, j, own_magnitude(s, y, i));
+        share_largest(shared, n + i, own_magnitude(s, y, n + j));
+        share_largest(shared, n + j, own_magnitude(s, y, n + i));
     }
 }
 
@@ -129,7 +128,7 @@ static void find_felt(const Mechanism *b, double *felt) {
 }
 
 /* |v| / size and sqrt(pull / size) of one coordinate, the larger; an angle's speed by 1 rad. */
-static double rate_of(const Solver *s, int j, double v, double pull) {
+static double rate_of_coordinate(const Solver *s, int j, double v, double pull) {
     const double size = s->state.size[j];
     const double unit = s->system->dimension[j] == s->system->angles ? 1 : size;
     return size > 0 ? larger(fabs(v) / unit, sqrt(fabs(pull) / size)) : 0;
@@ -141,7 +140,7 @@ double magnitudes_pace(const Solver *s) {
     const double *v = i->y + n, *before = i->y_old + n;
     double pace = s->state.now.rate;
     for (int j = 0; j < n; j++)
-        pace = larger(pace, rate_of(s, j, v[j], (v[j] - before[j]) / (i->t - i->t_old)));
+        pace = larger(pace, rate_of_coordinate(s, j, v[j], (v[j] - before[j]) / (i->t - i->t_old)));
     return pace;
 }
 
@@ -175,7 +174,7 @@ void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *s
 static double slowest_rate(const Solver *s) {
     double slowest = 0;
     for (int j = 0; j < s->system->n; j++) {
-        const double rate = rate_of(s, j, s->state.v[j], 0);
+        const double rate = rate_of_coordinate(s, j, s->state.v[j], 0);
         if (rate > 0 && !(slowest > 0 && slowest <= rate)) slowest = rate;
     }
     return slowest;
@@ -190,7 +189,7 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
     magnitudes_extents(system, s->p, least);
     for (int j = 0; j < system->n; j++)
         if (least[j] > 0 || system->dimension[j] == system->angles)
-            steady = larger(steady, rate_of(s, j, s->state.v[j], felt[j]));
+            steady = larger(steady, rate_of_coordinate(s, j, s->state.v[j], felt[j]));
     for (int j = 0; j < system->n; j++) {
         own[j] = 0;
         if (s->state.size[j] > 0) continue;
@@ -244,14 +243,14 @@ static int is_resting(const Solver *s, const double *felt, const double *back) {
 }
 
 /* What comes back is more than the rounding of a displacement; what nothing brings back is held fast. */
-static double find_rate(const Solver *s, double span, const double *felt, const double *back,
-                        double natural) {
+static double find_natural_rate(const Solver *s, double span, const double *felt, const double *back,
+                                double natural) {
     const int resting = is_resting(s, felt, back);
     double rate = natural, forced = 0;
     for (int j = 0; j < s->system->n; j++) {
         const double returns = back[j] > LOST / DISPLACED * felt[j] ? back[j] : 0;
-        rate = larger(rate, rate_of(s, j, s->state.v[j], resting ? returns : s->stepped.vdot[j]));
-        forced = larger(forced, rate_of(s, j, s->state.v[j], felt[j]));
+        rate = larger(rate, rate_of_coordinate(s, j, s->state.v[j], resting ? returns : s->stepped.vdot[j]));
+        forced = larger(forced, rate_of_coordinate(s, j, s->state.v[j], felt[j]));
     }
     if (!(rate > 0)) rate = forced;
     return rate > 0 ? rate : span > 0 ? 1 / span : 0;
@@ -304,7 +303,7 @@ Status magnitudes_complete(Solver *s, Instant at, double span) {
     find_felt(&s->stepped, felt);
     const double natural = find_own(s, span, felt, own);
     if (find_held(s, at, back, shaken) != OK) return FAILED;
-    if (!(s->state.now.rate > 0)) s->state.now.rate = find_rate(s, span, felt, back, natural);
+    if (!(s->state.now.rate > 0)) s->state.now.rate = find_natural_rate(s, span, felt, back, natural);
     take_sizes(s, felt, own);
     return find_scales(s, own, shaken);
 }

@@ -157,7 +157,7 @@ static void names(const Solver *s, const System *full, Owner of, int i, const ch
 }
 
 /* FAILED if a value is not finite; the cause names them as the FMU's variables are named. */
-static Status check_finite(Solver *s, const System *full, const Observed *o) {
+static Status check_observed_finite(Solver *s, const System *full, const Observed *o) {
     const System *own = s->system;
     const int n = full->n, stepped = own->embed != NULL ? own->n : 0;
     const int kept = stepped > 0 ? own->contacts * n : 0; /* with an embedding there are no frictions */
@@ -216,6 +216,6 @@ Status solver_observe(Solver *s, Observed *o) {
     if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;
     if (full->energies != NULL) full->energies(at.t, o->q, o->v, at.u, at.p, o->energy);
     for (int k = 0; k < EVENT_KINDS && s->system->embed != NULL; k++) observe_events(s, (EventKind)k, o);
-    if (check_finite(s, full, o) != OK) return FAILED;
+    if (check_observed_finite(s, full, o) != OK) return FAILED;
     return outputs_observe(full, at, o, &s->why);
 }

@@ -1,7 +1,7 @@
 /* optional.c -- everything: the FMU of a scene that asks for all outputs and methods. */
 #include "optional.h"
 
-const Optional OPTIONAL = {
+SHARED_VALUE const Optional OPTIONAL = {
     .methods = {[AUTO] = &dop853,
                 [DOP853] = &dop853,
                 [RK4] = &rk4,

@@ -10,6 +10,7 @@
 #include "impact.h"
 #include "jumps.h"
 #include "landing.h"
+#include "linkage.h"
 #include "peaks.h"
 #include "rattle.h"
 #include "slides.h"
@@ -40,6 +41,6 @@ typedef struct {
     const Slides *slides;
 } Optional;
 
-extern const Optional OPTIONAL;
+SHARED const Optional OPTIONAL;
 
 #endif

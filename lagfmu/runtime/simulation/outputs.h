@@ -2,16 +2,17 @@
 #ifndef LAGFMU_OUTPUTS_H
 #define LAGFMU_OUTPUTS_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* Their values from what was observed at `at` (the rest of `o`).  FAILED: one has none, and nothing in
  * its place. */
-Status outputs_observe(const System *s, Instant at, Observed *o, Why *why);
+SHARED Status outputs_observe(const System *s, Instant at, Observed *o, Why *why);
 
 /* Their changes w->down along a direction (full coordinates), from those that `sensitivity_along` found
  * with `b`; b = NULL where nothing was solved for.  A change that hangs on a multiplier which is not
  * unique is no number. */
-void outputs_change(Sensitivity *w, const Mechanism *b, const System *s, Instant at,
-                    const Observed *o, Direction d);
+SHARED void outputs_change(Sensitivity *w, const Mechanism *b, const System *s, Instant at,
+                           const Observed *o, Direction d);
 
 #endif

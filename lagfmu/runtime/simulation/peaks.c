@@ -17,7 +17,7 @@
 enum { PIECES = 8 };
 static const double INWARD = 1e-4;    /* of a piece: the way from an end on which growth is looked for */
 static const double PLACE = 1e-6;     /* of a bracket: how well the place of an extreme is found */
-static const double ROUNDING = 1e-13; /* of a quantity's values */
+static const double PEAK_ROUNDING = 1e-13; /* of a quantity's values */
 
 /* A stretch of the step just taken. */
 typedef struct {
@@ -33,12 +33,12 @@ typedef struct {
     double sense, from;       /* ... 1: largest, -1: smallest; [s] from which elapsed time counts */
 } Stretch;
 
-static int doubles(int peaks, int n) { return (PIECES + 2) * (1 + peaks) + 4 * n; }
+static int doubles_of_peaks(int peaks, int n) { return (PIECES + 2) * (1 + peaks) + 4 * n; }
 
 static double *reached(const Solver *s) { return s->peak + PEAK_PARTS * s->peaks; }
 
 /* Everything that is kept, at the state of now. */
-static Status measure(Solver *s, double *values) {
+static Status measure_peak(Solver *s, double *values) {
     if (solver_observe(s, &s->peak_seen) != OK) return FAILED;
     return s->measure(s, &s->peak_seen, values);
 }
@@ -49,7 +49,7 @@ static Status measure_there(Solver *s, double t, const double *y, double *values
     memcpy(s->state.q, y, n * sizeof *y);
     memcpy(s->state.v, y + n, n * sizeof *y);
     s->state.now.t = t;
-    return measure(s, values);
+    return measure_peak(s, values);
 }
 
 /* The same at time t of the stretch. */
@@ -65,7 +65,7 @@ static Status measure_at(Stretch *x, double t, double *values) {
     return measure_there(s, t, y, values);
 }
 
-static Status height(void *context, double elapsed, double *value) {
+static Status height_of_peak(void *context, double elapsed, double *value) {
     Stretch *x = context;
     if (measure_at(x, x->from + elapsed, x->value) != OK) return FAILED;
     *value = x->sense * x->value[x->quantity];
@@ -76,37 +76,37 @@ static double at(const Stretch *x, int j) { return x->sense * x->values[j * x->s
 
 /* Of extremes that are the same to the tolerance the first one's time stays; one that is on the way up, before
  * which nothing lies but what has counted since `begin`, goes along. */
-static int keep(Solver *s, int k, double sense, double begin, double t, double height) {
+static int keep_peaks(Solver *s, int k, double sense, double begin, double t, double height_of_peak) {
     double *kept = s->peak + PEAK_PARTS * k;
     const int way = sense > 0 ? PEAK_MAX : PEAK_MIN, when = sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME;
-    const double more = height - sense * kept[way];
+    const double more = height_of_peak - sense * kept[way];
     if (!(more > 0)) return 0;
     if (more > s->settings.tolerance * fabs(kept[way]) || kept[when] >= begin) kept[when] = t;
-    kept[way] = sense * height;
+    kept[way] = sense * height_of_peak;
     return 1;
 }
 
 /* The same of the stretch; while an importer integrates it changes by events alone, which tolerance asks for. */
-static void find(Stretch *x, double t, double height) {
+static void find(Stretch *x, double t, double height_of_peak) {
     Solver *s = x->s;
     const double record = s->peak[PEAK_PARTS * x->quantity + (x->sense > 0 ? PEAK_MAX : PEAK_MIN)];
-    if (x->exchange && !(height - x->sense * record > s->settings.tolerance * fabs(record))) return;
-    x->passed |= keep(s, x->quantity, x->sense, x->t[0], t, height);
+    if (x->exchange && !(height_of_peak - x->sense * record > s->settings.tolerance * fabs(record))) return;
+    x->passed |= keep_peaks(s, x->quantity, x->sense, x->t[0], t, height_of_peak);
 }
 
 /* Could there be more than the record next to sample j, below which its neighbour i lies? */
 static int may_pass(const Stretch *x, int i, int j) {
     const double record = x->sense * x->s->peak[PEAK_PARTS * x->quantity + (x->sense > 0 ? PEAK_MAX : PEAK_MIN)];
     const double fall = at(x, j) - at(x, i);
-    return fall > ROUNDING * fabs(at(x, j)) && at(x, j) + fall > record;
+    return fall > PEAK_ROUNDING * fabs(at(x, j)) && at(x, j) + fall > record;
 }
 
 /* The extreme between samples i and k, next to the time `elapsed` after the first, where it is `value`. */
-static Status polish(Stretch *x, int i, int k, double elapsed, double value) {
+static Status polish_extreme(Stretch *x, int i, int k, double elapsed, double value) {
     Solver *s = x->s;
     const double span = x->t[k] - x->t[i];
     x->from = x->t[i];
-    if (extreme_find(height, x, 0, span, PLACE * span, &elapsed, &value) != OK) return FAILED;
+    if (extreme_find(height_of_peak, x, 0, span, PLACE * span, &elapsed, &value) != OK) return FAILED;
     const double t = x->from + elapsed;
     if (x->exchange) {
         find(x, t, value);
@@ -125,13 +125,13 @@ static Status look_inward(Stretch *x, int i, int j) {
     double value;
     if (!may_pass(x, i, j)) return OK;
     x->from = x->t[first];
-    if (height(x, inward, &value) != OK) return FAILED;
-    if (value > at(x, j)) return polish(x, first, first + 1, inward, value);
+    if (height_of_peak(x, inward, &value) != OK) return FAILED;
+    if (value > at(x, j)) return polish_extreme(x, first, first + 1, inward, value);
     if (j == 0) find(x, x->t[0], at(x, 0)); /* from an importer's step to the next it is passed */
     return OK;
 }
 
-static Status look(Stretch *x) {
+static Status look_on_stretch(Stretch *x) {
     const int last = x->count - 1;
     if (!x->exchange) {
         find(x, x->t[0], at(x, 0));
@@ -141,7 +141,7 @@ static Status look(Stretch *x) {
     for (int j = 1; j < last; j++) {
         if (at(x, j) < at(x, j - 1) || at(x, j) < at(x, j + 1)) continue;
         if (!may_pass(x, at(x, j - 1) < at(x, j + 1) ? j - 1 : j + 1, j)) continue;
-        if (polish(x, j - 1, j + 1, x->t[j] - x->t[j - 1], at(x, j)) != OK) return FAILED;
+        if (polish_extreme(x, j - 1, j + 1, x->t[j] - x->t[j - 1], at(x, j)) != OK) return FAILED;
     }
     return OK;
 }
@@ -156,13 +156,13 @@ static Status look_at_all(Stretch *x, double t) {
         if (measure_at(x, x->t[j], x->values + j * s->peaks) != OK) return FAILED;
     for (x->quantity = 0; x->quantity < s->peaks; x->quantity++)
         for (x->sense = 1; x->sense >= -1; x->sense -= 2)
-            if (look(x) != OK) return FAILED;
+            if (look_on_stretch(x) != OK) return FAILED;
     *reached(s) = t;
     return OK;
 }
 
 /* The same with memory, and with the state of now put back. */
-static Status look_at(Stretch *x, double t) {
+static Status look_at_time(Stretch *x, double t) {
     Solver *s = x->s;
     const size_t n = (size_t)s->system->n, bytes = n * sizeof(double);
     const double now = s->state.now.t;
@@ -184,7 +184,7 @@ static Status pass(Solver *s, double t, const double *end) {
     Stretch x = {.s = s, .end = end};
     if (!(t > *reached(s))) return OK;
     x.dense = s->integrator.method->dense;
-    return look_at(&x, t);
+    return look_at_time(&x, t);
 }
 
 /* Hermite's cubic between the ends of a step. */
@@ -215,9 +215,9 @@ static Status step(Solver *s, int *event) {
     memcpy(i->y_old, i->y, bytes);
     memcpy(i->f_old, i->f, bytes);
     i->t_old = s->state.now.t_old = *reached(s) = begin;
-    if (measure(s, s->work_peaks) != OK) return FAILED;
+    if (measure_peak(s, s->work_peaks) != OK) return FAILED;
     begin_step(s);
-    if (look_at(&x, i->t) != OK) return FAILED;
+    if (look_at_time(&x, i->t) != OK) return FAILED;
     *event |= x.passed;
     return OK;
 }
@@ -225,19 +225,19 @@ static Status step(Solver *s, int *event) {
 static Status here(Solver *s, int first) {
     const double t = s->state.now.t;
     double *values = s->work_peaks;
-    if (measure(s, values) != OK) return FAILED;
+    if (measure_peak(s, values) != OK) return FAILED;
     for (int k = 0; k < s->peaks; k++) {
         double *kept = s->peak + PEAK_PARTS * k;
         if (first) {
             kept[PEAK_MAX] = kept[PEAK_MIN] = values[k];
             kept[PEAK_MAX_TIME] = kept[PEAK_MIN_TIME] = t;
         }
-        keep(s, k, 1, t, t, values[k]);
-        keep(s, k, -1, t, t, -values[k]);
+        keep_peaks(s, k, 1, t, t, values[k]);
+        keep_peaks(s, k, -1, t, t, -values[k]);
     }
     *reached(s) = s->state.now.t_old = t;
     begin_step(s);
     return OK;
 }
 
-const Peaks PEAKS = {doubles, here, pass, step};
+const Peaks PEAKS = {doubles_of_peaks, here, pass, step};

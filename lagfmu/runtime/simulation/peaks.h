@@ -2,6 +2,7 @@
 #ifndef LAGFMU_PEAKS_H
 #define LAGFMU_PEAKS_H
 
+#include "linkage.h"
 #include "solver.h"
 
 /* Of s->peaks quantities, which s->measure knows.  All of it is reached by one pointer (optional.h), NULL in an
@@ -24,6 +25,6 @@ typedef enum { PEAK_MAX, PEAK_MIN, PEAK_MAX_TIME, PEAK_MIN_TIME, PEAK_PARTS } Pe
 /* Doubles to be saved, the last one the time [s] as far as all has counted. */
 static inline int peaks_saved(int peaks) { return peaks > 0 ? PEAK_PARTS * peaks + 1 : 0; }
 
-extern const Peaks PEAKS;
+SHARED const Peaks PEAKS;
 
 #endif

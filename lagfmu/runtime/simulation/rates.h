@@ -3,6 +3,7 @@
 #ifndef LAGFMU_RATES_H
 #define LAGFMU_RATES_H
 
+#include "linkage.h"
 #include "thresholds.h"
 
 /* The latest communication points of an estimated motion, newest first. */
@@ -14,11 +15,11 @@ typedef struct {
 
 /* 1 where u has moved over the last step h and u' has not moved accordingly, or u' and not u''; `u` are
  * u, u', u'' as they are set, `went` where the rates have carried them to. */
-int rates_half_connected(const double *u, const double *went, double h);
+SHARED int rates_half_connected(const double *u, const double *went, double h);
 
 /* Takes up the point (t, u[0]) and puts the derivatives of the polynomial through the latest points into
  * u[1], u[2], u[3]; of the first point they are left alone.  `given`: how many of u[1], u[2] the importer
  * gave; then they stay, and the polynomial is Hermite's through the latest two points. */
-void rates_estimate(Past *past, double t, double *u, int given);
+SHARED void rates_estimate(Past *past, double t, double *u, int given);
 
 #endif

@@ -11,10 +11,11 @@
 #include <string.h>
 
 #include "digits.h"
+#include "numbers.h"
 #include "optional.h"
 #include "thresholds.h"
 
-enum { HALVINGS = 60 };
+enum { BISECTIONS = 60 };
 static const double PI = 3.14159265358979323846;
 
 void rest_set_noise(Solver *s, const double *speed, Slide *slides) {
@@ -48,15 +49,9 @@ void rest_slide_along(const Mechanism *b, int i, const double *v, Slide *slide) 
     slide->direction[1] = slip[1] / length;
 }
 
-static Status motion(Rest *x) {
+static Status motion_of_modes(Rest *x) {
     Solver *s = x->s;
     return mechanism_motion(&s->stepped, x->at, s->state.q, s->state.v, x->active);
-}
-
-static double largest(int count, const double *x) {
-    double most = 0;
-    for (int i = 0; i < count; i++) most = fmax(most, fabs(x[i]));
-    return most;
 }
 
 /* The signs of the normal forces of what slips on bilateral constraints. */
@@ -66,7 +61,7 @@ static Status find_signs(Rest *x) {
     int last = 0;
     for (int round = 0; round <= s->frictions; round++) {
         int wrong = 0;
-        if (motion(x) != OK) return FAILED;
+        if (motion_of_modes(x) != OK) return FAILED;
         const double zero = -SLIDES_SLACK * largest(s->m, b->lambda);
         for (int i = 0; i < s->frictions; i++) {
             if (x->slides[i].sticks || s->friction[i].gated) continue;
@@ -108,20 +103,20 @@ static const double *accelerations_at_work(const Rest *x) {
 }
 
 /* G vdot - gamma of row k, in the motion that was evaluated last, and what of it is rounding. */
-static double rate_of(const Mechanism *b, int k, const double *reach, double *floor) {
+static double rate_of_row(const Mechanism *b, int k, const double *reach, double *floor) {
     *floor = SLIDES_BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
     return mechanism_row(b, k, b->vdot) - b->gamma[k];
 }
 
 /* s' = G_t vdot - gamma_t of friction i, and what of it is rounding. */
-static Status find_rate(Rest *x, int i, double rate[2], double *floor) {
+static Status find_slip_rate(Rest *x, int i, double rate[2], double *floor) {
     const Friction *law = &x->s->system->friction[i];
-    if (motion(x) != OK) return FAILED;
+    if (motion_of_modes(x) != OK) return FAILED;
     const double *reach = accelerations_at_work(x);
     rate[1] = *floor = 0;
     for (int r = 0; r < law->rows; r++) {
         double own;
-        rate[r] = rate_of(&x->s->stepped, law->row[r], reach, &own);
+        rate[r] = rate_of_row(&x->s->stepped, law->row[r], reach, &own);
         *floor += own;
     }
     return OK;
@@ -134,7 +129,7 @@ static Status look_along(Rest *x, int i, double angle, double *across, double *a
     double *e = x->slides[i].direction;
     e[0] = cos(angle);
     e[1] = sin(angle);
-    if (find_rate(x, i, rate, floor) != OK) return FAILED;
+    if (find_slip_rate(x, i, rate, floor) != OK) return FAILED;
     *across = e[0] * rate[1] - e[1] * rate[0];
     *along = e[0] * rate[0] + e[1] * rate[1];
     return OK;
@@ -144,14 +139,14 @@ Status rest_agrees(Rest *x, int i, int *agrees) {
     const double *e = x->slides[i].direction;
     double rate[2], floor;
     x->active = x->s->active;
-    if (find_rate(x, i, rate, &floor) != OK) return FAILED;
+    if (find_slip_rate(x, i, rate, &floor) != OK) return FAILED;
     *agrees = e[0] * rate[0] + e[1] * rate[1] >= -floor && fabs(e[0] * rate[1] - e[1] * rate[0]) <= floor;
     return OK;
 }
 
 /* The root of s' across the direction, between two angles. */
 static Status close_in(Rest *x, int i, double low, double high, double f_low, double *angle) {
-    for (int round = 0; round < HALVINGS; round++) {
+    for (int round = 0; round < BISECTIONS; round++) {
         double middle = (low + high) / 2, f, along, floor;
         if (look_along(x, i, middle, &f, &along, &floor) != OK) return FAILED;
         if (f_low * f > 0) {
@@ -192,7 +187,7 @@ static Status steer(Rest *x, int i, int *found) {
     double *e = x->slides[i].direction;
     if (x->s->system->friction[i].rows == 2) return turn_on_circle(x, i, found);
     for (int way = 0; way < 2; way++) {
-        if (find_rate(x, i, rate, &floor) != OK) return FAILED;
+        if (find_slip_rate(x, i, rate, &floor) != OK) return FAILED;
         *found = rate[0] * e[0] >= -floor;
         if (*found) return OK;
         if (way == 0) e[0] = -e[0];
@@ -276,7 +271,7 @@ static int try_all(Rest *x) {
     return 0;
 }
 
-static Status no_modes(Rest *x) {
+static Status no_friction_modes(Rest *x) {
     int *which = x->sticking, count = 0;
     for (int i = 0; i < x->s->system->frictions; i++)
         if (x->resting[i]) which[count++] = i;
@@ -286,7 +281,7 @@ static Status no_modes(Rest *x) {
 static Status stick(Rest *x) {
     for (int i = 0; i < x->s->system->frictions; i++)
         if (x->resting[i]) x->slides[i].sticks = 1;
-    return motion(x);
+    return motion_of_modes(x);
 }
 
 /* Not all can stick, since what drives the bodies accelerates some of them. */
@@ -315,11 +310,11 @@ static Status settle_resting(Rest *x) {
         aim(x, worst);
         x->sticking[worst] = 0;
     }
-    return try_all(x) ? OK : no_modes(x);
+    return try_all(x) ? OK : no_friction_modes(x);
 }
 
 /* The frictions' modes for given contacts. */
-static Status choose(Rest *x, const int *ended) {
+static Status choose_modes(Rest *x, const int *ended) {
     Solver *s = x->s;
     Mechanism *b = &s->stepped;
     int any = 0;
@@ -374,7 +369,7 @@ static int parts(const Rest *x, int i, const int *touching) {
         for (int k = law->first; k < law->first + law->normals; k++) {
             double floor;
             if (s->press[k] != s->contact[c] || !touching[c]) continue;
-            if (rate_of(&x->s->stepped, s->contact[c], reach, &floor) > floor) return 1;
+            if (rate_of_row(&x->s->stepped, s->contact[c], reach, &floor) > floor) return 1;
         }
     return 0;
 }
@@ -396,7 +391,7 @@ static Status check_rest(Rest *x, const int *closed, const int *touching, const 
             continue;
         memcpy(trial, closed, (size_t)system->contacts * sizeof *trial);
         if (!turn_contacts(system, i, !on, trial, touching, leaving)) continue;
-        if (!on && (motion(x) != OK || !parts(x, i, touching))) continue;
+        if (!on && (motion_of_modes(x) != OK || !parts(x, i, touching))) continue;
         x->slides[i].sticks = !on;
         const int other =
             fits(x, trial, touching, leaving) && (on ? parts(x, i, touching) : f->reserve[i] >= 0);
@@ -412,7 +407,7 @@ static Status check_rest(Rest *x, const int *closed, const int *touching, const 
         (void)s->stepped.sliding->acting(&s->stepped, x->active); /* what is loaded */
         any = 1;
     }
-    return any ? motion(x) : OK;
+    return any ? motion_of_modes(x) : OK;
 }
 
 Status rest_settle(Rest *x, int *closed, const int *ended, const int *touching,
@@ -423,7 +418,7 @@ Status rest_settle(Rest *x, int *closed, const int *ended, const int *touching,
     x->active = active;
     for (int round = 0; round < SLIDES_ROUNDS; round++) {
         system_active(s->system, closed, active);
-        if (choose(x, ended) != OK) return FAILED;
+        if (choose_modes(x, ended) != OK) return FAILED;
         memcpy(before, closed, bytes);
         if (s->system->contacts == 0) return OK;
         if (OPTIONAL.contacts_modes(s, x->at, s->state.q, s->state.v, closed, touching, leaving) != OK)

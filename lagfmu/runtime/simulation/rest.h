@@ -3,6 +3,7 @@
 #define LAGFMU_REST_H
 
 #include "friction.h"
+#include "linkage.h"
 #include "solver.h"
 
 /* Frictions at s = 0, settled together; contacts as in `active`. */
@@ -16,24 +17,24 @@ typedef struct {
 } Rest;
 
 /* Trial modes as the state's own; the mechanism looks at them until rest_finish. */
-Rest rest_of(Solver *s, Instant at);
+SHARED Rest rest_of(Solver *s, Instant at);
 
 /* The modes of frictions and contacts together, from those in x->slides and `closed`; `ended` (frictions; NULL:
  * none) stopped slipping just now.  FAILED where the laws have no solution, or several (Painleve). */
-Status rest_settle(Rest *x, int *closed, const int *ended, const int *touching, const int *leaving);
+SHARED Status rest_settle(Rest *x, int *closed, const int *ended, const int *touching, const int *leaving);
 
 /* Does friction i, which slips at s = 0, go the way in which it begins to move?  Contacts as in s->active. */
-Status rest_agrees(Rest *x, int i, int *agrees);
+SHARED Status rest_agrees(Rest *x, int i, int *agrees);
 
 /* Back to the state's own modes, which are now those of x if `settled`. */
-Status rest_finish(Rest *x, Status settled);
+SHARED Status rest_finish(Rest *x, Status settled);
 
 /* What of each slip velocity is rounding: of motions of this speed (n), of the motion as it is and was; it
  * never becomes less. */
-void rest_set_noise(Solver *s, const double *speed, Slide *slides);
-void rest_renew_noise(Solver *s, Slide *slides);
+SHARED void rest_set_noise(Solver *s, const double *speed, Slide *slides);
+SHARED void rest_renew_noise(Solver *s, Slide *slides);
 
 /* Slipping along v's slip velocity, where that is not rounding. */
-void rest_slide_along(const Mechanism *b, int i, const double *v, Slide *slide);
+SHARED void rest_slide_along(const Mechanism *b, int i, const double *v, Slide *slide);
 
 #endif

@@ -41,7 +41,7 @@ static void add_row(const Rub *x, int k, double part) {
 }
 
 /* Rows that press, frictions that are pressed; 0 if there are none. */
-static int find_rows(Rub *x, const int *entering) {
+static int find_struck_rows(Rub *x, const int *entering) {
     const System *s = x->s->system;
     x->count = 0;
     for (int c = 0; c < s->contacts; c++)
@@ -58,7 +58,7 @@ static int find_rows(Rub *x, const int *entering) {
 }
 
 /* Factors the rows that act with both signs; A and the free slip velocities of the others. */
-static Status reduce(Rub *x, const int *entering, int *active, double *Lambda) {
+static Status reduce_rubbing(Rub *x, const int *entering, int *active, double *Lambda) {
     const System *s = x->s->system;
     Linear *l = &x->b->linear;
     system_active(s, entering, active);
@@ -138,7 +138,7 @@ static int sweep(Rub *x, const double *e) {
 }
 
 /* Velocities and all impulses that go with z. */
-static Status finish(Rub *x, double *dv, double *Lambda) {
+static Status finish_rubbing(Rub *x, double *dv, double *Lambda) {
     const System *s = x->s->system;
     memset(x->force, 0, (size_t)s->n * sizeof *x->force);
     for (int i = 0; i < x->count; i++) add_row(x, x->rows[i], x->z[i]);
@@ -168,12 +168,12 @@ Status rubbing(Solver *s, Instant at, const double *q, const double *v, const in
     x.dv = x.force + system->n;
     memcpy(x.slip, slip, (size_t)m * sizeof *slip);
     *done = 0;
-    if (!find_rows(&x, entering)) return OK;
+    if (!find_struck_rows(&x, entering)) return OK;
     system->coulomb(at.t, q, v, at.u, at.p, x.b->friction->mu, x.b->friction->load, x.b->friction->c);
-    if (reduce(&x, entering, active, plastic.Lambda) != OK) return FAILED;
+    if (reduce_rubbing(&x, entering, active, plastic.Lambda) != OK) return FAILED;
     if (!sweep(&x, e)) return OK;
-    if (finish(&x, found.dv, found.Lambda) != OK) return FAILED;
+    if (finish_rubbing(&x, found.dv, found.Lambda) != OK) return FAILED;
     memset(e, 0, (size_t)m * sizeof *e);
     *done = sweep(&x, e);
-    return *done ? finish(&x, plastic.dv, plastic.Lambda) : OK;
+    return *done ? finish_rubbing(&x, plastic.dv, plastic.Lambda) : OK;
 }

@@ -95,7 +95,7 @@ static Status look_into_dip(Solver *s, Samples *samples, int i, int contact, dou
 }
 
 /* One more look at time t, put in its place behind look k. */
-static Status look(Solver *s, Samples *samples, int k, double t, double *y) {
+static Status look_at(Solver *s, Samples *samples, int k, double t, double *y) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
     double *seen = samples->values + (SAMPLES_MOST + width) * width; /* one row of scratch */
@@ -106,7 +106,7 @@ static Status look(Solver *s, Samples *samples, int k, double t, double *y) {
 }
 
 /* Samples between samples until nothing can have passed unseen up to the first event. */
-static Status refine(Solver *s, Samples *samples, double *y) {
+static Status refine_samples(Solver *s, Samples *samples, double *y) {
     const double step = s->integrator.t - s->integrator.t_old;
     for (int k = 0; s->system->bounds != NULL && k + 1 < samples->count;) {
         const double a = samples->t[k], b = samples->t[k + 1], middle = a + (b - a) / 2;
@@ -116,7 +116,7 @@ static Status refine(Solver *s, Samples *samples, double *y) {
         if (clearance == BRACKETS) return OK;
         if (clearance == CLEAR || !more)
             k += 1;
-        else if (look(s, samples, k, middle, y) != OK)
+        else if (look_at(s, samples, k, middle, y) != OK)
             return FAILED;
     }
     return OK;
@@ -143,13 +143,13 @@ Status samples_take(Solver *s, const double *y1, double *y, Samples *samples) {
     if (indicators_at(s, i->t, y1, samples->values + width) != OK) return FAILED;
     samples->count = 2;
     for (int k = 1; k < SAMPLES_FIRST; k++)
-        if (look(s, samples, samples->count - 2, i->t_old + k * h / SAMPLES_FIRST, y) != OK) return FAILED;
+        if (look_at(s, samples, samples->count - 2, i->t_old + k * h / SAMPLES_FIRST, y) != OK) return FAILED;
     highest += i->t_old;
     for (int k = 0; k + 1 < samples->count; k++)
         if (samples->t[k] < highest && highest < samples->t[k + 1] &&
-            look(s, samples, k, highest, y) != OK)
+            look_at(s, samples, k, highest, y) != OK)
             return FAILED;
-    if (refine(s, samples, y) != OK) return FAILED;
+    if (refine_samples(s, samples, y) != OK) return FAILED;
     for (int c = 0; c < width; c++) {
         if (!may_dip(s, c)) continue;
         double *seen = samples->values + (SAMPLES_MOST + width) * width; /* one row of scratch */

@@ -2,6 +2,7 @@
 #ifndef LAGFMU_SAMPLES_H
 #define LAGFMU_SAMPLES_H
 
+#include "linkage.h"
 #include "solver.h"
 #include "thresholds.h"
 
@@ -18,6 +19,6 @@ static inline int samples_doubles(int indicators) {
 
 /* Fills `samples` for the step of s->integrator (dense output prepared), from state.indicator at its start
  * to the projected y1 at its end.  y (6 n): scratch. */
-Status samples_take(Solver *s, const double *y1, double *y, Samples *samples);
+SHARED Status samples_take(Solver *s, const double *y1, double *y, Samples *samples);
 
 #endif

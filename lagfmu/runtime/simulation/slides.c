@@ -33,7 +33,7 @@ static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     return OK;
 }
 
-static void note(Solver *s, EventKind kind, int i) {
+static void note_change(Solver *s, EventKind kind, int i) {
     state_note(&s->state, kind, i, s->system->n, s->state.q, s->state.v);
 }
 
@@ -59,7 +59,7 @@ static Status change(Solver *s, Instant at, const int *left, int *closed, const 
         const int stuck = s->state.slide[i].sticks, sticks = x.slides[i].sticks;
         for (int r = 0; r < law->rows && sticks && !stuck; r++)
             s->state.offset[law->row[r]] = b->f[law->row[r]];
-        if (b->friction->loaded[i] && stuck != sticks) note(s, sticks ? STICKING : SLIPPING, i);
+        if (b->friction->loaded[i] && stuck != sticks) note_change(s, sticks ? STICKING : SLIPPING, i);
     }
     return rest_finish(&x, OK);
 }
@@ -122,12 +122,12 @@ static Status renew(Solver *s) {
         if (!s->state.slide[i].sticks) continue;
         if (hypot(slip[0], slip[1]) <= SLIDES_JUMP * s->state.slide[i].noise) continue;
         rest_slide_along(b, i, s->state.v, &s->state.slide[i]);
-        note(s, SLIPPING, i);
+        note_change(s, SLIPPING, i);
     }
     return OK;
 }
 
-const Slides SLIDES = {
+SHARED_VALUE const Slides SLIDES = {
     .sliding = &SLIDING, .doubles = rubbing_doubles, .ints = rubbing_ints,
     .begin = begin, .change = change, .stop = stop, .contradicted = contradicted, .renew = renew,
     .indicators = slipping_indicators, .range = slipping_range,

@@ -11,6 +11,7 @@
 #include "friction.h"
 #include "impact.h"
 #include "indicators.h"
+#include "linkage.h"
 #include "solver.h"
 
 typedef struct {
@@ -46,11 +47,11 @@ typedef struct {
 } Slides;
 
 /* Workspace of rubbing.c, and its function. */
-size_t rubbing_doubles(const System *s);
-size_t rubbing_ints(const System *s);
-Status rubbing(Solver *s, Instant at, const double *q, const double *v, const int *entering,
-               const double *slip, double *e, Impulse plastic, Impulse found, int *done);
+SHARED size_t rubbing_doubles(const System *s);
+SHARED size_t rubbing_ints(const System *s);
+SHARED Status rubbing(Solver *s, Instant at, const double *q, const double *v, const int *entering,
+                      const double *slip, double *e, Impulse plastic, Impulse found, int *done);
 
-extern const Slides SLIDES;
+SHARED const Slides SLIDES;
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef LAGFMU_SOLVER_H
 #define LAGFMU_SOLVER_H
 
+#include "linkage.h"
 #include "mechanism.h"
 #include "precedence.h"
 #include "sensitivity.h"
@@ -69,7 +70,7 @@ typedef struct Solver {
 /* Takes all memory of the solver: what must be saved from `saved`, the rest from `scratch`.  Of
  * `saved` the first state.block_size bytes are the state's arrays; the drive and p follow.  To be
  * called once with arenas that count (base = NULL) and once with memory. */
-void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system);
+SHARED void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system);
 
 /* One start value that had to be moved onto the constraints. */
 typedef void (*Moved)(void *context, const char *coordinate, int is_velocity, double given,
@@ -79,36 +80,36 @@ typedef void (*Moved)(void *context, const char *coordinate, int is_velocity, do
  * rank (2 n, of the coordinates and then of the velocities: which of them move first), for the drive and
  * p that the caller has set; `moved` (may be NULL) is called for each value that
  * was moved.  FAILED: the start is refused, the cause is in s->why; the state is in disorder. */
-Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
-                    Moved moved, void *context);
+SHARED Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
+                           Moved moved, void *context);
 
 /* advance.c -- from state.now.t to t_end [s].  FAILED leaves the state in disorder: the caller
  * puts the saved one back (it keeps a copy). */
-Status solver_advance(Solver *s, double t_end);
+SHARED Status solver_advance(Solver *s, double t_end);
 
 /* follow.c -- the inputs may have been set: levels of jumps are those of now, contacts whose surface went away
  * open, the others go with it; a prescribed motion may have another place and other rates than it went by, and
  * forces others than the modes of contacts and frictions belong to (drive.turned).  What each step begins
  * with.  FAILED leaves the state in disorder. */
-Status solver_follow(Solver *s);
+SHARED Status solver_follow(Solver *s);
 
 /* The same, with nothing counted, for a caller that then puts the saved state back. */
-Status solver_look(Solver *s);
+SHARED Status solver_look(Solver *s);
 
 /* q and v at the communication point, where they are still to be found (on_demand).  FAILED: they cannot
  * be projected onto the constraints. */
-Status solver_arrive(Solver *s);
+SHARED Status solver_arrive(Solver *s);
 
 /* The same where the integrator has been beyond t_end already, and q and v there are found on demand: nothing
  * is left to do, and nothing can fail.  0: it has not been there, and nothing was done. */
-int solver_pass(Solver *s, double t_end);
+SHARED int solver_pass(Solver *s, double t_end);
 
 /* The inputs were set: what was integrated ahead with the old ones is dropped. */
-void solver_inputs_changed(Solver *s);
+SHARED void solver_inputs_changed(Solver *s);
 
-void observed_layout(Observed *o, Arena *arena, const System *system);
+SHARED void observed_layout(Observed *o, Arena *arena, const System *system);
 
 /* observe.c -- evaluates all of them at the state and inputs of now.  FAILED: one is not finite. */
-Status solver_observe(Solver *s, Observed *o);
+SHARED Status solver_observe(Solver *s, Observed *o);
 
 #endif

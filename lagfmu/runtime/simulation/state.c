@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-const char *const METHOD_NAMES[METHOD_COUNT] = {
+SHARED_VALUE const char *const METHOD_NAMES[METHOD_COUNT] = {
     [AUTO] = "auto", [DOP853] = "dop853", [RK4] = "rk4", [RADAU5] = "radau5", [RATTLE] = "rattle"};
 
 void drive_at(const System *s, const Drive *drive, double t, double *u) {

@@ -6,13 +6,14 @@
 #include "arena.h"
 #include "friction.h"
 #include "integrator.h"
+#include "linkage.h"
 #include "stiffness.h"
 #include "system.h"
 
 /* The numbers that an importer sees; they never change (lagfmu/methods.py).  METHOD_NAMES[0] is NULL. */
 typedef enum { AUTO = 1, DOP853 = 2, RK4 = 3, RADAU5 = 4, RATTLE = 5 } MethodName;
 enum { METHOD_COUNT = 6 };
-extern const char *const METHOD_NAMES[METHOD_COUNT];
+SHARED const char *const METHOD_NAMES[METHOD_COUNT];
 
 /* How to step.  tolerance: relative, a step; step [s]: largest step of rk4 and rattle, 0: chosen;
  * maximum_step [s]: largest adaptive step, 0: no limit.  maximum_steps: how many steps shorter than 1e-6
@@ -32,7 +33,7 @@ typedef struct {
 } Drive;
 
 /* u at time t.  */
-void drive_at(const System *s, const Drive *drive, double t, double *u);
+SHARED void drive_at(const System *s, const Drive *drive, double t, double *u);
 
 /* How often, over a whole run, which may last for ever. */
 typedef long long Count;
@@ -95,6 +96,6 @@ static inline int event_count_of(const System *s, EventKind kind) {
 }
 
 /* An event of contact, or friction, i, now and at the state q, v (n), unless this is a look. */
-void state_note(State *x, EventKind kind, int i, int n, const double *q, const double *v);
+SHARED void state_note(State *x, EventKind kind, int i, int n, const double *q, const double *v);
 
 #endif

@@ -52,7 +52,7 @@ static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
 }
 
 /* Impacts, if a contact has landed. */
-static Status strike(Solver *s, Instant at, const int *happened, Flags *x) {
+static Status strike_contacts(Solver *s, Instant at, const int *happened, Flags *x) {
     int landed = 0;
     const int contacts = s->system->contacts;
     double *slow = s->work_switch;
@@ -87,7 +87,7 @@ static int find_low(Solver *s, const double *slow, const int *shut, Flags *x) {
 }
 
 /* The modes after the impacts: accelerations decide where df/dt is zero; what parts is open. */
-static Status settle(Solver *s, Instant at, Flags *x) {
+static Status settle_modes(Solver *s, Instant at, Flags *x) {
     const System *system = s->system;
     const double *q = s->state.q, *v = s->state.v;
     double *slow = s->work_switch;
@@ -148,8 +148,8 @@ Status switch_modes(Solver *s, const int *happened) {
     int *flags = s->iwork_events;
     Flags x = {flags, flags + contacts, flags + 2 * contacts, flags + 3 * contacts,
                flags + 4 * contacts};
-    if (find_near(s, at, happened, &x) != OK || strike(s, at, happened, &x) != OK) return FAILED;
-    if (settle(s, at, &x) != OK || set_levels(s, at, x.closed) != OK) return FAILED;
+    if (find_near(s, at, happened, &x) != OK || strike_contacts(s, at, happened, &x) != OK) return FAILED;
+    if (settle_modes(s, at, &x) != OK || set_levels(s, at, x.closed) != OK) return FAILED;
     if (rubs && OPTIONAL.slides->change(s, at, happened + indicators_first_of_frictions(system),
                                         x.closed, x.touching, x.leaving) != OK)
         return FAILED;
