@@ -14,7 +14,7 @@ from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
 from test_extremes import isosceles, swing
 from test_jumps import MODELS as JUMPS
 
-from lagfmu import Scene, build_fmu
+from lagfmu import Peak, Scene, build_fmu
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.fmu.native import GENERATED
 from lagfmu.model.file import load
@@ -37,6 +37,7 @@ LIVES = {  # steps that reach the event or the singular point in between
     "Isosceles": 0.37,  # a step that fails
     "Gate": 0.2,  # forces that jump at two places, no contact
     "Lifted": 0.2,  # a force that jumps and opens a contact
+    "Peaks": 0.1,  # extremes, across impacts
     "Normal": 0.07,  # a scene: lambda of the hemisphere alone, numbers for m and g
     "Places": 0.1,  # a scene: coordinates that are only read, nothing is solved for lambda
 }
@@ -57,6 +58,10 @@ def unpacked(native_fmu, prepared, tmp_path_factory):
         elif name == "FallingRod":
             file = load(Path(__file__).parent.parent / "models" / "falling_rod.py")
             path = build_fmu(file.model, folder, target="native", check=False)
+        elif name == "Peaks":
+            model = prepared("BouncingBall").model
+            model = replace(model, name=name, peaks=(Peak("der(y)"), Peak("energy.*")))
+            path = build_fmu(model, folder, target="native", check=False)
         elif name in JUMPS:
             path = build_fmu(JUMPS[name](), folder, target="native", check=False)
         elif name == "Isosceles":

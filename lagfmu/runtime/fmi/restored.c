@@ -208,6 +208,10 @@ static Status together_in_solver(Instance *x, const Solver *s) {
     if (now->ahead && now->event_count > 0 &&
         !(now->event_time >= now->t_old && now->event_time <= now->t_integrator))
         return restored_none(x, "time of the event", now->event_time);
+    if (x->started && s->peaks > 0) { /* extremes are known as far as the state is */
+        const double reached = s->peak[peaks_saved(s->peaks) - 1];
+        if (x->exchange ? reached > now->t : reached != now->t) return restored_none(x, "time of the peaks", reached);
+    }
     return OK;
 }
 
