@@ -119,6 +119,32 @@ def test_residuals_are_drawn_for_those_who_ask(opened: Opened) -> None:
     assert any(t.startswith("Residuals") for t in captions.all_inner_texts())
 
 
+INK = """() => {
+    const canvas = document.querySelector("#charts canvas");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let darkest = 255;
+    for (let i = 0; i < data.length; i += 4) {
+        if (data[i + 3] > 200) darkest = Math.min(darkest, Math.max(data[i], data[i + 1], data[i + 2]));
+    }
+    const paper = getComputedStyle(document.body).backgroundColor;
+    return [darkest, Math.min(...paper.match(/\\d+/g).map(Number))];
+}"""
+
+
+def test_on_paper_ink_is_dark(opened: Opened) -> None:
+    """Printed from the dark theme, paper is white, and curves and figures are drawn anew in dark colours; the
+    picture and the curves have the whole width."""
+    page = opened("Hemisphere", color_scheme="dark", viewport={"width": 1280, "height": 900})
+    page.until("lagfmu.runs")
+    assert page.tab.evaluate(INK)[1] < 60
+    page.tab.emulate_media(media="print", color_scheme="dark")
+    page.until("document.getElementById('charts').clientWidth > 1000")
+    ink, paper = page.tab.evaluate(INK)
+    assert paper > 240
+    assert ink < 120
+    assert not page.tab.locator("#dials").is_visible()
+
+
 DOTS = """() => [...document.querySelectorAll("mover")].map((m) => {
     const [letter, dots] = [...m.children].map((e) => getComputedStyle(e));
     return parseFloat(dots.fontSize) / parseFloat(letter.fontSize) * (dots.fontWeight >= 700);

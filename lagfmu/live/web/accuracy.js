@@ -28,7 +28,7 @@ class Accuracy {
       settings.method = this.menu.value;
       changed();
     });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    onColors(() => this.draw());
     new ResizeObserver(() => this.draw()).observe(byId("trade").parentElement);
   }
 

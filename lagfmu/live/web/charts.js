@@ -203,7 +203,7 @@ class Charts {
       choices.append(element("label", {}, tick, ` ${group}`));
     }
     new ResizeObserver(() => this.drawn.forEach((c) => c.resize())).observe(box);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build());
+    onColors(() => this.build());
   }
 
   show(trajectory) {
@@ -218,6 +218,7 @@ class Charts {
     this.drawn = [];
     if (!this.trajectory) return;
     for (const chart of this.list.filter((c) => this.wanted.has(c.group))) this.add(chart);
+    this.now(this.t || 0);
   }
 
   add(listed) {
@@ -234,6 +235,7 @@ class Charts {
   }
 
   now(t) {
+    this.t = t;
     for (const c of this.drawn) c.now(t);
   }
 }

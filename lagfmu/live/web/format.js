@@ -33,6 +33,13 @@ function element(tag, attributes = {}, ...children) {
   return made;
 }
 
+/* What is drawn is drawn anew where colours change: in the other theme, and on paper. */
+function onColors(draw) {
+  for (const media of ["(prefers-color-scheme: dark)", "print"]) {
+    matchMedia(media).addEventListener("change", draw);
+  }
+}
+
 function color(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }

@@ -13,7 +13,7 @@ class Lead {
     figure.hidden = !this.menu.options.length;
     this.menu.addEventListener("change", () => this.build());
     new ResizeObserver(() => this.chart && this.chart.resize()).observe(this.holder);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build());
+    onColors(() => this.trajectory && this.build());
   }
 
   build() {
