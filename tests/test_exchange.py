@@ -256,3 +256,21 @@ def test_an_event_that_cannot_be_met_asks_for_no_other(library):
     info = EventInfo(1, 1, 1, 1, 1, 1.0)
     one.refuses("NewDiscreteStates", byref(info))
     assert bytes(info) == bytes(EventInfo())
+
+
+def test_what_has_drifted_off_a_table_still_lies_on_it(of):
+    """A block that an integrator has carried half a millimetre above a table that nobody moved is put back at
+    an event and does not leave; one whose table then drops by as much does."""
+    one = continuous(of(shaken))
+    one.states((-1e-7, -1.0))
+    for height, drop, shut in ((0.0, 0.0, 1), (5e-4, 0.0, 1), (0.0, -5e-4, 0)):
+        if height:
+            one.states((height, 0.0))
+        one.does("EnterEventMode")
+        for name, value in {"u": drop, "der(u)": 0.0, "der(u,2)": 0.0}.items():
+            one.set(name, value)
+        assert one.events().values or drop
+        assert one.array("GetContinuousStates", 2) == pytest.approx([0, 0], abs=1e-9)
+        assert one.integer("contact.table") == shut
+        assert one.integer("departure.table.count") == 1 - shut
+        one.does("EnterContinuousTimeMode")
