@@ -128,7 +128,7 @@ def test_what_cannot_be_filmed_is_told(
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
     told = animate(fmu, tmp_path / "film.mp4")
     assert told.exit_code == 3
-    assert "lagfmu[video]" in told.stderr
+    assert "pip install imageio-ffmpeg" in told.stderr
     plain = tmp_path / "plain.py"
     text = (Path(__file__).parent.parent / "models" / "bouncing_ball.py").read_text(
         encoding="utf-8"

@@ -117,7 +117,7 @@ def test_without_zig_the_message_says_what_to_do(
     fmu = str(native_fmu("Hemisphere"))
     result = CliRunner().invoke(app, ["page", fmu, "--out", str(tmp_path / "p.html")])
     assert result.exit_code == 3
-    assert "pip install lagfmu[native]" in result.stderr
+    assert "pip install ziglang" in result.stderr
 
 
 def test_a_page_is_the_same_from_model_and_fmu(

@@ -169,7 +169,7 @@ def _ffmpeg() -> str:
             found = str(imageio_ffmpeg.get_ffmpeg_exe())
         except (ImportError, RuntimeError):
             raise BuildError(
-                "an .mp4 film needs ffmpeg, which was not found: pip install lagfmu[video], or write a "
+                "an .mp4 film needs ffmpeg, which was not found: pip install imageio-ffmpeg, or write a "
                 ".gif or .html"
             ) from None
     return found

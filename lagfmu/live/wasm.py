@@ -23,7 +23,7 @@ def compile_module(name: str, sources: Mapping[str, bytes]) -> bytes:
     if compiler is None or not compiler.cross:
         raise BuildError(
             "a page needs ziglang, which compiles the FMU's C sources to WebAssembly, and it is not "
-            "installed: pip install lagfmu[native]"
+            "installed: pip install ziglang"
         )
     own = {file: text for file, text in sources.items() if file in GENERATED}
     runtime = {file: text for file, text in sources.items() if file not in own and file != ALL}

@@ -133,4 +133,4 @@ def _needed(module: str) -> Any:
     try:
         return __import__(module)
     except ImportError:
-        raise SimulationError(f"this needs {module}: pip install 'lagfmu[study]'") from None
+        raise SimulationError(f"this needs {module}: pip install {module}") from None

@@ -117,7 +117,7 @@ def connected(on: Any) -> tuple[Any, bool]:
         from dask.distributed import Client
     except ImportError:
         raise SimulationError(
-            "a sweep on a cluster needs dask.distributed: pip install 'lagfmu[study]'"
+            "a sweep on a cluster needs dask.distributed: pip install distributed"
         ) from None
     if not isinstance(on, str):
         return on, False

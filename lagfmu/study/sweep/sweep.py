@@ -295,7 +295,9 @@ def _require() -> None:
         except ImportError:
             missing.append(name)
     if missing:
-        raise SimulationError(f"a sweep needs {', '.join(missing)}: pip install 'lagfmu[study]'")
+        raise SimulationError(
+            f"a sweep needs {', '.join(missing)}: pip install {' '.join(missing)}"
+        )
 
 
 def _design(
@@ -399,7 +401,7 @@ def _save(found: Any, out: Path) -> None:
             found.to_netcdf(out, engine="h5netcdf")
     except (ImportError, ModuleNotFoundError, ValueError) as error:
         raise SimulationError(
-            f"cannot write {str(out)!r}: {error}; pip install 'lagfmu[study]'"
+            f"cannot write {str(out)!r}: {error}: pip install xarray h5netcdf h5py zarr"
         ) from None
     except OSError as error:
         raise SimulationError(f"cannot write {str(out)!r}: {error.strerror or error}") from None
