@@ -137,6 +137,18 @@ def test_a_coordinate_that_passes_zero_is_known_no_better_than_its_neighbours(tm
         assert np.abs(run["x"]).max() == pytest.approx(1.569596, abs=1e-5)
 
 
+def test_a_slip_that_has_to_pass_zero_is_not_stopped(tmp_path):
+    """A knife edge turns across the line along which it rubs: at phi = pi/2 the slip x' = y' cot(phi)
+    is 0 while y' is 0.526 m/s. Neither interface holds it there, and takes all of y' away."""
+    with Bench(built(("friction", "blade"), tmp_path), quick=True) as bench:
+        rows = bench.ordinary.rows
+        turned = int(np.argmax(rows["phi"] > np.pi / 2))
+        assert rows["der(x)"][turned - 1] > 0 > rows["der(x)"][turned]
+        assert rows["der(y)"][turned] > 0.5
+        assert not rows["sticks.grip"].any()
+        assert [c for c in exchange.compared(bench).checks if not c.ratio <= 1] == []
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("pair", pairs(), ids="+".join)
 def test_no_probe_finds_a_pair_wrong(pair, tmp_path):

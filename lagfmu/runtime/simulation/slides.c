@@ -1,6 +1,7 @@
 /* slides.c -- the modes of frictions: at the start, and at events. */
 #include "slides.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "flow.h"
@@ -8,6 +9,8 @@
 #include "rest.h"
 #include "slipping.h"
 #include "thresholds.h"
+
+static const double UNDONE = 10; /* times what accelerations did since a slip was 0, at most */
 
 static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     const System *system = s->system;
@@ -64,10 +67,40 @@ static Status change(Solver *s, Instant at, const int *left, int *closed, const 
     return rest_finish(&x, OK);
 }
 
+/* x^T M x. */
+static double squared(const Mechanism *b, const double *x) {
+    double sum = 0;
+    for (int e = 0; e < b->system->masses; e++) {
+        const int i = b->system->mass_row[e], j = b->system->mass_column[e];
+        const double part = b->M[e] * x[i] * x[j];
+        sum += part != 0 ? (i == j ? part : 2 * part) : 0;
+    }
+    return sum;
+}
+
+/* How long ago the slip of a friction was 0 [s], by its speed and acceleration; 0 where there is none. */
+static double overshot(const Solver *s, const Friction *law) {
+    const Mechanism *b = &s->stepped;
+    double speed = 0, rate = 0;
+    for (int r = 0; r < law->rows; r++) {
+        const int k = law->row[r];
+        speed = hypot(speed, mechanism_slip(b, k, s->state.v));
+        rate = hypot(rate, mechanism_row(b, k, b->vdot) - b->gamma[k]);
+    }
+    return rate > 0 ? speed / rate : 0;
+}
+
+/* A slip that has passed 0 goes back to 0, as far as that undoes what accelerations have done since.  Where the
+ * row depends on others (a slider at its dead centre, with the crank turning), it would stop all that moves:
+ * there nothing holds the slip at 0, and it has turned round. */
 static Status stop(Solver *s, Instant at, const int *left) {
     const System *system = s->system;
+    const int n = system->n;
     Mechanism *b = &s->stepped;
     Slide *held = s->trial_slides;
+    double *q = s->work_slides + 2 * system->frictions, *v = q + n, *change = v + n;
+    const double lost = s->state.now.lost, pull = squared(b, b->vdot);
+    double since = 0;
     int any = 0;
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     memcpy(held, s->state.slide, (size_t)system->frictions * sizeof *held);
@@ -75,13 +108,21 @@ static Status stop(Solver *s, Instant at, const int *left) {
         const Friction *law = &system->friction[i];
         if (!left[2 * i] || held[i].sticks) continue;
         held[i].sticks = any = 1;
+        since = fmax(since, overshot(s, law));
         for (int r = 0; r < law->rows; r++) s->state.offset[law->row[r]] = b->f[law->row[r]];
     }
     if (!any) return OK;
+    memcpy(q, s->state.q, (size_t)n * sizeof *q);
+    memcpy(v, s->state.v, (size_t)n * sizeof *v);
     b->friction->slide = held;
     const Status stopped = losses_project(s, at, 1);
     b->friction->slide = s->state.slide;
-    return stopped;
+    for (int j = 0; j < n; j++) change[j] = s->state.v[j] - v[j];
+    if (stopped == OK && squared(b, change) <= UNDONE * UNDONE * since * since * pull) return OK;
+    memcpy(s->state.q, q, (size_t)n * sizeof *q);
+    memcpy(s->state.v, v, (size_t)n * sizeof *v);
+    s->state.now.lost = lost;
+    return OK;
 }
 
 static Status contradicted(Solver *s, Instant at, int *left, int *any) {
