@@ -114,6 +114,7 @@ def test_the_archive_holds_what_it_needs_and_no_more(native_fmu):
         "modelDescription.xml",
         "documentation/index.html",
         "resources/lagfmu.json",
+        "resources/page.json",
         "resources/picture.json",
         f"binaries/{host().folder}/Hemisphere{host().suffix}",
     }
