@@ -436,7 +436,7 @@ def test_nothing_of_it_is_in_an_fmu_without(native_fmu, python_fmu):
     with zipfile.ZipFile(native_fmu("Hemisphere")) as archive:
         carried = archive.namelist()
     assert "sources/observe.c" in carried
-    assert not {"sources/bars.c", "sources/companion.c"} & {*carried}
+    assert "sources/bars.c" not in carried
     with zipfile.ZipFile(python_fmu("Hemisphere")) as archive:
         assert [n for n in archive.namelist() if n.endswith("/bars.py")] == []
 
