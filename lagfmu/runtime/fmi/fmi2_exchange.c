@@ -97,7 +97,13 @@ static fmi2Status read_array(Component *c, const char *function, int modes,
     if (!component_allowed(c, modes) || !c->instance.exchange) return component_forbidden(c, function);
     if (given != (size_t)expected) return wrong_size(c, function, given, expected);
     if (given > 0 && values == NULL) return component_missing(c, function);
-    return read(&c->instance, values) == OK ? fmi2OK : component_no_value(c);
+    if (read(&c->instance, values) != OK) return component_no_value(c);
+    for (int k = 0; k < expected; k++) {
+        if (isfinite(values[k])) continue;
+        (void)fail(&c->instance.solver.why, "%s: value %d is not finite", function, k + 1);
+        return component_no_value(c);
+    }
+    return fmi2OK;
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component component, fmi2Real derivatives[], size_t nx) {

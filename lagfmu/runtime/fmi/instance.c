@@ -230,7 +230,8 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
     if (solver_arrive(&x->solver) != OK) return FAILED;
     if (follow(x) != OK) return FAILED;
     if (estimated && was_set(x, v, value)) return OK;
-    if (x->started && ready(&x->solver, v, value)) return OK;
+    if (x->started && ready(&x->solver, v, value))
+        return isfinite(*value) ? OK : fail(&x->solver.why, "%s is not finite", v->name);
     if (!x->observed && instance_observe(x) != OK) return FAILED;
     return instance_value(&x->solver, &x->seen, v, value);
 }
@@ -389,13 +390,8 @@ static void warn_of_shares(Instance *x) {
     }
 }
 
-Status instance_start(Instance *x) {
+static Status find_start(Instance *x) {
     Solver *s = &x->solver;
-    if (x->started) return OK;
-    choose_settings(x);
-    s->stop_time = x->stop_time;
-    s->drive.since = x->start_time;
-    find_ranks(x);
     if (find_begin(x) != OK) return FAILED;
     const double *q0 = x->begin, *v0 = q0 + s->system->n;
     if (solver_start(s, x->start_time, q0, v0, x->rank, tell_moved, x) != OK) return FAILED;
@@ -403,8 +399,21 @@ Status instance_start(Instance *x) {
     if (x->exchange && magnitudes_incomplete(s) &&
         magnitudes_complete(s, flow_instant(s, x->start_time), 1) != OK)
         return FAILED;
+    return s->peaks > 0 ? OPTIONAL.peaks->here(s, 1) : OK;
+}
+
+Status instance_start(Instance *x) {
+    Solver *s = &x->solver;
+    if (x->started) return OK;
+    choose_settings(x);
+    s->stop_time = x->stop_time;
+    s->drive.since = x->start_time;
+    find_ranks(x);
+    if (find_start(x) != OK) {
+        solver_clear(s, x->start_time);
+        return FAILED;
+    }
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
-    if (s->peaks > 0 && OPTIONAL.peaks->here(s, 1) != OK) return FAILED;
     x->started = 1;
     warn_of_shares(x);
     x->observed = x->evaluated = 0;
@@ -524,10 +533,10 @@ static void tell_of_method(Instance *x, double product, int implicit) {
 
 Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
-    if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
     if (solver_pass(s, t_end)) {
         x->observed = x->evaluated = 0;
         if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
+        if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
         return OK;
     }
     unfollow(x);
@@ -551,6 +560,7 @@ Status instance_step(Instance *x, double t_end) {
     if (s->system->contacts + s->system->frictions > 0) report_events(x);
     if (has_closed(x)) warn_of_shares(x);
     tell_of_method(x, product, implicit);
+    if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
     return OK;
 }
 

@@ -203,6 +203,13 @@ static Status count_loss(Solver *s, double t) {
     return OK;
 }
 
+static Status check_lost(Solver *s) {
+    const Numbers *now = &s->state.now;
+    if (isfinite(now->lost) && isfinite(now->lost_old) && isfinite(now->lost_ahead)) return OK;
+    return fail(&s->why, "the energy that frictions and impacts dissipate on the way to t = %.17g s is beyond a "
+                "double", now->t);
+}
+
 /* The communication point is reached, or passed. */
 static Status arrive(Solver *s, double t_end) {
     const Integrator *i = &s->integrator;
@@ -343,5 +350,5 @@ Status solver_advance(Solver *s, double t_end) {
     }
     now->span = t_end - begun;
     keep(s);
-    return OK;
+    return check_lost(s);
 }

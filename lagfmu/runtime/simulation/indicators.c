@@ -36,9 +36,14 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
 Status indicators_at(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
     if (system->contacts + system->frictions > 0 && of_contacts(s, t, y, values) != OK) return FAILED;
-    if (system->jumps == 0) return OK;
-    const Instant at = flow_instant(s, t);
-    system->surfaces(t, y, at.u, at.p, values + system->contacts);
+    if (system->jumps > 0) {
+        const Instant at = flow_instant(s, t);
+        system->surfaces(t, y, at.u, at.p, values + system->contacts);
+    }
+    for (int i = 0; i < indicators_count(system); i++)
+        if (!isfinite(values[i]))
+            return fail(&s->why, "what ends a mode of a contact, a friction or a jump is not finite at t = %.17g s",
+                        t);
     return OK;
 }
 

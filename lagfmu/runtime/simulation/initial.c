@@ -86,7 +86,7 @@ static void natural_speeds(const Start *x, double *natural) {
     for (int e = 0; e < s->masses; e++) {
         int j = s->mass_row[e];
         if (s->mass_column[e] == j && b->M[e] > 0)
-            natural[j] = sqrt(x->s->state.size[j] * fabs(b->F[j]) / b->M[e]);
+            natural[j] = sqrt(x->s->state.size[j]) * sqrt(fabs(b->F[j]) / b->M[e]);
     }
 }
 
@@ -236,7 +236,7 @@ static Status check_start_finite(Solver *s, const double *q0, const double *v0) 
 }
 
 /* Nothing has happened yet: no steps, no departures, every row on its own level. */
-static void clear(Solver *s, double t) {
+void solver_clear(Solver *s, double t) {
     State *state = &s->state;
     memset(state->block, 0, state->block_size);
     memset(&state->now, 0, sizeof state->now);
@@ -247,7 +247,7 @@ static void clear(Solver *s, double t) {
 Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
                     Moved moved, void *context) {
     if (check_start_finite(s, q0, v0) == FAILED) return FAILED;
-    clear(s, t);
+    solver_clear(s, t);
     const Start x = {s, flow_instant(s, t), q0, v0, rank, rank + s->system->n};
     if (s->system->jumps > 0) OPTIONAL.jumps->settle(s, x.at, q0, v0, NULL, NULL);
     if (s->system->contacts > 0 && OPTIONAL.impact_check(s) != OK) return FAILED;

@@ -127,11 +127,14 @@ static void find_felt(const Mechanism *b, double *felt) {
     }
 }
 
+/* A rate whose square is a double too. */
+static double bounded(double rate) { return rate < FASTEST ? rate : FASTEST; }
+
 /* |v| / size and sqrt(pull / size) of one coordinate, the larger; an angle's speed by 1 rad. */
 static double rate_of_coordinate(const Solver *s, int j, double v, double pull) {
     const double size = s->state.size[j];
     const double unit = s->system->dimension[j] == s->system->angles ? 1 : size;
-    return size > 0 ? larger(fabs(v) / unit, sqrt(fabs(pull) / size)) : 0;
+    return size > 0 ? bounded(larger(fabs(v) / unit, sqrt(fabs(pull) / size))) : 0;
 }
 
 double magnitudes_pace(const Solver *s) {
@@ -196,6 +199,7 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
         const double speed = largest_alike(system, j, s->state.v);
         own[j] = larger(steady, speed > 0 ? largest_alike(system, j, felt) / speed : 0);
         if (own[j] > 0) own[j] = larger(own[j], slowest_rate(s));
+        own[j] = bounded(own[j]);
         natural = larger(natural, own[j]);
         if (!(own[j] > 0) && span > 0) own[j] = 1 / (MEASURED_PART * span);
     }
@@ -290,7 +294,7 @@ static Status find_scales(Solver *s, const double *own, const double *shaken) {
         state->scale[j] = positive(larger(state->scale[j], least));
         const double speed = larger(least * rate, roundings / s->settings.tolerance * shaken[j]);
         state->scale[n + j] = positive(larger(state->scale[n + j], speed));
-        if (!(state->scale[j] <= DBL_MAX && state->scale[n + j] <= DBL_MAX))
+        if (!(state->size[j] <= DBL_MAX && state->scale[j] <= DBL_MAX && state->scale[n + j] <= DBL_MAX))
             return fail(&s->why, "the start is refused: the scale of %s is not finite",
                         s->system->coordinates[j]);
     }

@@ -8,6 +8,7 @@
  * its contact opens (Genot & Brogliato 1999).  Both are looked at wherever the one or the other begins. */
 #include "rest.h"
 
+#include <float.h>
 #include <string.h>
 
 #include "digits.h"
@@ -35,7 +36,8 @@ void rest_renew_noise(Solver *s, Slide *slides) {
     const double *before = s->integrator.y_old + s->system->n;
     double *speed = s->work_contacts;
     for (int j = 0; j < s->system->n; j++)
-        speed[j] = fmax(fmax(fabs(s->state.v[j]), fabs(before[j])), s->state.size[j] * s->state.now.rate);
+        speed[j] = fmax(fmax(fabs(s->state.v[j]), fabs(before[j])),
+                        fmin(s->state.size[j] * s->state.now.rate, DBL_MAX));
     rest_set_noise(s, speed, slides);
 }
 

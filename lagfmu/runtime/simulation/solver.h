@@ -83,6 +83,9 @@ typedef void (*Moved)(void *context, const char *coordinate, int is_velocity, do
 SHARED Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
                            Moved moved, void *context);
 
+/* No state yet: at t [s], with nothing in it.  For a start that was refused. */
+void solver_clear(Solver *s, double t);
+
 /* advance.c -- from state.now.t to t_end [s].  FAILED leaves the state in disorder: the caller
  * puts the saved one back (it keeps a copy). */
 SHARED Status solver_advance(Solver *s, double t_end);
