@@ -236,7 +236,7 @@ static Status check_start_finite(Solver *s, const double *q0, const double *v0) 
 }
 
 /* Nothing has happened yet: no steps, no departures, every row on its own level. */
-void solver_clear(Solver *s, double t) {
+SHARED void solver_clear(Solver *s, double t) {
     State *state = &s->state;
     memset(state->block, 0, state->block_size);
     memset(&state->now, 0, sizeof state->now);

@@ -84,7 +84,7 @@ SHARED Status solver_start(Solver *s, double t, const double *q0, const double *
                            Moved moved, void *context);
 
 /* No state yet: at t [s], with nothing in it.  For a start that was refused. */
-void solver_clear(Solver *s, double t);
+SHARED void solver_clear(Solver *s, double t);
 
 /* advance.c -- from state.now.t to t_end [s].  FAILED leaves the state in disorder: the caller
  * puts the saved one back (it keeps a copy). */
