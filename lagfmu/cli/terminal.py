@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import contextlib
+import logging
 import sys
 import unicodedata
 import warnings
@@ -65,10 +66,38 @@ def say_error(text: str) -> None:
     errors.print(f"[bold red]error:[/] {escape(text)}", highlight=False, soft_wrap=True)
 
 
+class _Notes(logging.Handler):
+    """What the program tells besides, a line each, once."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.INFO)
+        self.told: set[str] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it, if it was not."""
+        text = record.getMessage()
+        if text not in self.told:
+            errors.print(f"[cyan]note:[/] {escape(text)}", highlight=False, soft_wrap=True)
+        self.told.add(text)
+
+
+@contextlib.contextmanager
+def _noted() -> Iterator[None]:
+    log, notes = logging.getLogger("lagfmu"), _Notes()
+    before = log.level
+    log.addHandler(notes)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(notes)
+        log.setLevel(before)
+
+
 @contextlib.contextmanager
 def plainly() -> Iterator[None]:
-    """Warnings and errors as one message each; an error ends the command with its exit code."""
-    with warnings.catch_warnings(record=True) as caught:
+    """Notes, warnings and errors as one message each; an error ends the command with its exit code."""
+    with _noted(), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             yield

@@ -25,7 +25,7 @@ from .. import names
 from ..solver import optional_bars
 from ..solver.advance import advance, beginning
 from ..solver.failure import StepFailureError
-from ..solver.initial import start
+from ..solver.initial import left_out, start
 from ..solver.observe import Values, observe
 from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.rates import Past, estimated, half_connected, restored_past
@@ -437,10 +437,10 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             y[j] = x
         found = start(self.system, self.settings, self.start_time, y[:n], y[n:], u, self.p, rank)
         for moved in found.moved:
-            if moved.rank == OMITTED:
-                self.log(str(moved), Fmi2Status.ok, "logEvents")
-            else:
+            if moved.rank != OMITTED:
                 self._warn(str(moved))
+        if line := left_out(found.moved):
+            self.log(line, Fmi2Status.ok, "logEvents")
         self.state, self.observed, self.expected = found.state, None, u
         if self.barred:
             self.bars = optional_bars.begun(found.state, self.with_bars)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -9,10 +10,11 @@ from typing import Any
 from ..errors import ModelError
 from ..interface.variables import VariableTable
 from ..names import motion
-from ..solver.initial import Moved
+from ..solver.initial import LEFT_OUT, Moved, left_out
 from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.system import System
 
+LOG = logging.getLogger("lagfmu")
 ALLOWED = 1e-6  # part of its coordinate's size by which a value in `start` may miss the constraints
 
 
@@ -34,9 +36,17 @@ def ranks(system: System, table: VariableTable, values: Mapping[str, Any]) -> li
 
 
 def tell(moved: Iterable[Moved | str]) -> None:
-    """One warning for each value that is moved."""
-    for m in moved:
-        warnings.warn(str(m), StartMovedWarning, stacklevel=3)
+    """One warning for each value that was given and is moved (as an FMU says it, or to be said); the logger
+    `lagfmu` hears in one line what those are that were left out."""
+    known = list(moved)
+    lines = [left_out(m for m in known if isinstance(m, Moved))]
+    for m in known:
+        if isinstance(m, str) and m.startswith(LEFT_OUT):
+            lines.append(m)
+        elif isinstance(m, str) or m.rank != OMITTED:
+            warnings.warn(str(m), StartMovedWarning, stacklevel=3)
+    for line in filter(None, lines):
+        LOG.info(line)
 
 
 def check_given(model: str, moved: Iterable[Moved], missed: Sequence[str]) -> None:

@@ -7,7 +7,7 @@ closed if their multiplier is positive.  Every value that was moved is reported.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -26,6 +26,7 @@ from .state import Departure, Settings, State
 from .system import Matrix, System, Vector
 from .thresholds import LARGEST_ANGLE, TOUCH
 
+LEFT_OUT = "start values that were left out"
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
 
 
@@ -43,15 +44,16 @@ class Moved(NamedTuple):
     size: float
 
     def __str__(self) -> str:
-        if self.rank == OMITTED:
-            return (
-                f"{self.name} has no start value: {self.used!r} in place of {self.given!r} satisfies the "
-                "constraints"
-            )
         return (
             f"start value {self.name} = {self.given!r} misses the constraints: projected to {self.used!r} "
             f"(moved by {self.used - self.given:.3g})"
         )
+
+
+def left_out(moved: Iterable[Moved]) -> str:
+    """Of the values that nobody gave, one line with what they are; empty where there are none."""
+    values = ", ".join(f"{m.name} = {m.used!r}" for m in moved if m.rank == OMITTED)
+    return f"{LEFT_OUT} follow from the constraints: {values}" if values else ""
 
 
 @dataclass(frozen=True)

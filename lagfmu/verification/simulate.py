@@ -29,12 +29,11 @@ from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import tell
+from ..solver.initial import LEFT_OUT
 from ..solver.state import tolerance_problem
 from .result import Result
 
-STARTS = re.compile(
-    r"start value .* misses the constraints|has no start value"
-)  # a message of a move
+STARTS = re.compile(rf"start value .* misses the constraints|{LEFT_OUT}")  # a message of a move
 MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 
 

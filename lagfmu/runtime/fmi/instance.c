@@ -311,20 +311,43 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
 
 /* ------------------------------------------------------------------ start */
 
+typedef struct {
+    Instance *x;
+    char line[400]; /* the values that nobody gave, as far as they fit */
+    int length, more;
+} Telling;
+
+/* Each value that was given and is moved; those that were left out are collected for one line. */
 static void tell_moved(void *context, const char *coordinate, int is_velocity, double given,
                        double used, Rank rank) {
-    Instance *x = context;
+    Telling *told = context;
+    Instance *x = told->x;
     const char *head = is_velocity ? "der(" : "", *tail = is_velocity ? ")" : "";
-    if (rank == OMITTED)
-        (void)snprintf(x->note, sizeof x->note,
-                       "%s%s%s has no start value: %s in place of %s satisfies the constraints", head,
-                       coordinate, tail, digits(used).text, digits(given).text);
-    else
-        (void)snprintf(x->note, sizeof x->note,
-                       "start value %s%s%s = %s misses the constraints: projected to %s (moved by "
-                       "%.3g)",
-                       head, coordinate, tail, digits(given).text, digits(used).text, used - given);
-    x->tell(x->context, rank == OMITTED ? NOTE_EVENT : NOTE_WARNING, x->note);
+    if (rank == OMITTED) {
+        const int room = (int)sizeof told->line - told->length;
+        const int needed = snprintf(told->line + told->length, (size_t)room, "%s%s%s%s = %s",
+                                    told->length > 0 ? ", " : "", head, coordinate, tail, digits(used).text);
+        if (needed < room && told->more == 0)
+            told->length += needed;
+        else
+            told->more++;
+        told->line[told->length] = 0;
+        return;
+    }
+    (void)snprintf(x->note, sizeof x->note,
+                   "start value %s%s%s = %s misses the constraints: projected to %s (moved by %.3g)", head,
+                   coordinate, tail, digits(given).text, digits(used).text, used - given);
+    x->tell(x->context, NOTE_WARNING, x->note);
+}
+
+static void tell_left_out(const Telling *told) {
+    Instance *x = told->x;
+    char more[32] = "";
+    if (told->length == 0) return;
+    if (told->more > 0) (void)snprintf(more, sizeof more, ", and %d more", told->more);
+    (void)snprintf(x->note, sizeof x->note,
+                   "start values that were left out follow from the constraints: %s%s", told->line, more);
+    x->tell(x->context, NOTE_EVENT, x->note);
 }
 
 /* A start value that differs from the described one was set, whatever calls set it. */
@@ -394,7 +417,9 @@ static Status find_start(Instance *x) {
     Solver *s = &x->solver;
     if (find_begin(x) != OK) return FAILED;
     const double *q0 = x->begin, *v0 = q0 + s->system->n;
-    if (solver_start(s, x->start_time, q0, v0, x->rank, tell_moved, x) != OK) return FAILED;
+    Telling told = {.x = x};
+    if (solver_start(s, x->start_time, q0, v0, x->rank, tell_moved, &told) != OK) return FAILED;
+    tell_left_out(&told);
     /* model exchange has no communication step: 1 s stands in for it */
     if (x->exchange && magnitudes_incomplete(s) &&
         magnitudes_complete(s, flow_instant(s, x->start_time), 1) != OK)
