@@ -148,6 +148,18 @@ def test_a_name_of_the_runtime_stands_in_one_file() -> None:
     assert {name: files for name, files in places.items() if len(files) > 1} == {}
 
 
+def test_values_that_files_of_the_runtime_share_are_defined_so() -> None:
+    """What a header declares SHARED without a parameter list a file defines as SHARED_VALUE."""
+    shared, defined = set(), set()
+    for path in sorted(ROOT.joinpath("runtime").rglob("*.[ch]")):
+        bare = TOKENS.sub("", path.read_text(encoding="utf-8"))
+        for line in re.findall(r"^SHARED const ([^;(]*);", bare, re.MULTILINE):
+            shared |= {re.findall(r"\w+", part.split("[")[0])[-1] for part in line.split(",")}
+        defined |= set(re.findall(r"^const [^;(]*?\b(\w+)(?:\[\w*\])* =", bare, re.MULTILINE))
+    assert shared
+    assert shared & defined == set()
+
+
 def test_what_files_of_the_runtime_share_is_declared_so() -> None:
     """SHARED makes it static where one file includes all: only the functions of FMI are exported."""
     plain = re.compile(

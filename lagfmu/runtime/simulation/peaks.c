@@ -240,4 +240,4 @@ static Status here(Solver *s, int first) {
     return OK;
 }
 
-const Peaks PEAKS = {doubles_of_peaks, here, pass, step};
+SHARED_VALUE const Peaks PEAKS = {doubles_of_peaks, here, pass, step};
