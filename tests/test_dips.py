@@ -136,3 +136,29 @@ def test_a_miss_stays_a_miss(own):
         one.start({"y": PULL / 8 + 1e-8, "der(y)": -PULL / 2}, tolerance=1e-12)
         one.step(1.0)
         assert one.get("y") == pytest.approx(PULL / 8 + 1e-8, rel=1e-10)
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+def test_a_narrow_bump_at_the_turn_of_a_flight_is_hit(tmp_path):
+    """A particle that is thrown up to v^2/(2 g) turns round in a bump a thousandth as wide: between two
+    samples it goes beyond both, and beyond the one in the middle, by what its path bends."""
+    h, g = symbols("h g", positive=True)
+    model = Model(
+        name="Turn",
+        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
+        coordinates={y: "m"},
+        constraints=[Contact("bump", w - 2 * w * exp(-(((y - h) / w) ** 2)))],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, PULL, "m/s^2"),
+            Parameter(w, 1e-4, "m"),
+            Parameter(h, 0.2, "m"),
+        ],
+        start={y.diff(): 2.0},
+    )
+    with instance(build_fmu(model, tmp_path, target="native", check=False)) as one:
+        for speed in np.linspace(1.9, 2.4, 14):
+            one.start({"der(y)": speed, "h": speed**2 / (2 * PULL)})
+            one.step(0.5)
+            assert one.get("closing.bump.count") == 1, speed
+            one.fmu.reset()
