@@ -13,6 +13,7 @@ import math
 import random
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 from sympy import Heaviside, cos, sin, symbols
@@ -198,12 +199,13 @@ def pairs() -> list[tuple[str, ...]]:
     return [p for p in itertools.combinations(FEATURES, 2) if together(p)]
 
 
+@cache
 def covering() -> list[tuple[str, ...]]:
     """Few sets of features: each pair stands in one of them at least."""
     chance, left, found = random.Random(3), set(pairs()), []
     while left:
         best: tuple[str, ...] = ()
-        for _ in range(200):
+        for _ in range(60):
             order = list(FEATURES)
             chance.shuffle(order)
             chosen = list(chance.choice(sorted(left)))

@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from ... import names
 from ...fmu.archive import unpack
 from ...fmu.session import RefusalError
-from .closed_forms import judged, laws
+from ...verification.verify import applies
+from .closed_forms import EQUATION, judged, laws
 from .facts import Facts, facts_of
 from .judge import EPS, Check, invariants, lost
 from .player import Drive, Player, Run, Values, play
@@ -230,7 +231,8 @@ class Bench:
         """Of coordinates, velocities, lambda and Q, relative to the largest magnitude of their unit.
 
         A Q is as large as the constraints' shares in it: what is left where they balance is rounding.
-        Where contacts differ beside an event only their own delay is seen: one such point is left out.
+        Where contacts differ beside an event only their own delay is seen: one such point is left out.  So is
+        what stands on the surface of a jump, where either side is right.
         """
         facts, found = self.facts, {}
         n = len(run.rows) if count is None else count
@@ -242,6 +244,10 @@ class Bench:
             alone[1:] &= ~differ[:-1]
             alone[:-1] &= ~differ[1:]
             alike &= ~alone
+        for form in self.forms:
+            if form.closed_form.name.startswith(EQUATION):
+                alike &= applies(form.closed_form, a, run.values)
+                alike &= applies(form.closed_form, b, run.values)
         groups = [facts.coordinates, [names.derivative(q) for q in facts.coordinates]]
         groups += [[names.name(names.MULTIPLIER, c) for c in facts.constraints]]
         forces = [names.name(names.FORCE, "", q) for q in facts.coordinates]

@@ -34,6 +34,7 @@ from ...verification.verify import applies
 from .player import Run
 
 LEEWAY = 10.0
+EQUATION = "Lagrange's equation of "  # what the laws of a model begin with (lagrange.py)
 SLOW = 1e-9  # of the fastest slip: one that has no direction yet
 Column = NDArray[np.float64]
 

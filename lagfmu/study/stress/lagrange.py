@@ -33,7 +33,7 @@ from ...model.elements import Constraint, Expr
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
 from ...verification.verify import closed_forms_in
-from .closed_forms import SLOW, magnitude
+from .closed_forms import EQUATION, SLOW, magnitude
 from .facts import ROUNDED, beside
 
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
@@ -63,7 +63,7 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
             if k != q and masses[k] != 0
             for least in (NOTHING if model.coordinates[q] == model.coordinates[k] else 0,)
         ]
-        name, scale = f"Lagrange's equation of {name_of(q)}", sp.Add(terms[q], *others)
+        name, scale = EQUATION + name_of(q), sp.Add(terms[q], *others)
         forms.append(replace(_form(name, inertia, force, scale, None), when=_beside_jumps(model)))
     forms += _of_constraints(model, _alone(masses, terms))
     forms += _of_shares(model, variables)
