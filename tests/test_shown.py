@@ -172,6 +172,8 @@ def test_an_invariant_ends_where_a_contact_closes() -> None:
     assert holds([0, 0, 0, 0], [0, 0, 1, 1]) == [True, True, False, False]
     assert holds([1, 0, 0, 0], [0, 2, 2, 2]) == [True, False, False, False]
     assert holds([0, 0, 0, 0], [1, 1, 1, 1]) == [True] * 4
+    kinds[2] = ("closing.a.count", int)
+    assert holds([0, 0, 0, 0], [0, 0, 1, 1]) == [True, True, False, False]
 
 
 def test_degrees_of_freedom_are_counted_with_the_contacts_closed() -> None:
