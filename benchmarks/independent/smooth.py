@@ -1,4 +1,4 @@
-"""Ten systems without events.  The hand-written equations are in the coordinates that the constraints leave."""
+"""Ten systems without events.  The equations by hand are in the coordinates that the constraints leave."""
 
 from __future__ import annotations
 
@@ -213,8 +213,14 @@ def coin_on_slope() -> System:
             Nonholonomic("ahead", x.diff() - R * theta.diff() * sp.cos(phi)),
             Nonholonomic("beside", y.diff() - R * theta.diff() * sp.sin(phi)),
         ],
-        parameters=[MASS, GRAVITY, Parameter(R, R0, "m"), Parameter(J, J0, "kg.m^2")]
-        + [Parameter(K, 0.02, "kg.m^2"), Parameter(c, c0, "1")],
+        parameters=[
+            MASS,
+            GRAVITY,
+            Parameter(R, R0, "m"),
+            Parameter(J, J0, "kg.m^2"),
+            Parameter(K, 0.02, "kg.m^2"),
+            Parameter(c, c0, "1"),
+        ],
         start={theta.diff(): 2.0, phi.diff(): w},
     )
 
@@ -243,8 +249,13 @@ def trapeze() -> System:
         coordinates={x: "m", y: "m", phi: "rad"},
         lagrangian=m / 2 * (x.diff() ** 2 + y.diff() ** 2) + J / 2 * phi.diff() ** 2 - m * g * y,
         constraints=[Holonomic("left", string(-1)), Holonomic("right", string(1))],
-        parameters=[MASS, GRAVITY, Parameter(L, l0, "m"), Parameter(d, 0.4, "m")]
-        + [Parameter(J, 0.02, "kg.m^2")],
+        parameters=[
+            MASS,
+            GRAVITY,
+            Parameter(L, l0, "m"),
+            Parameter(d, 0.4, "m"),
+            Parameter(J, 0.02, "kg.m^2"),
+        ],
         start={x: L * sin(0.9), y: -L * cos(0.9), phi: 0.0},
     )
 
@@ -291,8 +302,13 @@ def shaken_pivot() -> System:
         coordinates={x: "m", y: "m"},
         lagrangian=m / 2 * (x.diff() ** 2 + y.diff() ** 2) - m * g * y,
         constraints=[Holonomic("rod", (x - A * sp.sin(omega * t)) ** 2 + y**2 - L**2)],
-        parameters=[MASS, GRAVITY, Parameter(L, L0, "m"), Parameter(A, A0, "m")]
-        + [Parameter(omega, w, "rad/s")],
+        parameters=[
+            MASS,
+            GRAVITY,
+            Parameter(L, L0, "m"),
+            Parameter(A, A0, "m"),
+            Parameter(omega, w, "rad/s"),
+        ],
         start={x: L * sin(0.3), y: -L * cos(0.3), x.diff(): A * omega},
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,11 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class System:
-    """A model, and what its variables are at `stop` [s] by another way; `counts` are those of its events."""
+    """A model, and what its variables are at `stop` [s] by another way, counts of events among them."""
 
     model: Model
     stop: float
     expected: Callable[[float], Mapping[str, float]]
-    counts: Mapping[str, int] = field(default_factory=dict)
 
 
 def integrate(
