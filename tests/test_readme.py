@@ -100,8 +100,8 @@ def test_the_pieces_of_a_model_are_what_they_say(tmp_path, monkeypatch):
     (tmp_path / "road.csv").write_text("\n".join(rows), encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     around = {name: getattr(lagfmu, name) for name in lagfmu.__all__}
-    around |= {str(s.func): s for s in dynamicsymbols("x y z s theta")}
-    around |= {str(s): s for s in symbols("R L F mu_s mu_k", positive=True)}
+    around |= {str(s.func): s for s in dynamicsymbols("x y z s theta u v")}
+    around |= {str(s): s for s in symbols("R L F mu_s mu_k eps mu r", positive=True)}
     around |= {"Abs": Abs, "Path": Path, "__file__": str(tmp_path / "model.py"), "lagfmu": lagfmu}
     around |= {"damper": lagfmu.Spline("damper", [-1, 1], [-2, 2], "m/s", "N")}
     around["model"] = load(REPOSITORY / "models" / "hemisphere.py").model

@@ -9,6 +9,8 @@ by a clock.  Beyond the bounds the expression stays as it is.
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Collection
 from functools import lru_cache
 from math import comb
 from typing import Any
@@ -55,6 +57,20 @@ def bounded(e: Expr, operations: int = OPERATIONS) -> bool:
 def expanded(e: Expr) -> Expr:
     """Multiplied out."""
     return sp.expand(e) if terms(e) <= TERMS else e
+
+
+def gathered(e: Expr, symbols: Collection[Expr]) -> Expr:
+    """Terms that share one of the symbols as a factor, under it: k (x - y) + m g for k x - k y + m g."""
+    left, found = list(sp.Add.make_args(e)), []
+    while len(left) > 1:
+        shared = Counter(s for term in left for s in sp.Mul.make_args(term) if s in symbols)
+        most = max(shared, key=lambda s: (shared[s], str(s)), default=None)
+        if most is None or shared[most] < 2:
+            break
+        group = [term for term in left if most in sp.Mul.make_args(term)]
+        left = [term for term in left if term not in group]
+        found.append(sp.factor_terms(sp.Add(*group)))
+    return sp.Add(*found, *left)
 
 
 def sums_of_angles(e: Expr) -> Expr:

@@ -376,7 +376,9 @@ class _Typesetter:
         """M vdot - F + given, in coordinate j."""
         row = [(i, _tidy(eom.M[j, i])) for i in range(eom.n) if eom.M[j, i] != 0]
         inertia = self.notation.linear((mass, vdot[i]) for i, mass in row)
-        return _total(inertia + self.terms(_tidy(given - eom.F[j])))
+        rest = _tidy(given - eom.F[j])
+        short = shorter.gathered(rest, eom.p)
+        return _total(inertia + self.terms(min(short, rest, key=lambda e: e.count_ops())))
 
     def terms(self, expression: Expr) -> list[Printed]:
         """The expression as what may follow other terms."""
