@@ -92,7 +92,7 @@ def test_the_commands_and_the_examples_run_as_printed(tmp_path, monkeypatch, pyt
 def test_the_pieces_of_a_model_are_what_they_say(tmp_path, monkeypatch):
     """The blocks of Python that are part of a file: with the bead of the README, and with symbols of the
     names that they take from the text around them, each one runs."""
-    from sympy import Abs, symbols
+    from sympy import Abs, sqrt, symbols
     from sympy.physics.mechanics import dynamicsymbols
 
     (tmp_path / "bead.py").write_text(BLOCKS[0], encoding="utf-8")
@@ -102,7 +102,13 @@ def test_the_pieces_of_a_model_are_what_they_say(tmp_path, monkeypatch):
     around = {name: getattr(lagfmu, name) for name in lagfmu.__all__}
     around |= {str(s.func): s for s in dynamicsymbols("x y z s theta u v")}
     around |= {str(s): s for s in symbols("R L F mu_s mu_k eps mu r", positive=True)}
-    around |= {"Abs": Abs, "Path": Path, "__file__": str(tmp_path / "model.py"), "lagfmu": lagfmu}
+    around |= {
+        "Abs": Abs,
+        "sqrt": sqrt,
+        "Path": Path,
+        "__file__": str(tmp_path / "model.py"),
+        "lagfmu": lagfmu,
+    }
     around |= {"damper": lagfmu.Spline("damper", [-1, 1], [-2, 2], "m/s", "N")}
     around["model"] = load(REPOSITORY / "models" / "hemisphere.py").model
     pieces = [

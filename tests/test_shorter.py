@@ -79,6 +79,6 @@ def test_a_users_random_numbers_are_left_alone():
 def test_terms_that_share_a_parameter_are_gathered() -> None:
     """The force of a spring reads k (x - y), however it was multiplied out, and whatever else acts."""
     k, m, g, x, y = sp.symbols("k m g x y")
-    assert gathered(k * x - k * y + m * g, (k, m, g)) == k * (x - y) + m * g
-    assert gathered(k * x + m * y, (k, m, g)) == k * x + m * y
-    assert gathered(x * y + x, (k,)) == x * y + x
+    assert shorter.gathered(k * x - k * y + m * g, (k, m, g)) == k * (x - y) + m * g
+    assert shorter.gathered(k * x + m * y, (k, m, g)) == k * x + m * y
+    assert shorter.gathered(x * y + x, (k,)) == x * y + x
