@@ -67,7 +67,36 @@ def lifted():
     )
 
 
+def chased():
+    """A free body, and a gate u that gives it 2 N sideways while it is ahead of the gate by L."""
+    return Model(
+        name="Chased",
+        lagrangian=m * (v**2 + y.diff() ** 2) / 2,
+        coordinates={x: "m", y: "m"},
+        forces={y: F * Heaviside(x - u - L)},
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(F, 2.0, "N"), Parameter(L, 1.0, "m")],
+        inputs=[Input(u, "m")],
+        start={x: 0.0},
+    )
+
+
+def hung():
+    """Two blocks on a floor, the second pulled up with 2 m g as soon as the first is off the ground."""
+    return Model(
+        name="Hung",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * (x + y),
+        coordinates={x: "m", y: "m"},
+        forces={x: u, y: 2 * m * g * Heaviside(x)},
+        constraints=[Contact("first", x), Contact("second", y)],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(g, G, "m/s^2")],
+        inputs=[Input(u, "N")],
+        start={x: 0.0, y: 0.0},
+    )
+
+
 MODELS = {
+    "Chased": chased,
+    "Hung": hung,
     "Valley": lambda: cart("Valley", u, -F * Abs(x), x=1.0),
     "Pulse": lambda: cart("Pulse", Piecewise((F, (t > T / 4) & (t < T / 2)), (0, True)) + 0 * u),
     "Stairs": lambda: cart("Stairs", F * floor(2 * t / T)),
@@ -168,6 +197,36 @@ def test_a_gate_of_a_millimetre_is_not_flown_through(own):
         one.start(tolerance=1e-8)
         one.step(1.0)
         assert one.get("der(x)") ** 2 - 100**2 == pytest.approx(2 * 0.002, rel=1e-6)
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.4])
+def test_a_gate_that_an_input_moves_is_not_flown_through(tmp_path, begin):
+    """x = t flies ahead of u = b t + a t^2/2 by up to (1 - b)^2/2 a at t = (1 - b)/a = 0.625 s; L is a part
+    0.004 less: for 2 sqrt(0.004) 0.625 s, between two quarters of one step of 1 s, it feels 2 N."""
+    path = build_fmu(chased(), tmp_path, Scene("Chased"), target="native", check=False)
+    with instance(path) as one:
+        rise = 1 - begin
+        a = rise / 0.625
+        one.start({"der(x)": 1.0, "L": rise**2 / (2 * a) * 0.996}, tolerance=1e-8)
+        u = [one.variables["u"].valueReference]
+        one.fmu.setRealInputDerivatives(u * 2, [1, 2], [begin, a])
+        one.step(1.0)
+        assert one.get("der(y)") == pytest.approx(4 * 0.625 * 0.004**0.5, rel=1e-6)
+
+
+def test_what_a_departure_switches_on_is_read_with_it(tmp_path):
+    """20 N are set on the first block: it lifts off, which pulls the second one up with 2 m g; read at once,
+    both floors carry nothing, and both blocks accelerate."""
+    path = build_fmu(hung(), tmp_path, Scene("Hung"), target="native", check=False)
+    with instance(path) as one:
+        one.start({"u": 0.0}, tolerance=1e-8)
+        one.step(0.1)
+        one.set("u", 20.0)
+        assert one.get("der(x,2)") == pytest.approx(20 - G, rel=1e-12)
+        assert one.get("der(y,2)") == pytest.approx(G, rel=1e-12)
+        for floor_ in ("first", "second"):
+            assert one.get(f"lambda.{floor_}") == 0
+            assert not one.get(f"contact.{floor_}")
 
 
 def test_a_force_that_jumps_lifts_a_block_at_once(own):

@@ -18,7 +18,7 @@ import pytest
 from conftest import FILES
 from linkages import FOUR_BAR, TIME, pinned_rod, rods
 from runtime import FLAGS, INCLUDES, RUNTIME_FILES, SANITIZE, compile_library, compiler, objects
-from sympy import sin, sqrt, symbols
+from sympy import Rational, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_euler_parameters import top
 
@@ -987,6 +987,109 @@ def test_an_impact_loses_the_energy_that_newtons_law_says(restitution, bench):
     v = doubles(before)
     assert not one.c.bench_impact(one.handle, q, v, integers([1]), 1, Lambda)
     assert G @ np.array(v) == pytest.approx(0, abs=1e-15)  # plastic, whatever e is
+
+
+def jointed() -> Model:
+    """Any three contacts beside a rod, the first of them rough: constant masses and normals, all drawn."""
+    q = dynamicsymbols("q0:4")
+    M = [[symbols(f"M{i}{j}") for j in range(i + 1)] for i in range(4)]
+    A = [symbols(f"a{k}_0:4") for k in range(5)]
+    along = [sum(a * b for a, b in zip(row, q, strict=True)) for row in A]
+    bounce = symbols("e0:3")
+    numbers = [a for row in (*M, *A) for a in row]
+    return Model(
+        name="Jointed",
+        lagrangian=sum(
+            M[i][j] * q[i].diff() * q[j].diff() / (2 if i == j else 1)
+            for i in range(4)
+            for j in range(i + 1)
+        ),
+        coordinates=dict.fromkeys(q, "m"),
+        constraints=[
+            Holonomic("rod", along[0]),
+            Contact("rough", along[1], restitution=bounce[0]),
+            Nonholonomic("grip", along[2].diff(TIME), while_closed="rough"),
+            Contact("near", along[3], restitution=bounce[1]),
+            Contact("far", along[4], restitution=bounce[2]),
+        ],
+        parameters=[
+            *(
+                Parameter(a, 9.0 if k in (0, 2, 5, 9) else np.cos(k * k), "kg" if k < 10 else "1")
+                for k, a in enumerate(numbers)
+            ),
+            *(Parameter(a, 0.5, "1", min=0, max=1) for a in bounce),
+        ],
+        start=dict.fromkeys(q, 0.0),
+    )
+
+
+@pytest.mark.filterwarnings("ignore:.*follows from the others")
+def test_contacts_of_unlike_restitution_keep_newtons_law(bench):
+    """For all that strike, of any masses and directions: M (v+ - v-) = G^T Lambda, the rod keeps its length,
+    no contact pulls or is still approached, and the energy does not rise, though the rough one holds.  The
+    smooth ones alone, each with its own e: 0 <= Lambda, 0 <= s+ + e s-, one of them zero."""
+    one, rng, smooth = bench(jointed()), np.random.default_rng(5), np.array([3, 4])
+    contacts, gripped, lifted, kept = np.array([1, 3, 4]), 0, 0, 0
+    for draw in range(120):
+        B, A = rng.standard_normal((4, 4)), rng.standard_normal((5, 4))
+        M, before, values = B @ B.T + 0.1 * np.eye(4), rng.standard_normal(4), rng.uniform(0, 1, 3)
+        A[contacts] *= -np.sign(A[contacts] @ before)[:, None]
+        A[0] -= (A[0] @ before) / (before @ before) * before
+        one.p[:] = [*M[np.tril_indices(4)], *A.ravel(), *values]
+        entering = [(1, 1, 1), (0, 1, 1), (0, 0, 1), (1, 0, 1)][draw % 4]
+        v, Lambda = doubles(before), doubles([0.0] * 5)
+        at = one.handle, doubles([0.0] * 4), v, integers(entering), 0, Lambda
+        assert not one.c.bench_impact(*at), one.why()
+        pushes, after = np.array(Lambda), np.array(v)
+        size = np.abs(pushes).max()
+        np.testing.assert_allclose(M @ (after - before), A.T @ pushes, atol=1e-9 * size)
+        assert A[0] @ after == pytest.approx(0, abs=1e-9)
+        assert (pushes[contacts] >= -1e-9 * size).all()
+        struck = contacts[np.array(entering, bool)]
+        assert (A[struck] @ after > -1e-9).all()
+        assert after @ M @ after <= before @ M @ before * (1 + 1e-12)
+        kept += after @ M @ after > before @ M @ before * (1 - 1e-12)
+        gripped += pushes[2] != 0
+        lifted += bool(entering[0]) and pushes[1] == 0
+        assert pushes[1] != 0 or pushes[2] == 0
+        if not entering[0]:
+            left = A[smooth] @ after + values[1:] * (A[smooth] @ before)
+            left, pushes = left[2 - len(struck) :], pushes[struck]
+            assert (left >= -1e-9).all()
+            assert np.abs(left * pushes).max() < 1e-9 * size
+    assert kept > 8
+    assert gripped > 20
+    assert lifted > 5
+
+
+@pytest.mark.filterwarnings("ignore:.*follows from the others")
+def test_rounding_of_a_fast_motion_does_not_jam_an_impact(bench):
+    """A particle runs at 1e3 m/s between two walls that it touches, G v being rounding, and strikes a third
+    with 1e-6 m/s: it rebounds with e = 1/2 and runs on."""
+    a = 0.3
+    across = -sin(a) * x + float(np.cos(a)) * y
+    model = Model(
+        name="Alley",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + s.diff() ** 2) / 2,
+        coordinates={x: "m", y: "m", s: "m"},
+        constraints=[
+            Contact("left", across),
+            Contact("right", -1.1 * across),
+            Contact("end", s, restitution=Rational(1, 2)),
+        ],
+        parameters=[MASS],
+        start={x: 0.0, y: 0.0, s: 0.0},
+    )
+    one, jammed = bench(model), 0
+    for k in range(50):
+        before = np.array([*((1e3 + k) * np.array([np.cos(a), np.sin(a)])), -1e-6])
+        v, Lambda = doubles(before), doubles([0.0] * 3)
+        left = np.cos(a) * before[1] - np.sin(a) * before[0]
+        jammed += left != 0
+        at = one.handle, doubles([0.0] * 3), v, integers([1] * 3), 0, Lambda
+        assert not one.c.bench_impact(*at), one.why()
+        np.testing.assert_allclose(v, before + [0, 0, 1.5e-6], rtol=1e-14, atol=1e-12)
+    assert jammed > 5
 
 
 @pytest.mark.filterwarnings("ignore:.*follows from the others")
