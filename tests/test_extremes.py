@@ -5,6 +5,7 @@ refused with a reason; nothing is ever not-a-number with fmi2OK."""
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from ctypes import c_double, c_size_t
@@ -16,6 +17,7 @@ import fmpy
 import mpmath as mp
 import numpy as np
 import pytest
+import scipy
 from conftest import FILES
 from coupled_model import absorber
 from fmi2 import DISCARD, ERROR, OK
@@ -592,6 +594,72 @@ def test_a_parallelogram_through_its_change_point_is_right_or_refused(build, tol
         assert a["energy.kinetic"] == pytest.approx(1.0, rel=1e3 * tolerance)
         assert a["psi"] == pytest.approx(a["phi"], abs=1e3 * tolerance)
         assert a["theta"] == pytest.approx(0.0, abs=1e3 * tolerance)
+
+
+def four_points() -> Model:
+    """The parallelogram as two points on cranks and a coupler, under gravity; it turns over and over."""
+    xs, ys = dynamicsymbols("x1:3"), dynamicsymbols("y1:3")
+    speeds = [a.diff() ** 2 + b.diff() ** 2 for a, b in zip(xs, ys, strict=True)]
+    a, w = -0.5, 9.0
+    at = {
+        xs[0]: math.cos(a) / 2,
+        xs[1]: 1 + math.cos(a) / 2,
+        ys[0]: math.sin(a) / 2,
+        ys[1]: math.sin(a) / 2,
+    }
+    rates = {q.diff(): w / 2 * (-math.sin(a) if q in xs else math.cos(a)) for q in (*xs, *ys)}
+    return Model(
+        name="FourPoints",
+        lagrangian=m * (speeds[0] + 2 * speeds[1]) / 2 - m * g * (ys[0] + 2 * ys[1]),
+        coordinates=dict.fromkeys((*xs, *ys), "m"),
+        constraints=[
+            Holonomic("crank", xs[0] ** 2 + ys[0] ** 2 - r**2),
+            Holonomic("coupler", (xs[1] - xs[0]) ** 2 + (ys[1] - ys[0]) ** 2 - L**2),
+            Holonomic("rocker", (xs[1] - L) ** 2 + ys[1] ** 2 - r**2),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, g0, "m/s^2"),
+            Parameter(r, 0.5, "m"),
+            Parameter(L, 1.0, "m"),
+        ],
+        start=at | rates,
+    )
+
+
+@pytest.mark.parametrize("step", [0.1, 1.5])
+@pytest.mark.parametrize("digits", range(5, 14))
+def test_a_singular_configuration_is_passed_smoothly_at_every_tolerance(build, digits, step):
+    """With equal cranks the coupler keeps its direction, and the cranks turn as one pendulum: they lie in
+    line with the frame at phi = 0, pi, ..., t = int dphi / sqrt(w^2 - 2 g (sin phi - sin phi0)/r). The
+    anti-parallelogram begins at each; that it was not entered is said by name and time."""
+
+    def inverse_rate(a):
+        return (81 - 4 * g0 * (math.sin(a) + math.sin(0.5))) ** -0.5
+
+    passed = [
+        scipy.integrate.quad(inverse_rate, -0.5, k * math.pi, epsabs=1e-12)[0] for k in range(9)
+    ]
+    tolerance = 10.0**-digits
+    with instance(build(four_points())) as one:
+        one.start(tolerance=tolerance)
+        seen, reason = walk(one, step, round(1.5 / step))
+        log = [text for _, category, text in one.log if category == "logStatusWarning"]
+        native = one.native
+    assert reason == "" or not native
+    for a in seen:
+        assert a["x2"] - a["x1"] == pytest.approx(1.0, abs=1e-12)
+        assert a["y2"] == pytest.approx(a["y1"], abs=1e-12)
+        assert a["energy.total"] == pytest.approx(
+            seen[0]["energy.total"], rel=max(1e2 * tolerance, 1e-9)
+        )
+    if native:
+        assert all("'crank', 'coupler', 'rocker' depend on each other" in text for text in log)
+        told = [
+            float(t) for text in log for t in re.findall(r"at t = (\S+) s the motion passes", text)
+        ]
+        told, passed = ([t for t in times if t < 1.5] for times in (told, passed))
+        assert told == pytest.approx(passed, abs=max(1e2 * tolerance, 1e-7))
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-17, 1e-9])

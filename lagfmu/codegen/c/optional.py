@@ -18,7 +18,8 @@ AT_CONTACTS = {
     "switch_released": "switch.c",
     "switch_contradicted": "switch.c",
 }
-PEAKS = ("peaks.c", "extreme.c")  # behind PEAKS
+PEAKS, PASSAGE = "peaks.c", "passage.c"  # behind PEAKS and PASSAGE
+BEHIND_BOTH = "extreme.c"
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
 FRICTION = (  # behind SLIDES
     *("friction.c", "painleve.c", "rest.c", "rubbing.c", "share.c", "slides.c", "slipping.c"),
@@ -71,6 +72,7 @@ def optional_source(
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .jumps = &JUMPS,\n"] if system.floors else []
     rows += ["    .peaks = &PEAKS,\n"] if peaks else []
+    rows += ["    .passage = &PASSAGE,\n"] if _may_pass(system) else []
     rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
@@ -97,7 +99,11 @@ def files_left_out(
     if not scene.error_bars:
         gone.add("bars.c")  # behind ERROR_BARS of variables.c
     if not peaks:
-        gone |= {*PEAKS}
+        gone.add(PEAKS)
+    if not _may_pass(system):
+        gone.add(PASSAGE)
+    if {PEAKS, PASSAGE} <= gone:
+        gone.add(BEHIND_BOTH)
     if not system.floors:
         gone.add("jumps.c")
     if not system.prescribed:
@@ -109,6 +115,11 @@ def files_left_out(
     if not system.is_constrained:
         gone |= {*AT_CONSTRAINTS}
     return frozenset(gone)
+
+
+def _may_pass(system: System) -> bool:
+    """True if constraints may depend on each other for an instant; with frictions it is not looked for."""
+    return len(system.rows) > 1 and not system.frictions
 
 
 def _own(found: tuple[str, ...]) -> list[tuple[str, str]]:

@@ -574,6 +574,7 @@ Status instance_step(Instance *x, double t_end) {
     x->observed = x->evaluated = 0;
     const double product = s->state.now.choice.product;
     const int implicit = s->state.now.choice.implicit;
+    s->passed.text[0] = '\0';
     if (solver_advance(s, t_end) != OK) {
         instance_restore(x, x->backup);
         return FAILED;
@@ -581,6 +582,7 @@ Status instance_step(Instance *x, double t_end) {
     if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
     move_inputs(x, t_end);
     memset(x->set, 0, (size_t)s->system->inputs * sizeof *x->set);
+    if (s->passed.text[0] != '\0') x->tell(x->context, NOTE_WARNING, s->passed.text);
     if (s->system->lookup_count > 0) warn_of_tables(x);
     if (s->system->contacts + s->system->frictions > 0) report_events(x);
     if (has_closed(x)) warn_of_shares(x);

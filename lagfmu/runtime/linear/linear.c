@@ -202,6 +202,10 @@ Status linear_nearest(Linear *l, const double *c, double *x) {
     return status;
 }
 
+double linear_apart(const Linear *l) {
+    return l->rung == RUNG_WRITTEN_OUT || l->rung == RUNG_NULLSPACE ? 1 : schur_of(l)->apart;
+}
+
 int linear_basis(Linear *l, int *basis) {
     for (int k = 0; k < l->system->m; k++) basis[k] = l->active[k];
     if (l->rung != RUNG_ORTHOGONAL && l->rung != RUNG_LEAST_NORM) return 0;

@@ -64,6 +64,10 @@ SHARED Status linear_project(Linear *l, const double *M, const double *G, const 
  * the constraints are at angles of the order of `off` away from them. */
 SHARED double linear_rank_threshold(const Linear *l);
 
+/* How far the rows that were factored last are from depending on each other: the least sine of the angle between
+ * a row and those eliminated before it, in the metric of M; 1 where nothing has asked for it. */
+SHARED double linear_apart(const Linear *l);
+
 /* 1 if the rows that were factored last depend on each other.  basis (m): then as many of them as are
  * independent, otherwise all.  Factors are lost. */
 SHARED int linear_basis(Linear *l, int *basis);

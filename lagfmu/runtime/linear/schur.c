@@ -169,6 +169,7 @@ int schur_factor(Linear *l) {
     const Plan *plan = l->system->plan;
     Schur *own = schur_of(l);
     own->trust = SCHUR_UNSAFE;
+    own->apart = 1;
     if (!schur_masses(l, 0)) return 0;
     if (l->system->m > 0) {
         assemble(plan, own, l->active);
@@ -177,6 +178,7 @@ int schur_factor(Linear *l) {
         if (found.failed >= 0) own->doubtful_row = plan->schur.order[found.failed];
         own->condition = larger(own->condition, found.bound);
         own->growth = larger(own->growth, found.growth);
+        own->apart = found.failed < 0 ? 1 / sqrt(found.growth) : 0;
     }
     own->trust = judge(l, own->condition, own->growth);
     return own->trust != SCHUR_UNSAFE;

@@ -29,6 +29,7 @@ typedef struct {
     double *dx, *dlambda;      /* (n), (m) corrections */
     double *x_low, *lambda_low, *lambda; /* (n), (m), (m) */
     double condition, growth;  /* of M and S, the worse of the two (ldlt.h) */
+    double apart;              /* sine of the least angle between a row and those before it */
     Trust trust;
     int definite;              /* 1: M is safely so */
     int doubtful_mass;         /* coordinate whose pivot in M vanishes, or -1 */

@@ -82,27 +82,6 @@ static Status slide_on(Solver *s, const double *y1) {
     return OPTIONAL.slides->turn(s, i->t, y1);
 }
 
-/* One step, projected and searched for events; `bound`: not to be passed. */
-static Status step_towards(Solver *s, double t_end, double bound, double longest) {
-    Integrator *i = &s->integrator;
-    const int watch = indicators_count(s->system) > 0;
-    double *y1 = s->work_advance;
-    if (flow_step(s, i, bound, longest) != OK) return FAILED;
-    if (!(s->taken > 0)) s->first = i->t - i->t_old;
-    s->taken = fmax(s->taken, i->t - i->t_old);
-    s->state.now.estimated = fmax(s->state.now.estimated, i->error * s->settings.tolerance);
-    if ((watch || s->peaks > 0 || i->t > t_end) && flow_prepare_dense(s, i) != OK) return FAILED;
-    memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
-    if (flow_project(s, i->t, y1) != OK) return FAILED;
-    if (flow_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
-    if (watch && OPTIONAL.events_find(s, y1) != OK) return FAILED;
-    if (s->system->frictions > 0 && slide_on(s, y1) != OK) return FAILED;
-    integrator_move(i, y1);
-    s->state.now.steps += 1;
-    if (s->state.now.choice.implicit) stiffness_implicit_step(&s->state.now.choice, i);
-    return OK;
-}
-
 /* To where the integrator stood at t, before a step that failed or cannot be used; h: to try next. */
 static void take_back(Solver *s, double t, double h) {
     const Integrator *i = &s->integrator;
@@ -111,6 +90,39 @@ static void take_back(Solver *s, double t, double h) {
     memcpy(y, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y);
     restart(s, t, y, h);
     s->state.now.event_count = 0;
+}
+
+/* One step, that does not end in a singular configuration unless the bound is there. */
+static Status step_clear(Solver *s, double bound, double longest) {
+    Integrator *i = &s->integrator;
+    double h;
+    if (flow_step(s, i, bound, longest) != OK) return FAILED;
+    if (OPTIONAL.passage == NULL || i->t == bound || !OPTIONAL.passage->landed(s, &h)) return OK;
+    take_back(s, i->t_old, h);
+    return flow_step(s, i, bound, longest);
+}
+
+/* One step, projected and searched for events; `bound`: not to be passed. */
+static Status step_towards(Solver *s, double t_end, double bound, double longest) {
+    Integrator *i = &s->integrator;
+    const int watch = indicators_count(s->system) > 0;
+    double *y1 = s->work_advance;
+    if (step_clear(s, bound, longest) != OK) return FAILED;
+    if (!(s->taken > 0)) s->first = i->t - i->t_old;
+    s->taken = fmax(s->taken, i->t - i->t_old);
+    s->state.now.estimated = fmax(s->state.now.estimated, i->error * flow_tolerance(s));
+    const int near = OPTIONAL.passage != NULL && OPTIONAL.passage->suspected(s);
+    if ((watch || near || s->peaks > 0 || i->t > t_end) && flow_prepare_dense(s, i) != OK) return FAILED;
+    memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
+    if (flow_project(s, i->t, y1) != OK) return FAILED;
+    if (flow_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
+    if (near && OPTIONAL.passage->find(s) != OK) return FAILED;
+    if (watch && OPTIONAL.events_find(s, y1) != OK) return FAILED;
+    if (s->system->frictions > 0 && slide_on(s, y1) != OK) return FAILED;
+    integrator_move(i, y1);
+    s->state.now.steps += 1;
+    if (s->state.now.choice.implicit) stiffness_implicit_step(&s->state.now.choice, i);
+    return OK;
 }
 
 /* As far as the communication point, or past it. */
@@ -308,7 +320,10 @@ static Status travel(Solver *s, double t_end, double begun, Count first, int *me
         }
         if (s->integrator.t >= t_end) return arrive(s, t_end);
         if (s->peaks > 0 && OPTIONAL.peaks->pass(s, s->integrator.t, NULL) != OK) return FAILED;
-        if (take_step(s, t_end) != OK) return FAILED;
+        if (take_step(s, t_end) != OK) {
+            if (now->approach.near) OPTIONAL.passage->explain(s);
+            return FAILED;
+        }
         if (check_headway(s, t_end, begun, first) != OK) return FAILED;
     }
 }

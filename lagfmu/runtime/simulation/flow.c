@@ -13,6 +13,7 @@
 #include "thresholds.h"
 
 static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
+static const double PASSING = 1e-10; /* least tolerance of a step next to a singular configuration */
 static const double TOLERANCE_SHARE = 0.25; /* of the tolerance: errors of many steps add up */
 
 void flow_begin(Solver *s) {
@@ -45,10 +46,12 @@ Status flow_motion(Solver *s, Instant at, const double *q, const double *v) {
 static Status rate_of_state(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
     const int n = s->system->n;
+    if (s->state.now.approach.near && (y = OPTIONAL.passage->stage(s, t, y)) == NULL) return FAILED;
     s->stepped.stage = 1;
     const Status status = flow_motion(s, flow_instant(s, t), y, y + n);
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
+    if (OPTIONAL.passage != NULL) s->narrowest = fmin(s->narrowest, s->apart = linear_apart(&s->stepped.linear));
     for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
         dydt[j] = y[n + j];
         dydt[n + j] = s->stepped.vdot[j];
@@ -58,9 +61,10 @@ static Status rate_of_state(void *context, double t, const double *y, double *dy
 
 /* The same where every row acts and is solved by code written out: nine in ten of all evaluations. */
 static Status plain_rate(void *context, double t, const double *y, double *dydt) {
-    const Solver *s = context;
+    Solver *s = context;
     const int n = s->system->n;
     if (!s->system->accelerate(t, y, y + n, s->u, s->p, dydt + n)) return rate_of_state(context, t, y, dydt);
+    s->apart = 1;
     for (int j = 0; j < n; j++) dydt[j] = y[n + j];
     return OK;
 }
@@ -82,7 +86,7 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
 
 /* The equations at the times of a step from t on. */
 static Ode equations_at(Solver *s, double t) {
-    const int plain = is_plain(s);
+    const int plain = is_plain(s) && !s->state.now.approach.near;
     if (plain) (void)flow_instant(s, t); /* levels of jumps, which stay */
     return (Ode){s, plain ? plain_rate : rate_of_state, jacobian, &s->why};
 }
@@ -95,13 +99,18 @@ double flow_natural_step(const Solver *s) {
     return 1 / (flow_fewest_steps(s) * s->state.now.rate);
 }
 
+double flow_tolerance(const Solver *s) {
+    return fmax(s->settings.tolerance, s->state.now.approach.near ? PASSING : 0);
+}
+
 static Control control(const Solver *s, const Integrator *i, double longest) {
     const Settings *set = &s->settings;
     const double fixed = set->step > 0 ? set->step : flow_natural_step(s);
     if (s->limit > 0) longest = fmin(longest, s->limit);
+    if (s->state.now.approach.near) longest = fmin(longest, OPTIONAL.passage->longest(s, i->h_next));
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
     if (!s->integrator.method->fixed) magnitudes_shared(s, i->y, s->scale);
-    return (Control){TOLERANCE_SHARE * set->tolerance, s->scale, longest < HUGE_VAL ? longest : 0,
+    return (Control){TOLERANCE_SHARE * flow_tolerance(s), s->scale, longest < HUGE_VAL ? longest : 0,
                      fixed};
 }
 
@@ -128,6 +137,7 @@ static Status accept(Solver *s, Integrator *i) {
     if (mechanism_motion(&s->stepped, flow_instant(s, i->t), y, y + n, s->active) != OK)
         return FAILED;
     flow_choose_rows(s);
+    if (OPTIONAL.passage != NULL) OPTIONAL.passage->look(s, i->t, y);
     memcpy(i->f, y + n, (size_t)n * sizeof *y);
     memcpy(i->f + n, s->stepped.vdot, (size_t)n * sizeof *y);
     i->fresh = 0;
@@ -135,6 +145,7 @@ static Status accept(Solver *s, Integrator *i) {
 }
 
 Status flow_step(Solver *s, Integrator *i, double t_bound, double longest) {
+    s->narrowest = s->apart = 1;
     const Control c = control(s, i, longest);
     if (s->settings.method == RATTLE) {
         const Instant at = flow_instant(s, i->t);

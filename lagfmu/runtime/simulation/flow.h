@@ -31,6 +31,9 @@ SHARED Instant flow_instant(Solver *s, double t);
  * frictions, for the normal force is that of the multipliers of least norm. */
 SHARED Status flow_motion(Solver *s, Instant at, const double *q, const double *v);
 
+/* The relative tolerance of the step that begins here. */
+SHARED double flow_tolerance(const Solver *s);
+
 /* One accepted step towards t_bound, none longer than `longest` [s]. */
 SHARED Status flow_step(Solver *s, Integrator *i, double t_bound, double longest);
 

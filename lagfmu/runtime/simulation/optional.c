@@ -18,5 +18,6 @@ SHARED_VALUE const Optional OPTIONAL = {
     .switch_contradicted = switch_contradicted,
     .jumps = &JUMPS,
     .peaks = &PEAKS,
+    .passage = &PASSAGE,
     .slides = &SLIDES,
 };

@@ -11,6 +11,7 @@
 #include "jumps.h"
 #include "landing.h"
 #include "linkage.h"
+#include "passage.h"
 #include "peaks.h"
 #include "rattle.h"
 #include "slides.h"
@@ -37,6 +38,8 @@ typedef struct {
     const Jumps *jumps;
     /* Of quantities whose extremes are kept; NULL where there are none. */
     const Peaks *peaks;
+    /* Of singular configurations; NULL with less than two constraints, or with frictions. */
+    const Passage *passage;
     /* What constraints that hold by friction need; NULL where there are none. */
     const Slides *slides;
 } Optional;

@@ -70,6 +70,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
     s->work_contacts = arena_doubles(scratch, 2 * n + 3 * m);
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
+    s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? 2 * n : 0);
     s->work_advance = arena_doubles(scratch, 4 * n);
     s->work_events =
         arena_doubles(scratch, indicators == 0 ? 0 : 6 * n + indicators + samples_doubles(indicators));

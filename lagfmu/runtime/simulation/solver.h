@@ -50,6 +50,8 @@ typedef struct Solver {
     double *work_contacts;     /* (2 n + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */
     double *work_jumps;        /* (2 jumps + n) of jumps.c */
+    double apart, narrowest;   /* linear_apart() at the latest stage, and the least of a step */
+    double *work_passage;      /* (2 n) of passage.c */
     double *work_advance;      /* (4 n) of advance.c */
     double *work_events;       /* (6 n + indicators and all samples) of events.c */
     double *work_clearance;    /* of clearance.c */
@@ -64,6 +66,7 @@ typedef struct Solver {
     double *work_switch;       /* (m + n) of switch.c */
     double *work_impact;       /* of impact.c, see there */
     int *iwork_impact;
+    Why passed;                /* singular configurations passed since the caller emptied it, as a sentence */
     Why why;
 } Solver;
 

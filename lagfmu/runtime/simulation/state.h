@@ -38,11 +38,20 @@ SHARED void drive_at(const System *s, const Drive *drive, double t, double *u);
 /* How often, over a whole run, which may last for ever. */
 typedef long long Count;
 
+/* How a singular configuration is approached (passage.h): the time [s] of the latest step's beginning, how far the
+ * rows were apart there (sine of an angle; negative: such a configuration has been passed since), whether
+ * one is near, and in how many seconds (negative: behind). */
+typedef struct {
+    double t, apart, until;
+    int near;
+} Approach;
+
 /* The numbers of a state (copied as a struct) ... */
 typedef struct {
     double t;            /* [s] the communication point */
     double rate;         /* [1/s] the motion's natural rate at the start */
     int dependent;       /* 1: at the latest state on the constraints, rows that act depended on each other */
+    Approach approach;   /* to a singular configuration */
     double step;         /* [s] the step to try next */
     double span;         /* [s] the communication step that led to t; 0: none */
     Count steps;         /* internal steps taken so far */

@@ -1,0 +1,157 @@
+/* passage.c -- through a configuration in which constraints depend on each other for an instant: two branches
+ * of the motion cross there.
+ *
+ * The accelerations keep G v' = gamma, so that a state that is off the constraints by eps stays on f = eps, a
+ * hyperbola next to two lines that cross: within sqrt(eps) of the crossing it turns from one branch into the
+ * other, and a step control that resolves the turn follows it there.  On the constraints the motion along a
+ * branch is smooth, and a step passes over the crossing as over any other place.  So next to one each
+ * stage is moved onto the constraints before the accelerations are evaluated.  These lose digits as
+ * eps/apart^3, for which the error of such a step is allowed to be PASSING.
+ *
+ * Near is where `apart`, the sine of the angle between a row and those before it in the metric of M, is
+ * small and would be zero within a natural time, or was, if it went on as in the last step.  A step from there
+ * passes over the crossing with no stage next to it, or stops before it. */
+#include "passage.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "digits.h"
+#include "extreme.h"
+#include "flow.h"
+
+enum { PARTS = 16 };                 /* of a step, in which the least angle is looked for */
+static const double NARROW = 0.1;    /* angle [rad] below which a crossing may be near */
+static const double BETWEEN = 0.467;  /* of a step over a crossing, where it is to lie: the widest gap between the
+                                       * stages of dop853 */
+static const double CLEAR = 0.4;      /* of a step that ended in one: by so much it is shortened */
+static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how fast the angle falls */
+static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
+static const double PLACED = 1e-9;   /* of a step: how well the time of a passage is found */
+static const double NAMING = 1e-5;   /* how far off the constraints a state is taken to be that the rows are
+                                      * named at: linear_rank_threshold() */
+
+/* Factors the rows at (t, y), taken to be off the constraints by that much. */
+static Status factor_there(Solver *s, double t, const double *y, double off) {
+    Mechanism *b = &s->stepped;
+    if (mechanism_evaluate(b, flow_instant(s, t), y, y + s->system->n) != OK) return FAILED;
+    b->linear.off = off;
+    const Status status = linear_factor(&b->linear, b->M, b->G, s->active);
+    b->linear.off = 0;
+    return status;
+}
+
+/* How fast the angle falls [1/s] at the state where a step begins; y is left to the scratch. */
+static double falling(Solver *s, double t, const double *y, double apart) {
+    const int n = s->system->n;
+    const double ahead = LOOK_AHEAD / s->state.now.rate;
+    double *there = s->work_passage;
+    for (int j = 0; j < n; j++) {
+        there[j] = y[j] + ahead * y[n + j];
+        there[n + j] = y[n + j];
+    }
+    if (factor_there(s, t + ahead, there, DBL_MIN) != OK) return 0;
+    return (apart - linear_apart(&s->stepped.linear)) / ahead;
+}
+
+static void look(Solver *s, double t, const double *y) {
+    Approach *x = &s->state.now.approach;
+    const double apart = linear_apart(&s->stepped.linear), h = t - x->t, before = x->apart;
+    if (!(h > 0)) return;
+    *x = (Approach){t, apart, -1, 0};
+    if (!(apart < NARROW)) return;
+    const double fall = fabs(before) < NARROW ? (before - apart) / h : falling(s, t, y, apart);
+    x->near = fabs(fall) > apart * s->state.now.rate;
+    if (x->near) x->until = apart / fall;
+}
+
+static double longest(const Solver *s, double next) {
+    const double until = s->state.now.approach.until, over = until / BETWEEN;
+    if (!(until > 0) || !(next > 0)) return HUGE_VAL;
+    return over <= next ? over : until - (1 - CLEAR) * BETWEEN * next;
+}
+
+static int suspected(const Solver *s) {
+    const Approach *x = &s->state.now.approach;
+    return x->near || (s->narrowest < NARROW && s->narrowest < fabs(x->apart) / 2);
+}
+
+static int landed(const Solver *s, double *h) {
+    if (!suspected(s) || !(s->apart < LANDED)) return 0;
+    *h = (1 - CLEAR) * (s->integrator.t - s->integrator.t_old);
+    return 1;
+}
+
+static const double *stage(Solver *s, double t, const double *y) {
+    memcpy(s->work_passage, y, 2 * (size_t)s->system->n * sizeof *y);
+    return flow_project(s, t, s->work_passage) == OK ? s->work_passage : NULL;
+}
+
+static Status height_of_rows(void *context, double elapsed, double *value) {
+    Solver *s = context;
+    const Integrator *i = &s->integrator;
+    i->method->dense(i, i->t_old + elapsed, s->work_passage);
+    if (factor_there(s, i->t_old + elapsed, s->work_passage, DBL_MIN) != OK) return FAILED;
+    *value = -linear_apart(&s->stepped.linear);
+    return OK;
+}
+
+/* Appends the rows that depend on each other, and how many they are. */
+static int name_rows(Solver *s, Why *text) {
+    int count = 0;
+    for (int k = 0; k < s->system->m; k++) {
+        if (s->stepped.linear.unique[k]) continue;
+        why_append(text, "%s'%s'", count > 0 ? ", " : "", s->system->rows[k].name);
+        count += 1;
+    }
+    return count;
+}
+
+static Status tell(Solver *s, double t) {
+    Why rows = {""};
+    s->integrator.method->dense(&s->integrator, t, s->work_passage);
+    if (factor_there(s, t, s->work_passage, NAMING) != OK) return FAILED;
+    if (name_rows(s, &rows) == 0) return OK;
+    why_append(&s->passed, "%sat t = %.9g s the motion passes, smoothly, a singular configuration: the constraints %s "
+                           "depend on each other there, another branch begins, and next to it lambda and the "
+                           "accelerations lose digits",
+               s->passed.text[0] == '\0' ? "" : "; ", t, rows.text);
+    s->state.now.approach.apart *= -1;
+    return OK;
+}
+
+/* The angle falls and rises again as |t - t*|: t* is sought next to the smaller end of two of its parts. */
+static Status find_passage(Solver *s) {
+    const double h = s->integrator.t - s->integrator.t_old, part = h / PARTS;
+    double value[PARTS + 1], at_place;
+    int j = 0;
+    for (int k = 0; k <= PARTS; k++) {
+        if (height_of_rows(s, k * part, &value[k]) != OK) return FAILED;
+        if (value[k] > value[j]) j = k;
+    }
+    const int to = j == PARTS || (j > 0 && value[j - 1] > value[j + 1]) ? j - 1 : j + 1;
+    double place = part * (j + (to - j) * value[j] / fmin(value[j] + value[to], -DBL_MIN));
+    if (height_of_rows(s, place, &at_place) != OK) return FAILED;
+    if (!(at_place >= value[j])) {
+        if (j == 0 || j == PARTS) return OK; /* no passage, or it is another step's */
+        place = j * part;
+        at_place = value[j];
+    }
+    const double a = part * (j > 0 ? j - 1 : 0), b = part * (j < PARTS ? j + 1 : PARTS);
+    if (extreme_find(height_of_rows, s, a, b, PLACED * h, &place, &at_place) != OK) return FAILED;
+    return tell(s, s->integrator.t_old + place);
+}
+
+static void explain(Solver *s) {
+    const Integrator *i = &s->integrator;
+    const Why cause = s->why;
+    Why rows = {""};
+    const int named = factor_there(s, i->t, i->y, NAMING) == OK && name_rows(s, &rows) > 0;
+    s->why = cause;
+    if (named)
+        why_append(&s->why, " (next to t = %s s the constraints %s depend on each other: the configuration is singular)",
+                   digits(i->t).text, rows.text);
+}
+
+SHARED_VALUE const Passage PASSAGE = {look, longest, stage, suspected, landed, find_passage, explain};
