@@ -15,7 +15,17 @@ from runs import simulate_fmu
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Input, Model, Output, Parameter, Peak
+from lagfmu import (
+    Contact,
+    Friction,
+    Input,
+    Model,
+    Nonholonomic,
+    Output,
+    Parameter,
+    Peak,
+    multiplier,
+)
 from lagfmu.errors import ModelError
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
@@ -23,6 +33,7 @@ from lagfmu.prepare.prepare import prepare
 
 Peaked = Callable[..., Path]
 G = 9.81
+UNIT, GRAVITY = symbols("m g", positive=True)
 STEPS = pytest.mark.parametrize("step", [0.5, 0.005])
 
 
@@ -137,6 +148,36 @@ def test_friction_is_largest_just_before_the_block_slips(peaked: Peaked) -> None
         least = peaks(one, "lambda.ride")
         assert max(map(abs, least[:2])) == pytest.approx(0.5 * G, rel=1e-9)
         assert peaks(one, "energy.dissipated")[0] == one.get("energy.dissipated") > 0
+
+
+def test_a_slide_in_two_directions_ends_without_a_peak_of_its_direction(tmp_path: Path) -> None:
+    """A puck slides straight on: the components of its friction stay what they are until it stands, although
+    the direction of its velocity is but rounding's just before."""
+    x, y, z = dynamicsymbols("x y z")
+    puck = Model(
+        "Puck",
+        kinetic_energy=(x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) * UNIT / 2,
+        coordinates={x: "m", y: "m", z: "m"},
+        forces={z: -UNIT * GRAVITY},
+        constraints=[
+            Contact("ice", z),
+            Nonholonomic("along", x.diff(), while_closed="ice"),
+            Nonholonomic("across", y.diff(), while_closed="ice"),
+            Friction("grip", of=["along", "across"], normal=multiplier("ice"), static=0.2),
+        ],
+        parameters=[Parameter(UNIT, 1.0, "kg"), Parameter(GRAVITY, G, "m/s^2")],
+        outputs=[Peak("lambda.a*")],
+    )
+    fmu = write(prepare(puck), tmp_path, target="native")
+    with instance(fmu) as one:
+        for speed in (0.7, 1.0, 1.5, 2.0, 3.0):
+            for angle in (0.1, 0.3, 0.5235987, 0.9, 1.2):
+                way = speed * np.array([np.cos(angle), np.sin(angle)])
+                one.start({"der(x)": way[0], "der(y)": way[1]})
+                run(one, 2.0, 0.01)
+                least = [peaks(one, "lambda.along")[1], peaks(one, "lambda.across")[1]]
+                assert least == pytest.approx(list(-0.2 * G * way / speed), rel=1e-8)
+                one.fmu.reset()
 
 
 def test_both_sides_of_an_inputs_jump_count(tmp_path: Path) -> None:

@@ -4,8 +4,9 @@
  * all is evaluated as it would be read there.  A quantity that is largest at one of them has its extreme
  * between the neighbours; at an end, where the motion may go on otherwise, it has one inside if it grows on
  * the way in.  Those that could pass the record are found by extreme.c; dense output knows less than a step
- * does, so that the motion is integrated once more as far as there.  Differences of ROUNDING of the quantity
- * say nothing. */
+ * does, so that the motion is integrated once more as far as there.  Where these two do not agree that a record
+ * is passed, none is: at the end of a slide in two directions the direction of friction is rounding's.
+ * Differences of ROUNDING of the quantity say nothing. */
 #include "peaks.h"
 
 #include <math.h>
@@ -17,6 +18,7 @@
 enum { PIECES = 8 };
 static const double INWARD = 1e-4;    /* of a piece: the way from an end on which growth is looked for */
 static const double PLACE = 1e-6;     /* of a bracket: how well the place of an extreme is found */
+static const double AGREED = 2;       /* times what two integrations differ by: a record passed by more is one */
 static const double PEAK_ROUNDING = 1e-13; /* of a quantity's values */
 
 /* A stretch of the step just taken. */
@@ -86,19 +88,23 @@ static int keep_peaks(Solver *s, int k, double sense, double begin, double t, do
     return 1;
 }
 
+static double record_of(const Stretch *x) {
+    const double *kept = x->s->peak + PEAK_PARTS * x->quantity;
+    return x->sense * kept[x->sense > 0 ? PEAK_MAX : PEAK_MIN];
+}
+
 /* The same of the stretch; while an importer integrates it changes by events alone, which tolerance asks for. */
 static void find(Stretch *x, double t, double height_of_peak) {
     Solver *s = x->s;
-    const double record = s->peak[PEAK_PARTS * x->quantity + (x->sense > 0 ? PEAK_MAX : PEAK_MIN)];
-    if (x->exchange && !(height_of_peak - x->sense * record > s->settings.tolerance * fabs(record))) return;
+    const double record = record_of(x);
+    if (x->exchange && !(height_of_peak - record > s->settings.tolerance * fabs(record))) return;
     x->passed |= keep_peaks(s, x->quantity, x->sense, x->t[0], t, height_of_peak);
 }
 
 /* Could there be more than the record next to sample j, below which its neighbour i lies? */
 static int may_pass(const Stretch *x, int i, int j) {
-    const double record = x->sense * x->s->peak[PEAK_PARTS * x->quantity + (x->sense > 0 ? PEAK_MAX : PEAK_MIN)];
     const double fall = at(x, j) - at(x, i);
-    return fall > PEAK_ROUNDING * fabs(at(x, j)) && at(x, j) + fall > record;
+    return fall > PEAK_ROUNDING * fabs(at(x, j)) && at(x, j) + fall > record_of(x);
 }
 
 /* The extreme between samples i and k, next to the time `elapsed` after the first, where it is `value`. */
@@ -114,7 +120,8 @@ static Status polish_extreme(Stretch *x, int i, int k, double elapsed, double va
     }
     if (flow_reach(s, s->integrator.t_old, s->integrator.y_old, t, x->y) != OK) return FAILED;
     if (measure_there(s, t, x->y, x->value) != OK) return FAILED;
-    find(x, t, x->sense * x->value[x->quantity]);
+    const double again = x->sense * x->value[x->quantity];
+    if (again - record_of(x) > AGREED * fabs(again - value)) find(x, t, again);
     return OK;
 }
 
