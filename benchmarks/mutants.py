@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-COPIED = ("lagfmu", "tests", "models", "pyproject.toml")
+COPIED = ("lagfmu", "tests", "models", "benchmarks", "pyproject.toml")
 EVER_THE_SAME = (
     "pytest",
     "numpy",

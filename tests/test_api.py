@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 
 import pytest
+from fmpy import read_model_description
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -43,6 +45,17 @@ def test_a_statement_that_does_not_hold_is_an_error_and_the_file_is_kept(tmp_pat
         build_fmu(RESTING, tmp_path, Scene("Resting"), [twice], "native")
     assert "Resting.fmu" in str(refused.value)
     assert "FAIL" in page(tmp_path / "Resting.fmu")
+
+
+def test_the_licence_of_the_runtime_is_not_the_models(tmp_path):
+    """What lagfmu puts in is under its own licence, which a file says; the description has the model's."""
+    for model, said in ((RESTING, None), (replace(RESTING, license="CC0-1.0"), "CC0-1.0")):
+        path = build_fmu(model, tmp_path, target="native", check=False)
+        assert read_model_description(str(path)).license == said
+        with zipfile.ZipFile(path) as archive:
+            text = archive.read("documentation/licenses/lagfmu.txt").decode()
+        assert "sources/ but for model.c" in text
+        assert "MIT License" in text
 
 
 def test_figures_change_nothing_but_the_page(tmp_path):

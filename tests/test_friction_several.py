@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from fixed_step import euler, rk4
+from fixed_step import run as fixed_steps
+from fmi2 import Library
 from fmpy.fmi1 import FMICallException
 from instance import instance
 from runs import simulate_fmu
@@ -38,6 +42,8 @@ g = 9.81  # m/s^2
 x, y, z, theta, phi = dynamicsymbols("x y z theta phi")
 m, G, mu, alpha, a, h, J, e = symbols("m g mu alpha a h J e", nonnegative=True)
 mu_k = symbols("mu_k", nonnegative=True)
+rate, speed, clamp, force = symbols("w v N F")
+t = dynamicsymbols._t
 MASS = [Parameter(m, 1.0, "kg"), Parameter(G, g, "m/s^2")]
 
 
@@ -201,6 +207,91 @@ def test_a_puck_stops_in_both_directions_at_once(native: Make) -> None:
         assert np.hypot(run["slip.along"][-1], run["slip.across"][-1]) < 1e-14
         total = run["energy.total"] + run["energy.dissipated"]
         assert total[-1] == pytest.approx(total[0], abs=100 * tolerance)
+
+
+def whirled() -> Model:
+    """A point mass on a rough table, under a force that turns round at the rate w."""
+    along, aside = m * speed * rate, mu * m * G
+    return Model(
+        name="Whirled",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * G * z,
+        coordinates={x: "m", y: "m", z: "m"},
+        forces={
+            x: -along * cos(rate * t) - aside * sin(rate * t),
+            y: -along * sin(rate * t) + aside * cos(rate * t),
+        },
+        constraints=[
+            Contact("table", z),
+            Nonholonomic("along", x.diff()),
+            Nonholonomic("across", y.diff()),
+            Friction("grip", of=["along", "across"], normal=multiplier("table"), static=mu),
+        ],
+        parameters=[
+            *MASS,
+            Parameter(mu, 0.3, "1"),
+            Parameter(speed, 1.5, "m/s"),
+            Parameter(rate, 6.0, "rad/s"),
+        ],
+        start={x: 0.25, x.diff(): 0.0, y.diff(): 1.5},
+    )
+
+
+@pytest.mark.parametrize("method", [None, euler, rk4])
+def test_a_slide_that_turns_round_does_not_end(native: Make, method: Any, tmp_path: Path) -> None:
+    """A force with the part mu m g along the way and m v w across it leads a puck in a circle of v/w, round
+    and round at the speed v, in co-simulation and by an importer's fixed steps: no slip stops."""
+    angle, turns = 6.0 * 2.0, ["x", "y", "der(x)", "der(y)", "sticks.grip", "sticking.grip.count"]
+    path = native(whirled)
+    if method is None:
+        run = simulate(path, stop_time=2.0, step_size=0.5, tolerance=1e-10)[-1]
+        allowed = 1e-7
+    else:
+        run = fixed_steps(Library(path, tmp_path), method, 4000, 2.0, turns)
+        allowed = 1e-9 if method is rk4 else 0.02
+    assert run["x"] == pytest.approx(0.25 * np.cos(angle), abs=allowed)
+    assert run["y"] == pytest.approx(0.25 * np.sin(angle), abs=allowed)
+    assert run["der(x)"] == pytest.approx(-1.5 * np.sin(angle), abs=6 * allowed)
+    assert run["der(y)"] == pytest.approx(1.5 * np.cos(angle), abs=6 * allowed)
+    assert not run["sticks.grip"]
+    assert run["sticking.grip.count"] == 0
+
+
+def gripped() -> Model:
+    """A block between two belts that are clamped onto it and set off at t = 0, the first stands."""
+    return Model(
+        name="Gripped",
+        lagrangian=m * x.diff() ** 2 / 2,
+        coordinates={x: "m"},
+        forces={x: force},
+        constraints=[
+            Nonholonomic("under", x.diff()),
+            Nonholonomic("over", x.diff() - rate * t),
+            Friction("first", of=["under"], normal=clamp, static=mu),
+            Friction("second", of=["over"], normal=clamp, static=mu),
+        ],
+        parameters=[
+            MASS[0],
+            Parameter(mu, 0.5, "1"),
+            Parameter(clamp, 2.0, "N"),
+            Parameter(force, 0.5, "N"),
+            Parameter(rate, 5.0, "m/s^2"),
+        ],
+    )
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_two_belts_are_slipped_on_in_opposite_senses(native: Make, side: int) -> None:
+    """mu N = 1 N on either side, F = 0.5 N: the upper belt, at 5 m/s^2, drags the block with 1 N, the lower
+    holds it back with 1 N, so that F alone accelerates it.  That is the only motion: with either belt
+    dragging it the other way, or held by one of them, the block would not move as its forces say."""
+    values = {"F": 0.5 * side, "w": 5.0 * side}
+    run = simulate(native(gripped), stop_time=0.5, step_size=0.1, start_values=values)
+    t = run["time"]
+    assert run["x"] == pytest.approx(side * 0.25 * t**2, abs=1e-9)
+    assert run["lambda.under"][1:] == pytest.approx(-side, rel=1e-12)
+    assert run["lambda.over"][1:] == pytest.approx(side, rel=1e-12)
+    assert not run["sticks.first"].any()
+    assert not run["sticks.second"].any()
 
 
 def m_g_sin(angle: float) -> float:

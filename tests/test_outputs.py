@@ -241,7 +241,7 @@ def test_the_page_shows_what_an_output_is_made_of(prepared):
         (Output("tension", -2 * multiplier("rod"), "N"), ("'tension'", "N/m", "expected N")),
         (Output("h", y + m, "m"), ("output 'h'", "'m' (unit kg)", "unit m")),
         (Output("h", y + L, ""), ("output 'h' has no unit", "give one")),
-        (Output("h", y + L, "mm"), ("output 'h'", "1 mm = 0.001 m")),
+        (Output("h", y + L, "degC"), ("output 'h'", "an offset or logarithmic scale")),
         (Output("tension", multiplier("rope"), "N/m"), ("lambda.rope", "constraint", "rod")),
         (Output("f", force_of_constraint(r), "N"), ("Q.r", "coordinate", "x, y")),
         (Output("f", symbols("k") * y, "N"), ("output 'f'", "k is neither", "declare")),

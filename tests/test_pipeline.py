@@ -232,6 +232,9 @@ def test_the_results_that_an_fmu_carries_are_replayed(name, tmp_path):
         errors = replay.replay(str(path), 1e-9)
         assert any(n.startswith(("lambda.", "body.")) for n in errors)
         with zipfile.ZipFile(path) as archive:
+            told = archive.read("documentation/fmi-ls-ref.txt").decode()
+            assert f"{path.stem}_ref.csv" in told
+            assert 'href="fmi-ls-ref.txt"' in archive.read("documentation/index.html").decode()
             (table,) = (n for n in archive.namelist() if n.endswith("_ref.csv"))
             assert 10 < len(archive.read(table).splitlines()) - 1 <= 200
             sizes = [

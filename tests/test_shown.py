@@ -172,9 +172,36 @@ def test_an_invariant_ends_where_a_contact_closes() -> None:
     assert holds([0, 0, 0, 0], [0, 0, 1, 1]) == [True, True, False, False]
     assert holds([1, 0, 0, 0], [0, 2, 2, 2]) == [True, False, False, False]
     assert holds([0, 0, 0, 0], [1, 1, 1, 1]) == [True] * 4
+    kinds[2] = ("closing.a.count", int)
+    assert holds([0, 0, 0, 0], [0, 0, 1, 1]) == [True, True, False, False]
 
 
 def test_degrees_of_freedom_are_counted_with_the_contacts_closed() -> None:
     """On the sphere the particle has one; the line says so, since in flight it has two."""
     shown = CliRunner().invoke(app, ["show", str(MODELS / "hemisphere.py")]).output
     assert "N = n - rank G = 2 - 1 = 1, with every contact closed" in shown
+
+
+def test_show_prints_coulombs_law() -> None:
+    """A mass that slides on the floor: what holds while it sticks is a bound, and then a force against its
+    velocity; a bowling ball's slip is that of the point where it touches."""
+    shown = CliRunner().invoke(app, ["show", str(MODELS / "friction_oscillator.py")]).output
+    assert "grip sticks   |λ_rest| ≤ μ_s |λ_floor|" in shown
+    assert "grip slips    λ_rest = -μ_k |λ_floor| ẋ/|ẋ|" in shown
+    shown = CliRunner().invoke(app, ["show", str(MODELS / "bowling.py")]).output
+    assert "grip slips    λ_touch = -μ |λ_lane| (ẋ - R φ̇)/|ẋ - R φ̇|" in shown
+
+
+def test_show_refuses_a_start_that_build_refuses(tmp_path: Path) -> None:
+    """A bob given at 1.6 m on a rod of 1 m: the equations, then the message of `build`, with status 3."""
+    source = (MODELS / "pendulum.py").read_text(encoding="utf-8")
+    (tmp_path / "off.py").write_text(
+        source + "\nfrom dataclasses import replace\n"
+        "model = replace(model, start={**model.start, next(iter(model.coordinates)): 1.6})\n",
+        encoding="utf-8",
+    )
+    told = {c: CliRunner().invoke(app, [c, str(tmp_path / "off.py")]) for c in ("show", "build")}
+    for done in told.values():
+        assert done.exit_code == 3
+        assert "misses the constraints ('rod' by 1.85 m²)" in done.stderr
+    assert "λ_rod" in told["show"].output

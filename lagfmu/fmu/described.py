@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+import numpy as np
 from numpy.typing import NDArray
 
 from .. import names
@@ -46,6 +47,17 @@ def numbers_of(description: Any) -> dict[str, float]:
         for v in description.modelVariables
         if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
     }
+
+
+def asked(variable: Any, value: Any) -> Any:
+    """A value, or a column of them, that a user asked for of a variable, as the FMU gets it.
+
+    A start that is an expression of parameters goes before it if it differs from the description; one that
+    is asked for by name is meant, so that its described value is handed over one unit in the last place off.
+    """
+    if not (variable.description or "").endswith(names.FOLLOWS):
+        return value
+    return np.where(value == np.float64(variable.start), np.nextafter(value, np.inf), value)[()]
 
 
 def units_of(variables: Sequence[Any]) -> dict[str, str | None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.metadata
 import os
 import tempfile
 import zipfile
@@ -33,6 +34,8 @@ SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves n
 TARGETS = ("python", "native")
 PAGE = "documentation/index.html"
 LIVE = "documentation/play.html"  # beside it, which has a link to it
+REFERENCES = "documentation/fmi-ls-ref.txt"  # likewise, as FMI-LS-REF recommends
+LICENSE = "documentation/licenses/lagfmu.txt"
 
 
 def write(
@@ -70,6 +73,7 @@ def write(
             [c.name for c in prepared.equations.constraints if isinstance(c, Contact)],
         ),
     }
+    extra[LICENSE] = license_of(target).encode()
     if live:
         extra[LIVE] = live.encode()
     if (picture := pictures.picture_of(prepared)) is not None:
@@ -125,12 +129,31 @@ def as_fmu(
         yield write(prepared, folder, closed_forms, kind)
 
 
+def license_of(target: str) -> str:
+    """Of what lagfmu itself puts into an FMU; the model is under the one that its author says, if any."""
+    what = {
+        "native": "the compiled library, and sources/ but for model.c, optional.c, variables.c, identity.h",
+        "python": "resources/ but for the generated script, its tables and what they describe",
+    }[target]
+    text = importlib.metadata.distribution("lagfmu").read_text("licenses/LICENSE")
+    if text is None:
+        raise BuildError(
+            "lagfmu is not installed as a whole, its licence is missing: install it anew"
+        )
+    return (
+        f"This is the licence of the part of the FMU that comes with lagfmu: {what}.\n"
+        "The model is under the licence that modelDescription.xml names, if it names one.\n\n"
+        + text
+    )
+
+
 def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]] = ()) -> None:
     """Put files, and the figures of a verification, into an FMU that stands at `path`."""
     with zipfile.ZipFile(path) as archive:
         contents = {name: archive.read(name) for name in archive.namelist()} | dict(more)
-    if figures:
-        contents[PAGE] = with_figures(contents[PAGE].decode(), figures).encode()
+    told = Path(REFERENCES).name if REFERENCES in more else ""
+    if figures or told:
+        contents[PAGE] = with_figures(contents[PAGE].decode(), figures, told).encode()
     write_whole(path, pack(contents))
 
 

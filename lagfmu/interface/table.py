@@ -203,7 +203,7 @@ class _Builder:
         start = self.starts[name]
         approx = name in self.movable or bool(start.free_symbols)
         if start.free_symbols:
-            description += f"; starts at {start} unless another start is set"
+            description += f"; starts at {start} {names.FOLLOWS}"
         return Variable(
             of=of,
             kind="Real",

@@ -165,9 +165,9 @@ def _group(v: Variable) -> str:
     return by_role.get(v.role) or TITLES.get(v.of.head, "Motion")
 
 
-def with_figures(text: str, figures: Sequence[tuple[str, ...]]) -> str:
+def with_figures(text: str, figures: Sequence[tuple[str, ...]], references: str = "") -> str:
     """The page with rows (closed form, largest error, allowed, points, verdict) of a verification in their
-    place."""
+    place, and a link to the file beside it that tells of reference results."""
     link = '<li><a href="#verification">Verification</a></li>'
-    found = template("page/verification.html.j2").render(figures=figures)
+    found = template("page/verification.html.j2").render(figures=figures, references=references)
     return text.replace(LINK, link).replace(FIGURES, found.rstrip())

@@ -66,6 +66,8 @@ def typeset(form: Form) -> tuple[Section, ...]:
     sections = [page.energies(), page.lagrange()]
     if eom.m:
         sections += [page.constraints(), page.forces(), page.accelerations()]
+    if eom.frictions:
+        sections.append(page.frictions())
     if form.formulation == "nullspace" and eom.m:
         sections.append(page.without_lambda())
     if reduction is not None:
@@ -295,6 +297,56 @@ class _Typesetter:
                 ("potential energy", [("V =", "V ="), show(_energy(self.eom.potential))])
             )
         return self.section("Energies", "", equations)
+
+    def frictions(self) -> Section:
+        """Coulomb's law: |lambda| <= static |N| where it sticks, lambda = -kinetic |N| s/|s| where not."""
+        show, factor = self.notation.show, self.notation.factor
+        rows = [c.name for c in self.eom.constraints]
+
+        def vector(expressions: Sequence[Expr]) -> Printed:
+            latex, text = zip(*map(show, expressions), strict=True)
+            return (", ".join(latex), ", ".join(text))
+
+        equations: list[tuple[str, Sequence[Printed]]] = []
+        for law in self.eom.frictions:
+            normal = sp.Add(law.load, *(c * multiplier(k) for k, c in law.normal.items()))
+            forces = vector([multiplier(k) for k in law.of])
+            places = [rows.index(k) for k in law.of]
+            slip = [
+                sp.Add(*(self.eom.G[k, j] * v for j, v in enumerate(self.eom.v))) - self.eom.nu[k]
+                for k in places
+            ]
+            speed = vector([_tidy(s) for s in slip])
+            s = ("s", "s") if len(slip) > 1 else speed
+            bound = ("\\left|{}\\right|", "|{}|")
+            size = tuple(b.format(f) for b, f in zip(bound, show(normal), strict=True))
+            many = len(slip) > 1
+            vectors = ("\\left({}\\right)", "({})") if many else ("{}", "{}")
+            force = tuple(v.format(f) for v, f in zip(vectors, forces, strict=True))
+            length = tuple(b.format(f) for b, f in zip(bound, force, strict=True))
+            stick: list[Printed] = [(length[0], length[1]), ("\\le", "≤"), factor(law.static)]
+            equations.append((f"{law.name} sticks", [*stick, (size[0], size[1])]))
+            sign = (
+                f"\\frac{{{s[0]}}}{{\\left|{s[0]}\\right|}}",
+                f"({s[1]})/|{s[1]}|" if " " in s[1] else f"{s[1]}/|{s[1]}|",
+            )
+            kinetic = factor(law.kinetic)
+            slide: list[Printed] = [
+                (force[0], force[1]),
+                ("=", "="),
+                ("-" + kinetic[0], "-" + kinetic[1]),
+            ]
+            slide += [(size[0], size[1]), sign]
+            if many:
+                slide += [
+                    ("\\text{with } s =", "with s ="),
+                    (vectors[0].format(speed[0]), vectors[1].format(speed[1])),
+                ]
+            equations.append((f"{law.name} slips", slide))
+        remark = (
+            "What a friction limits holds as long as it sticks; where it slips this is its force."
+        )
+        return self.section("Coulomb's law", remark, equations)
 
     def lagrange(self) -> Section:
         """(M vdot)_j - (F - Q_nc)_j = Q_nc,j + sum_k lambda_k a_kj."""

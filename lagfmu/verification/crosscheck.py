@@ -18,7 +18,7 @@ from xml.etree import ElementTree as ET
 from .. import names
 from ..errors import SimulationError
 from ..fmu.described import Trajectory, experiment_of, read_description
-from ..fmu.write import write_whole
+from ..fmu.write import REFERENCES, write_whole
 from .pipeline import as_json
 from .report import report
 from .simulate import communication_points, simulate
@@ -35,6 +35,16 @@ MANIFEST = {
     "fmi-ls:fmi-ls-description": "Layered Standard providing information on related files included "
     "in an FMU.",
 }
+NOTE = """Reference results of {name} (FMI-LS-REF), in extra/org.fmi-standard.fmi-ls-ref/
+
+One experiment: from the start values of modelDescription.xml to {stop!r} s, with a communication step of
+{step!r} s.  {file} holds multipliers, generalized forces of constraint, coordinates, contacts and
+events, made by this FMU in co-simulation at a relative tolerance of {tolerance:g}.
+
+Expect each Real within ten times your tolerance of its column's largest magnitude; more in long runs and in
+chaotic motions; single points beside an event may differ by the error of its time.  Look at the multipliers:
+they are what this FMU is for.  verification.json tells how far the outputs were from their closed forms.
+"""
 README = """# {name}: reference results
 
 Made by lagfmu with fmpy from `{file}` at a relative tolerance of {tolerance:g}: co-simulation from 0 to
@@ -163,7 +173,8 @@ def layered(fmu: Path, found: Verification | None) -> dict[str, bytes]:
     for kind, source, role, what in related:
         ET.SubElement(manifest, "Related", type=kind, source=source, role=role, description=what)
     files["fmi-ls-manifest.xml"] = _xml(manifest)
-    return {f"{PLACE}/{k}": v for k, v in sorted(files.items())}
+    told = NOTE.format(name=name, file=f"{name}_ref.csv", stop=stop, step=wide, tolerance=TOLERANCE)
+    return {f"{PLACE}/{k}": v for k, v in sorted(files.items())} | {REFERENCES: told.encode()}
 
 
 def at_points(fmu: Path, stop: float, step: float) -> Trajectory:

@@ -21,7 +21,14 @@ from numpy.typing import NDArray
 from .. import names
 from ..errors import SettingError, SimulationError
 from ..fmu.archive import unpack
-from ..fmu.described import Trajectory, experiment_of, has_error_bars, items_of, read_description
+from ..fmu.described import (
+    Trajectory,
+    asked,
+    experiment_of,
+    has_error_bars,
+    items_of,
+    read_description,
+)
 from ..fmu.python import offered, slave_of
 from ..fmu.slave import Refused
 from ..methods import IN_PYTHON, NUMBERS, unknown
@@ -183,7 +190,8 @@ def _simulate_model(
         for name, value in values.items():
             whole = settable[name].kind == "Enumeration"
             give = slave.set_integer if whole else slave.set_real
-            give([place[name]], [settable[name].items.get(value, value)])
+            number = settable[name].items.get(value, asked(table[name], value))
+            give([place[name]], [number])
         slave.set_real([place[n] for n in fed], [float(x[0]) for x in fed.values()])
         slave.exit_initialization_mode()
         for k, t in enumerate(times.tolist()):
@@ -275,8 +283,10 @@ def _simulate_fmu(
         if v.causality in ("parameter", "input") or v.initial in ("exact", "approx")
     }
     _check_values(str(path), settable, values)
+    variables = {v.name: v for v in description.modelVariables}
     values = {
-        k: settable[k].items.get(v, v) if isinstance(v, str) else v for k, v in values.items()
+        k: settable[k].items.get(v, v) if isinstance(v, str) else asked(variables[k], v)
+        for k, v in values.items()
     }
     folder = unpack(path)
     try:

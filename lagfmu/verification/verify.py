@@ -362,6 +362,8 @@ def _landed(result: Trajectory) -> NDArray[np.bool_]:
             count in known
         ):  # one that opens twice between two points, or while it was open, had closed
             landed[1:] |= np.diff(np.asarray(result[count], dtype=float)) > closed[:-1]
+        if (impacts := names.name(names.CLOSINGS, contact)) in known:  # a bounce, too
+            landed |= np.asarray(result[impacts]) > 0
     return np.logical_or.accumulate(landed)
 
 

@@ -27,6 +27,7 @@ def show(
     from ...page.text import show as show_prepared
     from ...page.text import show_what_is_known
     from ...prepare.prepare import prepare
+    from ...prepare.starts import check_given
     from ..scenes import chosen, loaded, narrowed
 
     with plainly():
@@ -38,3 +39,5 @@ def show(
                 show_what_is_known(error.known, console)
                 raise
             show_prepared(prepared, console)
+            structure = prepared.structure
+            check_given(file.model.name, structure.start.moved, structure.missed)

@@ -68,7 +68,9 @@ def number(text: str, name: str, what: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise SettingError(f"{what}: {text!r} is no finite number")
+        raise SettingError(
+            f"{what}: {text!r} is no finite number; expected one in SI, without a unit"
+        )
     return value
 
 

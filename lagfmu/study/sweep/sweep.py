@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ... import names
 from ...errors import SettingError, SimulationError
 from ...fmu.archive import opened, unpack, version
-from ...fmu.described import Trajectory, experiment_of, read_description
+from ...fmu.described import Trajectory, asked, experiment_of, read_description
 from ...fmu.session import TYPES, Plan, plug
 from ...fmu.write import as_fmu
 from ...model.model import Model
@@ -243,7 +243,10 @@ def _run(
     """What is not yet there.  Raises KeyboardInterrupt, when all that is finished is kept."""
     layout, chunk = study.layout, study.chunk
     total, done, refused = len(layout.design), parts.done, 0
-    table = layout.design.table
+    description = read_description(study.path)
+    variables = {v.name: v for v in description.modelVariables}
+    columns = zip(layout.design.names, layout.design.table.T, strict=True)
+    table = np.column_stack([asked(variables[n], column) for n, column in columns])
     left = [
         (n, table[n * chunk : (n + 1) * chunk]) for n in range(-(-total // chunk)) if n not in done
     ]
@@ -259,7 +262,7 @@ def _run(
             stack.callback(closed, client)
         folder = unpack(study.path)
         stack.callback(shutil.rmtree, folder, ignore_errors=True)
-        plugged = plug(study.path, read_description(study.path), folder)
+        plugged = plug(study.path, description, folder)
         tell()
         if client is None:
             stop = stack.enter_context(asked_to_stop())
