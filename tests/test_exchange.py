@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from fmi2 import EXCHANGE, EventInfo, Library, Single
-from sympy import Rational, sin, symbols
+from sympy import Heaviside, Rational, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu
@@ -67,6 +67,21 @@ def table() -> Model:
             Contact(f"leg{k}", z + a * R * roll + b * R * pitch) for k, (a, b) in enumerate(legs)
         ],
         parameters=[MASS, GRAVITY, Parameter(R, RADIUS, "m")],
+        start={z: 0.0},
+    )
+
+
+def lifted() -> Model:
+    """A block on a floor that a force of three times its weight begins to pull up at t = 0.5 s."""
+    T = symbols("T", positive=True)
+    pull = 3 * m * g * Heaviside(dynamicsymbols._t - T)
+    return Model(
+        name="Lifted",
+        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
+        coordinates={z: "m"},
+        forces={z: pull},
+        constraints=[Contact("floor", z)],
+        parameters=[MASS, GRAVITY, Parameter(T, 0.5, "s")],
         start={z: 0.0},
     )
 
@@ -226,6 +241,25 @@ def test_a_bounce_returns_its_part_of_the_speed_at_the_floor(library, e):
     height, rebound = one.array("GetContinuousStates", 2)
     assert height == pytest.approx(0, abs=1e-12)
     assert rebound == pytest.approx(e * np.sqrt(speed**2 - 2 * one.get("g") * depth), rel=1e-12)
+    one.does("EnterEventMode")
+    assert not one.events().values  # nothing more happens
+
+
+def test_a_force_that_has_come_is_said_and_lifts_off(of):
+    """At the end of an importer's step past t = 0.5 s a pull of 3 m g has come, whether or not it has looked:
+    an event is asked for, in which the block leaves the floor; it goes up with 2 g."""
+    event, end = c_int(), c_int()
+    one = continuous(of(lifted))
+    for time in (0.4, 0.6):
+        one.does("SetTime", c_double(time))
+        one.states((0.0, 0.0))
+        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
+        assert event.value == (time > 0.5)
+    one.does("EnterEventMode")
+    one.events()
+    assert one.integer("departure.floor.count") == 1
+    assert one.get("lambda.floor") == 0
+    assert one.array("GetDerivatives", 2) == pytest.approx([0, 2 * one.get("g")], rel=1e-12)
 
 
 def test_what_an_importer_has_not_seen_is_said(library, of):
