@@ -19,27 +19,21 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
-from sympy import Eq, Symbol, factor_terms, sympify
+from sympy import Eq, factor_terms, sympify
 from sympy import Integral as Integral_
 from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
 from ...model.display import Displayed
 from ...model.elements import Expr
-from .coefficients import Chart, pfaffian
-from .echelon import rref
-from .frobenius import curvature, derived_flag, exact, obstruction
+from .forms import Chart, on_surfaces, pfaffian
+from .frobenius import closed, curvature, derived_flag, obstruction, rref
+from .functions import Functions
+from .generators import Undecided
 from .integrals import first_integrals
-from .surfaces import on_surfaces
-from .tower import Tower
-from .undecided import Undecided, within
 
 __all__ = ["Classification", "Integral", "Kind", "classify", "pfaffian"]
-
-
-_EFFORT = 3e6  # for the integrals of a set, and again for those of its forms one by one
 
 
 class Kind(StrEnum):
@@ -99,15 +93,16 @@ def classify(
     `forms` are linear in the velocities q_j' of the `coordinates` q_j (`dynamicsymbols`), and set
     to zero; every other symbol is a generic parameter, every other function an unknown one.
     Numbers with a decimal point are read as the decimal number with 14 digits.  With
-    `integrate=False`, the integrals are not looked for; else, with an effort that is
-    counted in operations: the answer is the same on every machine and under any load.
+    `integrate=False`, the integrals are not looked for; else, where an integrating factor is
+    simple.  What would take too long is told by the sizes of expressions, not by a clock: the answer is the
+    same on every machine and under any load.
     """
     given = tuple(forms) if isinstance(forms, list | tuple) else (forms,)
     plain = tuple(f.lhs - f.rhs if isinstance(f, Eq) else sympify(f) for f in given)
     for form in plain:
         pfaffian(form, coordinates)  # it is one, as it was given
     left, surfaces, free = on_surfaces(plain, tuple(coordinates), holonomic)
-    return _classify(left, free, surfaces, integrate, _EFFORT)
+    return _classify(left, free, surfaces, integrate)
 
 
 def _classify(
@@ -115,121 +110,106 @@ def _classify(
     coordinates: tuple[Expr, ...],
     surfaces: tuple[Expr, ...],
     integrate: bool,
-    effort: float,
 ) -> Classification:
-    time = dynamicsymbols._t
-    held = tuple(f.diff(time) for f in surfaces)
-    split = [pfaffian(form, coordinates) for form in (*forms, *held)]
-    rows = [[*a, a0] for a, a0 in split]
-    used: set[Any] = set().union(*(entry.free_symbols for row in rows for entry in row))
-    chart = Chart(coordinates, {symbol for symbol in used if isinstance(symbol, Symbol)})
-    rows = [[chart.there(entry) for entry in row] for row in rows]
     each: tuple[Classification, ...] = ()
     if len(forms) > 1:
-        share = effort / len(forms)
-        each = tuple(_classify((form,), coordinates, surfaces, integrate, share) for form in forms)
-    levels = [chart.there(f) for f in surfaces]
-    known = [*levels, *(chart.there(i.f) for c in each for i in c.integrals)]
-    analysis = _Analysis(forms, held, rows, chart, each)
-    return analysis.run(known, levels, effort if integrate else 0.0)
+        each = tuple(_classify((form,), coordinates, surfaces, integrate) for form in forms)
+    system = _System(forms, coordinates, surfaces)
+    back = system.chart.back
+    try:
+        kind, flag, bottom, text, witness = system.proof()
+    except Undecided as undecided:
+        expr = back(undecided.expr)
+        text = f"undecided: whether {expr} is zero decides the answer, and it is {undecided.reason}"
+        return Classification(Kind.UNDECIDED, forms, system.rank, None, (), text, expr, each)
+    found: tuple[Integral, ...] = ()
+    depth = flag[-1]
+    if integrate and depth:
+        found = system.integrals(bottom, [i.f for c in each for i in c.integrals])
+        if len(found) < depth:
+            were = "was" if len(found) == 1 else "were"
+            text += f"; of {depth} integrals, {len(found)} {were} found in closed form"
+    return Classification(kind, forms, system.rank, depth, found, text, witness, each, flag)
 
 
-class _Analysis:
-    """Frobenius' theorem and the derived flag for the rows a of one-forms sum_j a_j dx_j: the forms, and
-    `held`, which are differentials."""
+class _System:
+    """The one-forms of a set, and the differentials of the surfaces that they are held on."""
 
     def __init__(
-        self,
-        forms: tuple[Expr, ...],
-        held: tuple[Expr, ...],
-        rows: list[list[Expr]],
-        chart: Chart,
-        each: tuple[Classification, ...],
+        self, forms: tuple[Expr, ...], coordinates: tuple[Expr, ...], surfaces: tuple[Expr, ...]
     ) -> None:
-        self.forms, self.rows, self.chart, self.each = forms, rows, chart, each
-        self.all = (*forms, *held)
-        self.variables = chart.variables
-        self.width = len(self.variables)
-        self.tower = Tower(self.variables, [entry for row in rows for entry in row])
+        self.forms = forms
+        self.all = (*forms, *(f.diff(dynamicsymbols._t) for f in surfaces))
+        rows = [[*a, a0] for a, a0 in (pfaffian(form, coordinates) for form in self.all)]
+        self.chart = Chart(coordinates, [entry for row in rows for entry in row])
+        self.rows = [[self.chart.there(entry) for entry in row] for row in rows]
+        self.levels = [self.chart.there(f) for f in surfaces]
+        self.rank = 0
 
-    def run(self, known: list[Expr], levels: list[Expr], effort: float) -> Classification:
-        rank = fixed = 0
-        try:
-            for entry in (entry for row in self.rows for entry in row if entry.has(Integral_)):
-                raise Undecided(entry, "an integral, which is not looked into")
-            matrix = [[self.tower.element(entry) for entry in row] for row in self.rows]
-            reduced, pivots = self._echelon(matrix)
-            count = len(pivots)
-            fixed = len(rref(self.tower, matrix[len(self.forms) :], self.width)[1]) if levels else 0
-            rank = count - fixed
-            self._consistent(reduced, pivots)
-            basis = [row[: self.width] for row in reduced[:count]]
-            bend = curvature(self.tower, basis, pivots)
-            first, witness, where = obstruction(self.tower, matrix, bend, pivots)
-            flag, bottom = derived_flag(self.tower, basis, bend)
-            stands = all(exact(self.tower, row) for row in matrix[: len(self.forms)])
-        except Undecided as undecided:
-            return self._answer(
-                Kind.UNDECIDED,
-                rank,
-                None,
-                (),
-                f"undecided: whether {self.chart.back(undecided.expr)} is zero decides the answer, "
-                f"and it is {undecided.reason}",
-                self.chart.back(undecided.expr),
-                (),
-            )
-        flag = [rank - fixed for rank in flag]
-        depth = flag[-1]
-        if stands:
+    def proof(self) -> tuple[Kind, tuple[int, ...], list[list[Expr]], str, Expr]:
+        """Frobenius' theorem: the kind, the derived flag and the rows at its bottom, certificate, witness."""
+        entries = [entry for row in self.rows for entry in row]
+        for entry in (entry for entry in entries if entry.has(Integral_)):
+            raise Undecided(entry, "an integral, which is not looked into")
+        variables = self.chart.variables
+        width, count = len(variables), len(self.all)
+        field = self.field = Functions(variables, entries)
+        matrix = [[field.element(entry) for entry in row] for row in self.rows]
+        unit = [[field.one if i == j else field.zero for j in range(count)] for i in range(count)]
+        whole = [
+            a + b for a, b in zip(matrix, unit, strict=True)
+        ]  # each with what it is combined of
+        self.reduced, self.pivots = rref(field, whole, width)
+        held = len(rref(field, matrix[len(self.forms) :], width)[1])
+        self.rank = len(self.pivots) - held
+        self._consistent()
+        basis = [row[:width] for row in self.reduced[: len(self.pivots)]]
+        bend = curvature(field, basis, self.pivots)
+        first, value, where = obstruction(field, matrix, bend, self.pivots)
+        ranks, bottom = derived_flag(field, basis, bend)
+        flag = tuple(rank - held for rank in ranks)
+        if all(closed(field, row) for row in matrix[: len(self.forms)]):
             kind = Kind.HOLONOMIC
-        elif depth == rank:
+        elif flag[-1] == self.rank:
             kind = Kind.INTEGRABLE
         else:
-            kind = Kind.PARTLY if depth else Kind.NONHOLONOMIC
-        found: list[Integral] = []
-        if effort and depth:
-            rows = [[self.tower.back(entry) for entry in row] for row in bottom]
-            with within(effort):
-                candidates = first_integrals(self.rows, rows, self.variables, known)
-            for f in (f for f in candidates if f not in levels):
-                with suppress(Undecided):  # it has passed, but its factors may be too long
-                    found.append(self._integral(f, reduced[:count], pivots))
-        witness = self.chart.back(factor_terms(self.tower.back(witness)))
+            kind = Kind.PARTLY if flag[-1] else Kind.NONHOLONOMIC
+        witness = self.chart.back(factor_terms(field.expr(value)))
         text = self._certificate(kind, flag, first, witness, where)
-        if effort and len(found) < depth:
-            text += (
-                f"; of {depth} integrals, {len(found)} "
-                f"{'was' if len(found) == 1 else 'were'} found in closed form"
-            )
-        return self._answer(kind, rank, depth, tuple(found), text, witness, tuple(flag))
+        return kind, flag, [[field.expr(a) for a in row] for row in bottom], text, witness
 
-    def _answer(
-        self,
-        kind: Kind,
-        rank: int,
-        depth: int | None,
-        found: tuple[Integral, ...],
-        text: str,
-        witness: Expr,
-        flag: tuple[int, ...],
-    ) -> Classification:
-        return Classification(kind, self.forms, rank, depth, found, text, witness, self.each, flag)
+    def integrals(self, bottom: list[list[Expr]], known: list[Expr]) -> tuple[Integral, ...]:
+        """Integrals of the rows, besides the surfaces themselves."""
+        known = [*self.levels, *map(self.chart.there, known)]
+        found = []
+        for f in first_integrals(self.rows, bottom, self.chart.variables, known):
+            if f not in self.levels:
+                with suppress(Undecided):  # it has passed, but its factors may be too long
+                    found.append(self._integral(f))
+        return tuple(found)
 
-    def _echelon(self, matrix: list[list[Any]]) -> tuple[list[list[Any]], list[int]]:
-        """Reduced rows, each followed by its combination of the given forms."""
-        tower, count = self.tower, len(matrix)
-        unit = [
-            [tower.K.one if i == j else tower.K.zero for j in range(count)] for i in range(count)
-        ]
-        return rref(tower, [a + b for a, b in zip(matrix, unit, strict=True)], self.width)
+    def _integral(self, f: Expr) -> Integral:
+        """f with its integrating factors: df = sum_i (df/dx_(p_i)) (reduced row i)."""
+        variables = self.chart.variables
+        field = Functions(variables, [f, *(entry for row in self.rows for entry in row)])
+        f = min(f, field.expr(field.element(f)), key=lambda e: e.count_ops())
+        slopes = [field.element(f.diff(variables[pivot])) for pivot in self.pivots]
+        factors = []
+        for k in range(len(self.forms)):
+            parts = [
+                field.times(slope, field.element(self.field.expr(row[len(variables) + k])))
+                for slope, row in zip(slopes, self.reduced, strict=False)
+            ]
+            factors.append(self.chart.back(factor_terms(field.expr(field.plus(*parts)))))
+        return Integral(self.chart.back(f), tuple(factors))
 
-    def _consistent(self, reduced: list[list[Any]], pivots: list[int]) -> None:
+    def _consistent(self) -> None:
         """dt is no combination of the forms: else, they ask that a function of (q, t) be zero."""
-        if self.width - 1 not in pivots:
+        width = len(self.chart.variables)
+        if width - 1 not in self.pivots:
             return
-        row = reduced[pivots.index(self.width - 1)]
-        used = [k for k in range(len(self.all)) if row[self.width + k]]
+        row = self.reduced[self.pivots.index(width - 1)]
+        used = [k for k in range(len(self.all)) if row[width + k]]
         if len(used) == 1 and not any(self.rows[used[0]][:-1]):
             raise DerivationError(
                 f"constraint {self.all[used[0]]} has no velocity in it: it is no Pfaffian "
@@ -242,28 +222,15 @@ class _Analysis:
             "is not zero; remove or correct one of them"
         )
 
-    def _integral(self, f: Expr, reduced: list[list[Any]], pivots: list[int]) -> Integral:
-        """f with its integrating factors: df = sum_i (df/dx_(p_i)) (reduced row i)."""
-        tower = Tower(self.variables, [f, *(entry for row in self.rows for entry in row)])
-        f = min(f, tower.back(tower.element(f)), key=lambda e: e.count_ops())  # common factors gone
-        factors = [tower.K.zero] * len(self.forms)
-        for row, pivot in zip(reduced, pivots, strict=True):
-            slope = tower.element(f.diff(self.variables[pivot]))
-            for k in range(len(self.forms)):
-                part = tower.element(self.tower.back(row[self.width + k]))
-                factors[k] = tower.lift(factors[k]) + tower.lift(slope) * part
-        listed = [self.chart.back(factor_terms(tower.back(tower.reduce(mu)))) for mu in factors]
-        return Integral(self.chart.back(f), tuple(listed))
-
     def _certificate(
         self,
         kind: Kind,
-        flag: list[int],
+        flag: tuple[int, ...],
         first: int | None,
         witness: Expr,
         where: tuple[int, ...],
     ) -> str:
-        names = [str(variable.name) for variable in self.variables]
+        names = [str(variable.name) for variable in self.chart.variables]
         count, held = len(self.forms), len(self.all) - len(self.forms)
         alone = count == 1
         wedge = "omega" if alone else " ^ ".join(f"omega_{k + 1}" for k in range(count))

@@ -1,119 +1,168 @@
-"""Frobenius' theorem and the derived flag of a codistribution.
+"""Frobenius' theorem and the derived flag of a codistribution, by linear algebra over its functions.
 
 Reduced rows omega_i = dx_p + sum_f b_f dx_f, p being the pivots, span it; X_f = d/dx_f - sum_i b_if
 d/dx_(p_i) are the fields they annul.  The codistribution is integrable where every d(omega_i)(X_f,
 X_g) = X_f(b_g) - X_g(b_f) vanishes; else I(k+1) = {omega in I(k): d(omega) = 0 mod I(k)} ends in the
-largest part that is (Bryant et al., *Exterior Differential Systems*, ch. II).
+largest part that is (Bryant et al., *Exterior Differential Systems*, ch. II).  All ranks are generic:
+they hold where no pivot vanishes.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from .echelon import determinant, nullspace, rref
-from .tower import Tower
+from .functions import Functions
+from .generators import Undecided
+
+Row = list[Any]  # of elements: the coefficients of a one-form
 
 
-def pairs(count: int) -> Iterator[tuple[int, int]]:
-    """All (i, j) with i < j < count."""
-    return itertools.combinations(range(count), 2)
+def size(element: Any) -> int:
+    """Terms above and below."""
+    return len(element.numer) + len(element.denom)
 
 
-def exact(tower: Tower, row: list[Any]) -> bool:
+def rref(field: Functions, rows: Sequence[Row], width: int) -> tuple[list[Row], list[int]]:
+    """Reduced row echelon form with pivots in the first `width` columns; zero rows last."""
+    matrix = [list(row) for row in rows]
+    pivots: list[int] = []
+    for column in range(width):
+        top = len(pivots)
+        chosen = _pivot(field, matrix, top, column)
+        if chosen is None:
+            continue
+        matrix[top], matrix[chosen] = matrix[chosen], matrix[top]
+        head = matrix[top][column]
+        matrix[top] = [field.over(entry, head) for entry in matrix[top]]
+        for k, row in enumerate(matrix):
+            factor = row[column]
+            if k != top and factor:
+                matrix[k] = [
+                    field.minus(a, field.times(factor, b)) if b else a
+                    for a, b in zip(row, matrix[top], strict=True)
+                ]
+                matrix[k][column] = field.zero
+        pivots.append(column)
+    return matrix, pivots
+
+
+def _pivot(field: Functions, matrix: list[Row], top: int, column: int) -> int | None:
+    """The row of the shortest entry that is proven not zero."""
+    doubt: Undecided | None = None
+    for k in sorted(range(top, len(matrix)), key=lambda k: size(matrix[k][column])):
+        try:
+            if not field.is_zero(matrix[k][column]):
+                return k
+            matrix[k][column] = field.zero
+        except Undecided as undecided:
+            doubt = undecided
+    if doubt is not None:
+        raise doubt
+    return None
+
+
+def determinant(field: Functions, matrix: list[Row]) -> Any:
+    """By expansion along the first row: the sets are small."""
+    if not matrix:
+        return field.one
+    parts = []
+    for j, entry in enumerate(matrix[0]):
+        if entry:
+            minor = determinant(field, [[*row[:j], *row[j + 1 :]] for row in matrix[1:]])
+            parts.append(field.times(entry, -minor if j % 2 else minor))
+    return field.plus(*parts)
+
+
+def closed(field: Functions, row: Row) -> bool:
     """d(omega) = 0 as it stands."""
-    for i, j in pairs(len(tower.variables)):
-        one = tower.diff(row[j], tower.variables[i])
-        two = tower.diff(row[i], tower.variables[j])
-        if not tower.is_zero(tower.lift(one) - tower.lift(two)):
-            return False
-    return True
+    return all(
+        field.is_zero(field.minus(field.diff(row[j], x), field.diff(row[i], y)))
+        for (i, x), (j, y) in itertools.combinations(enumerate(field.variables), 2)
+    )
 
 
-def along(
-    tower: Tower, basis: Sequence[Sequence[Any]], pivots: Sequence[int], f: int, value: Any
-) -> Any:
+def along(field: Functions, basis: Sequence[Row], pivots: Sequence[int], f: int, value: Any) -> Any:
     """X_f(value), with X_f = d/dx_f - sum_i b_if d/dx_(p_i)."""
-    total = tower.diff(value, tower.variables[f])
-    for row, pivot in zip(basis, pivots, strict=True):
-        if row[f]:
-            slope = tower.diff(value, tower.variables[pivot])
-            total = tower.lift(total) - tower.lift(row[f]) * slope
-    return tower.reduce(total)
+    slopes = [
+        field.times(-row[f], field.diff(value, field.variables[pivot]))
+        for row, pivot in zip(basis, pivots, strict=True)
+        if row[f]
+    ]
+    return field.plus(field.diff(value, field.variables[f]), *slopes)
 
 
-def curvature(
-    tower: Tower, basis: list[list[Any]], pivots: list[int]
-) -> dict[tuple[int, int], list[Any]]:
-    """d(omega_i)(X_f, X_g), omega_i being the reduced rows, and X_f the fields they annul.
+Curvature = dict[tuple[int, int], Row]  # (f, g) -> d(omega_i)(X_f, X_g) of each reduced row
 
-    With omega_i = dx_p + sum_f b_f dx_f, it is X_f(b_g) - X_g(b_f).
-    """
-    free = [j for j in range(len(tower.variables)) if j not in pivots]
+
+def curvature(field: Functions, basis: list[Row], pivots: list[int]) -> Curvature:
+    """d(omega_i)(X_f, X_g) = X_f(b_g) - X_g(b_f), omega_i being the reduced rows."""
+    free = [j for j in range(len(field.variables)) if j not in pivots]
     table = {}
-    for f, g in ((free[i], free[j]) for i, j in pairs(len(free))):
+    for f, g in itertools.combinations(free, 2):
         column = []
         for row in basis:
-            one = along(tower, basis, pivots, f, row[g])
-            two = along(tower, basis, pivots, g, row[f])
-            value = tower.reduce(tower.lift(one) - tower.lift(two))
-            column.append(tower.K.zero if tower.is_zero(value) else value)
+            one = along(field, basis, pivots, f, row[g])
+            value = field.minus(one, along(field, basis, pivots, g, row[f]))
+            column.append(field.zero if field.is_zero(value) else value)
         table[f, g] = column
     return table
 
 
 def obstruction(
-    tower: Tower,
-    matrix: list[list[Any]],
-    bend: dict[tuple[int, int], list[Any]],
-    pivots: list[int],
+    field: Functions, matrix: list[Row], bend: Curvature, pivots: list[int]
 ) -> tuple[int | None, Any, tuple[int, ...]]:
     """k, a coefficient of d(omega_k) wedge omega_1 ... that is not zero, and its place.
 
-    The coefficient at dx_f, dx_g and the pivots is det(a_P) d(omega_k)(X_f, X_g), a_P being
-    the pivot columns of independent forms; as omega_k = sum_i a_(k, p_i) (reduced row i),
-    d(omega_k)(X_f, X_g) = sum_i a_(k, p_i) d(reduced row i)(X_f, X_g).
+    The coefficient at dx_f, dx_g and the pivots is det(a_P) d(omega_k)(X_f, X_g), a_P being the pivot
+    columns of independent forms, and omega_k = sum_i a_(k, p_i) (reduced row i).
     """
-    best: tuple[int | None, Any, tuple[int, ...]] = (None, tower.K.zero, ())
+    found: list[tuple[int, Any, tuple[int, ...]]] = []
     for (f, g), column in bend.items():
         for k, row in enumerate(matrix):
-            value = tower.K.zero
-            for pivot, entry in zip(pivots, column, strict=True):
-                value += tower.lift(row[pivot]) * tower.lift(entry)
-            value = tower.reduce(value)
-            if value and not tower.is_zero(value):
-                value = tower.reduce(value * _minor(tower, matrix, pivots))
-                size = len(value.numer) + len(value.denom)
-                if best[0] is None or size < len(best[1].numer) + len(best[1].denom):
-                    best = (k, value, (f, g, *pivots))
-    return best
-
-
-def _minor(tower: Tower, matrix: list[list[Any]], pivots: list[int]) -> Any:
-    """The determinant of the pivot columns of the first independent forms."""
-    transposed = [[tower.lift(row[p]) for row in matrix] for p in pivots]
-    _, independent = rref(tower, transposed, len(matrix))
-    square = [[tower.lift(matrix[k][p]) for p in pivots] for k in independent]
-    return determinant(tower, square)
+            value = field.plus(
+                *[field.times(row[p], b) for p, b in zip(pivots, column, strict=True)]
+            )
+            if not field.is_zero(value):
+                found.append((k, value, (f, g, *pivots)))
+    if not found:
+        return None, field.zero, ()
+    _, independent = rref(field, [[row[p] for row in matrix] for p in pivots], len(matrix))
+    minor = determinant(field, [[matrix[k][p] for p in pivots] for k in independent])
+    whole = [(k, field.times(value, minor), where) for k, value, where in found]
+    return min(whole, key=lambda one: size(one[1]))
 
 
 def derived_flag(
-    tower: Tower, basis: list[list[Any]], bend: dict[tuple[int, int], list[Any]]
-) -> tuple[list[int], list[list[Any]]]:
+    field: Functions, basis: list[Row], bend: Curvature
+) -> tuple[list[int], list[Row]]:
     """The ranks of the derived flag down to where it is stable, and the reduced rows there."""
     flag = [len(basis)]
     while basis and any(any(column) for column in bend.values()):
-        kernel = nullspace(tower, list(bend.values()), len(basis))
         derived = []
-        for vector in kernel:
-            row = [tower.K.zero] * len(tower.variables)
-            for factor, form in zip(vector, basis, strict=True):
-                row = [
-                    a + tower.lift(factor) * tower.lift(b) for a, b in zip(row, form, strict=True)
+        for vector in _nullspace(field, list(bend.values()), len(basis)):
+            columns = zip(*basis, strict=True)
+            derived.append(
+                [
+                    field.plus(*[field.times(c, a) for c, a in zip(vector, column, strict=True)])
+                    for column in columns
                 ]
-            derived.append([tower.reduce(entry) for entry in row])
+            )
         flag.append(len(derived))
-        basis, pivots = rref(tower, derived, len(tower.variables))
-        bend = curvature(tower, basis, pivots)
+        basis, pivots = rref(field, derived, len(field.variables))
+        bend = curvature(field, basis, pivots)
     return flag, basis
+
+
+def _nullspace(field: Functions, rows: Sequence[Row], width: int) -> list[Row]:
+    """A basis of the vectors v with rows v = 0."""
+    matrix, pivots = rref(field, rows, width)
+    basis = []
+    for free in (column for column in range(width) if column not in pivots):
+        vector = [field.zero] * width
+        vector[free] = field.one
+        for k, pivot in enumerate(pivots):
+            vector[pivot] = -matrix[k][free]
+        basis.append(vector)
+    return basis
