@@ -334,6 +334,7 @@ def test_peaks_of_nothing_are_refused(outputs: Sequence[Any], words: Sequence[st
     with pytest.raises(ModelError) as refused:
         prepare(oscillator(outputs))
     assert all(word in str(refused.value) for word in words)
+    assert str(refused.value).count("'energy.kinetic'") <= 1  # what is near is told once
     assert prepare(oscillator([Output("peak.height", x, "m")]))
 
 

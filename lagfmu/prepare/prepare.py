@@ -271,7 +271,7 @@ def _with_measured(outputs: tuple[str, ...]) -> tuple[str, ...]:
 
 def _check_peaks(model: Model, scene: Scene, tables: Iterable[VariableTable]) -> None:
     """Each Peak is of a Real output of the FMU that has everything.  Raises ModelError."""
-    known = [v.name for table in tables for v in table.measurable]
+    known = list(dict.fromkeys(v.name for table in tables for v in table.measurable))
     problems: list[str] = []
     select([peak.of for peak in model.peaks], known, "Peak: the Real output", problems)
     if problems and tuple(scene.frictions) == EVERYTHING:
