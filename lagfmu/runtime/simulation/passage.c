@@ -25,7 +25,7 @@ enum { PARTS = 16 };                 /* of a step, in which the least angle is l
 static const double NARROW = 0.1;    /* angle [rad] below which a crossing may be near */
 static const double BETWEEN = 0.467;  /* of a step over a crossing, where it is to lie: the widest gap between the
                                        * stages of dop853 */
-static const double CLEAR = 0.4;      /* of a step that ended in one: by so much it is shortened */
+static const double BACKED = 0.4;      /* of a step that ended in one: by so much it is shortened */
 static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how fast the angle falls */
 static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
 static const double PLACED = 1e-9;   /* of a step: how well the time of a passage is found */
@@ -69,7 +69,7 @@ static void look(Solver *s, double t, const double *y) {
 static double longest(const Solver *s, double next) {
     const double until = s->state.now.approach.until, over = until / BETWEEN;
     if (!(until > 0) || !(next > 0)) return HUGE_VAL;
-    return over <= next ? over : until - (1 - CLEAR) * BETWEEN * next;
+    return over <= next ? over : until - (1 - BACKED) * BETWEEN * next;
 }
 
 static int suspected(const Solver *s) {
@@ -79,7 +79,7 @@ static int suspected(const Solver *s) {
 
 static int landed(const Solver *s, double *h) {
     if (!suspected(s) || !(s->apart < LANDED)) return 0;
-    *h = (1 - CLEAR) * (s->integrator.t - s->integrator.t_old);
+    *h = (1 - BACKED) * (s->integrator.t - s->integrator.t_old);
     return 1;
 }
 
