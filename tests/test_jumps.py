@@ -23,7 +23,7 @@ from sympy import (
 )
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu
+from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu, simulate
 from lagfmu.errors import ModelError
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.mechanics.equations import derive
@@ -355,3 +355,17 @@ def test_a_pulse_shorter_than_a_step_needs_a_word(tmp_path, target):
             one.start({"solver.maximum_step": step})
             one.step(1.0)
             assert one.get("der(x)") == pytest.approx(2.0 * 1e-4 * float(expected), rel=1e-6)
+
+
+def test_a_symbol_without_assumptions_may_say_when(tmp_path):
+    """symbols("T") says nothing of T: the force F from T on moves the mass by F (t - T)^2/(2 m) all the same."""
+    x, (m, F, T) = dynamicsymbols("x"), symbols("m F T")
+    model = Model(
+        "Late",
+        coordinates={x: "m"},
+        lagrangian=m * x.diff() ** 2 / 2,
+        forces={x: F * Heaviside(dynamicsymbols._t - T)},
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(F, 2.0, "N"), Parameter(T, 0.5, "s")],
+    )
+    path = build_fmu(model, tmp_path, target="native", check=False)
+    assert simulate(path, 1.0)["x"][-1] == pytest.approx(0.25, rel=1e-12)

@@ -51,7 +51,9 @@ def model_source(form: Form, tangents: bool = True) -> str:
     Raises DerivationError if a function or a number has no counterpart in C.
     """
     form, jumps = levelled(form)
-    eom, reduction = _in_reals(form.equations), form.reduction
+    given = form.equations
+    jumps = jumps.mapped(_real([*given.q, *given.v, *given.u, *given.p, TIME]))
+    eom, reduction = _in_reals(given), form.reduction
     index = _index("coordinates", eom.q) + _index("constraints", [c.name for c in eom.constraints])
     if reduction is None:
         text = _System(eom, "", form.formulation, tangents, jumps=jumps).text() + _pointer(
@@ -336,7 +338,7 @@ class _System:
                 {"p": words.p},
                 {"w": [Result(e, states[j]) for j, e in formulas.items()]},
             )
-        jumps = self.jumps.mapped(_real([*eom.q, *eom.v, *eom.u, *eom.p, TIME]))
+        jumps = self.jumps
         if jumps.surfaces:
             h = [s.h for s in jumps.surfaces]
             found["surfaces"] = define(
