@@ -358,7 +358,7 @@ def test_a_pulse_shorter_than_a_step_needs_a_word(tmp_path, target):
 
 
 def test_a_symbol_without_assumptions_may_say_when(tmp_path):
-    """symbols("T") says nothing of T: the force F from T on moves the mass by F (t - T)^2/(2 m) all the same."""
+    """symbols("T") says nothing of T: the force F from T on moves the mass by F (t - T)^2/(2 m)."""
     x, (m, F, T) = dynamicsymbols("x"), symbols("m F T")
     model = Model(
         "Late",
