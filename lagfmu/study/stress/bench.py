@@ -231,15 +231,16 @@ class Bench:
         """Of coordinates, velocities, lambda and Q, relative to the largest magnitude of their unit.
 
         A Q is as large as the constraints' shares in it: what is left where they balance is rounding.
-        Where contacts differ beside an event only their own delay is seen: one such point is left out.  So is
-        what stands on the surface of a jump, where either side is right.
+        Where contacts or their impacts differ beside an event only their own delay is seen: one such point is
+        left out.  So is what stands on the surface of a jump, where either side is right.
         """
         facts, found = self.facts, {}
         n = len(run.rows) if count is None else count
         a, b = run.rows[:n], other.rows[:n]
         alike = np.ones(n, dtype=bool)
         for c in facts.contacts:
-            differ = np.asarray(a[names.name(names.CONTACT, c)] != b[names.name(names.CONTACT, c)])
+            told = {names.name(names.CONTACT, c), names.name(names.CLOSINGS, c)} & {*a.dtype.names}
+            differ = np.logical_or.reduce([np.asarray(a[n] != b[n]) for n in sorted(told)])
             alone = differ.copy()
             alone[1:] &= ~differ[:-1]
             alone[:-1] &= ~differ[1:]
