@@ -81,7 +81,8 @@ def table(
                 folder, ("interval.c",), model + text + motions, [f"-I{folder}"]
             )
             count = ctypes.c_int.in_dll(library, "VARIABLE_COUNT").value
-            rows = (CVariable * count).in_dll(library, "VARIABLES")
+            first = ctypes.c_void_p.in_dll(library, "VARIABLES").value
+            rows = (CVariable * count).from_address(first)
             made[name] = (p, library, list(rows))
         return made[name]
 

@@ -179,7 +179,7 @@ def test_nothing_of_the_documentation_keeps_a_reader_out(
     """axe-core finds nothing in the page of an FMU with contacts, frictions and its verification, on a phone:
     wide tables scroll by keys."""
     path = tmp_path / "index.html"
-    figures = [("energy", "1e-9", "1e-8", "pass"), ("force", "1", "1e-8", "FAIL")]
+    figures = [("energy", "1e-9", "1e-8", "21", "pass"), ("force", "1", "1e-8", "21", "FAIL")]
     path.write_text(with_figures(documentation(prepared("Belt")), figures), encoding="utf-8")
     page = Page(browser, path, viewport={"width": 390, "height": 844}, color_scheme=theme)
     assert page.violations() == []

@@ -78,7 +78,9 @@ def test_a_users_random_numbers_are_left_alone():
 
 def test_terms_that_share_a_parameter_are_gathered() -> None:
     """The force of a spring reads k (x - y), however it was multiplied out, and whatever else acts."""
-    k, m, g, x, y = sp.symbols("k m g x y")
-    assert shorter.gathered(k * x - k * y + m * g, (k, m, g)) == k * (x - y) + m * g
-    assert shorter.gathered(k * x + m * y, (k, m, g)) == k * x + m * y
-    assert shorter.gathered(x * y + x, (k,)) == x * y + x
+    k, m, g, x, y, w = sp.symbols("k m g x y w")
+    known = (k, m, g), (x, y)
+    assert shorter.gathered(k * x - k * y + m * g, *known) == k * (x - y) + m * g
+    assert shorter.gathered(k * x + m * y, *known) == k * x + m * y
+    fall = m * g * sp.cos(x) - m * y * w**2  # as textbooks have it
+    assert shorter.gathered(fall, *known) == fall

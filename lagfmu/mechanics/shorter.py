@@ -59,9 +59,16 @@ def expanded(e: Expr) -> Expr:
     return sp.expand(e) if terms(e) <= TERMS else e
 
 
-def gathered(e: Expr, symbols: Collection[Expr]) -> Expr:
-    """Terms that share one of the symbols as a factor, under it: k (x - y) + m g for k x - k y + m g."""
-    left, found = list(sp.Add.make_args(e)), []
+def gathered(e: Expr, symbols: Collection[Expr], places: Collection[Expr]) -> Expr:
+    """The force of a spring under its stiffness, k (x - y) for k x - k y: terms of the symbols and places
+    alone that share a symbol, if one of them holds a place."""
+    known = {*symbols, *places}
+    straight = [
+        term
+        for term in sp.Add.make_args(e)
+        if term.free_symbols <= known and not term.has(sp.Function)
+    ]
+    left, found = list(straight), []
     while len(left) > 1:
         shared = Counter(s for term in left for s in sp.Mul.make_args(term) if s in symbols)
         most = max(shared, key=lambda s: (shared[s], str(s)), default=None)
@@ -69,8 +76,10 @@ def gathered(e: Expr, symbols: Collection[Expr]) -> Expr:
             break
         group = [term for term in left if most in sp.Mul.make_args(term)]
         left = [term for term in left if term not in group]
-        found.append(sp.factor_terms(sp.Add(*group)))
-    return sp.Add(*found, *left)
+        whole = sp.Add(*group)
+        found.append(sp.factor_terms(whole) if whole.has(*places) else whole)
+    others = [term for term in sp.Add.make_args(e) if term not in straight]
+    return sp.Add(*found, *left, *others)
 
 
 def sums_of_angles(e: Expr) -> Expr:

@@ -377,7 +377,7 @@ class _Typesetter:
         row = [(i, _tidy(eom.M[j, i])) for i in range(eom.n) if eom.M[j, i] != 0]
         inertia = self.notation.linear((mass, vdot[i]) for i, mass in row)
         rest = _tidy(given - eom.F[j])
-        short = shorter.gathered(rest, eom.p)
+        short = shorter.gathered(rest, eom.p, eom.q)
         return _total(inertia + self.terms(min(short, rest, key=lambda e: e.count_ops())))
 
     def terms(self, expression: Expr) -> list[Printed]:
