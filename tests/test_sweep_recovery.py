@@ -46,8 +46,10 @@ def halve(place: Path) -> None:
 
 
 def flip(place: Path) -> None:
+    """A bit in every byte of a stretch, wherever numbers and what describes them stand."""
     content = bytearray(place.read_bytes())
-    content[len(content) // 3] ^= 1
+    for k in range(len(content) // 4, len(content) // 2):
+        content[k] ^= 1
     place.write_bytes(content)
 
 

@@ -41,7 +41,6 @@ static const double LOST = 1e3 * DBL_EPSILON; /* what projections leave of a pla
 static const double MEASURED_PART = 1e-3; /* of the first step, in which a motion without scale is measured */
 static const double DISPLACED = 0x1p-20; /* of a coordinate's size, to see what holds it */
 static const double SHAKEN = 1e9; /* times the tolerance: roundings of q that an error of v may reach */
-static const double FASTEST = 1e150; /* [1/s] of a motion */
 static const double STILL = 1e-100; /* scale of what neither moves nor is pushed: anything else exceeds it */
 
 /* ---- steps ---- */

@@ -32,6 +32,8 @@
 #include <float.h>
 #include <string.h>
 
+static const double FASTEST = 1e150; /* [1/s] of a motion */
+
 static double positive(double x) { return x > 0 ? x : STILL; }
 
 void magnitudes_extents(const System *s, const double *p, double *least) {
