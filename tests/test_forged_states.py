@@ -101,6 +101,7 @@ def attack(path: str, folder: str, kind: str, seed: int, count: int = 500) -> No
         ("Hemisphere", "steps"),
         ("CartPendulum", "steps"),
         ("BouncingBall", "steps"),
+        ("Chain", "steps"),
         ("Hemisphere", "exchange"),
     ],
 )

@@ -202,6 +202,8 @@ static Status together_in_solver(Instance *x, const Solver *s) {
         return restored_none(x, "stiffness mode", c->implicit);
     if (c->failures > STIFFNESS_MOST_FAILURES || c->retries > STIFFNESS_MOST_RETRIES)
         return restored_none(x, "stiffness memory", c->failures + c->retries);
+    if (now->approach.near && OPTIONAL.passage == NULL)
+        return restored_none(x, "approach to a singular configuration", 1);
     if (now->between && !(now->ahead && x->started && !x->exchange))
         return restored_none(x, "mode of the step ahead", now->between);
     if (now->event_count > indicators_count(s->system))
