@@ -78,13 +78,13 @@ static double at(const Stretch *x, int j) { return x->sense * x->values[j * x->s
 
 /* Of extremes that are the same to the tolerance the first one's time stays; one that is on the way up, before
  * which nothing lies but what has counted since `begin`, goes along. */
-static int keep_peaks(Solver *s, int k, double sense, double begin, double t, double height_of_peak) {
+static int keep_peaks(Solver *s, int k, double sense, double begin, double t, double height) {
     double *kept = s->peak + PEAK_PARTS * k;
     const int way = sense > 0 ? PEAK_MAX : PEAK_MIN, when = sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME;
-    const double more = height_of_peak - sense * kept[way];
+    const double more = height - sense * kept[way];
     if (!(more > 0)) return 0;
     if (more > s->settings.tolerance * fabs(kept[way]) || kept[when] >= begin) kept[when] = t;
-    kept[way] = sense * height_of_peak;
+    kept[way] = sense * height;
     return 1;
 }
 
@@ -94,11 +94,11 @@ static double record_of(const Stretch *x) {
 }
 
 /* The same of the stretch; while an importer integrates it changes by events alone, which tolerance asks for. */
-static void find(Stretch *x, double t, double height_of_peak) {
+static void find(Stretch *x, double t, double height) {
     Solver *s = x->s;
     const double record = record_of(x);
-    if (x->exchange && !(height_of_peak - record > s->settings.tolerance * fabs(record))) return;
-    x->passed |= keep_peaks(s, x->quantity, x->sense, x->t[0], t, height_of_peak);
+    if (x->exchange && !(height - record > s->settings.tolerance * fabs(record))) return;
+    x->passed |= keep_peaks(s, x->quantity, x->sense, x->t[0], t, height);
 }
 
 /* Could there be more than the record next to sample j, below which its neighbour i lies? */
