@@ -64,6 +64,13 @@ def test_imports_run_in_one_direction(path: Path) -> None:
     assert not above
 
 
+def test_no_module_is_imported_in_secret() -> None:
+    """A room that is imported by a name in a text is no arrow that anybody sees."""
+    secret = re.compile(r"\b(import_module|__import__)\(\s*f?[\"'](lagfmu|\.)")
+    for path in sorted(ROOT.rglob("*.py")):
+        assert not secret.search(path.read_text(encoding="utf-8")), path.name
+
+
 def test_the_solver_stands_alone() -> None:
     """It travels inside python FMUs, with the names of variables, where there is no lagfmu."""
     for path in ROOT.joinpath("solver").glob("*.py"):
