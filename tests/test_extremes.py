@@ -28,7 +28,7 @@ from instance import Instance, instance
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu
+from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu, names
 from lagfmu.fmu.compiler import find_compiler
 from lagfmu.prepare.consistency import RedundantConstraintWarning
 from lagfmu.prepare.prepare import prepare
@@ -229,7 +229,10 @@ def exponents(path: Path) -> tuple[dict[str, tuple[float, ...]], dict[str, float
     for v in description.modelVariables:
         base = units.get(v.unit)
         found[v.name] = (0, 0, 0) if base is None else (base.kg, base.m, base.s)
-        if v.type == "Real" and v.start is not None and not v.name.startswith("solver."):
+        follows = (v.description or "").endswith(
+            names.FOLLOWS
+        )  # a start of parameters goes with them
+        if v.type == "Real" and v.start is not None and not follows and "solver." not in v.name:
             starts[v.name] = float(v.start)
     return found, starts
 
@@ -300,6 +303,9 @@ def apart(expected: Any, found: Any) -> dict[str, float]:
     for n in scale:
         if n.startswith("energy."):
             scale[n] = energy
+        elif names.read(n).quantity in names.EVENTS:  # a place that an event is at may be 0
+            at = names.read(n)
+            scale[n] = max(scale[n], scale.get(names.derivative(at.coordinate, at.order), 0.0))
         elif n.endswith(",2)"):
             scale[n] = max(scale[n], scale[n.replace(",2)", ")")])
     return {
