@@ -15,7 +15,6 @@ import pytest
 
 import lagfmu
 from lagfmu.cli.progress import told
-from lagfmu.cli.terminal import console
 from lagfmu.errors import SettingError
 from lagfmu.study.sweep.parts import PartWarning
 
@@ -127,7 +126,6 @@ def test_progress_tells_rate_cost_and_time_left(monkeypatch, capsys):
     """400 of 1000 runs were there; 100 more in 20 s on 4 workers: 5/s, 800 ms each, 100 s left."""
     now = 0.0
     monkeypatch.setattr(time, "monotonic", lambda: now)
-    monkeypatch.setattr(console, "file", sys.stdout)
     with told(None, 4) as tell:
         tell(400, 1000, 0)
         now = 2.5
