@@ -121,7 +121,10 @@ def test_residuals_are_drawn_for_those_who_ask(opened: Opened) -> None:
 
 INK = """() => {
     const canvas = document.querySelector("#charts canvas");
-    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    const copy = new OffscreenCanvas(canvas.width, canvas.height);
+    const context = copy.getContext("2d", { willReadFrequently: true });
+    context.drawImage(canvas, 0, 0);
+    const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
     let darkest = 255;
     for (let i = 0; i < data.length; i += 4) {
         if (data[i + 3] > 200) darkest = Math.min(darkest, Math.max(data[i], data[i + 1], data[i + 2]));
