@@ -35,8 +35,8 @@ from lagfmu.mechanics.equations import TIME, EquationsOfMotion
 from lagfmu.mechanics.form import Form
 from lagfmu.mechanics.formulations.minimal import reduce
 from lagfmu.model.spline import SplineBase
+from lagfmu.numeric.system import System
 from lagfmu.prepare.prepare import Prepared
-from lagfmu.solver.system import System
 
 CLOSE = 1e-14  # of the magnitude of what is added up, about 45 roundings
 NAMES = sorted(FILES)

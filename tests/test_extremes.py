@@ -30,9 +30,9 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu, names
 from lagfmu.fmu.compiler import find_compiler
+from lagfmu.numeric.failure import StepFailureError
 from lagfmu.prepare.consistency import RedundantConstraintWarning
 from lagfmu.prepare.prepare import prepare
-from lagfmu.solver.failure import StepFailureError
 from lagfmu.solver.instant import Instant as At
 from lagfmu.solver.motion import project
 from lagfmu.verification.simulate import simulate

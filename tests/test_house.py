@@ -11,10 +11,11 @@ import pytest
 import lagfmu
 
 ROOT = Path(lagfmu.__file__).parent
-ROOMS = (  # each imports from those before it, and from no other; `solver` from nothing, it travels alone
+ROOMS = (  # each imports from those before it, and from no other
     "errors",
     "names",
     "methods",
+    "numeric",
     "solver",
     "model",
     "mechanics",
@@ -72,9 +73,10 @@ def test_no_module_is_imported_in_secret() -> None:
 
 
 def test_the_solver_stands_alone() -> None:
-    """It travels inside python FMUs, with the names of variables, where there is no lagfmu."""
-    for path in ROOT.joinpath("solver").glob("*.py"):
-        assert imported(path) <= {"solver", "names"}, path.name
+    """It travels inside python FMUs, with the numeric form and the names of variables, where there is no
+    lagfmu."""
+    for path in [*ROOT.glob("solver/*.py"), *ROOT.glob("numeric/*.py")]:
+        assert imported(path) <= {"solver", "numeric", "names"}, path.name
 
 
 def test_the_rooms_can_be_counted() -> None:

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from runtime import SANITIZE, compile_library, compiler
 
 from lagfmu.codegen.c.elimination import plan
-from lagfmu.solver.failure import StepFailureError
+from lagfmu.numeric.failure import StepFailureError
 from lagfmu.solver.linear import solve
 from lagfmu.solver.solution import Solution
 

@@ -28,15 +28,15 @@ from lagfmu.codegen.py.equations import lower
 from lagfmu.errors import ModelError
 from lagfmu.mechanics.equations import derive
 from lagfmu.mechanics.form import Form
+from lagfmu.numeric.failure import StartFailureError, StepFailureError
+from lagfmu.numeric.priority import GIVEN, OMITTED, SET
 from lagfmu.prepare.prepare import Prepared, prepare
 from lagfmu.solver import initial
 from lagfmu.solver.contacts import complementary_modes
-from lagfmu.solver.failure import StartFailureError, StepFailureError
 from lagfmu.solver.impact import impact
 from lagfmu.solver.instant import Instant
 from lagfmu.solver.motion import project
 from lagfmu.solver.observe import observe
-from lagfmu.solver.precedence import GIVEN, OMITTED, SET
 from lagfmu.solver.state import Settings
 
 EPS = np.finfo(float).eps

@@ -10,7 +10,7 @@ import pytest
 from runtime import INCLUDES, compiler
 
 import lagfmu
-from lagfmu.solver import thresholds
+from lagfmu.numeric import thresholds
 
 PACKAGE = Path(lagfmu.__file__).parent
 NAMES = sorted(thresholds._VALUES)
@@ -39,8 +39,12 @@ def test_both_engines_decide_by_it(name: str) -> None:
     """A threshold in the header is used by the C runtime and by the python engine."""
     word = re.compile(rf"\b{name}\b")
     c = [f for f in PACKAGE.glob("runtime/*/*.[ch]") if f.name != "thresholds.h"]
-    python = [*PACKAGE.glob("solver/*.py"), PACKAGE / "fmu" / "slave.py"]
-    python.remove(PACKAGE / "solver" / "thresholds.py")
+    python = [
+        *PACKAGE.glob("numeric/*.py"),
+        *PACKAGE.glob("solver/*.py"),
+        PACKAGE / "fmu" / "slave.py",
+    ]
+    python.remove(PACKAGE / "numeric" / "thresholds.py")
     assert any(word.search(f.read_text()) for f in c), "not in the C runtime"
     assert any(word.search(f.read_text()) for f in python), "not in the python engine"
 

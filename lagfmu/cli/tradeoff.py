@@ -19,9 +19,9 @@ from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile
 from ..model.goal import Goal
 from ..model.scene import Scene
+from ..numeric.tolerance import tolerance_problem
 from ..page.table import print_whole
 from ..prepare.prepare import prepare
-from ..solver.state import tolerance_problem
 from ..study.tradeoff.choose import Choice, Tick, choose
 from ..study.tradeoff.figure import draw
 from ..study.tradeoff.importer import Importer

@@ -18,7 +18,7 @@ from typing import Any
 from .references import end_once, keep, keep_module_of
 
 try:
-    from ..solver.system import Embedding, Friction, Lookups, Own, Row, System
+    from ..numeric.system import Embedding, Friction, Lookups, Own, Row, System
     from .slave import LagfmuSlave
 except Exception as error:  # a NumPy of another Python, or an old one, fails in many ways
     from pythonfmu.enums import Fmi2Status

@@ -20,14 +20,15 @@ from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
 from ..methods import IN_PYTHON, NUMBERS
 from ..model.scene import Scene
+from ..numeric.system import System
 from ..prepare.prepare import Prepared
-from ..solver.system import System
 from .archive import pack, version
 from .description import model_description
 from .slave import LagfmuSlave
 
 SHIPPED = (
     "names.py",
+    "numeric",
     "solver",
     "runtime/base/thresholds.h",
     "fmu/entry.py",
@@ -153,9 +154,9 @@ def _script(prepared: Prepared, table: VariableTable, package: str) -> str:
     words = ["Embedding", "Friction", "Lookups", "Own", "Row", "System"]
     vocabulary = f"from {package}.fmu.entry import {', '.join(words)}"
     if "interval." in equations:
-        vocabulary = f"from {package}.solver import interval\n{vocabulary}"
+        vocabulary = f"from {package}.numeric import interval\n{vocabulary}"
     if "= Cubic(" in equations:
-        vocabulary = f"from {package}.solver.cubic import Cubic\n{vocabulary}"
+        vocabulary = f"from {package}.numeric.cubic import Cubic\n{vocabulary}"
     return SCRIPT.format(
         vocabulary=vocabulary,
         name=scene.name,

@@ -22,17 +22,18 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from .. import names
+from ..numeric.failure import StepFailureError
+from ..numeric.priority import GIVEN, OMITTED, SET, left_out
+from ..numeric.system import System
+from ..numeric.thresholds import SMALLEST_TOLERANCE
+from ..numeric.tolerance import tolerance_problem
 from ..solver import optional_bars
 from ..solver.advance import advance, beginning
-from ..solver.failure import StepFailureError
-from ..solver.initial import left_out, start
+from ..solver.initial import start
 from ..solver.observe import Values, observe
-from ..solver.precedence import GIVEN, OMITTED, SET
 from ..solver.rates import Past, estimated, half_connected, restored_past
 from ..solver.restored import restored, restored_settings
-from ..solver.state import Settings, State, tolerance_problem
-from ..solver.system import System
-from ..solver.thresholds import SMALLEST_TOLERANCE
+from ..solver.state import Settings, State
 from .references import end_once, keep, keep_module_of
 
 Call = TypeVar("Call", bound=Callable[..., Any])

@@ -37,8 +37,8 @@ from ..model.units import (
     parse_unit,
 )
 from ..names import Subject, derivative
-from ..solver.state import MAXIMUM_STEPS
-from ..solver.thresholds import LARGEST_TOLERANCE
+from ..numeric.thresholds import LARGEST_TOLERANCE
+from ..numeric.tolerance import MAXIMUM_STEPS
 from .variables import Value, Variable, VariableTable
 
 SPEED = METRE / SECOND

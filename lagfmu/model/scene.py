@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from ..errors import RequestError
 from ..methods import METHODS, integrators, unknown
-from ..solver.state import DEFAULT_TOLERANCE, tolerance_problem
+from ..numeric.tolerance import DEFAULT_TOLERANCE, tolerance_problem
 from .elements import NAME, is_number
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")

@@ -24,7 +24,7 @@ import sympy as sp
 from scipy.interpolate import CubicSpline
 
 from ..errors import LagfmuWarning, TableError, UnitError
-from ..solver.cubic import Cubic
+from ..numeric.cubic import Cubic
 from .elements import NAME, Expr
 from .units import DisplayUnit, parse_scaled
 

@@ -17,8 +17,8 @@ from .. import names
 from ..interface.variables import Variable
 from ..model.model import Contact, Holonomic, Nonholonomic
 from ..model.units import Unit, for_reading
+from ..numeric.priority import OMITTED
 from ..prepare.prepare import Prepared
-from ..solver.precedence import OMITTED
 from .savings import savings
 from .template import template
 from .typeset import typeset

@@ -23,8 +23,8 @@ from ..model.model import Model, Nonholonomic
 from ..model.picture import Arrow, Disk, Ground, Line, Point, Rod, Shape, Spring, Track, points_of
 from ..model.reactions import multiplier
 from ..model.spline import SplineBase
+from ..numeric.cubic import Cubic
 from ..prepare.prepare import Prepared
-from ..solver.cubic import Cubic
 
 Packed = float | str | list[Any]
 FUNCTIONS: Mapping[Any, str] = {

@@ -14,9 +14,9 @@ from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.integrability.classify import Classification, classify
 from ..model.model import Contact, Nonholonomic, name_of
 from ..names import FORCE, MULTIPLIER, OWN
+from ..numeric.priority import OMITTED
 from ..prepare.consistency import of_undecided
 from ..prepare.prepare import Derived, Prepared
-from ..solver.precedence import OMITTED
 from .documentation import as_given, shown
 from .savings import Savings, savings
 from .typeset import Notation, typeset

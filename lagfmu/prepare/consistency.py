@@ -21,18 +21,18 @@ from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..model.units import ONE, for_reading
 from ..names import RESIDUAL, derivative, motion, name
+from ..numeric.failure import OmittedStartError, StepFailureError
+from ..numeric.priority import GIVEN
+from ..numeric.system import NONHOLONOMIC, Matrix, System, Vector
+from ..numeric.thresholds import RANK
 from ..solver.afar import project_from_afar
-from ..solver.failure import OmittedStartError, StepFailureError
 from ..solver.friction import law
 from ..solver.initial import Start, start
 from ..solver.instant import Instant
 from ..solver.jumps import levels_at
 from ..solver.magnitudes import Mask
 from ..solver.observe import expand, observe
-from ..solver.precedence import GIVEN
 from ..solver.state import Settings
-from ..solver.system import NONHOLONOMIC, Matrix, System, Vector
-from ..solver.thresholds import RANK
 from .diagnosis import cause_of_failure, negative_energy
 from .starts import ranks
 

@@ -9,11 +9,11 @@ import random
 
 import numpy as np
 
+from ..numeric.failure import StepFailureError
+from ..numeric.system import Matrix, System, Vector
+from ..numeric.thresholds import RANK
 from ..solver.afar import project_from_afar
-from ..solver.failure import StepFailureError
 from ..solver.instant import Instant
-from ..solver.system import Matrix, System, Vector
-from ..solver.thresholds import RANK
 
 NEGATIVE = 1e-12  # a mass below this fraction of its neighbours' is rounding
 INDEFINITE = 1e-8  # an eigenvalue of the scaled mass matrix above -this is rounding

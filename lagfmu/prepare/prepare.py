@@ -20,7 +20,7 @@ from ..model.model import Contact, Model, Peak, name_of
 from ..model.scene import EVERYTHING, Scene
 from ..model.selection import select
 from ..model.stuck import stuck
-from ..solver.system import System
+from ..numeric.system import System
 from .consistency import Structure, check_embedding, check_held, examine
 from .reduced import check_branch, misses, restarted, told_apart
 

@@ -18,9 +18,9 @@ from ..interface.variables import VariableTable
 from ..mechanics.form import Form
 from ..model.model import Model
 from ..names import motion
+from ..numeric.system import System
 from ..solver.initial import Start
 from ..solver.observe import expand
-from ..solver.system import System
 from .consistency import Structure, levelled, values_at_start
 from .starts import ALLOWED, StartMovedWarning, check_given
 

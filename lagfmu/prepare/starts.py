@@ -10,9 +10,8 @@ from typing import Any
 from ..errors import ModelError
 from ..interface.variables import VariableTable
 from ..names import motion
-from ..solver.initial import LEFT_OUT, Moved, left_out
-from ..solver.precedence import GIVEN, OMITTED, SET
-from ..solver.system import System
+from ..numeric.priority import GIVEN, LEFT_OUT, OMITTED, SET, Moved, left_out
+from ..numeric.system import System
 
 LOG = logging.getLogger("lagfmu")
 ALLOWED = 1e-6  # part of its coordinate's size by which a value in `start` may miss the constraints

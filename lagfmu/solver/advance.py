@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from ..numeric.failure import StepFailureError
+from ..numeric.system import System, Vector
+from ..numeric.thresholds import AT_ONCE, CHATTER, HEADWAY, PATIENCE, STEP_LIMIT
 from . import optional_contacts, optional_events, optional_slides
-from .failure import StepFailureError
 from .flow import AfterStep, Flow
-from .indicators import indicators, is_watched
+from .indicators import indicators
 from .instant import Instant
 from .jumps import levels_at, passed
 from .magnitudes import complete, is_incomplete
 from .motion import project
 from .state import Settings, State
 from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step, is_due, unjudged_step
-from .system import System, Vector
-from .thresholds import AT_ONCE, CHATTER, HEADWAY, PATIENCE, STEP_LIMIT
 
 
 def advance(
@@ -123,7 +123,7 @@ def _travel(flow: Flow, state: State, t_end: float, headway: Headway) -> State:
     solver = flow.stepper(state.t, y, t_end, state.step or None)
     armed = list(state.armed)
     steps, choice, local = state.steps, state.choice, state.local
-    watch, lost = is_watched(flow.system), state.dissipated
+    watch, lost = flow.system.is_watched, state.dissipated
     before = indicators(flow, state.t, y) if watch else np.zeros(0)
     while True:
         t0, y0 = solver.t, solver.y

@@ -11,13 +11,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .failure import OmittedStartError, StartFailureError, StepFailureError
+from ..numeric.failure import OmittedStartError, StartFailureError, StepFailureError
+from ..numeric.priority import GIVEN, OMITTED
+from ..numeric.system import NONHOLONOMIC, Vector
+from ..numeric.thresholds import AFAR_ARRIVED, AFAR_ITERATIONS, AFAR_NEAR, AFAR_SWEEPS
 from .instant import Instant
 from .magnitudes import extents, motion_speeds
 from .motion import EPS
-from .precedence import GIVEN, OMITTED, Stage, singular_omissions, stages
-from .system import NONHOLONOMIC, Vector
-from .thresholds import AFAR_ARRIVED, AFAR_ITERATIONS, AFAR_NEAR, AFAR_SWEEPS
+from .precedence import Stage, singular_omissions, stages
 
 
 def project_from_afar(

@@ -29,13 +29,13 @@ from typing import Any
 
 from ..names import COUNT_OF, motion, read
 from ..names import name as name_of
+from ..numeric.failure import StepFailureError
+from ..numeric.system import System
+from ..numeric.thresholds import FEWEST_STEPS_RK4
 from .advance import advance
-from .failure import StepFailureError
 from .observe import Values, observe
 from .restored import restored
 from .state import Local, Settings, State
-from .system import System
-from .thresholds import FEWEST_STEPS_RK4
 
 COARSER = 100.0  # the companion's tolerance, in those of the delivered run
 MARGIN = 5.0  # a bar is so many times what the ratio of local errors leaves of a difference, ...

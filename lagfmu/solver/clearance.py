@@ -16,11 +16,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from ..numeric.interval import Interval, of
+from ..numeric.system import Vector
+from ..numeric.thresholds import SAMPLES_COARSE, SAMPLES_FINE
 from .flow import Flow
 from .indicators import ranges
-from .interval import Interval, of
-from .system import Vector
-from .thresholds import SAMPLES_COARSE, SAMPLES_FINE
 
 CLEAR, BRACKETS, UNKNOWN = "clear", "brackets", "unknown"  # what is known between two samples
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .system import Matrix, Vector
-from .thresholds import LCP_DEPENDENT, LCP_ZERO
+from ..numeric.system import Matrix, Vector
+from ..numeric.thresholds import LCP_DEPENDENT, LCP_ZERO
 
 
 def complementary(A: Matrix, b: Vector) -> tuple[Vector, Vector] | None:

@@ -14,11 +14,11 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from .failure import StepFailureError
+from ..numeric.failure import StepFailureError
+from ..numeric.system import Vector
+from ..numeric.thresholds import CONTACT_PULL, CONTACTS_MOST
 from .instant import Instant, Motion
 from .motion import motion
-from .system import Vector
-from .thresholds import CONTACT_PULL, CONTACTS_MOST
 
 
 def complementary_modes(

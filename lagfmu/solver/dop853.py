@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853
 
-from .system import Vector
+from ..numeric.system import Vector
 
 SAFETY, LEAST, MOST = 0.9, 0.2, 10.0  # of the step: how near the error may come, and the next one
 COUNT = DOP853.n_stages

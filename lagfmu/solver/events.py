@@ -12,12 +12,12 @@ from typing import Any
 
 from scipy.optimize import brentq
 
+from ..numeric.system import Vector
 from .flow import Flow
 from .indicators import indicators, ranges
 from .motion import EPS
 from .ranges import Range, first_of_frictions
 from .samples import look_into_dips, samples
-from .system import Vector
 
 Event = tuple[
     float, dict[int, int]

@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from .failure import StepFailureError, plain
+from ..numeric.failure import StepFailureError, plain
+from ..numeric.system import Matrix, System, Vector
+from ..numeric.thresholds import BALANCED, FAR, FEWEST_STEPS_RK4, HOPELESS, LEAST_FAR
 from .instant import Instant, Motion
 from .magnitudes import shared
 from .methods import share, stepper
@@ -22,8 +24,6 @@ from .motion import distance, independent, motion, project
 from .state import NO_LOCAL, Local, Settings, State
 from .stiffness import Choice
 from .straight import solver_of
-from .system import Matrix, System, Vector
-from .thresholds import BALANCED, FAR, FEWEST_STEPS_RK4, HOPELESS, LEAST_FAR
 
 SHIFT = 2.0**-26  # of a size, for a difference quotient: half of a double's digits
 AfterStep = Callable[[Any, State, Local], Local]

@@ -26,13 +26,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .failure import StepFailureError
+from ..numeric.failure import StepFailureError
+from ..numeric.system import Matrix, System, Vector
 from .instant import Instant, Motion
 from .painleve import check_opened, check_solvable
 from .share import best_share
 from .solution import Solution
 from .state import Slide
-from .system import Matrix, System, Vector
 
 Method = Callable[[Matrix, Vector, Matrix, Vector], Solution]
 

@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..numeric.failure import StartFailureError, StepFailureError
+from ..numeric.system import Matrix, System, Vector
+from ..numeric.thresholds import IMPACT_PULL, IMPACT_ROUNDING, IMPACT_ROUNDS
 from .complementarity import complementary
-from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
-from .system import Matrix, System, Vector
-from .thresholds import IMPACT_PULL, IMPACT_ROUNDING, IMPACT_ROUNDS
 
 
 @dataclass(frozen=True)

@@ -15,17 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numeric.system import Vector
 from . import optional_slides
 from .flow import Flow
 from .instant import Motion
 from .jumps import limits, surfaces
 from .ranges import Range
-from .system import System, Vector
-
-
-def is_watched(system: System) -> bool:
-    """True if there is anything to watch."""
-    return bool(system.contacts or system.floors or system.frictions)
 
 
 def indicators(flow: Flow, t: float, y: Vector) -> Vector:

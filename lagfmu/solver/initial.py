@@ -7,53 +7,25 @@ closed if their multiplier is positive.  Every value that was moved is reported.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from ..names import motion
+from ..numeric.failure import StartFailureError, StepFailureError
+from ..numeric.priority import GIVEN, Moved
+from ..numeric.system import Matrix, System, Vector
+from ..numeric.thresholds import LARGEST_ANGLE, TOUCH
 from . import optional_contacts, optional_slides
 from .afar import project_from_afar, velocities_from_afar
-from .failure import StartFailureError, StepFailureError
 from .instant import Instant
 from .jumps import levels_at, settled
 from .magnitudes import complete, motion_speeds, sizes
 from .motion import EPS, project
-from .precedence import GIVEN, OMITTED
 from .state import Departure, Settings, State
-from .system import Matrix, System, Vector
-from .thresholds import LARGEST_ANGLE, TOUCH
 
-LEFT_OUT = "start values that were left out"
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
-
-
-class Moved(NamedTuple):
-    """A start value that missed the constraints, what it was moved to, and of which rank it is.
-
-    `size`: the magnitude of the coordinate; of a velocity, that magnitude times the motion's natural rate,
-    or the velocity itself if it is larger.
-    """
-
-    name: str
-    given: float
-    used: float
-    rank: int
-    size: float
-
-    def __str__(self) -> str:
-        return (
-            f"start value {self.name} = {self.given!r} misses the constraints: projected to {self.used!r} "
-            f"(moved by {self.used - self.given:.3g})"
-        )
-
-
-def left_out(moved: Iterable[Moved]) -> str:
-    """Of the values that nobody gave, one line with what they are; empty where there are none."""
-    values = ", ".join(f"{m.name} = {m.used!r}" for m in moved if m.rank == OMITTED)
-    return f"{LEFT_OUT} follow from the constraints: {values}" if values else ""
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .failure import StepFailureError, plain
+from ..numeric.failure import StepFailureError, plain
+from ..numeric.system import Matrix, System, Vector
 from .state import Slide
-from .system import Matrix, System, Vector
 
 
 @dataclass(frozen=True)

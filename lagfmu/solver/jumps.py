@@ -17,8 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..numeric.system import System, Vector
 from .instant import Instant
-from .system import System, Vector
 
 Levels = tuple[float, ...]
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import lapack
 
+from ..numeric.system import Matrix, Vector
 from .schur import mass_factor
 from .solution import Solution
-from .system import Matrix, Vector
 
 REGULAR = 1e-14  # reciprocal condition above which the matrix is not singular
 

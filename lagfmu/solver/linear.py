@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numeric.failure import MasslessError, StepFailureError
+from ..numeric.system import Matrix, Vector
+from ..numeric.thresholds import ON_CONSTRAINTS
 from . import dependent
-from .failure import MasslessError, StepFailureError
 from .kkt import kkt
 from .schur import schur
 from .solution import Solution, loose
-from .system import Matrix, Vector
-from .thresholds import ON_CONSTRAINTS
 
 TAKES_PART = 1e-6  # part of a motion by which a coordinate counts as moving
 

@@ -32,12 +32,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .failure import StepFailureError
+from ..numeric.failure import StepFailureError
+from ..numeric.system import Matrix, System, Vector
+from ..numeric.thresholds import DISPLACED, LOST, MEASURED_PART, SHAKEN, STILL, TOUCH
 from .instant import Instant, Motion
 from .motion import EPS, independent, motion
 from .state import Settings, State
-from .system import Matrix, System, Vector
-from .thresholds import DISPLACED, LOST, MEASURED_PART, SHAKEN, STILL, TOUCH
 
 Mask = NDArray[np.bool_]
 

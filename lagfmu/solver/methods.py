@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from ..numeric.system import Matrix, Vector
 from .integrators import INTEGRATORS
 from .state import Settings
-from .system import Matrix, Vector
 
 RELATIVE_FLOOR = 100 * np.finfo(float).eps  # SciPy's own
 

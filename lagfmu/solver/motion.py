@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from . import optional_friction
-from .failure import MasslessError, StepFailureError
-from .instant import Instant, Motion
-from .linear import solve, solve_nullspace
-from .solution import Solution
-from .straight import solver_of
-from .system import NONHOLONOMIC, Matrix, Vector
-from .thresholds import (
+from ..numeric.failure import MasslessError, StepFailureError
+from ..numeric.system import NONHOLONOMIC, Matrix, Vector
+from ..numeric.thresholds import (
     PROJECTION_ITERATIONS,
     PROJECTION_LINEAR,
     PROJECTION_ROUNDING,
     PROJECTION_SMALL,
     RANK,
 )
+from . import optional_friction
+from .instant import Instant, Motion
+from .linear import solve, solve_nullspace
+from .solution import Solution
+from .straight import solver_of
 
 EPS = float(np.finfo(float).eps)
 

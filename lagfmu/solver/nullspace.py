@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import lapack
 
+from ..numeric.system import Matrix, Vector
+from ..numeric.thresholds import RANK
 from .schur import half_solve, mass_factor
 from .solution import Solution
-from .system import Matrix, Vector
-from .thresholds import RANK
 
 
 def nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector) -> Solution | None:

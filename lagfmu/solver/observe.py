@@ -9,12 +9,12 @@ import numpy as np
 
 from .. import names
 from ..names import derivative
+from ..numeric.failure import StepFailureError, plain
+from ..numeric.system import NONHOLONOMIC, System, Vector
 from . import optional_slides
-from .failure import StepFailureError, plain
 from .instant import Instant
 from .motion import motion
 from .state import State
-from .system import NONHOLONOMIC, System, Vector
 
 Values = dict[str, float | int | bool]
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import lapack
 
-from .failure import MasslessError, StepFailureError
+from ..numeric.failure import MasslessError, StepFailureError
+from ..numeric.system import Matrix, Vector
+from ..numeric.thresholds import CONSISTENT, HIDDEN, HIDES, ON_CONSTRAINTS, RANK, VANISHES
 from .schur import half_solve, mass_factor
 from .solution import Solution, loose
-from .system import Matrix, Vector
-from .thresholds import CONSISTENT, HIDDEN, HIDES, ON_CONSTRAINTS, RANK, VANISHES
 
 
 def orthogonal(M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool, off: float) -> Solution:

@@ -15,10 +15,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .failure import StepFailureError
+from ..numeric.failure import StepFailureError
+from ..numeric.system import Matrix, Vector
+from ..numeric.thresholds import PAINLEVE_OPENED, PAINLEVE_ROWS, PAINLEVE_SAFE
 from .instant import Instant
-from .system import Matrix, Vector
-from .thresholds import PAINLEVE_OPENED, PAINLEVE_ROWS, PAINLEVE_SAFE
 
 NEVER_SLIPS = (
     "if it is meant never to slip, leave the friction out and let its constraints act with the contact "

@@ -17,13 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..numeric.priority import GIVEN, OMITTED, SET
+from ..numeric.system import Matrix, System, Vector
+from ..numeric.thresholds import RANK_EASE
 from .instant import Instant
 from .linear import solve
 from .magnitudes import Mask
-from .system import Matrix, System, Vector
-from .thresholds import RANK_EASE
-
-OMITTED, GIVEN, SET = 0, 1, 2  # nobody said it; the model's `start` does; the importer did
 
 
 @dataclass(frozen=True)

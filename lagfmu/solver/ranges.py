@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .system import System
+from ..numeric.system import System
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from .system import System
-from .thresholds import RATES_KEPT, RATES_ROUNDING
+from ..numeric.system import System
+from ..numeric.thresholds import RATES_KEPT, RATES_ROUNDING
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from .failure import StepFailureError
+from ..numeric.failure import StepFailureError
+from ..numeric.system import Vector
+from ..numeric.thresholds import (
+    SLIDES_ANGLES,
+    SLIDES_BACK,
+    SLIDES_MOST,
+    SLIDES_ROUNDS,
+    SLIDES_SLACK,
+)
 from .instant import Instant, Motion
 from .motion import motion
 from .painleve import paradox
 from .state import Slide
-from .system import Vector
-from .thresholds import SLIDES_ANGLES, SLIDES_BACK, SLIDES_MOST, SLIDES_ROUNDS, SLIDES_SLACK
 
 
 class Now:

@@ -12,9 +12,10 @@ import math
 from dataclasses import fields
 from typing import Any
 
-from .state import Departure, Settings, Slide, State, tolerance_problem
+from ..numeric.system import System
+from ..numeric.tolerance import tolerance_problem
+from .state import Departure, Settings, Slide, State
 from .stiffness import LATEST, MOST, Choice
-from .system import System
 
 MOST_COUNTED = 2**53
 POSITIVE = (

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from .system import Vector
+from ..numeric.system import Vector
 
 
 class RK4:

@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..numeric.system import Matrix, Vector
+from ..numeric.thresholds import RUBBING_CLOSE, RUBBING_ROUGH, RUBBING_SWEEPS
 from .friction import Law, law
 from .impact import Impulse, Struck, base_rows, bounded
 from .instant import Instant
 from .linear import solve
-from .system import Matrix, Vector
-from .thresholds import RUBBING_CLOSE, RUBBING_ROUGH, RUBBING_SWEEPS
 
 
 @dataclass(frozen=True)

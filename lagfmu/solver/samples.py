@@ -10,11 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ..numeric.system import Vector
+from ..numeric.thresholds import (
+    SAMPLES_DIPS,
+    SAMPLES_FIRST,
+    SAMPLES_MOST,
+    SAMPLES_SHALLOW,
+    SAMPLES_SMALLEST,
+)
 from .clearance import BRACKETS, CLEAR, between
 from .flow import Flow
 from .indicators import indicators
-from .system import Vector
-from .thresholds import SAMPLES_DIPS, SAMPLES_FIRST, SAMPLES_MOST, SAMPLES_SHALLOW, SAMPLES_SMALLEST
 
 
 def samples(

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import blas, lapack
 
+from ..numeric.system import Matrix, Vector
 from .solution import Solution
-from .system import Matrix, Vector
 
 TRUSTED = 1e-5  # reciprocal condition above which the Schur complement is used
 EXACT = 1e-2  # and above which its solution needs no refinement

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.linalg
 
-from .system import Matrix, System, Vector
-from .thresholds import SHARE_DEPENDENT, SHARE_ROUNDS, SHARE_WIDE
+from ..numeric.system import Matrix, System, Vector
+from ..numeric.thresholds import SHARE_DEPENDENT, SHARE_ROUNDS, SHARE_WIDE
 
 
 def best_share(

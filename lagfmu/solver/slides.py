@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .failure import StepFailureError
+from ..numeric.failure import StepFailureError
+from ..numeric.system import Matrix, System, Vector
+from ..numeric.thresholds import SLIDES_BACK, SLIDES_JUMP, SLIDES_ROUNDS, SLIDES_SLACK
 from .flow import Flow
 from .friction import heading, loaded, slip_velocity
 from .instant import Instant, Motion
@@ -20,8 +22,6 @@ from .painleve import NEVER_SLIPS
 from .ranges import first_of_frictions
 from .rest import Now, Rest, signed
 from .state import Departure, Slide, State
-from .system import Matrix, System, Vector
-from .thresholds import SLIDES_BACK, SLIDES_JUMP, SLIDES_ROUNDS, SLIDES_SLACK
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from .. import names
+from ..numeric.system import System, Vector
+from ..numeric.thresholds import SLIDES_SLACK
 from .flow import Flow
 from .friction import loaded
 from .instant import Motion
 from .ranges import Range
 from .state import State
-from .system import System, Vector
-from .thresholds import SLIDES_SLACK
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)  # of the work done by friction within a step
 

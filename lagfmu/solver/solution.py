@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .system import Vector
-from .thresholds import RANK_LOOSEST, RANK_TURNED
+from ..numeric.system import Vector
+from ..numeric.thresholds import RANK_LOOSEST, RANK_TURNED
 
 
 def loose(off: float) -> float:

@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .system import Vector
-from .thresholds import (
+from ..numeric.system import Vector
+from ..numeric.thresholds import (
     BOUND,
     SLOWER,
     STABLE,

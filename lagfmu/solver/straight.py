@@ -16,8 +16,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ..numeric.system import System
 from .schur import EXACT
-from .system import System
 
 LONGEST = 600  # lines, beyond which NumPy is as fast
 LEAST = 1e-250  # of a pivot's diagonal: below, squares may have lost digits

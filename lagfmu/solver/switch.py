@@ -9,6 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..numeric.system import Vector
+from ..numeric.thresholds import SLOW
 from . import optional_slides
 from .contacts import complementary_modes, low
 from .flow import Flow
@@ -16,8 +18,6 @@ from .impact import impacts
 from .instant import Instant
 from .motion import motion, project
 from .state import Departure, State
-from .system import Vector
-from .thresholds import SLOW
 
 
 def released(at: Instant, state: State, span: float) -> State:

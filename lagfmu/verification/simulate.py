@@ -34,10 +34,10 @@ from ..fmu.slave import Refused
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
 from ..model.scene import Scene
+from ..numeric.priority import LEFT_OUT
+from ..numeric.tolerance import tolerance_problem
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import tell
-from ..solver.initial import LEFT_OUT
-from ..solver.state import tolerance_problem
 from .result import Result
 
 STARTS = re.compile(rf"start value .* misses the constraints|{LEFT_OUT}")  # a message of a move

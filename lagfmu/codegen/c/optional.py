@@ -5,8 +5,7 @@ from __future__ import annotations
 from ...mechanics.form import Form
 from ...methods import INTEGRATORS, METHODS
 from ...model.scene import Scene
-from ...solver.indicators import is_watched
-from ...solver.system import System
+from ...numeric.system import System
 from .tables import entanglements
 
 AT_EVENTS = {"events_find": "events.c"}
@@ -68,7 +67,7 @@ def optional_source(
         f"    .methods[{place.upper()}] = &{menu[place]},\n" for place in METHODS if place in menu
     ]
     rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
-    rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if is_watched(system)]
+    rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if system.is_watched]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .jumps = &JUMPS,\n"] if system.floors else []
     rows += ["    .peaks = &PEAKS,\n"] if peaks else []
@@ -108,7 +107,7 @@ def files_left_out(
         gone.add("jumps.c")
     if not system.prescribed:
         gone |= {*MOTIONS}
-    if not is_watched(system):
+    if not system.is_watched:
         gone |= {*AT_EVENTS.values(), *BEHIND_EVENTS}
     if not (system.contacts or system.frictions):
         gone |= {*AT_CONTACTS.values(), *BEHIND_CONTACTS}

@@ -12,7 +12,7 @@ from ... import names
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.form import Form
 from ...model.scene import Scene
-from ...solver.system import System
+from ...numeric.system import System
 from .printer import string
 
 Place = tuple[str, int, int]  # where, index, contact

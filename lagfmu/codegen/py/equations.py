@@ -14,8 +14,8 @@ from ...mechanics.form import Form
 from ...mechanics.jumps import NONE, Jumps, levelled
 from ...model.elements import Expr
 from ...model.model import Contact, Nonholonomic
-from ...solver.cubic import Cubic
-from ...solver.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
+from ...numeric.cubic import Cubic
+from ...numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, System
 from .. import bounds
 from .function import function, identifiers, table_name
 
@@ -23,7 +23,7 @@ from .function import function, identifiers, table_name
 def source(form: Form) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations.
 
-    It needs the names System, Row, Own, Friction, Lookups and Embedding of `lagfmu.solver.system`, and Cubic
+    It needs the names System, Row, Own, Friction, Lookups and Embedding of `lagfmu.numeric.system`, and Cubic
     where there are tables.
     """
     form, jumps = levelled(form)
@@ -84,8 +84,8 @@ def _imported(text: str) -> str:
 
 def compile_system(text: str) -> System:
     """Run generated source in memory and take its SYSTEM."""
-    from ...solver import interval
-    from ...solver import system as vocabulary
+    from ...numeric import interval
+    from ...numeric import system as vocabulary
 
     scope: dict[str, Any] = {
         "interval": interval,

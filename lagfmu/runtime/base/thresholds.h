@@ -1,6 +1,6 @@
 /* thresholds.h -- what both engines decide by: each value stands once.
  *
- * The python engine reads this file (lagfmu/solver/thresholds.py).  A threshold that only one of them has
+ * The python engine reads this file (lagfmu/numeric/thresholds.py).  A threshold that only one of them has
  * stands where it is used. */
 #ifndef LAGFMU_THRESHOLDS_H
 #define LAGFMU_THRESHOLDS_H

@@ -24,7 +24,7 @@ from ...fmu.session import TYPES, Plan, plug
 from ...fmu.write import as_fmu
 from ...model.model import Model
 from ...model.scene import Scene
-from ...solver.state import tolerance_problem
+from ...numeric.tolerance import tolerance_problem
 from ...verification.simulate import (
     check_inputs,
     communication_points,

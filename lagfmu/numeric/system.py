@@ -136,6 +136,11 @@ class System:
         return tuple(k for k, row in enumerate(self.rows) if row.kind == CONTACT)
 
     @property
+    def is_watched(self) -> bool:
+        """True if there are events to watch for: contacts, jumps of forces, frictions."""
+        return bool(self.contacts or self.floors or self.frictions)
+
+    @property
     def is_constrained(self) -> bool:
         """True if accelerations are solved for together with multipliers, stepped or recovered."""
         full = None if self.embedding is None else self.embedding.full
