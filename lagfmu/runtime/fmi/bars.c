@@ -12,10 +12,10 @@
 
 #include "digits.h"
 #include "instance.h"
-#include "flow.h"
-#include "magnitudes.h"
+#include "nominals.h"
 #include "optional.h"
 #include "restored.h"
+#include "segment.h"
 
 static const double INFINITE = DBL_MAX;
 /* Of bars.h; MARGIN, SPREAD, ESTIMATE and ROUNDING are calibrated: benchmarks/error_bars.py --drawn. */
@@ -74,7 +74,7 @@ static double asked_step(const Instance *x, double span) {
     const Solver *s = &x->solver;
     const int known = s->state.now.rate > 0 && isfinite(s->state.now.rate);
     if (x->given.step > 0) return x->given.step;
-    return known ? flow_natural_step(s) : span / flow_fewest_steps(s);
+    return known ? segment_natural_step(s) : span / segment_fewest_steps(s);
 }
 
 /* ------------------------------------------------------------------ a run */
@@ -163,7 +163,7 @@ static void measure_difference(Instance *x) {
     const size_t n = (size_t)own->n;
     memcpy(b->state, state->q, n * sizeof *b->state);
     memcpy(b->state + n, state->v, n * sizeof *b->state);
-    magnitudes_shared(&x->solver, b->state, b->scale);
+    nominals_shared(&x->solver, b->state, b->scale);
     for (int j = 0; j < full->n; j++) b->push[j] = fabs(x->seen.applied[j]);
     for (int e = 0; e < full->entries; e++) b->push[full->entry_column[e]] += fabs(x->seen.share[e]);
     b->paired = have_met_the_same(&x->solver, &b->solver);

@@ -15,12 +15,12 @@
 #include <math.h>
 #include <string.h>
 
-#include "indicators.h"
-#include "flow.h"
 #include "friction.h"
-#include "magnitudes.h"
+#include "indicators.h"
+#include "nominals.h"
 #include "optional.h"
 #include "schur.h"
+#include "segment.h"
 
 
 void exchange_begin(Instance *x) {
@@ -76,7 +76,7 @@ Status exchange_nominals(Instance *x, double *nominals) {
     if (instance_start(x) != OK) return FAILED;
     double *still = x->solver.work_advance, *scale = still + 2 * n;
     memset(still, 0, 2 * (size_t)n * sizeof *still);
-    magnitudes_shared(&x->solver, still, scale);
+    nominals_shared(&x->solver, still, scale);
     for (int j = 0; j < n; j++) {
         nominals[2 * j] = scale[j];
         nominals[2 * j + 1] = scale[n + j];
@@ -93,8 +93,8 @@ Status exchange_evaluate(Instance *x) {
     if (x->evaluated) return OK;
     if (instance_start(x) != OK) return FAILED;
     if (x->gain < 0 && exchange_find_gain(x) != OK) return FAILED;
-    flow_begin(s);
-    if (flow_motion(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
+    segment_begin(s);
+    if (segment_motion(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
     x->evaluated = 1;
     return OK;
 }
@@ -104,9 +104,9 @@ Status exchange_multipliers(Instance *x) {
     Solver *s = &x->solver;
     if (!s->state.now.dependent) return exchange_evaluate(x);
     if (instance_start(x) != OK) return FAILED;
-    flow_begin(s);
+    segment_begin(s);
     x->evaluated = 0;
-    return mechanism_motion_near(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
+    return mechanism_motion_near(&s->stepped, segment_instant(s, s->state.now.t), s->state.q, s->state.v,
                                  s->active, s->state.offset, s->state.size);
 }
 
@@ -126,7 +126,7 @@ static Status stabilize(Instance *x, double *derivatives) {
     const double alpha = x->gain;
     double *c = s->sensitivity.c, *a = s->sensitivity.dvdot;
     if (!(alpha > 0)) return OK;
-    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+    if (mechanism_residual(b, segment_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int k = 0; k < s->system->m; k++)
         c[k] = s->system->rows[k].kind == NONHOLONOMIC
@@ -156,7 +156,7 @@ Status exchange_indicators(Instance *x, double *indicators) {
     const System *system = s->system;
     if (indicators_count(system) == 0) return OK;
     if (exchange_multipliers(x) != OK) return FAILED;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     if (system->jumps > 0)
         system->surfaces(at.t, s->state.q, at.u, at.p, indicators + system->contacts);

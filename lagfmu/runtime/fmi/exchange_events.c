@@ -12,10 +12,10 @@
 #include <string.h>
 
 #include "indicators.h"
-#include "flow.h"
 #include "losses.h"
 #include "optional.h"
 #include "schur.h"
+#include "segment.h"
 
 static const double SHORT = 1e-2; /* natural time in which a contact closes what drift has opened */
 static const double CLOSE = 10;   /* condition of rows that stand for all, beyond which they are chosen anew */
@@ -25,12 +25,12 @@ static const double DRIFT_LIMIT = 1e-3; /* residual, relative to a constraint's 
 static Status choose_rows(Instance *x) {
     Solver *s = &x->solver;
     if (s->system->m < 2) return OK;
-    flow_begin(s);
+    segment_begin(s);
     x->evaluated = 0;
-    if (mechanism_motion_near(&s->stepped, flow_instant(s, s->state.now.t), s->state.q, s->state.v,
+    if (mechanism_motion_near(&s->stepped, segment_instant(s, s->state.now.t), s->state.q, s->state.v,
                               s->active, s->state.offset, s->state.size) != OK)
         return FAILED;
-    flow_choose_rows(s);
+    segment_choose_rows(s);
     return OK;
 }
 
@@ -42,7 +42,7 @@ static Status drift(Instance *x, double *worst) {
     *worst = 0;
     if (exchange_evaluate(x) != OK) return FAILED;
     const int *active = b->sliding != NULL ? b->sliding->acting(b, s->active) : s->active;
-    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+    if (mechanism_residual(b, segment_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int k = 0; k < system->m; k++) {
         double size = 0, speed = 0;
@@ -66,7 +66,7 @@ static Status find_happened(Instance *x, int *any) {
     Mechanism *b = &s->stepped;
     *any = 0;
     if (exchange_multipliers(x) != OK) return FAILED;
-    if (mechanism_residual(b, flow_instant(s, s->state.now.t), s->state.q, b->f) != OK)
+    if (mechanism_residual(b, segment_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
@@ -99,7 +99,7 @@ static Status judge_step(Instance *x, int *event) {
     double worst;
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
     *event = s->system->jumps > 0 &&
-             OPTIONAL.jumps->stale(s, flow_instant(s, s->state.now.t), s->state.q);
+             OPTIONAL.jumps->stale(s, segment_instant(s, s->state.now.t), s->state.q);
     if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
     if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
@@ -124,7 +124,7 @@ Status exchange_step_done(Instance *x, int *event) {
 /* The levels of forces that jump; `changed`: 1 if one is not what it was. */
 static Status settle_jumps(Instance *x, int *changed) {
     Solver *s = &x->solver;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     int again = 0;
     *changed = 0;
     if (s->system->jumps == 0) return OK;
@@ -149,9 +149,9 @@ static Status release(Instance *x, double drift) {
 static Status project(Instance *x) {
     Solver *s = &x->solver;
     if (s->system->m == 0) return OK;
-    flow_begin(s);
+    segment_begin(s);
     x->observed = x->evaluated = 0;
-    return losses_project(s, flow_instant(s, s->state.now.t), 1);
+    return losses_project(s, segment_instant(s, s->state.now.t), 1);
 }
 
 /* What an importer has done to its inputs until now belongs to the step; what it does after, to the event. */
@@ -169,12 +169,12 @@ static Status pass_event(Instance *x) {
     if (!any && !(jumped && s->system->contacts + s->system->frictions > 0)) return OK;
     x->evaluated = 0;
     if (s->system->frictions > 0 &&
-        OPTIONAL.slides->stop(s, flow_instant(s, s->state.now.t),
+        OPTIONAL.slides->stop(s, segment_instant(s, s->state.now.t),
                               x->happened + indicators_first_of_frictions(s->system)) != OK)
         return FAILED;
-    const double inside = losses_energy(s, flow_instant(s, s->state.now.t));
+    const double inside = losses_energy(s, segment_instant(s, s->state.now.t));
     if (OPTIONAL.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
-    s->state.now.lost += inside - losses_energy(s, flow_instant(s, s->state.now.t));
+    s->state.now.lost += inside - losses_energy(s, segment_instant(s, s->state.now.t));
     if (OPTIONAL.switch_modes(s, x->happened) != OK) return FAILED;
     return choose_rows(x);
 }

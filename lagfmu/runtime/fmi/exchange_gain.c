@@ -2,7 +2,7 @@
  *
  *   alpha = 3 min(natural rate, max(rho, |dG/dt| / |G|, sqrt(|vdot|/size)))   [1/s]
  *
- * The natural rate (magnitudes.c) says how small a time may matter where nothing tells what is large: of a belt
+ * The natural rate (nominals.c) says how small a time may matter where nothing tells what is large: of a belt
  * at 0.2 m/s under g it is 2 g / (0.2 m/s), 98 1/s, though nothing there is quicker than its spring.  So it is
  * bounded by what the motion does: rho, the largest |eigenvalue| of its own linearization
  *
@@ -17,9 +17,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "flow.h"
-#include "magnitudes.h"
+#include "nominals.h"
 #include "numbers.h"
+#include "segment.h"
 
 static const double GAIN = 3; /* in units of the motion's own rate */
 enum { ROUNDS = 24, GAIN_SETTLED = 8 }; /* products, and how many of them only turn the vector */
@@ -33,7 +33,7 @@ typedef struct {
 
 static Status move(Solver *s, double *vdot) {
     s->stepped.stage = 1;
-    const Status status = flow_motion(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v);
+    const Status status = segment_motion(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v);
     s->stepped.stage = 0;
     memcpy(vdot, s->stepped.vdot, (size_t)s->system->n * sizeof *vdot);
     return status;
@@ -80,7 +80,7 @@ static double own_rate(const Tried *x) {
 static double sized_rate(Solver *s, const double *vdot) {
     const System *system = s->system;
     double *least = s->work_initial, rate = 0;
-    magnitudes_extents(system, s->p, least);
+    nominals_extents(system, s->p, least);
     for (int j = 0; j < system->n; j++) {
         const double size = system->dimension[j] == system->angles ? 1 : least[j];
         if (size > 0) rate = fmax(rate, sqrt(fabs(vdot[j]) / size));
@@ -94,7 +94,7 @@ static double turning_rate(Solver *s, const double *size) {
     Mechanism *b = &s->stepped;
     double *G = s->sensitivity.dG, *q = s->work_advance, rate = 0;
     const double ahead = PART / s->state.now.rate;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     memcpy(G, b->G, (size_t)system->entries * sizeof *G);
     for (int j = 0; j < system->n; j++) q[j] = s->state.q[j] + ahead * s->state.v[j];
     if (mechanism_evaluate(b, at, q, s->state.v) != OK) return 0;
@@ -116,7 +116,7 @@ Status exchange_find_gain(Instance *x) {
     const Tried tried = {s, size, size + 2 * n, size + 4 * n};
     x->gain = 0;
     if (s->system->m == 0) return OK;
-    flow_begin(s);
+    segment_begin(s);
     x->evaluated = 0;
     if (move(s, tried.vdot) != OK) return FAILED;
     for (int j = 0; j < n; j++) {

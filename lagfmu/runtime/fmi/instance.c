@@ -7,11 +7,11 @@
 
 #include "digits.h"
 #include "indicators.h"
-#include "flow.h"
-#include "magnitudes.h"
+#include "nominals.h"
 #include "optional.h"
 #include "outputs.h"
 #include "prescribed.h"
+#include "segment.h"
 #include "thresholds.h"
 
 /* ------------------------------------------------------------------ memory */
@@ -399,8 +399,8 @@ static void warn_of_shares(Instance *x) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
     if (s->system->frictions == 0) return;
-    flow_begin(s);
-    if (flow_motion(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return;
+    segment_begin(s);
+    if (segment_motion(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return;
     for (int i = 0; i < s->system->frictions; i++) {
         if (x->shared[i] || b->sliding->presses_uniquely(b, i)) continue;
         x->shared[i] = 1;
@@ -421,8 +421,8 @@ static Status find_start(Instance *x) {
     if (solver_start(s, x->start_time, q0, v0, x->rank, tell_moved, &told) != OK) return FAILED;
     tell_left_out(&told);
     /* model exchange has no communication step: 1 s stands in for it */
-    if (x->exchange && magnitudes_incomplete(s) &&
-        magnitudes_complete(s, flow_instant(s, x->start_time), 1) != OK)
+    if (x->exchange && nominals_incomplete(s) &&
+        nominals_complete(s, segment_instant(s, x->start_time), 1) != OK)
         return FAILED;
     return s->peaks > 0 ? OPTIONAL.peaks->here(s, 1) : OK;
 }
@@ -463,7 +463,7 @@ Status instance_observe(Instance *x) {
 static void warn_of_tables(Instance *x) {
     Solver *s = &x->solver;
     const System *system = s->system;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     system->lookups(at.t, s->state.q, s->state.v, at.u, at.p, x->places);
     for (int i = 0; i < system->lookup_count && i < 30; i++) {
         const double first = system->lookup_first[i], last = system->lookup_last[i];
@@ -599,8 +599,8 @@ Status instance_differentiate(Instance *x, Direction d) {
     if (s->system->tangent == NULL)
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
-    const Instant at = flow_instant(s, s->state.now.t);
-    flow_begin(s);
+    const Instant at = segment_instant(s, s->state.now.t);
+    segment_begin(s);
     if (mechanism_motion_near(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
                               s->state.size) != OK)
         return FAILED;

@@ -50,7 +50,7 @@ SHARED void friction_slip(const Mechanism *b, int i, const double *v, double s[2
 SHARED double friction_normal(const Mechanism *b, int i, const double *lambda);
 
 /* The unit vector of the slip velocity s; beyond a stop it goes on as before, so that the equations of a
- * flow stay smooth there. */
+ * segment stay smooth there. */
 SHARED void friction_heading(const Slide *slide, const double s[2], double e[2]);
 
 /* painleve.c -- the refusal of a sliding problem that has no acceleration, or several. */

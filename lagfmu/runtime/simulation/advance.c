@@ -1,6 +1,6 @@
 /* advance.c -- from one communication point to the next.
  *
- * Steps are taken and projected within a flow (flow.c); events are found (events.c) and met (switch.c).
+ * Steps are taken and projected within a segment (segment.c); events are found (events.c) and met (switch.c).
  * In a scene without inputs the integrator may stand ahead of the communication point: the state there
  * is read from dense output and projected, on demand if the caller has it so: what nobody looks at costs
  * nothing.  It never passes the stop time, an event that lies ahead is
@@ -10,9 +10,9 @@
 #include <string.h>
 
 #include "indicators.h"
-#include "flow.h"
+#include "nominals.h"
 #include "optional.h"
-#include "magnitudes.h"
+#include "segment.h"
 #include "thresholds.h"
 
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
@@ -96,10 +96,10 @@ static void take_back(Solver *s, double t, double h) {
 static Status step_clear(Solver *s, double bound, double longest) {
     Integrator *i = &s->integrator;
     double h;
-    if (flow_step(s, i, bound, longest) != OK) return FAILED;
+    if (segment_step(s, i, bound, longest) != OK) return FAILED;
     if (OPTIONAL.passage == NULL || i->t == bound || !OPTIONAL.passage->landed(s, &h)) return OK;
     take_back(s, i->t_old, h);
-    return flow_step(s, i, bound, longest);
+    return segment_step(s, i, bound, longest);
 }
 
 /* One step, projected and searched for events; `bound`: not to be passed. */
@@ -110,12 +110,12 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     if (step_clear(s, bound, longest) != OK) return FAILED;
     if (!(s->taken > 0)) s->first = i->t - i->t_old;
     s->taken = fmax(s->taken, i->t - i->t_old);
-    s->state.now.estimated = fmax(s->state.now.estimated, i->error * flow_tolerance(s));
+    s->state.now.estimated = fmax(s->state.now.estimated, i->error * segment_tolerance(s));
     const int near = OPTIONAL.passage != NULL && OPTIONAL.passage->suspected(s);
-    if ((watch || near || s->peaks > 0 || i->t > t_end) && flow_prepare_dense(s, i) != OK) return FAILED;
+    if ((watch || near || s->peaks > 0 || i->t > t_end) && segment_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
-    if (flow_project(s, i->t, y1) != OK) return FAILED;
-    if (flow_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
+    if (segment_project(s, i->t, y1) != OK) return FAILED;
+    if (segment_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
     if (near && OPTIONAL.passage->find(s) != OK) return FAILED;
     if (watch && OPTIONAL.events_find(s, y1) != OK) return FAILED;
     if (s->system->frictions > 0 && slide_on(s, y1) != OK) return FAILED;
@@ -141,7 +141,7 @@ static Status try_step(Solver *s, double t_end) {
 static void choose_method(Solver *s) {
     Integrator *i = &s->integrator;
     Choice *choice = &s->state.now.choice;
-    if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && flow_rate(s, i) == OK)
+    if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && segment_rate(s, i) == OK)
         stiffness_explicit_step(choice, i, s->state.size);
     if (!stiffness_turn(choice)) return;
     double *y = s->work_advance;
@@ -173,7 +173,7 @@ static Status put_between(Solver *s, double t) {
     const Integrator *i = &s->integrator;
     double *y = s->work_advance;
     i->method->dense(i, t, y);
-    if (flow_project(s, t, y) != OK) return FAILED;
+    if (segment_project(s, t, y) != OK) return FAILED;
     put(s, t, y);
     return OK;
 }
@@ -186,7 +186,7 @@ static int waits(const Solver *s) {
 Status solver_arrive(Solver *s) {
     if (!s->state.now.between) return OK;
     resume(s);
-    flow_begin(s);
+    segment_begin(s);
     return put_between(s, s->state.now.t);
 }
 
@@ -247,7 +247,7 @@ static Status meet(Solver *s) {
     const double t = s->state.now.event_time;
     double *y = s->work_advance;
     if (s->system->frictions > 0 && count_loss(s, t) != OK) return FAILED;
-    if (flow_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
+    if (segment_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     put(s, t, y);
     if (s->peaks > 0 && OPTIONAL.peaks->pass(s, t, y) != OK) return FAILED;
     s->state.now.step = i->t - i->t_old;
@@ -289,7 +289,7 @@ static Status check_headway(Solver *s, double t_end, double begun, Count first) 
     const Integrator *i = &s->integrator;
     const double t = now->event_count > 0 ? now->event_time : i->t;
     const double done = (double)(now->steps - first), gone = t - begun, most = s->settings.maximum_steps;
-    const double h = t - i->t_old, pace = h * now->rate < HEADWAY ? magnitudes_pace(s) : now->rate;
+    const double h = t - i->t_old, pace = h * now->rate < HEADWAY ? nominals_pace(s) : now->rate;
     if (h * pace < HEADWAY) now->tiny += 1;
     if (most > 0 && (double)now->tiny > most) {
         (void)fail(&s->why,
@@ -310,7 +310,7 @@ static Status check_headway(Solver *s, double t_end, double begun, Count first) 
 /* To t_end, or to the first event before it. */
 static Status travel(Solver *s, double t_end, double begun, Count first, int *met) {
     Numbers *now = &s->state.now;
-    flow_begin(s);
+    segment_begin(s);
     *met = 0;
     if (!now->ahead && set_out(s) != OK) return FAILED;
     for (;;) {
@@ -328,11 +328,11 @@ static Status travel(Solver *s, double t_end, double begun, Count first, int *me
     }
 }
 
-static Status complete_magnitudes(Solver *s, double span) {
-    flow_begin(s);
-    const Instant at = flow_instant(s, s->state.now.t);
+static Status complete_nominals(Solver *s, double span) {
+    segment_begin(s);
+    const Instant at = segment_instant(s, s->state.now.t);
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
-    return magnitudes_complete(s, at, span);
+    return nominals_complete(s, at, span);
 }
 
 Status solver_advance(Solver *s, double t_end) {
@@ -348,12 +348,12 @@ Status solver_advance(Solver *s, double t_end) {
     s->taken = now->ahead ? now->t_integrator - now->t_old : 0;
     resume(s);
     if (solver_follow(s) != OK) return FAILED;
-    if (magnitudes_incomplete(s) && complete_magnitudes(s, t_end - begun) != OK) return FAILED;
+    if (nominals_incomplete(s) && complete_nominals(s, t_end - begun) != OK) return FAILED;
     while (now->t < t_end) {
         int met;
         if (travel(s, t_end, begun, first, &met) != OK) return FAILED;
         if (!met) continue;
-        if (events == 0 || now->t - since >= AT_ONCE / magnitudes_pace(s)) {
+        if (events == 0 || now->t - since >= AT_ONCE / nominals_pace(s)) {
             since = now->t;
             events = 0;
         }

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "digits.h"
-#include "magnitudes.h"
+#include "nominals.h"
 #include "thresholds.h"
 
 enum { STEP_HALVINGS = 25 };
@@ -88,7 +88,7 @@ static Status newton_from_afar(const Start *x, int stage, double *q, const int *
     double *f_trial = f + s->m, *allowed = f_trial + s->m;
     int *own = x->s->iwork_initial + s->m;
     const int all = precedence_rows(s, x->rank_q, stage, rows, own);
-    magnitudes_extents(s, x->at.p, least);
+    nominals_extents(s, x->at.p, least);
     if (mechanism_residual(b, x->at, q, f) == FAILED) return afar_refused(x->s);
     for (int count = 0;; count++) {
         if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return afar_refused(x->s);
@@ -186,7 +186,7 @@ static int on_velocities(const Start *x, const double *least, const double *v, c
     double *shared = speed + s->n;
     int on = 1;
     for (int j = 0; j < s->n; j++) speed[j] = fmax(fmax(fabs(v[j]), fabs(x->v0[j])), least[j]);
-    magnitudes_motion_speeds(b, speed, shared);
+    nominals_motion_speeds(b, speed, shared);
     for (int k = 0; k < s->m; k++) {
         slip[k] = -mechanism_slip(b, k, v);
         const double terms = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);

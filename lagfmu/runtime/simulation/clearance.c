@@ -13,7 +13,7 @@
 #include <math.h>
 
 #include "indicators.h"
-#include "flow.h"
+#include "segment.h"
 #include "thresholds.h"
 
 static Interval box(double a, double middle, double b) {

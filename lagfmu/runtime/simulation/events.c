@@ -11,9 +11,9 @@
 #include <string.h>
 
 #include "indicators.h"
-#include "flow.h"
-#include "samples.h"
 #include "root.h"
+#include "samples.h"
+#include "segment.h"
 
 static const double SEEN_NEAR = 0x1p-36;   /* of the time between two samples: how near a root is sought by sight */
 static const double SEEN_BESIDE = 0x1p-12; /* and how far beside it the slope is taken */
@@ -39,7 +39,7 @@ typedef struct {
 static Status height(void *context, double elapsed, double *value) {
     const Sought *x = context;
     const double t = x->t0 + elapsed;
-    if (flow_reach(x->s, x->t0, x->y0, t, x->y) != OK) return FAILED;
+    if (segment_reach(x->s, x->t0, x->y0, t, x->y) != OK) return FAILED;
     if (indicators_at(x->s, t, x->y, x->values) != OK) return FAILED;
     *value = range_inside(x->range, x->values[x->indicator]);
     return OK;

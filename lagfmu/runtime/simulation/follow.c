@@ -3,8 +3,8 @@
  *
  * Forces that jump have the levels of now, what a prescribed motion carries goes with it, and modes that the
  * new forces contradict are settled (switch.h). */
-#include "flow.h"
 #include "optional.h"
+#include "segment.h"
 
 /* What closed contacts and other constraints do when motions are prescribed anew. */
 static Status carry(Solver *s) {
@@ -13,7 +13,7 @@ static Status carry(Solver *s) {
         system_active(system, s->state.closed, s->active);
     else if (OPTIONAL.switch_released(s, s->state.now.span, 0) != OK)
         return FAILED;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
                              s->state.size);
 }
@@ -24,10 +24,10 @@ static Status follow_contacts(Solver *s) {
 
 /* What rests on a surface at which forces jump may be about to leave it. */
 static Status follow_jumps(Solver *s, int *changed) {
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     *changed = 0;
     if (s->system->jumps == 0) return OK;
-    flow_begin(s);
+    segment_begin(s);
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, changed);
     return OK;
@@ -36,7 +36,7 @@ static Status follow_jumps(Solver *s, int *changed) {
 Status solver_follow(Solver *s) {
     int changed;
     if (!s->state.now.ahead && s->system->jumps > 0)
-        OPTIONAL.jumps->settle(s, flow_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
+        OPTIONAL.jumps->settle(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (s->system->prescribed_count > 0 && carry(s) != OK) return FAILED;
     if (s->system->frictions > 0 && OPTIONAL.slides->renew(s) != OK) return FAILED;
     if (!s->drive.turned) return OK;

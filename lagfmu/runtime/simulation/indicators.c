@@ -8,8 +8,8 @@
 
 #include <math.h>
 
-#include "flow.h"
 #include "optional.h"
+#include "segment.h"
 
 int indicators_count(const System *s) { return s->contacts + s->jumps + 2 * s->frictions; }
 
@@ -17,7 +17,7 @@ int indicators_first_of_frictions(const System *s) { return s->contacts + s->jum
 
 static Status of_contacts(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
-    const Instant at = flow_instant(s, t);
+    const Instant at = segment_instant(s, t);
     Mechanism *b = &s->stepped;
     int any = system->frictions > 0;
     for (int c = 0; c < system->contacts; c++) any |= s->state.closed[c];
@@ -37,7 +37,7 @@ Status indicators_at(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
     if (system->contacts + system->frictions > 0 && of_contacts(s, t, y, values) != OK) return FAILED;
     if (system->jumps > 0) {
-        const Instant at = flow_instant(s, t);
+        const Instant at = segment_instant(s, t);
         system->surfaces(t, y, at.u, at.p, values + system->contacts);
     }
     for (int i = 0; i < indicators_count(system); i++)

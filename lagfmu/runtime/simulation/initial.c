@@ -1,5 +1,5 @@
 /* initial.c -- a consistent start: projection of start values onto the constraints, contact modes,
- * magnitudes.
+ * nominals.
  *
  * Positions are projected (afar.c, precedence.c) onto the constraints that always act and onto contacts
  * that are penetrated (f < gap); then velocities onto G v = nu; then the contacts that touch are
@@ -9,9 +9,9 @@
 
 #include "afar.h"
 #include "digits.h"
-#include "flow.h"
-#include "magnitudes.h"
+#include "nominals.h"
 #include "optional.h"
+#include "segment.h"
 #include "thresholds.h"
 
 
@@ -74,7 +74,7 @@ static Status find_positions(const Start *x) {
         memcpy(state->q, moved, (size_t)s->n * sizeof *moved);
     }
     if (check_angles(x) == FAILED) return FAILED;
-    magnitudes_sizes(x->s, state->q);
+    nominals_sizes(x->s, state->q);
     return OK;
 }
 
@@ -99,7 +99,7 @@ static Status check_velocities(const Start *x, const int *active, double *fastes
     int missed = 0;
     for (int j = 0; j < s->n; j++)
         fastest[j] = fmax(fmax(fabs(x->v0[j]), fabs(v[j])), fastest[j]);
-    magnitudes_motion_speeds(b, fastest, shared);
+    nominals_motion_speeds(b, fastest, shared);
     for (int k = 0; k < s->m; k++) {
         double unit = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);
         if (!active[k] || fabs(mechanism_slip(b, k, v)) <= TOUCH * unit) continue;
@@ -159,7 +159,7 @@ static Status find_velocities(const Start *x) {
     if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
     for (int j = 0; j < s->n; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
-    magnitudes_motion_speeds(b, fastest, shared);
+    nominals_motion_speeds(b, fastest, shared);
     for (int c = 0; c < s->contacts; c++) {
         int k = s->contact[c];
         double speed = mechanism_slip(b, k, x->v0);
@@ -192,19 +192,19 @@ static Status find_modes(const Start *x) {
         return afar_refused(x->s);
     if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
         return afar_refused(x->s);
-    flow_choose_rows(x->s);
+    segment_choose_rows(x->s);
     return OK;
 }
 
 /* A start value is its own scale, so that a start at theta0 = 1e-6 is resolved. */
-static Status find_magnitudes(const Start *x) {
+static Status find_nominals(const Start *x) {
     Solver *s = x->s;
     const int n = s->system->n;
     for (int j = 0; j < n; j++) {
         s->state.scale[j] = fabs(s->state.q[j]);
         s->state.scale[n + j] = fabs(s->state.v[j]);
     }
-    return magnitudes_complete(s, x->at, 0);
+    return nominals_complete(s, x->at, 0);
 }
 
 static void tell_each_moved(const Start *x, Moved moved, void *context) {
@@ -249,17 +249,17 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
                     Moved moved, void *context) {
     if (check_start_finite(s, q0, v0) == FAILED) return FAILED;
     solver_clear(s, t);
-    const Start x = {s, flow_instant(s, t), q0, v0, rank, rank + s->system->n};
+    const Start x = {s, segment_instant(s, t), q0, v0, rank, rank + s->system->n};
     if (s->system->jumps > 0) OPTIONAL.jumps->settle(s, x.at, q0, v0, NULL, NULL);
     if (s->system->contacts > 0 && OPTIONAL.impact_check(s) != OK) return FAILED;
     s->stepped.dependent = 1; /* it is not known yet */
-    magnitudes_sizes(s, q0);
+    nominals_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;
     if (s->system->jumps > 0) OPTIONAL.jumps->settle(s, x.at, s->state.q, v0, NULL, NULL);
     if (find_velocities(&x) == FAILED) return FAILED;
     if (find_modes(&x) == FAILED) return FAILED;
     for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];
-    if (find_magnitudes(&x) == FAILED) return FAILED;
+    if (find_nominals(&x) == FAILED) return FAILED;
     if (moved != NULL) tell_each_moved(&x, moved, context);
     return OK;
 }

@@ -11,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "flow.h"
+#include "segment.h"
 
 /* The speeds' change (m) on the rows `active`. */
 static void set_changes(Solver *s, const int *happened, const double *pull, const double *depth,
@@ -30,7 +30,7 @@ static void set_changes(Solver *s, const int *happened, const double *pull, cons
 
 Status landing_lift(Solver *s, const int *happened, const double *pull) {
     const System *system = s->system;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     Mechanism *b = &s->stepped;
     int *acting = s->iwork_initial, any = 0;
     double *v = s->work_initial, *dv = v + system->n, *depth = dv + system->n;

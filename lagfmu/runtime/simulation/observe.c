@@ -9,7 +9,7 @@
 
 #include "digits.h"
 #include "outputs.h"
-#include "flow.h"
+#include "segment.h"
 
 static int same_row(const System *a, int i, const System *b, int k) {
     return strcmp(a->rows[i].name, b->rows[k].name) == 0;
@@ -208,7 +208,7 @@ static Status check_observed_finite(Solver *s, const System *full, const Observe
 Status solver_observe(Solver *s, Observed *o) {
     const System *full = s->system->embed != NULL ? s->system->full : s->system;
     Mechanism *b = s->system->embed != NULL ? &s->full : &s->stepped;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     system_active(s->system, s->state.closed, s->active);
     s->stepped.dependent = s->state.now.dependent;
     if (s->system->embed != NULL && observe_stepped(s, at, o) == FAILED) return FAILED;

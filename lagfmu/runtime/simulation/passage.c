@@ -19,7 +19,7 @@
 
 #include "digits.h"
 #include "extreme.h"
-#include "flow.h"
+#include "segment.h"
 
 enum { PARTS = 16 };                 /* of a step, in which the least angle is looked for */
 static const double NARROW = 0.1;    /* angle [rad] below which a crossing may be near */
@@ -35,7 +35,7 @@ static const double NAMING = 1e-5;   /* how far off the constraints a state is t
 /* Factors the rows at (t, y), taken to be off the constraints by that much. */
 static Status factor_there(Solver *s, double t, const double *y, double off) {
     Mechanism *b = &s->stepped;
-    if (mechanism_evaluate(b, flow_instant(s, t), y, y + s->system->n) != OK) return FAILED;
+    if (mechanism_evaluate(b, segment_instant(s, t), y, y + s->system->n) != OK) return FAILED;
     b->linear.off = off;
     const Status status = linear_factor(&b->linear, b->M, b->G, s->active);
     b->linear.off = 0;
@@ -85,7 +85,7 @@ static int landed(const Solver *s, double *h) {
 
 static const double *stage(Solver *s, double t, const double *y) {
     memcpy(s->work_passage, y, 2 * (size_t)s->system->n * sizeof *y);
-    return flow_project(s, t, s->work_passage) == OK ? s->work_passage : NULL;
+    return segment_project(s, t, s->work_passage) == OK ? s->work_passage : NULL;
 }
 
 static Status height_of_rows(void *context, double elapsed, double *value) {

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "extreme.h"
-#include "flow.h"
+#include "segment.h"
 
 enum { PIECES = 8 };
 static const double INWARD = 1e-4;    /* of a piece: the way from an end on which growth is looked for */
@@ -62,7 +62,7 @@ static Status measure_at(Stretch *x, double t, double *values) {
     if (t == x->t[x->count - 1] && x->end != NULL) y = x->end;
     if (y == x->y) {
         x->dense(i, t, x->y);
-        if (flow_project(s, t, x->y) != OK) return FAILED;
+        if (segment_project(s, t, x->y) != OK) return FAILED;
     }
     return measure_there(s, t, y, values);
 }
@@ -118,7 +118,7 @@ static Status polish_extreme(Stretch *x, int i, int k, double elapsed, double va
         find(x, t, value);
         return OK;
     }
-    if (flow_reach(s, s->integrator.t_old, s->integrator.y_old, t, x->y) != OK) return FAILED;
+    if (segment_reach(s, s->integrator.t_old, s->integrator.y_old, t, x->y) != OK) return FAILED;
     if (measure_there(s, t, x->y, x->value) != OK) return FAILED;
     const double again = x->sense * x->value[x->quantity];
     if (again - record_of(x) > AGREED * fabs(again - value)) find(x, t, again);

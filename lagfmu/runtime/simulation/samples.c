@@ -10,7 +10,7 @@
 
 #include "clearance.h"
 #include "indicators.h"
-#include "flow.h"
+#include "segment.h"
 #include "thresholds.h"
 
 /* The time [s] in which an open contact that has just been left parts most, f' / (-f''). */
@@ -23,7 +23,7 @@ static Status top_of_rebound(Solver *s, double t, const double *y, const double 
     for (int c = 0; c < system->contacts; c++)
         left |= !s->state.closed[c] && values[c] <= s->state.gap[c];
     if (!left) return OK;
-    if (mechanism_motion_near(b, flow_instant(s, t), y, y + system->n, s->active, s->state.offset,
+    if (mechanism_motion_near(b, segment_instant(s, t), y, y + system->n, s->active, s->state.offset,
                               s->state.size) != OK)
         return FAILED;
     for (int c = 0; c < system->contacts; c++) {

@@ -4,9 +4,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "flow.h"
 #include "losses.h"
 #include "rest.h"
+#include "segment.h"
 #include "slipping.h"
 #include "thresholds.h"
 
@@ -154,7 +154,7 @@ static Status renew(Solver *s) {
     int any = 0;
     for (int i = 0; i < s->system->frictions; i++) any |= s->state.slide[i].sticks;
     if (!any || s->system->inputs == 0) return OK;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     rest_renew_noise(s, s->state.slide); /* at the start nothing may have been at work */
     for (int i = 0; i < s->system->frictions; i++) {

@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-#include "flow.h"
 #include "friction.h"
+#include "segment.h"
 #include "thresholds.h"
 
 void slipping_indicators(const Solver *s, double *values) {
@@ -37,7 +37,7 @@ Status slipping_turn(Solver *s, double t, const double *y) {
     Mechanism *b = &s->stepped;
     if (!slipping_turns(s)) return OK;
     const double *v = y + s->system->n;
-    if (mechanism_evaluate(b, flow_instant(s, t), y, v) != OK) return FAILED;
+    if (mechanism_evaluate(b, segment_instant(s, t), y, v) != OK) return FAILED;
     for (int i = 0; i < s->system->frictions; i++) {
         double slip[2], e[2];
         if (s->state.slide[i].sticks) continue;
@@ -56,7 +56,7 @@ static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.56888
 
 /* The motion at a state that may lie off the constraints. */
 static Status move_near(Solver *s, double t, const double *y) {
-    return mechanism_motion_near(&s->stepped, flow_instant(s, t), y, y + s->system->n, s->active,
+    return mechanism_motion_near(&s->stepped, segment_instant(s, t), y, y + s->system->n, s->active,
                                  s->state.offset, s->state.size);
 }
 

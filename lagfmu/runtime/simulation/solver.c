@@ -1,11 +1,11 @@
 /* solver.c -- the memory of a simulation, taken in two passes (arena.h). */
 #include "solver.h"
 
-#include "impact.h"
 #include "clearance.h"
+#include "impact.h"
 #include "indicators.h"
-#include "samples.h"
 #include "optional.h"
+#include "samples.h"
 
 static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
     const int n = s->n, contacts = s->contacts, indicators = indicators_count(s);

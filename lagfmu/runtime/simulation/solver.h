@@ -45,7 +45,7 @@ typedef struct Solver {
     double *push;              /* (contacts) impulse of the impacts of the present instant [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
-    double *work_initial;      /* (6 n + 3 m) of initial.c, afar.c and magnitudes.c */
+    double *work_initial;      /* (6 n + 3 m) of initial.c, afar.c and nominals.c */
     int *iwork_initial;        /* (2 m + contacts) */
     double *work_contacts;     /* (2 n + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */
@@ -69,6 +69,11 @@ typedef struct Solver {
     Why passed;                /* singular configurations passed since the caller emptied it, as a sentence */
     Why why;
 } Solver;
+
+/* (m) The rows for states off the constraints: those that act, as many of them as are independent. */
+static inline const int *solver_rows(const Solver *s) {
+    return s->state.now.dependent ? s->state.basis : s->active;
+}
 
 /* Takes all memory of the solver: what must be saved from `saved`, the rest from `scratch`.  Of
  * `saved` the first state.block_size bytes are the state's arrays; the drive and p follow.  To be

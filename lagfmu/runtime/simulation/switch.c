@@ -9,9 +9,9 @@
 #include "contacts.h"
 #include "impact.h"
 #include "indicators.h"
-#include "flow.h"
 #include "losses.h"
 #include "optional.h"
+#include "segment.h"
 #include "thresholds.h"
 
 /* What is said of each contact while an event is met: flags (contacts). */
@@ -140,7 +140,7 @@ static void note_closings(Solver *s, const int *happened, const int *closed, con
 Status switch_modes(Solver *s, const int *happened) {
     const System *system = s->system;
     const int contacts = system->contacts;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     const int rubs = system->frictions > 0;
     double *arriving = s->work_switch + system->m;
     memcpy(arriving, s->state.v, (size_t)system->n * sizeof *arriving);
@@ -194,7 +194,7 @@ static Status has_parted(Solver *s, Instant at, int c, double span, double drift
 Status switch_released(Solver *s, double span, double drift) {
     const System *system = s->system;
     if (system->prescribed_count == 0) return OK;
-    const Instant at = flow_instant(s, s->state.now.t);
+    const Instant at = segment_instant(s, s->state.now.t);
     for (int c = 0; c < system->contacts; c++) {
         int parted;
         if (!s->state.closed[c]) continue;
@@ -235,7 +235,7 @@ static Status find_contradicted(Solver *s, Instant at, int *left, int *any) {
 
 Status switch_contradicted(Solver *s) {
     int any;
-    flow_begin(s);
-    if (find_contradicted(s, flow_instant(s, s->state.now.t), s->state.left, &any) != OK) return FAILED;
+    segment_begin(s);
+    if (find_contradicted(s, segment_instant(s, s->state.now.t), s->state.left, &any) != OK) return FAILED;
     return any ? switch_modes(s, s->state.left) : OK;
 }

@@ -1,4 +1,4 @@
-/* magnitudes.c -- what is large and what is small in a motion.  No unit counts.
+/* nominals.c -- what is large and what is small in a motion.  No unit counts.
  *
  *   size   of a coordinate: |q|, or the largest parameter of its dimension; of angles at most 1 rad
  *   rate   [1/s] of the motion: the largest |v| / size and sqrt(|vdot| / size)
@@ -23,9 +23,8 @@
  * only time is the importer's: tau is MEASURED_PART of the first communication step.  Were the motion a
  * million times faster than that step, its size would be taken for at most 1e6 times what it is,
  * which the floor of the scale, below 1e-6, still forgives. */
-#include "magnitudes.h"
+#include "nominals.h"
 
-#include "flow.h"
 #include "numbers.h"
 #include "thresholds.h"
 
@@ -36,7 +35,7 @@ static const double FASTEST = 1e150; /* [1/s] of a motion */
 
 static double positive(double x) { return x > 0 ? x : STILL; }
 
-void magnitudes_extents(const System *s, const double *p, double *least) {
+void nominals_extents(const System *s, const double *p, double *least) {
     for (int j = 0; j < s->n; j++) {
         least[j] = s->folded != NULL ? s->folded[j] : 0;
         for (int i = 0; i < s->parameters; i++)
@@ -44,11 +43,11 @@ void magnitudes_extents(const System *s, const double *p, double *least) {
     }
 }
 
-void magnitudes_sizes(Solver *s, const double *q) {
+void nominals_sizes(Solver *s, const double *q) {
     const System *system = s->system;
     double *size = s->state.size, *least = s->work_initial;
     double turn = 0;
-    magnitudes_extents(system, s->p, least);
+    nominals_extents(system, s->p, least);
     for (int j = 0; j < system->n; j++) {
         const double place = fabs(q[j]) > LOST * size[j] ? fabs(q[j]) : 0;
         size[j] = larger(place, least[j]);
@@ -62,7 +61,7 @@ void magnitudes_sizes(Solver *s, const double *q) {
 static void share_largest(double *shared, int j, double value) { shared[j] = larger(shared[j], value); }
 
 /* What coordinate i has, for others. */
-static double own_magnitude(const Solver *s, const double *y, int i) {
+static double own_nominal(const Solver *s, const double *y, int i) {
     return larger(s->state.scale[i], fabs(y[i]));
 }
 
@@ -75,8 +74,8 @@ static void share_row(const Solver *s, const double *y, int k, int e, double *sh
         const int i = system->entry_column[d];
         if (system->dimension[i] != system->dimension[first]) continue;
         if (d < e) return; /* they have it already */
-        q = larger(q, own_magnitude(s, y, i));
-        v = larger(v, own_magnitude(s, y, n + i));
+        q = larger(q, own_nominal(s, y, i));
+        v = larger(v, own_nominal(s, y, n + i));
     }
     for (int d = e; d < system->row_start[k + 1]; d++) {
         const int i = system->entry_column[d];
@@ -86,7 +85,7 @@ static void share_row(const Solver *s, const double *y, int k, int e, double *sh
     }
 }
 
-void magnitudes_shared(const Solver *s, const double *y, double *shared) {
+void nominals_shared(const Solver *s, const double *y, double *shared) {
     const System *system = s->system;
     const int n = system->n;
     memcpy(shared, s->state.scale, 2 * (size_t)n * sizeof *shared);
@@ -97,14 +96,14 @@ void magnitudes_shared(const Solver *s, const double *y, double *shared) {
         const int i = system->mass_row[e], j = system->mass_column[e];
         if (i == j || system->dimension[i] != system->dimension[j]) continue;
         if (system->dimension[i] == system->angles) continue;
-        share_largest(shared, i, own_magnitude(s, y, j));
-        share_largest(shared, j, own_magnitude(s, y, i));
-        share_largest(shared, n + i, own_magnitude(s, y, n + j));
-        share_largest(shared, n + j, own_magnitude(s, y, n + i));
+        share_largest(shared, i, own_nominal(s, y, j));
+        share_largest(shared, j, own_nominal(s, y, i));
+        share_largest(shared, n + i, own_nominal(s, y, n + j));
+        share_largest(shared, n + j, own_nominal(s, y, n + i));
     }
 }
 
-int magnitudes_incomplete(const Solver *s) {
+int nominals_incomplete(const Solver *s) {
     int incomplete = !(s->state.now.rate > 0);
     for (int j = 0; j < s->system->n; j++) incomplete |= !(s->state.size[j] > 0);
     return incomplete;
@@ -139,7 +138,7 @@ static double rate_of_coordinate(const Solver *s, int j, double v, double pull) 
     return size > 0 ? bounded(larger(fabs(v) / unit, sqrt(fabs(pull) / size))) : 0;
 }
 
-double magnitudes_pace(const Solver *s) {
+double nominals_pace(const Solver *s) {
     const Integrator *i = &s->integrator;
     const int n = s->system->n;
     const double *v = i->y + n, *before = i->y_old + n;
@@ -157,7 +156,7 @@ static double largest_alike(const System *s, int j, const double *x) {
     return largest;
 }
 
-void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *shared) {
+void nominals_motion_speeds(const Mechanism *b, const double *speed, double *shared) {
     const System *s = b->system;
     double momentum = 0;
     for (int e = 0; e < s->masses; e++)
@@ -191,7 +190,7 @@ static double slowest_rate(const Solver *s) {
 static double find_own(Solver *s, double span, const double *felt, double *own) {
     const System *system = s->system;
     double *least = s->work_initial, steady = 0, natural = 0;
-    magnitudes_extents(system, s->p, least);
+    nominals_extents(system, s->p, least);
     for (int j = 0; j < system->n; j++)
         if (least[j] > 0 || system->dimension[j] == system->angles)
             steady = larger(steady, rate_of_coordinate(s, j, s->state.v[j], felt[j]));
@@ -223,7 +222,7 @@ static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
         const double q = state->q[j], size = state->size[j];
         if (!(size > 0)) continue;
         state->q[j] += DISPLACED * size;
-        evaluated = mechanism_motion(b, at, state->q, state->v, flow_rows(s)) == OK;
+        evaluated = mechanism_motion(b, at, state->q, state->v, solver_rows(s)) == OK;
         state->q[j] = q;
         for (int i = 0; i < n; i++) {
             const double change = fabs(b->vdot[i] - vdot[i]) / DISPLACED;
@@ -303,7 +302,7 @@ static Status find_scales(Solver *s, const double *own, const double *shaken) {
     return OK;
 }
 
-Status magnitudes_complete(Solver *s, Instant at, double span) {
+Status nominals_complete(Solver *s, Instant at, double span) {
     const int n = s->system->n;
     double *felt = s->work_initial + n, *own = felt + n, *back = own + n, *shaken = back + n;
     find_felt(&s->stepped, felt);

@@ -1,37 +1,37 @@
-/* magnitudes.h -- what is large and what is small in a motion: sizes, natural rate, error scales. */
-#ifndef LAGFMU_MAGNITUDES_H
-#define LAGFMU_MAGNITUDES_H
+/* nominals.h -- what is large and what is small in a motion: sizes, natural rate, error scales. */
+#ifndef LAGFMU_NOMINALS_H
+#define LAGFMU_NOMINALS_H
 
 #include "linkage.h"
 #include "solver.h"
 
 /* least (n): for each coordinate the largest parameter of its dimension; 0 for an angle. */
-SHARED void magnitudes_extents(const System *s, const double *p, double *least);
+SHARED void nominals_extents(const System *s, const double *p, double *least);
 
 /* state.size at q; 0 where there is none.  Before: the sizes before q was projected, or 0. */
-SHARED void magnitudes_sizes(Solver *s, const double *q);
+SHARED void nominals_sizes(Solver *s, const double *q);
 
 /* shared (n): what speeds a whole motion has that moves each coordinate at `speed` (n) >= 0: the largest of
  * its dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its
  * own.  A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed
  * is rounding of theirs.  Of the masses that were evaluated last. */
-SHARED void magnitudes_motion_speeds(const Mechanism *b, const double *speed, double *shared);
+SHARED void nominals_motion_speeds(const Mechanism *b, const double *speed, double *shared);
 
 /* shared (2 n): state.scale, no smaller than the scales and magnitudes in y (2 n) of the coordinates that each
  * one can turn into by another choice of axes: those of its dimension with which a constraint or the mass
  * matrix ties it; angles with which a constraint does.  So the steps are the same in whatever frame. */
-SHARED void magnitudes_shared(const Solver *s, const double *y, double *shared);
+SHARED void nominals_shared(const Solver *s, const double *y, double *shared);
 
 /* 1 while a size, or the rate, is not known. */
-SHARED int magnitudes_incomplete(const Solver *s);
+SHARED int nominals_incomplete(const Solver *s);
 
 /* Sizes, rate, scales and gaps as far as they can be known; scales only grow.  `stepped` holds the
  * motion at the state and instant; span [s]: of the first step, or 0 while there is none.  FAILED if one
  * is not finite. */
-SHARED Status magnitudes_complete(Solver *s, Instant at, double span);
+SHARED Status nominals_complete(Solver *s, Instant at, double span);
 
 /* The motion's rate [1/s] in the step just taken, which inputs may have made another one than at the start;
  * never less than that. */
-SHARED double magnitudes_pace(const Solver *s);
+SHARED double nominals_pace(const Solver *s);
 
 #endif

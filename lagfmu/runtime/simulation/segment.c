@@ -1,12 +1,11 @@
-/* flow.c -- the index-1 equations of motion as an ordinary differential equation, and its projection
+/* segment.c -- the index-1 equations of motion as an ordinary differential equation, and its projection
  * (Hairer & Wanner II, sect. VII.2: index reduction with projection). */
-#include "flow.h"
-
-#include "magnitudes.h"
+#include "segment.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "nominals.h"
 #include "optional.h"
 #include "sensitivity.h"
 #include "step_size.h"
@@ -16,31 +15,27 @@ static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
 static const double PASSING = 1e-10; /* least tolerance of a step next to a singular configuration */
 static const double TOLERANCE_SHARE = 0.25; /* of the tolerance: errors of many steps add up */
 
-void flow_begin(Solver *s) {
+void segment_begin(Solver *s) {
     system_active(s->system, s->state.closed, s->active);
     s->stepped.dependent = s->state.now.dependent;
 }
 
-void flow_choose_rows(Solver *s) {
+void segment_choose_rows(Solver *s) {
     s->state.now.dependent = linear_basis(&s->stepped.linear, s->state.basis);
     s->stepped.dependent = s->state.now.dependent;
 }
 
-const int *flow_rows(const Solver *s) {
-    return s->state.now.dependent ? s->state.basis : s->active;
-}
-
-Instant flow_instant(Solver *s, double t) {
+Instant segment_instant(Solver *s, double t) {
     const System *system = s->system;
     if (system->inputs > 0) drive_at(system, &s->drive, t, s->u);
     for (int k = 0; k < system->jumps; k++) s->u[system->inputs + k] = s->state.level[k];
     return (Instant){t, s->u, s->p};
 }
 
-Status flow_motion(Solver *s, Instant at, const double *q, const double *v) {
+Status segment_motion(Solver *s, Instant at, const double *q, const double *v) {
     return s->system->frictions > 0 ? mechanism_motion_near(&s->stepped, at, q, v, s->active,
                                                             s->state.offset, s->state.size)
-                                    : mechanism_motion(&s->stepped, at, q, v, flow_rows(s));
+                                    : mechanism_motion(&s->stepped, at, q, v, solver_rows(s));
 }
 
 static Status rate_of_state(void *context, double t, const double *y, double *dydt) {
@@ -48,7 +43,7 @@ static Status rate_of_state(void *context, double t, const double *y, double *dy
     const int n = s->system->n;
     if (s->state.now.approach.near && (y = OPTIONAL.passage->stage(s, t, y)) == NULL) return FAILED;
     s->stepped.stage = 1;
-    const Status status = flow_motion(s, flow_instant(s, t), y, y + n);
+    const Status status = segment_motion(s, segment_instant(s, t), y, y + n);
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
     if (OPTIONAL.passage != NULL) s->narrowest = fmin(s->narrowest, s->apart = linear_apart(&s->stepped.linear));
@@ -70,7 +65,7 @@ static Status plain_rate(void *context, double t, const double *y, double *dydt)
 }
 
 static int is_plain(const Solver *s) {
-    const int *rows = flow_rows(s);
+    const int *rows = solver_rows(s);
     if (s->system->accelerate == NULL || s->system->frictions > 0) return 0;
     for (int k = 0; k < s->system->m; k++)
         if (!rows[k]) return 0;
@@ -80,37 +75,37 @@ static int is_plain(const Solver *s) {
 static Status jacobian(void *context, double t, const double *y, double *J, double *dfdt) {
     Solver *s = context;
     if (s->system->frictions > 0) return OPTIONAL.slides->jacobian(s, t, y, J, dfdt);
-    return sensitivity_jacobian(&s->sensitivity, &s->stepped, flow_instant(s, t), flow_rows(s), y, J,
+    return sensitivity_jacobian(&s->sensitivity, &s->stepped, segment_instant(s, t), solver_rows(s), y, J,
                                 dfdt);
 }
 
 /* The equations at the times of a step from t on. */
 static Ode equations_at(Solver *s, double t) {
     const int plain = is_plain(s) && !s->state.now.approach.near;
-    if (plain) (void)flow_instant(s, t); /* levels of jumps, which stay */
+    if (plain) (void)segment_instant(s, t); /* levels of jumps, which stay */
     return (Ode){s, plain ? plain_rate : rate_of_state, jacobian, &s->why};
 }
 
-double flow_fewest_steps(const Solver *s) {
+double segment_fewest_steps(const Solver *s) {
     return s->settings.method == RATTLE ? FEWEST_STEPS_RATTLE : FEWEST_STEPS_RK4;
 }
 
-double flow_natural_step(const Solver *s) {
-    return 1 / (flow_fewest_steps(s) * s->state.now.rate);
+double segment_natural_step(const Solver *s) {
+    return 1 / (segment_fewest_steps(s) * s->state.now.rate);
 }
 
-double flow_tolerance(const Solver *s) {
+double segment_tolerance(const Solver *s) {
     return fmax(s->settings.tolerance, s->state.now.approach.near ? PASSING : 0);
 }
 
 static Control control(const Solver *s, const Integrator *i, double longest) {
     const Settings *set = &s->settings;
-    const double fixed = set->step > 0 ? set->step : flow_natural_step(s);
+    const double fixed = set->step > 0 ? set->step : segment_natural_step(s);
     if (s->limit > 0) longest = fmin(longest, s->limit);
     if (s->state.now.approach.near) longest = fmin(longest, OPTIONAL.passage->longest(s, i->h_next));
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
-    if (!s->integrator.method->fixed) magnitudes_shared(s, i->y, s->scale);
-    return (Control){TOLERANCE_SHARE * flow_tolerance(s), s->scale, longest < HUGE_VAL ? longest : 0,
+    if (!s->integrator.method->fixed) nominals_shared(s, i->y, s->scale);
+    return (Control){TOLERANCE_SHARE * segment_tolerance(s), s->scale, longest < HUGE_VAL ? longest : 0,
                      fixed};
 }
 
@@ -134,9 +129,9 @@ static Status accept(Solver *s, Integrator *i) {
     const int n = s->system->n;
     if (i != &s->integrator || !i->fresh || s->system->m < 2) return OK;
     const double *y = i->y;
-    if (mechanism_motion(&s->stepped, flow_instant(s, i->t), y, y + n, s->active) != OK)
+    if (mechanism_motion(&s->stepped, segment_instant(s, i->t), y, y + n, s->active) != OK)
         return FAILED;
-    flow_choose_rows(s);
+    segment_choose_rows(s);
     if (OPTIONAL.passage != NULL) OPTIONAL.passage->look(s, i->t, y);
     memcpy(i->f, y + n, (size_t)n * sizeof *y);
     memcpy(i->f + n, s->stepped.vdot, (size_t)n * sizeof *y);
@@ -144,11 +139,11 @@ static Status accept(Solver *s, Integrator *i) {
     return OK;
 }
 
-Status flow_step(Solver *s, Integrator *i, double t_bound, double longest) {
+Status segment_step(Solver *s, Integrator *i, double t_bound, double longest) {
     s->narrowest = s->apart = 1;
     const Control c = control(s, i, longest);
     if (s->settings.method == RATTLE) {
-        const Instant at = flow_instant(s, i->t);
+        const Instant at = segment_instant(s, i->t);
         return OPTIONAL.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,
                                  t_bound);
     }
@@ -158,18 +153,18 @@ Status flow_step(Solver *s, Integrator *i, double t_bound, double longest) {
     return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;
 }
 
-Status flow_rate(Solver *s, Integrator *i) {
+Status segment_rate(Solver *s, Integrator *i) {
     const Ode ode = equations_at(s, i->t);
     return step_size_rate(i, &ode);
 }
 
-Status flow_prepare_dense(Solver *s, Integrator *i) {
+Status segment_prepare_dense(Solver *s, Integrator *i) {
     const Ode ode = equations_at(s, i->t);
     return i->method->prepare_dense == NULL ? OK : i->method->prepare_dense(i, &ode);
 }
 
-Status flow_project(Solver *s, double t, double *y) {
-    return mechanism_project(&s->stepped, flow_instant(s, t), y, y + s->system->n, s->active,
+Status segment_project(Solver *s, double t, double *y) {
+    return mechanism_project(&s->stepped, segment_instant(s, t), y, y + s->system->n, s->active,
                              s->state.offset, s->state.size);
 }
 
@@ -186,7 +181,7 @@ static int is_balanced(const Solver *s, int j, double moved) {
     return 0;
 }
 
-Status flow_check_projection(Solver *s, double t, const double *y, const double *projected) {
+Status segment_check_projection(Solver *s, double t, const double *y, const double *projected) {
     const int n = s->system->n;
     const double far = fmax(FAR * s->settings.tolerance, LEAST_FAR);
     if (s->integrator.method->fixed) return OK;
@@ -205,13 +200,13 @@ Status flow_check_projection(Solver *s, double t, const double *y, const double 
     return OK;
 }
 
-Status flow_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
+Status segment_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
     Integrator *i = &s->probe;
     memcpy(y, y0, 2 * (size_t)s->system->n * sizeof *y);
     if (!(t1 > t0)) return OK;
     integrator_start(i, s->integrator.method, t0, y0, t1 - t0);
     while (i->t < t1)
-        if (flow_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
+        if (segment_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
     memcpy(y, i->y, 2 * (size_t)s->system->n * sizeof *y);
-    return flow_project(s, t1, y);
+    return segment_project(s, t1, y);
 }
