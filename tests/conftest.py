@@ -28,12 +28,8 @@ from browser import Page, chromium
 from fmi2 import Library
 from once import once
 
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.live.playable import playable as playable_of
-from lagfmu.live.render import Playable, render
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import Prepared, prepare
+from lagfmu.testing import Playable, Prepared, find_compiler, load, prepare, render, write
+from lagfmu.testing import playable as playable_of
 
 MODELS = Path(__file__).parent.parent / "models"
 FILES = {

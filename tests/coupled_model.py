@@ -16,7 +16,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Input, Model, Parameter, Scene
-from lagfmu.model.file import load
+from lagfmu.testing import load
 
 cart = load(Path(__file__).parent.parent / "models" / "cart_pendulum.py").model
 s, x, y = cart.coordinates

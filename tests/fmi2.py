@@ -11,8 +11,8 @@ from typing import Any
 
 import fmpy
 
-from lagfmu.fmu.compiler import host
 from lagfmu.methods import NUMBERS
+from lagfmu.testing import host
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 EXCHANGE, CO_SIMULATION = 0, 1

@@ -11,7 +11,7 @@ from typing import Any
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 
-from lagfmu.verification.simulate import items_of
+from lagfmu.testing import items_of
 
 
 class Instance:

@@ -5,12 +5,19 @@ from __future__ import annotations
 
 from functools import partial
 
-from lagfmu.fmu.session import RefusalError
-from lagfmu.study.stress.bench import Bench, Finding
-from lagfmu.study.stress.facts import Facts
-from lagfmu.study.stress.judge import EPS, Check, differ
-from lagfmu.study.stress.player import Player, Run, table
-from lagfmu.study.stress.probe import Probe
+from lagfmu.testing import (
+    EPS,
+    Bench,
+    Check,
+    Facts,
+    Finding,
+    Player,
+    Probe,
+    RefusalError,
+    Run,
+    differ,
+)
+from lagfmu.testing import table_of_run as table
 
 FAMILY = "calls"
 STEPS = (0.11, 0.23, 0.07, 0.31, 0.05, 0.23)  # parts of the default experiment

@@ -21,15 +21,19 @@ import numpy as np
 import sympy as sp
 
 from lagfmu import names
-from lagfmu.fmu.session import RefusalError
-from lagfmu.study.stress.bench import Bench, Finding
-from lagfmu.study.stress.closed_forms import JudgedForm, magnitude
-from lagfmu.study.stress.facts import Facts
-from lagfmu.study.stress.judge import Check
-from lagfmu.study.stress.player import table
-from lagfmu.study.stress.probe import Probe
-from lagfmu.verification.evaluate import function
-from lagfmu.verification.verify import applies
+from lagfmu.testing import (
+    Bench,
+    Check,
+    Facts,
+    Finding,
+    JudgedForm,
+    Probe,
+    RefusalError,
+    applies,
+    function,
+    magnitude,
+)
+from lagfmu.testing import table_of_run as table
 
 FAMILY = "derivatives"
 WITHIN = 1e-11

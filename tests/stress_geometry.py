@@ -11,15 +11,18 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from lagfmu import names
-from lagfmu.fmu.closed_forms import pack_closed_forms, unpack_closed_forms
-from lagfmu.model.closed_form import TIME, ClosedForm
-from lagfmu.model.elements import Expr
-from lagfmu.model.model import Contact, Model, Nonholonomic, name_of
-from lagfmu.model.reactions import reactions_in
+from lagfmu import ClosedForm, Contact, Model, Nonholonomic, names
 from lagfmu.names import read
-from lagfmu.prepare.prepare import Prepared
-from lagfmu.verification.evaluate import function
+from lagfmu.testing import (
+    TIME,
+    Expr,
+    Prepared,
+    function,
+    name_of,
+    pack_closed_forms,
+    reactions_in,
+    unpack_closed_forms,
+)
 
 Column = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -30,11 +30,7 @@ from scipy.optimize import nnls
 from stress_geometry import Collision, Geometry, geometry_of, twin
 
 from lagfmu import names
-from lagfmu.study.stress.bench import Bench, Finding
-from lagfmu.study.stress.facts import Facts
-from lagfmu.study.stress.judge import Check
-from lagfmu.study.stress.player import Player
-from lagfmu.study.stress.probe import Probe
+from lagfmu.testing import Bench, Check, Facts, Finding, Player, Probe
 
 FAMILY = "impacts"
 ABOVE, JUST_ABOVE = 1e-6, 1e-12  # height of the start, relative to the gaps' own sizes

@@ -12,10 +12,7 @@ import numpy as np
 from stress_geometry import Collision, Geometry, geometry_of
 
 from lagfmu.names import UNIQUE, name
-from lagfmu.study.stress.bench import Bench, Finding
-from lagfmu.study.stress.facts import Facts
-from lagfmu.study.stress.judge import Check, acts
-from lagfmu.study.stress.probe import Probe
+from lagfmu.testing import Bench, Check, Facts, Finding, Probe, acts
 
 FAMILY = "unique"
 ZERO, SURE = 1e-12, 1e-5  # singular values in between say nothing

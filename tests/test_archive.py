@@ -16,8 +16,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from lagfmu.cli.app import app
-from lagfmu.verification.pipeline import NOT_RUN, TERMINATED
+from lagfmu.testing import NOT_RUN, TERMINATED, app
 
 
 def hostile(archive, kind):

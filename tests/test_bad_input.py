@@ -39,10 +39,8 @@ from lagfmu import (
     verify,
 )
 from lagfmu.errors import BuildError, DerivationError, ModelError, VerificationError
-from lagfmu.model.file import load
-from lagfmu.page.text import show
-from lagfmu.prepare.consistency import RedundantConstraintWarning
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import RedundantConstraintWarning, load, prepare
+from lagfmu.testing import show_in as show
 
 DISCARD, ERROR, FATAL = 2, 3, 4
 
@@ -755,12 +753,12 @@ SMALL_FILES = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-from lagfmu.cli.app import app
+from lagfmu.testing import app
 app(sys.argv[1:])
 """
 NO_ROOM = """
 import errno, sys, tempfile
-from lagfmu.cli.app import app
+from lagfmu.testing import app
 def full(*arguments, **options):
     raise OSError(errno.ENOSPC, "No space left on device")
 tempfile.mkdtemp = full

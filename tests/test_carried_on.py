@@ -12,7 +12,7 @@ from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu, derive
-from lagfmu.fmu.compiler import find_compiler
+from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 

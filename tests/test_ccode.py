@@ -24,19 +24,32 @@ from conftest import FILES, MODELS
 from runtime import FLAGS, INCLUDES, compile_library, compiler
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter, derive
-from lagfmu.codegen.c.equations import model_source
-from lagfmu.codegen.c.function import BLOCK
-from lagfmu.codegen.c.printer import identifiers, number
-from lagfmu.codegen.py.equations import lower
+from lagfmu import (
+    Contact,
+    Embedding,
+    EquationsOfMotion,
+    Holonomic,
+    Input,
+    Model,
+    Nonholonomic,
+    Parameter,
+    derive,
+)
 from lagfmu.errors import DerivationError
-from lagfmu.mechanics.differential import Differential
-from lagfmu.mechanics.equations import TIME, EquationsOfMotion
-from lagfmu.mechanics.form import Form
-from lagfmu.mechanics.formulations.minimal import reduce
-from lagfmu.model.spline import SplineBase
-from lagfmu.numeric.system import System
-from lagfmu.prepare.prepare import Prepared
+from lagfmu.testing import (
+    TIME,
+    Differential,
+    Form,
+    Prepared,
+    SplineBase,
+    System,
+    c_function,
+    identifiers,
+    lower,
+    model_source,
+    number,
+    reduce,
+)
 
 CLOSE = 1e-14  # of the magnitude of what is added up, about 45 roundings
 NAMES = sorted(FILES)
@@ -866,7 +879,7 @@ def test_code_grows_linearly_and_in_blocks(tmp_path: Path) -> None:
         assert len(texts[whole]) < 2.1 * len(texts[half])
         assert sum(bodies(texts[whole])) < 2.1 * sum(bodies(texts[half]))
     assert len(bodies(texts[64])) > 10
-    assert max(bodies(texts[64])) < BLOCK
+    assert max(bodies(texts[64])) < c_function.BLOCK
 
 
 def test_a_long_chain_has_the_right_numbers(tmp_path: Path) -> None:
@@ -895,7 +908,7 @@ def serial(n: int) -> Model:
 
 def test_blocks_share_what_is_costly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Split or whole, the sine of an angle is computed once a function; the values stay right."""
-    monkeypatch.setattr("lagfmu.codegen.c.function.BLOCK", 150)
+    monkeypatch.setattr(c_function, "BLOCK", 150)
     one = made(serial(3), tmp_path)
     checked(one, (1,))
     assert "blocks[k]" in one.source
@@ -914,10 +927,7 @@ def test_small_models_are_not_split(case: Callable[[str], Case]) -> None:
 SOURCES_IN_ANOTHER_PROCESS = """
 import hashlib, sys
 from pathlib import Path
-from lagfmu.codegen.c.equations import model_source
-from lagfmu.codegen.c.variables import variables_source
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import load, model_source, prepare, variables_source
 digest = hashlib.sha256()
 for path in sys.argv[1:]:
     file = load(Path(path))

@@ -13,8 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import roots_laguerre
 
 from lagfmu import derive, simulate
-from lagfmu.codegen.py.equations import lower
-from lagfmu.mechanics.form import Form
+from lagfmu.testing import Form, lower
 
 pytestmark = pytest.mark.python_cases(3)
 

@@ -16,9 +16,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from lagfmu.cli.app import COMMANDS, app
-from lagfmu.verification.pipeline import EXIT_CODES, NOT_RUN, WRONG_USAGE
-from lagfmu.verification.plot import panels
+from lagfmu.testing import COMMANDS, EXIT_CODES, NOT_RUN, WRONG_USAGE, app, panels
 
 REPOSITORY = Path(__file__).parent.parent
 MODELS = REPOSITORY / "models"
@@ -322,7 +320,7 @@ def test_help_and_version_are_told_without_waiting(words):
     assert run.stdout
 
 
-@pytest.mark.parametrize("interrupted", ["lagfmu.cli.app", "lagfmu.prepare.prepare"])
+@pytest.mark.parametrize("interrupted", ["typer", "sympy"])
 def test_ctrl_c_while_it_is_loading_ends_without_a_traceback(interrupted):
     """Half of a short command's time goes by before it begins."""
     lines = [

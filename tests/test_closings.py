@@ -17,10 +17,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, Scene, multiplier, sweep
 from lagfmu.errors import BuildError, ModelError
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.sweep.table import happened
+from lagfmu.testing import happened, load, prepare, write
 
 Fmu = Callable[[str], Path]
 G = 9.81

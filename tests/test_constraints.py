@@ -23,8 +23,9 @@ from sympy import (
 )
 from sympy.physics.mechanics import dynamicsymbols
 
+from lagfmu import classify
 from lagfmu.errors import DerivationError
-from lagfmu.mechanics.integrability.classify import Kind, classify, pfaffian
+from lagfmu.testing import Kind, pfaffian
 
 x, y, z, s, phi, theta, psi = dynamicsymbols("x y z s phi theta psi")
 t = dynamicsymbols._t

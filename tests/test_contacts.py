@@ -21,7 +21,7 @@ from lagfmu import (
     build_fmu,
     simulate,
 )
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import prepare
 
 G = 9.81
 x, y, theta, phi, r = dynamicsymbols("x y theta phi r")

@@ -15,16 +15,22 @@ import pytest
 from crossings import covering, model, pairs, together
 
 from lagfmu import simulate
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress import exchange, runs
-from lagfmu.study.stress.bench import Bench
-from lagfmu.study.stress.judge import first_landing
-from lagfmu.study.stress.lagrange import lay_beside
-from lagfmu.study.stress.player import play
-from lagfmu.study.stress.probe import UNFINISHED, WRONG, attempt, verdict
-from lagfmu.study.stress.probes import probes
+from lagfmu.testing import (
+    UNFINISHED,
+    WRONG,
+    Bench,
+    attempt,
+    exchange,
+    find_compiler,
+    first_landing,
+    lay_beside,
+    prepare,
+    probes,
+    runs,
+    verdict,
+    write,
+)
+from lagfmu.testing import play_of as play
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from runtime import compile_library
 
-from lagfmu.codegen.c import elimination
-from lagfmu.codegen.c.solve import solve_source
+from lagfmu.testing import elimination, solve_source
 
 EPS = np.finfo(float).eps
 DOUBLES = ctypes.POINTER(ctypes.c_double)

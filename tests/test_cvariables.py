@@ -13,14 +13,11 @@ import pytest
 from conftest import FILES
 from runtime import RUNTIME_FILES, compile_library
 
-from lagfmu.codegen.c.equations import model_source
-from lagfmu.codegen.c.printer import string
-from lagfmu.codegen.c.variables import variables_source
 from lagfmu.methods import NUMBERS
-from lagfmu.prepare.prepare import Prepared
 from lagfmu.solver.initial import start
 from lagfmu.solver.observe import observe
 from lagfmu.solver.state import Settings
+from lagfmu.testing import Prepared, model_source, string, variables_source
 
 NAMES = sorted(set(FILES) - {"SlippingSphere"})  # the table of places has no frictions here
 TYPES = ("Real", "Integer", "Boolean", "String")

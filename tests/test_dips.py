@@ -14,7 +14,7 @@ from sympy import cos, exp, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Model, Parameter, Scene, build_fmu
-from lagfmu.fmu.compiler import find_compiler
+from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.python_cases(3)
 

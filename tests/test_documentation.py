@@ -14,14 +14,19 @@ from rich.console import Console
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter
-from lagfmu.mechanics.equations import derive
-from lagfmu.mechanics.form import Form
-from lagfmu.model.scene import Scene
-from lagfmu.page.documentation import page, with_figures
-from lagfmu.page.text import show
-from lagfmu.page.typeset import Notation, name_latex, name_text, typeset
-from lagfmu.prepare.prepare import Prepared, prepare
+from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, derive
+from lagfmu.testing import (
+    Form,
+    Notation,
+    Prepared,
+    name_latex,
+    name_text,
+    prepare,
+    typeset,
+    with_figures,
+)
+from lagfmu.testing import documentation_page as page
+from lagfmu.testing import show_in as show
 
 t = dynamicsymbols._t
 x, y, s, theta, F = dynamicsymbols("x y s theta F")

@@ -10,7 +10,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu
-from lagfmu.fmu.compiler import find_compiler
+from lagfmu.testing import find_compiler
 
 G = 9.81
 y, u = dynamicsymbols("y u")

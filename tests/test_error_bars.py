@@ -23,16 +23,10 @@ from sympy.physics.mechanics import dynamicsymbols
 from test_forged_states import forged_text
 from typer.testing import CliRunner
 
-from lagfmu import Model, Output, Parameter, Scene, sweep
-from lagfmu.cli.app import app
+from lagfmu import Model, Output, Parameter, Scene, simulate, sweep
 from lagfmu.errors import SimulationError
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
 from lagfmu.names import bar as bar_of
-from lagfmu.prepare.prepare import prepare
-from lagfmu.verification.plot import figure_of
-from lagfmu.verification.simulate import ErrorBarWarning, simulate
+from lagfmu.testing import ErrorBarWarning, app, figure_of, find_compiler, load, prepare, write
 
 INFINITE = np.finfo(float).max
 Barred = Callable[[str], Path]

@@ -12,10 +12,7 @@ from sympy import Matrix, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter, Scene, simulate
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.prepare.prepare import prepare
-from lagfmu.prepare.starts import StartMovedWarning
+from lagfmu.testing import StartMovedWarning, find_compiler, prepare, write
 
 A, C, m, g, arm = symbols("A C m g l", positive=True)
 LEAN, SPIN = 0.4, 60.0  # rad; rad/s about the axis of figure

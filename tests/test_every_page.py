@@ -14,12 +14,17 @@ import pytest
 from browser import Page
 from conftest import EVERY, MODELS
 
-from lagfmu.fmu.session import LAST, Plan, Session, plug
-from lagfmu.live.render import Playable
-from lagfmu.model.file import load
-from lagfmu.page.picture import picture_of
-from lagfmu.prepare.prepare import Prepared
-from lagfmu.verification.simulate import communication_points
+from lagfmu.testing import (
+    LAST,
+    Plan,
+    Playable,
+    Prepared,
+    Session,
+    communication_points,
+    load,
+    picture_of,
+    plug,
+)
 
 pytest.importorskip("wasmtime", reason="pip install -e '.[test]'")
 

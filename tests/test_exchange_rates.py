@@ -13,7 +13,7 @@ from fmi2 import EXCHANGE, Single
 from numpy.typing import NDArray
 
 from lagfmu import simulate
-from lagfmu.fmu.compiler import find_compiler
+from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 Vector = NDArray[np.float64]

@@ -28,14 +28,10 @@ from instance import Instance, instance
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu, names
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.numeric.failure import StepFailureError
-from lagfmu.prepare.consistency import RedundantConstraintWarning
-from lagfmu.prepare.prepare import prepare
+from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu, names, simulate
 from lagfmu.solver.instant import Instant as At
 from lagfmu.solver.motion import project
-from lagfmu.verification.simulate import simulate
+from lagfmu.testing import RedundantConstraintWarning, StepFailureError, find_compiler, prepare
 
 pytestmark = pytest.mark.python_cases(4)
 

@@ -8,8 +8,7 @@ import pytest
 from conftest import MODELS
 
 from lagfmu.errors import ModelError
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import load, prepare
 
 
 @pytest.mark.parametrize("n", [1, 3])

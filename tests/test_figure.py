@@ -16,9 +16,7 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import Result
-from lagfmu.cli.app import app
-from lagfmu.model.file import load
-from lagfmu.verification.plot import COLOURS, figure_of
+from lagfmu.testing import COLOURS, app, figure_of, load
 
 REPOSITORY = Path(__file__).parent.parent
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")

@@ -13,12 +13,8 @@ from browser import Page
 from PIL import Image
 from typer.testing import CliRunner
 
-from lagfmu.cli import film
-from lagfmu.cli.app import app
-from lagfmu.live import moving
-from lagfmu.live.playable import told_by
-from lagfmu.prepare.prepare import Prepared
-from lagfmu.verification.simulate import simulate
+from lagfmu import simulate
+from lagfmu.testing import Prepared, app, film, moving, told_by
 
 Fmu = Callable[[str], Path]
 

@@ -12,8 +12,7 @@ import pytest
 from fmi2 import CO_SIMULATION, DISCARD, EXCHANGE, OK, Library, Single
 
 from lagfmu import Scene, build_fmu
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.model.file import load
+from lagfmu.testing import find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"

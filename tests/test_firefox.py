@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from firefox import firefox
 
-from lagfmu.verification.simulate import simulate
+from lagfmu import simulate
 
 MOVE = """(() => {
     const slider = document.querySelector('input[data-name="theta"]');

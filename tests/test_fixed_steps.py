@@ -8,7 +8,7 @@ import pytest
 from fixed_step import euler, rk4, run
 
 from lagfmu import simulate
-from lagfmu.fmu.compiler import find_compiler
+from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 

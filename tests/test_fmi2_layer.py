@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from fmi2 import DISCARD, ERROR, EXCHANGE, Library
 
-from lagfmu.fmu.compiler import find_compiler
 from lagfmu.methods import NUMBERS
+from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 

@@ -21,7 +21,7 @@ from sympy import Rational, cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu
-from lagfmu.model.model import name_of
+from lagfmu.testing import name_of
 
 pytestmark = pytest.mark.python_cases(6)
 ALL = sorted(FILES)
@@ -556,9 +556,7 @@ def test_the_slave_script_is_numeric(name, python_fmu):
 
 BUILD = """
 import sys
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
-from lagfmu.fmu.write import write
+from lagfmu.testing import load, prepare, write
 file = load(sys.argv[1])
 write(prepare(file.model, file.scenes[0]), sys.argv[2])
 """

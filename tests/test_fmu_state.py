@@ -145,9 +145,7 @@ def test_two_models_in_one_process_are_both_right(fmu):
 BUILD = """
 import sys
 from pathlib import Path
-from lagfmu.fmu.write import write
-from lagfmu.prepare.prepare import prepare
-from lagfmu.model.file import load
+from lagfmu.testing import load, prepare, write
 file = load(sys.argv[1])
 for scene in file.scenes:
     write(prepare(file.model, scene), sys.argv[2], file.closed_forms)

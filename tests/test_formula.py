@@ -14,12 +14,17 @@ from hypothesis import strategies as st
 
 from lagfmu import ClosedForm, Holonomic, Model, Parameter, Scene, output, verify
 from lagfmu.errors import ModelError, VerificationError
-from lagfmu.fmu.closed_forms import pack_closed_forms, unpack_closed_forms
-from lagfmu.fmu.described import file_stem
-from lagfmu.fmu.formula import LONGEST_SUM, read_formula, text_of
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress.facts import facts_of
-from lagfmu.verification.verify import RECORD
+from lagfmu.testing import (
+    LONGEST_SUM,
+    RECORD,
+    facts_of,
+    file_stem,
+    pack_closed_forms,
+    prepare,
+    read_formula,
+    text_of,
+    unpack_closed_forms,
+)
 
 x, y = sp.symbols("x y", real=True)
 SYMBOLS = {"s0": x, "s1": y}

@@ -11,10 +11,7 @@ import pytest
 from linkages import straight_line
 
 from lagfmu import Scene, simulate
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.prepare.prepare import prepare
-from lagfmu.prepare.starts import StartMovedWarning
+from lagfmu.testing import StartMovedWarning, find_compiler, prepare, write
 
 TURNED = 0.5  # rad
 

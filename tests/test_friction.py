@@ -26,13 +26,8 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.fmu.closed_forms import carried
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load as read_file
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress.lagrange import lagrange
-from lagfmu.verification.verify import check_closed_form
+from lagfmu.testing import carried, check_closed_form, find_compiler, lagrange, prepare, write
+from lagfmu.testing import load as read_file
 
 MODELS = Path(__file__).parent.parent / "models"
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")

@@ -13,10 +13,7 @@ import pytest
 from instance import Instance, instance
 from mpmath import mp, mpf
 
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import find_compiler, load, prepare, write
 
 MODELS = Path(__file__).parent.parent / "models"
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")

@@ -15,9 +15,7 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, Scene, multiplier, simulate
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import find_compiler, prepare, write
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 g = 9.81  # m/s^2

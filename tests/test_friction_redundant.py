@@ -29,13 +29,12 @@ from lagfmu import (
     multiplier,
     simulate,
 )
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.page.text import show
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import find_compiler, prepare
+from lagfmu.testing import show_in as show
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
-    pytest.mark.filterwarnings("ignore::lagfmu.prepare.consistency.RedundantConstraintWarning"),
+    pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning"),
 ]
 x, z, theta, F = dynamicsymbols("x z theta F")
 m, G, mu, a, J, alpha = symbols("m g mu a J alpha", nonnegative=True)

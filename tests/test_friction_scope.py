@@ -33,12 +33,8 @@ from lagfmu import (
     multiplier,
     simulate,
 )
-from lagfmu.cli.app import app
 from lagfmu.errors import LagfmuError, ModelError
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import app, find_compiler, load, prepare, write
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"

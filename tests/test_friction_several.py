@@ -29,12 +29,9 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import SimulationError
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
 from lagfmu.solver.friction import heading
 from lagfmu.solver.state import Slide
+from lagfmu.testing import find_compiler, load, prepare, write
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"

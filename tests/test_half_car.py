@@ -12,8 +12,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Input, Model, Parameter, build_fmu, simulate
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.model.file import load
+from lagfmu.testing import find_compiler, load
 
 M, J, m, g, a, b, k, c, v = 1200.0, 1500.0, 80.0, 9.81, 1.2, 1.5, 4e4, 3e3, 14.0
 

@@ -29,6 +29,7 @@ ROOMS = (  # each imports from those before it, and from no other
     "study",
     "api",
     "cli",
+    "testing",
 )
 FLOORS = ("base", "linear", "ode", "mechanics", "simulation", "fmi")  # of the C runtime
 MODULES = sorted(p for p in ROOT.rglob("*.py") if p.parent != ROOT or p.stem in ROOMS)
@@ -70,6 +71,20 @@ def test_no_module_is_imported_in_secret() -> None:
     secret = re.compile(r"\b(import_module|__import__)\(\s*f?[\"'](lagfmu|\.)")
     for path in sorted(ROOT.rglob("*.py")):
         assert not secret.search(path.read_text(encoding="utf-8")), path.name
+
+
+def test_a_test_imports_no_room() -> None:
+    """A test knows what users know and what lagfmu.testing hands on: no room that moves breaks it."""
+    known = {
+        "lagfmu",
+        *(f"lagfmu.{name}" for name in ("cli", "errors", "methods", "names", "testing")),
+    }
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        imported = re.findall(r"\b(?:from|import) (lagfmu\b[\w.]*)", text)
+        named = re.findall(r"[\"':](lagfmu\.[a-z_]+)\.[\w.]+[\"']", text)
+        rooms = {name for name in (*imported, *named) if not name.startswith("lagfmu.solver.")}
+        assert rooms <= known, path.name
 
 
 def test_the_solver_stands_alone() -> None:

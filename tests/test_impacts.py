@@ -18,14 +18,20 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Model, Parameter, Scene, simulate
 from lagfmu.errors import LagfmuError
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.numeric.failure import StepFailureError
-from lagfmu.numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Row, System
-from lagfmu.prepare.prepare import prepare
 from lagfmu.solver.complementarity import complementary
 from lagfmu.solver.impact import impact, impacts
 from lagfmu.solver.instant import Instant
+from lagfmu.testing import (
+    CONTACT,
+    HOLONOMIC,
+    NONHOLONOMIC,
+    Row,
+    StepFailureError,
+    System,
+    find_compiler,
+    prepare,
+    write,
+)
 
 Run = Callable[..., Any]
 pytestmark = pytest.mark.filterwarnings("ignore:.*follows? from the others")

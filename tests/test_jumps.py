@@ -23,13 +23,9 @@ from sympy import (
 )
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu, simulate
+from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu, derive, simulate
 from lagfmu.errors import ModelError
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.mechanics.equations import derive
-from lagfmu.mechanics.form import Form
-from lagfmu.mechanics.jumps import jumps_of, with_jumps
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import Form, find_compiler, jumps_of, prepare, with_jumps
 
 G = 9.81
 x, y, u = dynamicsymbols("x y u")

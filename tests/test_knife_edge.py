@@ -10,9 +10,8 @@ from runs import simulate_fmu
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Model, Nonholonomic, Parameter, build_fmu
+from lagfmu import Contact, Model, Nonholonomic, Parameter, build_fmu, simulate
 from lagfmu.errors import SimulationError
-from lagfmu.verification.simulate import simulate
 
 pytestmark = pytest.mark.python_cases(3)
 

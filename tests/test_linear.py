@@ -8,11 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from lagfmu.numeric.failure import StepFailureError
-from lagfmu.numeric.system import HOLONOMIC, Row, System
 from lagfmu.solver.linear import solve, solve_nullspace
 from lagfmu.solver.solution import Solution
 from lagfmu.solver.straight import solver_of
+from lagfmu.testing import HOLONOMIC, Row, StepFailureError, System
 
 SOLVERS = pytest.mark.parametrize("solver", [solve, solve_nullspace])
 

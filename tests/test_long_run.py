@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from fmi2 import Library
 
-from lagfmu.fmu.compiler import find_compiler
+from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 

@@ -34,7 +34,7 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import prepare
 
 t = dynamicsymbols._t
 x, y, theta, phi = dynamicsymbols("x y theta phi")

@@ -14,14 +14,9 @@ from conftest import EVERY
 from scipy.integrate import simpson
 from scipy.special import ellipk, ellipkinc
 
-from lagfmu import derive, simulate
+from lagfmu import Model, derive, simulate, verify
 from lagfmu.errors import SimulationError
-from lagfmu.fmu.closed_forms import carried
-from lagfmu.fmu.described import read_description
-from lagfmu.model.file import ModelFile, load
-from lagfmu.model.model import Model
-from lagfmu.prepare.prepare import prepare
-from lagfmu.verification.verify import check_closed_form, verify
+from lagfmu.testing import ModelFile, carried, check_closed_form, load, prepare, read_description
 
 MODELS = Path(__file__).parent.parent / "models"
 g = 9.81  # m/s^2

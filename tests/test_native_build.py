@@ -24,12 +24,19 @@ from runtime import INCLUDES
 from typer.testing import CliRunner
 
 from lagfmu import Contact, names
-from lagfmu.cli.app import app
 from lagfmu.errors import BuildError, LagfmuError, UsageError
-from lagfmu.fmu import compiler
-from lagfmu.fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
-from lagfmu.fmu.write import write
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import (
+    NAMES,
+    PLATFORMS,
+    app,
+    chosen,
+    compile_libraries,
+    compiler,
+    find_compiler,
+    host,
+    prepare,
+    write,
+)
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
@@ -222,9 +229,7 @@ BUILD = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import load, prepare, write
 file = load(Path(sys.argv[1]))
 for s in file.scenes:
     if s.name == "PendulumCartesian":

@@ -11,10 +11,8 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import derive
-from lagfmu.cli.app import app
 from lagfmu.errors import DerivationError
-from lagfmu.model.file import load
-from lagfmu.model.library import known
+from lagfmu.testing import app, known, load
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,8 @@ import sympy as sp
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Model, Nonholonomic, Parameter
-from lagfmu.mechanics.equations import EquationsOfMotion, derive
-from lagfmu.mechanics.formulations.nullspace import lambda_free, null_space
+from lagfmu import Contact, EquationsOfMotion, Holonomic, Model, Nonholonomic, Parameter, derive
+from lagfmu.testing import lambda_free, null_space
 
 x, y, z, r, theta, phi, psi = dynamicsymbols("x y z r theta phi psi")
 m, g, L, a, R, J = symbols("m g L a R J", positive=True)

@@ -9,7 +9,7 @@ import pytest
 from fmi2 import ERROR, OK, Single
 from test_ahead import candle
 
-from lagfmu.fmu.compiler import find_compiler
+from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 

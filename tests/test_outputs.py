@@ -27,11 +27,8 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.model.formula import with_outputs
-from lagfmu.page.documentation import page
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress.lagrange import lagrange
-from lagfmu.study.tradeoff.quantities import OWN, quantities
+from lagfmu.testing import OWN, lagrange, prepare, quantities, with_outputs
+from lagfmu.testing import documentation_page as page
 
 t = dynamicsymbols._t
 x, y, r, theta, F = dynamicsymbols("x y r theta F")

@@ -14,9 +14,8 @@ import pytest
 from browser import Page
 from typer.testing import CliRunner
 
-from lagfmu.cli.app import app
-from lagfmu.live.playable import playable as playable_of
-from lagfmu.live.render import Playable, render
+from lagfmu.testing import Playable, app, render, wasm
+from lagfmu.testing import playable as playable_of
 
 
 def test_the_particle_leaves_at_two_thirds(opened: Callable[..., Page]) -> None:
@@ -113,7 +112,7 @@ def test_without_zig_the_message_says_what_to_do(
     native_fmu: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The system's cc knows no WebAssembly."""
-    monkeypatch.setattr("lagfmu.live.wasm.find_compiler", lambda: None)
+    monkeypatch.setattr(wasm, "find_compiler", lambda: None)
     fmu = str(native_fmu("Hemisphere"))
     result = CliRunner().invoke(app, ["page", fmu, "--out", str(tmp_path / "p.html")])
     assert result.exit_code == 3

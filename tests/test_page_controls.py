@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from browser import Page
 
-from lagfmu.verification.simulate import simulate
+from lagfmu import simulate
 
 Opened = Callable[..., Page]
 Fmu = Callable[[str], Path]

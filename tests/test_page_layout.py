@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 from browser import Page
 
-from lagfmu.page.documentation import page as documentation
-from lagfmu.page.documentation import with_figures
-from lagfmu.prepare.prepare import Prepared
+from lagfmu.testing import Prepared, with_figures
+from lagfmu.testing import documentation_page as documentation
 
 Opened = Callable[..., Page]
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}

@@ -27,9 +27,7 @@ from lagfmu import (
     multiplier,
 )
 from lagfmu.errors import ModelError
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import load, prepare, write
 
 Peaked = Callable[..., Path]
 G = 9.81

@@ -30,12 +30,19 @@ from lagfmu import (
     output,
 )
 from lagfmu.errors import BuildError, ModelError
-from lagfmu.live.moving import Moving
-from lagfmu.live.playable import playable as playable_of
-from lagfmu.live.render import render
-from lagfmu.model.file import load
-from lagfmu.page.picture import as_bytes, direction, pack, picture_of, read_picture, values
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import (
+    Moving,
+    as_bytes,
+    direction,
+    load,
+    picture_of,
+    prepare,
+    read_picture,
+    render,
+)
+from lagfmu.testing import pack_picture as pack
+from lagfmu.testing import picture_values as values
+from lagfmu.testing import playable as playable_of
 
 x, y, theta = dynamicsymbols("x y theta")
 L = sp.symbols("L", positive=True)

@@ -17,9 +17,7 @@ from sympy import symbols
 from typer.testing import CliRunner
 
 from lagfmu import ClosedForm, Scene, build_fmu
-from lagfmu.cli.app import app
-from lagfmu.model.file import load
-from lagfmu.verification.reference import read_table
+from lagfmu.testing import app, load, read_table
 
 WEIGHT = """
 from sympy import symbols

@@ -17,10 +17,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Model, Page, Scene
 from lagfmu.errors import BuildError, ModelError
-from lagfmu.live.playable import told_by
-from lagfmu.model.file import load
-from lagfmu.page.preset import IN_FMU, preset_of, read_preset
-from lagfmu.prepare.prepare import Prepared, prepare
+from lagfmu.testing import IN_FMU, Prepared, load, prepare, preset_of, read_preset, told_by
 
 SHOWN = """() => ({
     sliders: [...document.querySelectorAll("#dials details[open] input[data-name]")]

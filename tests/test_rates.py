@@ -15,7 +15,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu
 from lagfmu.errors import ModelError
-from lagfmu.model.file import load
+from lagfmu.testing import load
 
 W = np.pi / 8.0
 

@@ -19,15 +19,19 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import simulate, verify
-from lagfmu.cli.app import app
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress.bench import Bench
-from lagfmu.study.stress.lagrange import lay_beside
-from lagfmu.study.stress.probe import WRONG, attempt, verdict
-from lagfmu.study.stress.probes import probes
+from lagfmu.testing import (
+    WRONG,
+    Bench,
+    app,
+    attempt,
+    find_compiler,
+    lay_beside,
+    load,
+    prepare,
+    probes,
+    verdict,
+    write,
+)
 
 REPOSITORY = Path(__file__).parent.parent
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")

@@ -14,8 +14,7 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.model.file import load
+from lagfmu.testing import find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"

@@ -11,8 +11,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Embedding, Holonomic, Model, Parameter, Scene, simulate
 from lagfmu.errors import CannotStartError
-from lagfmu.prepare.prepare import prepare
-from lagfmu.prepare.starts import StartMovedWarning
+from lagfmu.testing import StartMovedWarning, prepare
 
 x, y, theta = dynamicsymbols("x y theta")
 m, g, L = symbols("m g L", positive=True)
@@ -43,7 +42,7 @@ STARTS = {
 }
 
 
-@pytest.mark.filterwarnings("ignore::lagfmu.prepare.starts.StartMovedWarning")
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.StartMovedWarning")
 @pytest.mark.parametrize("named", STARTS)
 def test_both_formulations_begin_alike(named):
     """The motion is that of the start given, in whichever coordinates it is given."""

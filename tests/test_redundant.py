@@ -15,12 +15,14 @@ from redundant import SYSTEMS
 from runs import simulate_fmu
 
 from lagfmu import Scene, simulate
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.numeric.priority import Stage
-from lagfmu.prepare.consistency import RedundantConstraintWarning
-from lagfmu.prepare.prepare import prepare
-from lagfmu.prepare.starts import StartMovedWarning
+from lagfmu.solver.precedence import Stage
+from lagfmu.testing import (
+    RedundantConstraintWarning,
+    StartMovedWarning,
+    find_compiler,
+    prepare,
+    write,
+)
 
 SPAN = 1.0  # s
 Pair = tuple[Path, Path]

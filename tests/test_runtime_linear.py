@@ -19,10 +19,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from runtime import SANITIZE, compile_library, compiler
 
-from lagfmu.codegen.c.elimination import plan
-from lagfmu.numeric.failure import StepFailureError
 from lagfmu.solver.linear import solve
 from lagfmu.solver.solution import Solution
+from lagfmu.testing import StepFailureError, plan
 
 SOURCES = [
     "cod.c",

@@ -22,22 +22,35 @@ from sympy import Rational, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_euler_parameters import top
 
-from lagfmu import Contact, Embedding, Holonomic, Input, Model, Nonholonomic, Parameter, Scene
-from lagfmu.codegen.c.equations import model_source
-from lagfmu.codegen.py.equations import lower
+from lagfmu import (
+    Contact,
+    Embedding,
+    Holonomic,
+    Input,
+    Model,
+    Nonholonomic,
+    Parameter,
+    Scene,
+    derive,
+)
 from lagfmu.errors import ModelError
-from lagfmu.mechanics.equations import derive
-from lagfmu.mechanics.form import Form
-from lagfmu.numeric.failure import StartFailureError, StepFailureError
-from lagfmu.numeric.priority import GIVEN, OMITTED, SET
-from lagfmu.prepare.prepare import Prepared, prepare
 from lagfmu.solver import initial
 from lagfmu.solver.contacts import complementary_modes
 from lagfmu.solver.impact import impact
 from lagfmu.solver.instant import Instant
 from lagfmu.solver.motion import project
 from lagfmu.solver.observe import observe
+from lagfmu.solver.precedence import GIVEN, OMITTED, SET
 from lagfmu.solver.state import Settings
+from lagfmu.testing import (
+    Form,
+    Prepared,
+    StartFailureError,
+    StepFailureError,
+    lower,
+    model_source,
+    prepare,
+)
 
 EPS = np.finfo(float).eps
 SOURCES = sorted(  # but what stands on the solver

@@ -15,13 +15,11 @@ from test_extremes import isosceles, swing
 from test_jumps import MODELS as JUMPS
 
 from lagfmu import Peak, Scene, build_fmu
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.native import GENERATED
-from lagfmu.model.file import load
+from lagfmu.testing import GENERATED, find_compiler, load
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
-    pytest.mark.filterwarnings("ignore::lagfmu.prepare.consistency.RedundantConstraintWarning"),
+    pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning"),
 ]
 SCENARIO = Path(__file__).parent / "scenario.c"
 LIVES = {  # steps that reach the event or the singular point in between

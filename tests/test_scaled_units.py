@@ -11,9 +11,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Input, Model, Output, Parameter, Scene, Spline
 from lagfmu.errors import ModelError, UnitError
-from lagfmu.fmu.description import model_description
-from lagfmu.model.units import METRE, parse_quantity, parse_unit
-from lagfmu.prepare.prepare import prepare
+from lagfmu.testing import METRE, model_description, parse_quantity, parse_unit, prepare
 
 theta, w = dynamicsymbols("theta w")
 m, L, g = symbols("m L g", positive=True)

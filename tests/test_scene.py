@@ -18,18 +18,22 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
-from lagfmu import Model, Parameter, build_fmu, simulate, verify
-from lagfmu.cli.app import app
-from lagfmu.codegen.c.equations import model_source
+from lagfmu import Contact, Model, Parameter, Scene, build_fmu, simulate, verify
 from lagfmu.errors import LagfmuError, ModelError
-from lagfmu.fmu.write import write
 from lagfmu.methods import METHODS
-from lagfmu.model.file import ModelFile, load
-from lagfmu.model.model import Contact
-from lagfmu.model.scene import Scene
-from lagfmu.page.savings import NATIVE, OPERATIONS, savings
-from lagfmu.prepare.prepare import Prepared, prepare
-from lagfmu.verification.simulate import Trajectory
+from lagfmu.testing import (
+    NATIVE,
+    OPERATIONS,
+    ModelFile,
+    Prepared,
+    Trajectory,
+    app,
+    load,
+    model_source,
+    prepare,
+    savings,
+    write,
+)
 
 pytestmark = pytest.mark.python_cases(3)
 FORCES = ("lambda.*", "Q.*")

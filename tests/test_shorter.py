@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 from sympy.core.random import rng
 
-from lagfmu.mechanics import shorter
+from lagfmu.testing import shorter
 
 a, b, c = sp.symbols("a b c", real=True)
 ANGLES = sp.symbols("q0:20", real=True)

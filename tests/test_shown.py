@@ -13,13 +13,7 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import ClosedForm, Conserved, Result, Scene, output
-from lagfmu.cli.app import app
-from lagfmu.cli.terminal import console
-from lagfmu.fmu.closed_forms import carried
-from lagfmu.model.file import load
-from lagfmu.page.wrapped import wrapped
-from lagfmu.verification.plot import moments
-from lagfmu.verification.verify import applies, check_closed_form
+from lagfmu.testing import app, applies, carried, check_closed_form, console, load, moments, wrapped
 
 
 def simulated(*words: object) -> dict[str, list[str]]:

@@ -27,7 +27,7 @@ from lagfmu import (
     verify,
 )
 from lagfmu.errors import LagfmuError, LagfmuWarning, ModelError, TableError
-from lagfmu.study.stress.facts import facts_of
+from lagfmu.testing import facts_of
 
 x, z = dynamicsymbols("x z")
 m, g = symbols("m g", positive=True)

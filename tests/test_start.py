@@ -16,12 +16,8 @@ from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
 from lagfmu import Model, Parameter, Scene, simulate, sweep
-from lagfmu.cli.app import app
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.prepare.prepare import prepare
-from lagfmu.prepare.starts import StartMovedWarning
+from lagfmu.testing import StartMovedWarning, app, find_compiler, prepare, write
 
 x, y, theta = dynamicsymbols("x y theta")
 HALF = 0.75  # m, from the pivot to the middle of the rod

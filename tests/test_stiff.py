@@ -14,13 +14,12 @@ from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Model, Parameter, Scene, build_fmu
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.numeric.thresholds import STIFF_STEPS
 from lagfmu.solver import advance as advancing
 from lagfmu.solver import flow
 from lagfmu.solver.initial import start
 from lagfmu.solver.state import Settings, State
 from lagfmu.solver.stiffness import DEARER, Choice, Slope, explicit, explicit_step
+from lagfmu.testing import STIFF_STEPS, find_compiler
 
 G = 9.81
 x, y = dynamicsymbols("x y")

@@ -20,36 +20,45 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import lagfmu
-from lagfmu.cli import stress as command
-from lagfmu.cli.app import app
-from lagfmu.cli.stress import stress
-from lagfmu.fmu.closed_forms import CarriedForm
-from lagfmu.fmu.session import RefusalError
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.model.model import name_of
-from lagfmu.prepare.consistency import RedundantConstraintWarning
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress.bench import Bench, Finding
-from lagfmu.study.stress.closed_forms import judged as judged_forms
-from lagfmu.study.stress.closed_forms import magnitude
-from lagfmu.study.stress.judge import Check, first_landing
-from lagfmu.study.stress.lagrange import lagrange, lay_beside
-from lagfmu.study.stress.probe import (
+from lagfmu.testing import (
     CONSISTENT,
+    NO_WORRY,
+    NOT_RUN,
     REFUSED,
     RIGHT,
     UNFINISHED,
+    VERDICTS,
+    WORRY,
     WRONG,
+    WRONG_USAGE,
+    Bench,
+    CarriedForm,
+    Check,
+    Finding,
     Probe,
+    RedundantConstraintWarning,
+    RefusalError,
+    Stressed,
     Verdict,
+    app,
+    applies,
+    as_markdown,
     attempt,
+    first_landing,
+    lagrange,
+    lay_beside,
+    load,
+    magnitude,
+    name_of,
+    prepare,
+    probes,
+    stress,
     verdict,
+    worker,
+    write,
 )
-from lagfmu.study.stress.probes import probes
-from lagfmu.study.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed, as_markdown
-from lagfmu.verification.pipeline import NOT_RUN, WRONG_USAGE
-from lagfmu.verification.verify import applies
+from lagfmu.testing import judged as judged_forms
+from lagfmu.testing import stress_command as command
 
 UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
 
@@ -339,10 +348,7 @@ def four_probes(monkeypatch, tmp_path):
     program = tmp_path / "worker.py"
     program.write_text(
         "import os, sys, time\n"
-        "import lagfmu.study.stress.worker as w\n"
-        "from lagfmu.study.stress.bench import Finding\n"
-        "from lagfmu.study.stress.judge import Check\n"
-        "from lagfmu.study.stress.probe import Probe\n"
+        "from lagfmu.testing import Check, Finding, Probe, worker as w\n"
         "good = Finding((Check('x', 0.0, 1.0),))\n"
         "w.probes = lambda *_: [Probe('f', 'good', lambda b: good),\n"
         "    Probe('f', 'crash', lambda b: os.abort()), Probe('f', 'hang', lambda b: time.sleep(99)),\n"
@@ -352,7 +358,7 @@ def four_probes(monkeypatch, tmp_path):
     popen = command.subprocess.Popen
 
     def start(arguments, **named):
-        if "lagfmu.study.stress.worker" in arguments:
+        if worker.__name__ in arguments:
             arguments = [arguments[0], str(program), *arguments[3:]]
         return popen(arguments, **named)
 
@@ -425,7 +431,7 @@ def test_a_force_is_known_to_what_the_smallest_lambda_makes_of_it(prepared):
 
 def test_a_closed_form_is_not_judged_by_what_underflows_on_its_way(bench):
     """2 l (f^2/g) with l = 5e-324, f = 1e-10 and g = 1e-50 is 1e-293 and no 0: only l f underflows."""
-    from lagfmu.verification.evaluate import Compiled
+    from lagfmu.testing import Compiled
 
     if np.finfo(np.longdouble).maxexp <= np.finfo(float).maxexp:
         pytest.skip("no numbers of a wider range here")

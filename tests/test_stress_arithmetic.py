@@ -10,14 +10,27 @@ from typing import Any
 
 import pytest
 
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.session import RefusalError
-from lagfmu.study.stress.bench import Bench, Finding
-from lagfmu.study.stress.judge import Check, differ
-from lagfmu.study.stress.lagrange import lay_beside
-from lagfmu.study.stress.player import Player, Run, clear, play
-from lagfmu.study.stress.probe import REFUSED, RIGHT, WRONG, Probe, attempt, verdict
-from lagfmu.study.stress.runs import departures, started
+from lagfmu.testing import (
+    REFUSED,
+    RIGHT,
+    WRONG,
+    Bench,
+    Check,
+    Finding,
+    Player,
+    Probe,
+    RefusalError,
+    Run,
+    attempt,
+    clear,
+    departures,
+    differ,
+    find_compiler,
+    lay_beside,
+    started,
+    verdict,
+)
+from lagfmu.testing import play_of as play
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 NAMES = ("Hemisphere", "PendulumCartesian", "KnifeEdge", "CartPendulum", "Bowling")

@@ -17,12 +17,19 @@ import stress_derivatives as derivatives
 import stress_unique as unique
 from stress_geometry import lay_geometry
 
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.study.stress import exchange
-from lagfmu.study.stress.bench import Bench
-from lagfmu.study.stress.lagrange import lay_beside
-from lagfmu.study.stress.player import Player
-from lagfmu.study.stress.probe import RIGHT, WRONG, Probe, Verdict, attempt, verdict
+from lagfmu.testing import (
+    RIGHT,
+    WRONG,
+    Bench,
+    Player,
+    Probe,
+    Verdict,
+    attempt,
+    exchange,
+    find_compiler,
+    lay_beside,
+    verdict,
+)
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 FAMILIES = (calls, derivatives, unique)

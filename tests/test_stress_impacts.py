@@ -15,14 +15,19 @@ from stress_geometry import geometry_of, lay_geometry, twin
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-import lagfmu.fmu.native
-from lagfmu import Contact, Friction, Nonholonomic, Parameter, Scene, multiplier
-from lagfmu.fmu.compiler import find_compiler
-from lagfmu.fmu.write import write
-from lagfmu.model.model import Model
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress.bench import Bench
-from lagfmu.study.stress.probe import RIGHT, WRONG, Verdict, attempt, verdict
+from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, Scene, multiplier
+from lagfmu.testing import (
+    RIGHT,
+    WRONG,
+    Bench,
+    Verdict,
+    attempt,
+    find_compiler,
+    native,
+    prepare,
+    verdict,
+    write,
+)
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
@@ -77,12 +82,12 @@ MUTANTS: dict[str, tuple[str, str]] = {
 def test_a_wrong_law_of_impacts_is_found(mutant, tmp_path, monkeypatch):
     """Contacts taken one after another, a rebound too fast by a tenth of e, contacts that pull: each is
     wrong in some row."""
-    files: Callable[[], dict[str, Any]] = lagfmu.fmu.native.runtime_files
+    files: Callable[[], dict[str, Any]] = native.runtime_files
     old, new = (text.encode() for text in MUTANTS[mutant])
     changed = files()
     assert changed["impact.c"].count(old) == 1
     changed["impact.c"] = changed["impact.c"].replace(old, new)
-    monkeypatch.setattr(lagfmu.fmu.native, "runtime_files", lambda: changed)
+    monkeypatch.setattr(native, "runtime_files", lambda: changed)
     rows = probed(rod(inertia=4.0, theta=0.2), tmp_path) | probed(corner(tilt=0.3), tmp_path)
     assert any(row.verdict == WRONG for row in rows.values())
 

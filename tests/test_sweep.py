@@ -23,14 +23,25 @@ from conftest import MODELS
 from typer.testing import CliRunner
 
 import lagfmu
-from lagfmu.cli.app import app
 from lagfmu.errors import LagfmuError, SimulationError
-from lagfmu.fmu.archive import version
-from lagfmu.fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, Session, plug
-from lagfmu.study.sweep import engine
-from lagfmu.study.sweep.design import axis, design, distribution, sampled
-from lagfmu.study.sweep.host import Host
-from lagfmu.verification.simulate import read_description
+from lagfmu.testing import (
+    LAST,
+    MAX,
+    MEAN,
+    TIME_OF_MAX,
+    Host,
+    Plan,
+    Session,
+    app,
+    axis,
+    design,
+    distribution,
+    engine,
+    plug,
+    read_description,
+    sampled,
+)
+from lagfmu.testing import archive_version as version
 
 THETA = np.linspace(0.05, 1.0, 12)
 KEEP = ("lambda.surface:max", "departure.surface.time:last", "lambda.surface:time-of-max")

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 
 import lagfmu
-from lagfmu.cli.progress import told
 from lagfmu.errors import SettingError
-from lagfmu.study.sweep.parts import PartWarning
+from lagfmu.testing import PartWarning, told
 
 KEEP = ("lambda.surface:max", "theta:trajectory")
 VALUES = {"theta": np.linspace(0.1, 1.0, 10)}

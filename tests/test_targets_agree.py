@@ -19,7 +19,7 @@ from conftest import FILES
 from instance import instance
 from test_models import CHANGED
 
-from lagfmu.verification.simulate import simulate
+from lagfmu import simulate
 
 POINTS = 40  # communication points of a run
 AGREE = 1e-9

@@ -10,7 +10,7 @@ import pytest
 from runtime import INCLUDES, compiler
 
 import lagfmu
-from lagfmu.numeric import thresholds
+from lagfmu.testing import thresholds
 
 PACKAGE = Path(lagfmu.__file__).parent
 NAMES = sorted(thresholds._VALUES)

@@ -17,21 +17,28 @@ from rich.console import Console
 from scipy.special import ellipj, ellipk
 from test_cli import SMALL, lagfmu
 
-from lagfmu import Scene, simulate
+from lagfmu import Scene, simulate, verify
 from lagfmu.errors import BuildError, SimulationError, UsageError
-from lagfmu.fmu.write import write
-from lagfmu.model.file import load
-from lagfmu.model.goal import Goal, parse
-from lagfmu.page.table import print_whole
-from lagfmu.prepare.prepare import prepare
-from lagfmu.study.tradeoff.choose import bisected, choose
-from lagfmu.study.tradeoff.held_out import other_values
-from lagfmu.study.tradeoff.importer import Importer
-from lagfmu.study.tradeoff.measure import Plan, Point, Tradeoff, measure, take_turns
-from lagfmu.study.tradeoff.reference import refer
-from lagfmu.study.tradeoff.report import table
-from lagfmu.study.tradeoff.setting import Setting
-from lagfmu.verification.verify import verify
+from lagfmu.testing import (
+    Goal,
+    Importer,
+    Point,
+    Setting,
+    Tradeoff,
+    bisected,
+    choose,
+    load,
+    measure,
+    other_values,
+    prepare,
+    print_whole,
+    refer,
+    take_turns,
+    write,
+)
+from lagfmu.testing import TradeoffPlan as Plan
+from lagfmu.testing import parse_goal as parse
+from lagfmu.testing import tradeoff_table as table
 
 MODELS = Path(__file__).parent.parent / "models"
 PENDULUM = load(MODELS / "pendulum.py")

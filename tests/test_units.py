@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu.errors import UnitError
-from lagfmu.model.units import (
+from lagfmu.testing import (
     ENERGY,
     ONE,
     POWER,

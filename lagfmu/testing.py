@@ -1,0 +1,127 @@
+"""What tests need of lagfmu's inside, in one place: a module that moves breaks this file alone.
+
+What users need is in `lagfmu`.
+"""
+
+from .cli import film
+from .cli import stress as stress_command
+from .cli.app import COMMANDS, app
+from .cli.progress import told
+from .cli.stress import stress
+from .cli.terminal import console
+from .codegen.c import elimination
+from .codegen.c import function as c_function
+from .codegen.c.elimination import Elimination, eliminate, plan
+from .codegen.c.elimination import Plan as EliminationPlan
+from .codegen.c.equations import model_source
+from .codegen.c.printer import identifiers, number, string
+from .codegen.c.solve import solve_source
+from .codegen.c.variables import variables_source
+from .codegen.py.equations import lower
+from .fmu import compiler, native
+from .fmu.archive import version as archive_version
+from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
+from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
+from .fmu.described import Trajectory, file_stem, items_of, read_description
+from .fmu.description import model_description
+from .fmu.formula import LONGEST_SUM, read_formula, text_of
+from .fmu.native import GENERATED
+from .fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, RefusalError, Session, plug
+from .fmu.write import write
+from .live import moving, wasm
+from .live.moving import Moving
+from .live.playable import playable, told_by
+from .live.render import Playable, render
+from .mechanics import shorter
+from .mechanics.differential import Differential
+from .mechanics.form import Form
+from .mechanics.formulations.minimal import reduce
+from .mechanics.formulations.nullspace import lambda_free, null_space
+from .mechanics.integrability.classify import Kind, pfaffian
+from .mechanics.jumps import jumps_of, with_jumps
+from .model.closed_form import TIME
+from .model.elements import Expr
+from .model.file import ModelFile, load
+from .model.formula import with_outputs
+from .model.goal import Goal
+from .model.goal import parse as parse_goal
+from .model.library import known
+from .model.model import name_of
+from .model.reactions import reactions_in
+from .model.spline import SplineBase
+from .model.units import (
+    ENERGY,
+    METRE,
+    ONE,
+    POWER,
+    SECOND,
+    Unit,
+    check_dimension,
+    dimension_of,
+    generalized_force_unit,
+    multiplier_unit,
+    parse_quantity,
+    parse_unit,
+    plain,
+)
+from .numeric import thresholds
+from .numeric.failure import StartFailureError, StepFailureError
+from .numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Row, System
+from .numeric.thresholds import STIFF_STEPS
+from .page.documentation import page as documentation_page
+from .page.documentation import with_figures
+from .page.picture import as_bytes, direction, picture_of, read_picture
+from .page.picture import pack as pack_picture
+from .page.picture import values as picture_values
+from .page.preset import IN_FMU, preset_of, read_preset
+from .page.savings import NATIVE, OPERATIONS, savings
+from .page.table import print_whole
+from .page.text import show as show_in
+from .page.typeset import Notation, name_latex, name_text, typeset
+from .page.wrapped import wrapped
+from .prepare.consistency import RedundantConstraintWarning
+from .prepare.prepare import Prepared, prepare
+from .prepare.starts import StartMovedWarning
+from .study.stress import exchange, runs, worker
+from .study.stress.bench import Bench, Finding
+from .study.stress.closed_forms import JudgedForm, judged, magnitude
+from .study.stress.facts import Facts, facts_of
+from .study.stress.judge import EPS, Check, acts, differ, first_landing
+from .study.stress.lagrange import lagrange, lay_beside
+from .study.stress.player import Player, Run, clear
+from .study.stress.player import play as play_of
+from .study.stress.player import table as table_of_run
+from .study.stress.probe import (
+    CONSISTENT,
+    REFUSED,
+    RIGHT,
+    UNFINISHED,
+    WRONG,
+    Probe,
+    Verdict,
+    attempt,
+    verdict,
+)
+from .study.stress.probes import probes
+from .study.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed, as_markdown
+from .study.stress.runs import departures, started
+from .study.sweep import engine
+from .study.sweep.design import axis, design, distribution, sampled
+from .study.sweep.host import Host
+from .study.sweep.parts import PartWarning
+from .study.sweep.table import happened
+from .study.tradeoff.choose import bisected, choose
+from .study.tradeoff.held_out import other_values
+from .study.tradeoff.importer import Importer
+from .study.tradeoff.measure import Plan as TradeoffPlan
+from .study.tradeoff.measure import Point, Tradeoff, measure, take_turns
+from .study.tradeoff.quantities import OWN, quantities
+from .study.tradeoff.reference import refer
+from .study.tradeoff.report import table as tradeoff_table
+from .study.tradeoff.setting import Setting
+from .verification.evaluate import Compiled, function
+from .verification.pipeline import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
+from .verification.plot import COLOURS, figure_of, moments, panels
+from .verification.reference import read_table
+from .verification.simulate import ErrorBarWarning, communication_points
+from .verification.verify import RECORD, applies, check_closed_form
