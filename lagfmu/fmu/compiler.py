@@ -50,7 +50,7 @@ HOT = {  # where the time of a step and of a communication point goes; all else 
     *("model.c", "mechanism.c", "project.c", "friction.c", "sensitivity.c"),
     *("linear.c", "schur.c", "ldlt.c", "lu.c", "painleve.c"),
     *("dop853.c", "rk4.c", "radau5.c", "rattle.c", "integrator.c"),
-    *("segment.c", "state.c", "observe.c", "clearance.c", "system.c"),
+    *("segment.c", "state.c", "observe.c", "minimum_gap.c", "system.c"),
 }
 
 SHARED = ("-shared", "-s", "-Os")  # -Os is for what the compiler adds of its own

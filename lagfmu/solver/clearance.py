@@ -18,7 +18,7 @@ from typing import Any
 
 from ..numeric.interval import Interval, of
 from ..numeric.system import Vector
-from ..numeric.thresholds import SAMPLES_COARSE, SAMPLES_FINE
+from ..numeric.thresholds import SEARCH_COARSE, SEARCH_FINE
 from .flow import Flow
 from .indicators import ranges
 
@@ -43,10 +43,10 @@ def between(
             rates = _rates(flow, dense, a, b)
         (low, high), f_a, f_b = rates[k], float(at_a[k]), float(at_b[k])
         if math.isnan(low):
-            if b - a > SAMPLES_COARSE * step:
+            if b - a > SEARCH_COARSE * step:
                 return UNKNOWN
         elif r.inside(f_b) < -r.slack:
-            if b - a > SAMPLES_FINE * step and low < 0 < high:
+            if b - a > SEARCH_FINE * step and low < 0 < high:
                 return UNKNOWN
         elif (
             r.low > -math.inf and _lowest(f_a - r.low, f_b - r.low, low, high, b - a) < -r.slack

@@ -12,11 +12,11 @@ from typing import Any
 
 from ..numeric.system import Vector
 from ..numeric.thresholds import (
-    SAMPLES_DIPS,
-    SAMPLES_FIRST,
-    SAMPLES_MOST,
-    SAMPLES_SHALLOW,
-    SAMPLES_SMALLEST,
+    SEARCH_DIPS,
+    SEARCH_FIRST,
+    SEARCH_MOST,
+    SEARCH_SHALLOW,
+    SEARCH_SMALLEST,
 )
 from .clearance import BRACKETS, CLEAR, between
 from .flow import Flow
@@ -32,7 +32,7 @@ def samples(
     """
     h, dense = float(solver.t - t0), solver.dense_output()
     highest = t0 + _top_of_rebound(flow, t0, y0, before)
-    inner = {t0 + k * h / SAMPLES_FIRST for k in range(1, SAMPLES_FIRST)} | {highest}
+    inner = {t0 + k * h / SEARCH_FIRST for k in range(1, SEARCH_FIRST)} | {highest}
     times = [t0, *sorted(t for t in inner if t0 < t < solver.t), float(solver.t)]
     values = [before]
     values += [indicators(flow, t, dense(t)) for t in times[1:-1]]
@@ -44,7 +44,7 @@ def samples(
         found = between(flow, dense, a, b, values[k], values[k + 1], h)
         if found == BRACKETS:
             break
-        more = len(times) < SAMPLES_MOST and b - a > SAMPLES_SMALLEST * h and a < middle < b
+        more = len(times) < SEARCH_MOST and b - a > SEARCH_SMALLEST * h and a < middle < b
         if found == CLEAR or not more:
             k += 1
         else:
@@ -86,11 +86,11 @@ def look_into_dips(
     """
     for i in range(len(times) - 2):
         t, lam = times[i : i + 3], [float(v[contact]) for v in values[i : i + 3]]
-        for _ in range(SAMPLES_DIPS):
+        for _ in range(SEARCH_DIPS):
             if min(lam) < 0:
                 break
             lowest, depth = _vertex(t, lam)
-            if not (t[0] < lowest < t[2]) or lowest in t or depth > SAMPLES_SHALLOW * max(lam):
+            if not (t[0] < lowest < t[2]) or lowest in t or depth > SEARCH_SHALLOW * max(lam):
                 break
             seen = indicators(flow, lowest, solver.dense_output()(lowest))
             if seen[contact] < 0:

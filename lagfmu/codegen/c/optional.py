@@ -29,7 +29,7 @@ NO_RUNGS = """
 SHARED_VALUE const Dependent *const DEPENDENT = NULL;
 """
 BEHIND_EVENTS, BEHIND_CONTACTS = (
-    ("clearance.c", "interval.c", "samples.c", "root.c"),
+    ("event_search.c", "interval.c", "minimum_gap.c", "root.c"),
     ("complementarity.c",),
 )  # what only those need
 AT_CONSTRAINTS = (

@@ -68,11 +68,11 @@ enum {
 };
 
 /* ---- events ---- */
-enum { SAMPLES_FIRST = 4, SAMPLES_MOST = 512, SAMPLES_DIPS = 3 }; /* in a step; parabolas drawn through a dip */
-static const double SAMPLES_SMALLEST = 0x1p-30; /* of a step */
-static const double SAMPLES_SHALLOW = 0.1;      /* of the samples, how low a dip must go to be looked into */
-static const double SAMPLES_COARSE = 0x1p-5; /* of a step: as near as is looked where no rate is known */
-static const double SAMPLES_FINE = 0x1p-6;   /* of a step: near enough to take the one event that is seen */
+enum { SEARCH_FIRST = 4, SEARCH_MOST = 512, SEARCH_DIPS = 3 }; /* in a step; parabolas drawn through a dip */
+static const double SEARCH_SMALLEST = 0x1p-30; /* of a step */
+static const double SEARCH_SHALLOW = 0.1;      /* of the samples, how low a dip must go to be looked into */
+static const double SEARCH_COARSE = 0x1p-5; /* of a step: as near as is looked where no rate is known */
+static const double SEARCH_FINE = 0x1p-6;   /* of a step: near enough to take the one event that is seen */
 enum { RATES_KEPT = 4 };                   /* points of a cubic polynomial through an estimated input */
 static const double RATES_ROUNDING = 1e-9; /* of a communication step */
 

@@ -10,9 +10,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "event_search.h"
 #include "indicators.h"
 #include "root.h"
-#include "samples.h"
 #include "segment.h"
 
 static const double SEEN_NEAR = 0x1p-36;   /* of the time between two samples: how near a root is sought by sight */
@@ -187,10 +187,10 @@ Status events_find(Solver *s, const double *y1) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
     double *y = s->work_events, *values = y + 3 * i->ny;
-    Samples samples = {0, values + width, values + width + SAMPLES_MOST + width};
+    Samples samples = {0, values + width, values + width + SEARCH_MOST + width};
     Sought x = {s, i->t_old, i->y_old, 0, {0, 0, 0, 0}, y, values};
     s->state.now.event_count = 0;
-    if (samples_take(s, y1, y, &samples) != OK) return FAILED;
+    if (event_search(s, y1, y, &samples) != OK) return FAILED;
     for (int k = 0; k < width; k++) {
         double time;
         int found, way;

@@ -1,11 +1,11 @@
 /* solver.c -- the memory of a simulation, taken in two passes (arena.h). */
 #include "solver.h"
 
-#include "clearance.h"
+#include "event_search.h"
 #include "impact.h"
 #include "indicators.h"
+#include "minimum_gap.h"
 #include "optional.h"
-#include "samples.h"
 
 static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
     const int n = s->n, contacts = s->contacts, indicators = indicators_count(s);
@@ -73,12 +73,12 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? 2 * n : 0);
     s->work_advance = arena_doubles(scratch, 4 * n);
     s->work_events =
-        arena_doubles(scratch, indicators == 0 ? 0 : 6 * n + indicators + samples_doubles(indicators));
+        arena_doubles(scratch, indicators == 0 ? 0 : 6 * n + indicators + event_search_doubles(indicators));
     if (s->peaks > 0) {
         observed_layout(&s->peak_seen, scratch, system);
         s->work_peaks = arena_doubles(scratch, OPTIONAL.peaks->doubles(s->peaks, n));
     }
-    s->work_clearance = arena_doubles(scratch, clearance_doubles(system));
+    s->work_gap = arena_doubles(scratch, minimum_gap_doubles(system));
     const int frictions = system->frictions, some = frictions > 0;
     s->work_rub = arena_take(scratch, some ? OPTIONAL.slides->doubles(system) : 0, sizeof(double));
     s->iwork_rub = arena_take(scratch, some ? OPTIONAL.slides->ints(system) : 0, sizeof(int));

@@ -54,7 +54,7 @@ typedef struct Solver {
     double *work_passage;      /* (2 n) of passage.c */
     double *work_advance;      /* (4 n) of advance.c */
     double *work_events;       /* (6 n + indicators and all samples) of events.c */
-    double *work_clearance;    /* of clearance.c */
+    double *work_gap;    /* of minimum_gap.c */
     Observed peak_seen;        /* of peaks.c, with */
     double *work_peaks;
     double *work_rub;          /* of rubbing.c */

@@ -1,28 +1,28 @@
-/* samples.c -- where in a step an event may pass unseen, more is looked at.
+/* event_search.c -- where in a step an event may pass unseen, more is looked at.
  *
  * First at the quarters of the step, and where a rebound is highest; then in the middle between two samples
  * as long as f of an open contact, or h of a force that jumps, can have left its range and come back
- * (clearance.c); and where a multiplier may dip below zero between two samples. */
-#include "samples.h"
+ * (minimum_gap.c); and where a multiplier may dip below zero between two samples. */
+#include "event_search.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "clearance.h"
 #include "indicators.h"
+#include "minimum_gap.h"
 #include "segment.h"
 #include "thresholds.h"
 
-/* The time [s] in which an open contact that has just been left parts most, f' / (-f''). */
+/* The time [s] in which an open contact that has just departed is farthest off, f' / (-f''). */
 static Status top_of_rebound(Solver *s, double t, const double *y, const double *values,
                              double *top) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
-    int left = 0;
+    int departed = 0;
     *top = HUGE_VAL;
     for (int c = 0; c < system->contacts; c++)
-        left |= !s->state.closed[c] && values[c] <= s->state.gap[c];
-    if (!left) return OK;
+        departed |= !s->state.closed[c] && values[c] <= s->state.gap[c];
+    if (!departed) return OK;
     if (mechanism_motion_near(b, segment_instant(s, t), y, y + system->n, s->active, s->state.offset,
                               s->state.size) != OK)
         return FAILED;
@@ -69,12 +69,12 @@ static Status look_into_dip(Solver *s, Samples *samples, int i, int contact, dou
         t[k] = samples->t[i + k];
         lambda[k] = samples->values[(i + k) * width + contact];
     }
-    for (int round = 0; round < SAMPLES_DIPS; round++) {
+    for (int round = 0; round < SEARCH_DIPS; round++) {
         double lowest, depth;
         const double least = fmin(lambda[0], fmin(lambda[1], lambda[2]));
         const double most = fmax(lambda[0], fmax(lambda[1], lambda[2]));
         if (least < 0 || !vertex(t, lambda, &lowest, &depth)) return OK;
-        if (!(t[0] < lowest && lowest < t[2]) || lowest == t[1] || depth > SAMPLES_SHALLOW * most)
+        if (!(t[0] < lowest && lowest < t[2]) || lowest == t[1] || depth > SEARCH_SHALLOW * most)
             return OK;
         integrator->method->dense(integrator, lowest, y);
         if (indicators_at(s, lowest, y, seen) != OK) return FAILED;
@@ -98,7 +98,7 @@ static Status look_into_dip(Solver *s, Samples *samples, int i, int contact, dou
 static Status look_at(Solver *s, Samples *samples, int k, double t, double *y) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
-    double *seen = samples->values + (SAMPLES_MOST + width) * width; /* one row of scratch */
+    double *seen = samples->values + (SEARCH_MOST + width) * width; /* one row of scratch */
     i->method->dense(i, t, y);
     if (indicators_at(s, t, y, seen) != OK) return FAILED;
     insert(samples, k + 1, width, t, seen);
@@ -106,15 +106,15 @@ static Status look_at(Solver *s, Samples *samples, int k, double t, double *y) {
 }
 
 /* Samples between samples until nothing can have passed unseen up to the first event. */
-static Status refine_samples(Solver *s, Samples *samples, double *y) {
+static Status refine_search(Solver *s, Samples *samples, double *y) {
     const double step = s->integrator.t - s->integrator.t_old;
     for (int k = 0; s->system->bounds != NULL && k + 1 < samples->count;) {
         const double a = samples->t[k], b = samples->t[k + 1], middle = a + (b - a) / 2;
-        const Clearance clearance = clearance_between(s, samples, k, y);
-        const int more = samples->count < SAMPLES_MOST - 1 && b - a > SAMPLES_SMALLEST * step &&
+        const MinimumGap gap = minimum_gap(s, samples, k, y);
+        const int more = samples->count < SEARCH_MOST - 1 && b - a > SEARCH_SMALLEST * step &&
                          middle > a && middle < b;
-        if (clearance == BRACKETS) return OK;
-        if (clearance == CLEAR || !more)
+        if (gap == BRACKETS) return OK;
+        if (gap == CLEAR || !more)
             k += 1;
         else if (look_at(s, samples, k, middle, y) != OK)
             return FAILED;
@@ -131,7 +131,7 @@ static int may_dip(const Solver *s, int c) {
     return of_friction % 2 == 0 || !system->friction[of_friction / 2].gated; /* else it is 1 */
 }
 
-Status samples_take(Solver *s, const double *y1, double *y, Samples *samples) {
+Status event_search(Solver *s, const double *y1, double *y, Samples *samples) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
     const double h = i->t - i->t_old;
@@ -142,17 +142,17 @@ Status samples_take(Solver *s, const double *y1, double *y, Samples *samples) {
     samples->t[1] = i->t;
     if (indicators_at(s, i->t, y1, samples->values + width) != OK) return FAILED;
     samples->count = 2;
-    for (int k = 1; k < SAMPLES_FIRST; k++)
-        if (look_at(s, samples, samples->count - 2, i->t_old + k * h / SAMPLES_FIRST, y) != OK) return FAILED;
+    for (int k = 1; k < SEARCH_FIRST; k++)
+        if (look_at(s, samples, samples->count - 2, i->t_old + k * h / SEARCH_FIRST, y) != OK) return FAILED;
     highest += i->t_old;
     for (int k = 0; k + 1 < samples->count; k++)
         if (samples->t[k] < highest && highest < samples->t[k + 1] &&
             look_at(s, samples, k, highest, y) != OK)
             return FAILED;
-    if (refine_samples(s, samples, y) != OK) return FAILED;
+    if (refine_search(s, samples, y) != OK) return FAILED;
     for (int c = 0; c < width; c++) {
         if (!may_dip(s, c)) continue;
-        double *seen = samples->values + (SAMPLES_MOST + width) * width; /* one row of scratch */
+        double *seen = samples->values + (SEARCH_MOST + width) * width; /* one row of scratch */
         for (int k = 0, found = 0; k + 2 < samples->count && !found; k++)
             if (look_into_dip(s, samples, k, c, y, seen, &found) != OK) return FAILED;
     }

@@ -1,4 +1,4 @@
-/* clearance.c -- can an indicator have left its range between two samples?
+/* minimum_gap.c -- can an indicator have left its range between two samples?
  *
  * Its rate f' = G v - nu is evaluated in interval arithmetic (interval.h) for the boxes of t, q, v and u
  * between the samples: with l <= f' <= h,
@@ -8,7 +8,7 @@
  * whose lowest point is where the two lines meet (Piyavskii 1972).  It rises to the true minimum with the
  * square of b - a.  The boxes hold the dense output at both ends and in the middle and as much more as that
  * deviates from a straight line: the motion is smooth over a step, which f need not be. */
-#include "clearance.h"
+#include "minimum_gap.h"
 
 #include <math.h>
 
@@ -27,7 +27,7 @@ static const Interval *bound_rates(Solver *s, double a, double b, double *y) {
     const Integrator *i = &s->integrator;
     const int n = system->n, inputs = system->inputs, driven = inputs + system->jumps;
     const double t[3] = {a, a + (b - a) / 2, b};
-    double *u = s->work_clearance;
+    double *u = s->work_gap;
     Interval *q = (Interval *)(void *)(u + 3 * driven), *w = q + 2 * n, *rate = w + driven;
     for (int k = 0; k < 3; k++) {
         i->method->dense(i, t[k], y + k * 2 * n);
@@ -66,14 +66,14 @@ static int is_inside(const Solver *s, int i, double value) {
     return !(range_inside(r, value) < -r.slack);
 }
 
-Clearance clearance_between(Solver *s, const Samples *samples, int k, double *y) {
+MinimumGap minimum_gap(Solver *s, const Samples *samples, int k, double *y) {
     const int width = indicators_count(s->system);
     const double *at_a = samples->values + k * width, *at_b = at_a + width;
     const double a = samples->t[k], b = samples->t[k + 1], h = b - a;
     const double step = s->integrator.t - s->integrator.t_old;
     const int moving = inputs_move(s);
     const Interval *rates = NULL;
-    Clearance found = CLEAR;
+    MinimumGap found = CLEAR;
     for (int i = 0; i < width; i++)
         if (is_inside(s, i, at_a[i]) && !is_inside(s, i, at_b[i])) found = BRACKETS;
     for (int i = 0; i < width; i++) {
@@ -83,12 +83,12 @@ Clearance clearance_between(Solver *s, const Samples *samples, int k, double *y)
         Interval rate = rates[i];
         if (moving && i >= s->system->contacts) rate = interval_unknown();
         if (isnan(rate.low)) {
-            if (h > SAMPLES_COARSE * step) return UNKNOWN;
+            if (h > SEARCH_COARSE * step) return UNKNOWN;
             continue;
         }
         const Interval fall = {-rate.high, -rate.low};
         if (!is_inside(s, i, at_b[i])) {
-            if (h > SAMPLES_FINE * step && rate.low < 0 && rate.high > 0) return UNKNOWN;
+            if (h > SEARCH_FINE * step && rate.low < 0 && rate.high > 0) return UNKNOWN;
         } else if ((r.low > -HUGE_VAL &&
                     lowest(at_a[i] - r.low, at_b[i] - r.low, rate, h) < -r.slack) ||
                    (r.high < HUGE_VAL &&

@@ -1,6 +1,6 @@
-/* samples.h -- the times within a step at which the indicators are looked at. */
-#ifndef LAGFMU_SAMPLES_H
-#define LAGFMU_SAMPLES_H
+/* event_search.h -- the times within a step at which the indicators are looked at. */
+#ifndef LAGFMU_EVENT_SEARCH_H
+#define LAGFMU_EVENT_SEARCH_H
 
 #include "linkage.h"
 #include "solver.h"
@@ -13,12 +13,12 @@ typedef struct {
 } Samples;
 
 /* Doubles behind t and values, one row of scratch among them. */
-static inline int samples_doubles(int indicators) {
-    return (SAMPLES_MOST + indicators) * (1 + indicators) + indicators;
+static inline int event_search_doubles(int indicators) {
+    return (SEARCH_MOST + indicators) * (1 + indicators) + indicators;
 }
 
 /* Fills `samples` for the step of s->integrator (dense output prepared), from state.indicator at its start
  * to the projected y1 at its end.  y (6 n): scratch. */
-SHARED Status samples_take(Solver *s, const double *y1, double *y, Samples *samples);
+SHARED Status event_search(Solver *s, const double *y1, double *y, Samples *samples);
 
 #endif
