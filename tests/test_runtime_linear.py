@@ -34,7 +34,7 @@ SOURCES = [
     "lu.c",
     "nullspace.c",
     "orthogonal.c",
-    "residual.c",
+    "refinement.c",
     "schur.c",
     "stiffened.c",
     "status.c",

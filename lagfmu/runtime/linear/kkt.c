@@ -13,7 +13,7 @@
 
 #include "condition.h"
 #include "lu.h"
-#include "residual.h"
+#include "refinement.h"
 #include "schur.h"
 
 static const double REGULAR = 1e-14; /* reciprocal condition above which K is not singular */

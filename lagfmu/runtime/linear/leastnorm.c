@@ -14,7 +14,7 @@
 #include "cod.h"
 #include "kkt.h"
 #include "numbers.h"
-#include "residual.h"
+#include "refinement.h"
 #include "thresholds.h"
 
 /* The scaled KKT matrix of the rows that act, decomposed. */

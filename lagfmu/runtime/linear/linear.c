@@ -11,6 +11,7 @@
 #include "dependent.h"
 #include "kkt.h"
 #include "numbers.h"
+#include "refinement.h"
 #include "schur.h"
 #include "stiffened.h"
 #include "thresholds.h"
@@ -36,6 +37,7 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     l->zero = arena_doubles(arena, n);
     for (int i = 0; i < n && l->zero != NULL; i++) l->zero[i] = 0;
     schur_layout(l, arena);
+    refinement_layout(l, arena);
     stiffened_layout(l, arena);
     l->dense = NULL;
     l->pivots = NULL;

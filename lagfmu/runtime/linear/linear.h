@@ -19,6 +19,12 @@ typedef enum {
     RUNG_WRITTEN_OUT /* the first, as system->solve */
 } Rung;
 
+/* Of refinement.c: the low parts of x (n) and lambda (m); what both equations leave, r (n), with its low part,
+ * and g (m); the corrections. */
+typedef struct {
+    double *x_low, *lambda_low, *r, *r_low, *g, *dx, *dlambda;
+} Refinement;
+
 typedef struct {
     const System *system;
     const double *M, *G;  /* the values that were factored (not copied: they must stay) */
@@ -28,6 +34,7 @@ typedef struct {
     Why *why;
     double *zero;         /* (n) for b = NULL */
     double *sparse;       /* workspace of schur.c */
+    Refinement refinement;
     double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
     int *pivots;
     int stiffened;        /* 1: M holds more than masses (stiffened.h) */

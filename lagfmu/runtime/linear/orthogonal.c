@@ -8,7 +8,7 @@
 #include <math.h>
 
 #include "numbers.h"
-#include "residual.h"
+#include "refinement.h"
 #include "thresholds.h"
 #include "weighted.h"
 

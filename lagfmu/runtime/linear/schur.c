@@ -19,7 +19,7 @@
 
 #include "ldlt.h"
 #include "numbers.h"
-#include "residual.h"
+#include "refinement.h"
 
 static const double EXACT = 4e3;    /* condition up to which lambda is right to 1e-12 as it is */
 static const double LITTLE = 1e3;  /* cancellation in pivots that does not count: see judge() */
@@ -48,13 +48,6 @@ void schur_layout(Linear *l, Arena *arena) {
     at.row = arena_doubles(arena, full);
     at.y = arena_doubles(arena, s->n);
     at.z = arena_doubles(arena, s->m);
-    at.r = arena_doubles(arena, s->n);
-    at.r_low = arena_doubles(arena, s->n);
-    at.g = arena_doubles(arena, s->m);
-    at.dx = arena_doubles(arena, s->n);
-    at.dlambda = arena_doubles(arena, s->m);
-    at.x_low = arena_doubles(arena, s->n);
-    at.lambda_low = arena_doubles(arena, s->m);
     at.lambda = arena_doubles(arena, s->m);
     at.trust = SCHUR_UNSAFE;
     if (arena->base == NULL) return;
@@ -233,8 +226,7 @@ static void constrain(const Linear *l, const double *c, double *y, double *lambd
     }
 }
 
-static void substitute_schur(const Linear *l, const double *b, const double *c, double *x,
-                             double *lambda) {
+static void substitute_schur(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     int diagonal = l->system->plan->diagonal;
     double *y = diagonal ? x : schur_of(l)->y;
     if (b != NULL) {
@@ -250,7 +242,8 @@ static void substitute_schur(const Linear *l, const double *b, const double *c, 
  * S's. */
 static int settled(const Linear *l, const double *x, const double *lambda) {
     const System *s = l->system;
-    const Schur *own = schur_of(l);
+    const double *diagonal = schur_of(l)->diagonal;
+    const Refinement *own = &l->refinement;
     double moved = 0, size = 0, moved_lambda = 0, size_lambda = 0;
     for (int a = 0; a < s->masses; a++) {
         int i = s->mass_row[a];
@@ -259,43 +252,20 @@ static int settled(const Linear *l, const double *x, const double *lambda) {
         size += l->M[a] * x[i] * x[i];
     }
     for (int k = 0; k < s->m; k++) {
-        moved_lambda += own->diagonal[k] * own->dlambda[k] * own->dlambda[k];
-        size_lambda += own->diagonal[k] * lambda[k] * lambda[k];
+        moved_lambda += diagonal[k] * own->dlambda[k] * own->dlambda[k];
+        size_lambda += diagonal[k] * lambda[k] * lambda[k];
     }
     double all = size + size_lambda;
     return moved <= SETTLED * SETTLED * all && moved_lambda <= SETTLED * SETTLED * all;
 }
 
-/* One step of refinement, of x + x_low and lambda + lambda_low if `doubled`. */
-static void refine_once(Linear *l, int doubled, const double *b, const double *c, double *x,
-                        double *lambda) {
-    const System *s = l->system;
-    Schur *own = schur_of(l);
-    if (doubled)
-        residual_doubled(l, b, c, x, own->x_low, lambda, own->lambda_low, own->r, own->r_low,
-                         own->g);
-    else
-        linear_residual(l, b, c, x, lambda, own->r, own->g);
-    substitute_schur(l, own->r, own->g, own->dx, own->dlambda);
-    if (doubled) {
-        doubled_move(s->n, x, own->x_low, own->dx);
-        doubled_move(s->m, lambda, own->lambda_low, own->dlambda);
-    } else {
-        for (int i = 0; i < s->n; i++) x[i] += own->dx[i];
-        for (int k = 0; k < s->m; k++) lambda[k] += own->dlambda[k];
-    }
-}
-
 int schur_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
-    const System *s = l->system;
-    Schur *own = schur_of(l);
+    const Trust trust = schur_of(l)->trust;
     substitute_schur(l, b, c, x, lambda);
-    if (own->trust == SCHUR_EXACT) return 1;
-    int doubled = own->trust == SCHUR_DOUBLED;
-    for (int i = 0; i < s->n && doubled; i++) own->x_low[i] = 0;
-    for (int k = 0; k < s->m && doubled; k++) own->lambda_low[k] = 0;
+    if (trust == SCHUR_EXACT) return 1;
+    refine_begin(l);
     for (int step = 0; step < 3; step++) {
-        refine_once(l, doubled, b, c, x, lambda);
+        refine_once(l, substitute_schur, trust == SCHUR_DOUBLED, b, c, x, lambda);
         if (settled(l, x, lambda)) return 1;
     }
     return 0;

@@ -25,9 +25,7 @@ typedef struct {
     double *diagonal;          /* (m) S_kk by rows of G; 1 where a row does not act */
     double *row_size, *row;    /* (max(n, m)) scratch of ldlt.c; row is zero between calls */
     double *y, *z;             /* (n), (m) scratch of schur_solve() */
-    double *r, *r_low, *g;     /* (n), (n), (m) residuals */
-    double *dx, *dlambda;      /* (n), (m) corrections */
-    double *x_low, *lambda_low, *lambda; /* (n), (m), (m) */
+    double *lambda;            /* (m) where the caller asks for none */
     double condition, growth;  /* of M and S, the worse of the two (ldlt.h) */
     double apart;              /* sine of the least angle between a row and those before it */
     Trust trust;
