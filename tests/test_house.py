@@ -17,6 +17,7 @@ ROOMS = (  # each imports from those before it, and from no other
     "methods",
     "numeric",
     "solver",
+    "engine",
     "model",
     "mechanics",
     "interface",

@@ -105,6 +105,21 @@ def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
     return pack(contents)
 
 
+def refusals(prepared: Prepared) -> list[str]:
+    """What the scene asks for that native FMUs alone do, each by name; empty: this target can be built."""
+    scene, system = prepared.scene, prepared.system
+    found = [f"it does not slip (friction {law.name!r})" for law in system.frictions]
+    if system.surfaces is not None:
+        found.append("its forces do not jump")
+    if scene.error_bars:
+        found.append("it has no error bars")
+    peaks = dict.fromkeys(v.of.coordinate for v in prepared.table.those(*names.PEAKS))
+    found += [f"it tells no extremes (peak.{name})" for name in peaks]
+    if scene.method not in IN_PYTHON:
+        found.append(f"its methods are {', '.join(IN_PYTHON)} (not {scene.method!r})")
+    return found
+
+
 def offered(prepared: Prepared) -> VariableTable:
     """The variables that it has, with the methods that are written in Python.  Raises BuildError."""
     scene = prepared.scene

@@ -1,0 +1,204 @@
+"""One communication step: SciPy's integrator step by step, projection after each, events in between.
+
+    y = (q, v) ,  y' = (v, vdot)      the index-1 equations; lambda is eliminated or solved for in each one
+
+The integrators are scipy.integrate's DOP853 (Hairer, Norsett & Wanner, Solving Ordinary Differential
+Equations I, sect. II.5 and II.6) and Radau (Hairer & Wanner II, sect. IV.8).  After each accepted step y
+is projected, and the next step begins there.  The error of a step is weighed by tolerance * max(|y_i|,
+s_i), s_i being the size of the coordinate, and that size times the natural rate for its velocity.  The
+integrator begins anew at each communication point and after each event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.integrate import DOP853, Radau
+
+from ..numeric.failure import StepFailureError
+from ..numeric.system import System, Vector
+from .equations import Motion, Ranks
+from .events import Found, Search
+from .projection import project_positions, project_velocities
+from .state import Settings, State
+from .switch import at_event, begun
+
+INTEGRATORS = {"auto": DOP853, "dop853": DOP853, "radau5": Radau}
+HEADWAY = 1e-6  # of the natural time: shorter steps are counted
+CROWD = (
+    200  # events within 1e-9 of the natural time, and attempts at one step: there is no going on
+)
+
+
+def advance(
+    system: System,
+    settings: Settings,
+    state: State,
+    u: Sequence[float],
+    p: Sequence[float],
+    end: float,
+) -> State:
+    """The state at `end` [s], with the inputs u as they were set at state.t.
+
+    Raises StepFailureError with the reason why that is not reached.
+    """
+    motion, start, tiny = Motion(system, u, p, state.t), state.t, 0
+    with np.errstate(all="ignore"):
+        state, latest, crowd = begun(motion, settings, state), state.t, 0
+        while state.t < end:
+            state, found, short = _segment(motion, settings, state, end, tiny)
+            tiny += short
+            if found is None:
+                continue
+            state = replace(at_event(motion, settings, state, found), step=0.0)
+            crowd = crowd + 1 if state.t - latest <= 1e-9 / settings.rate else 0
+            latest = state.t
+            if crowd > CROWD:
+                raise StepFailureError(
+                    f"more than {CROWD} events follow each other at t = {state.t!r} s without headway"
+                )
+    return replace(state, span=end - start)
+
+
+def _segment(
+    motion: Motion, settings: Settings, state: State, end: float, tiny: int
+) -> tuple[State, Found | None, int]:
+    """The smooth motion to `end` or to the next event; the state there, the event, how many steps were
+    tiny.
+    """
+    system, n = motion.system, motion.system.n
+    size = np.array(settings.size)
+    rows = system.active(state.closed)
+    t, y = state.t, np.array([*state.q, *state.v])
+    ranks = motion.ranks(motion.terms(t, y[:n], y[n:]), rows)
+    stepper = _Stepper(motion, settings, (rows, ranks.all), t, y, end, state.step)
+    search = Search(motion, settings, state, rows, ranks.all) if system.contacts else None
+    steps, short, proposed = state.steps, 0, state.step
+    while True:
+        before, y = stepper.step(t, y)
+        steps += 1
+        found, now = None, stepper.t
+        short += stepper.length < HEADWAY / settings.rate
+        if 0 < settings.maximum_steps < tiny + short:
+            raise StepFailureError(
+                f"no headway at t = {now!r} s: more than solver.maximum_steps = "
+                f"{settings.maximum_steps:.0f} steps were shorter than {HEADWAY:g} of the natural time "
+                f"{1 / settings.rate:.3g} s"
+            )
+        if search is not None:
+            search.rank = ranks.all
+            dense = stepper.dense()
+            found = search.first(t, now, dense)
+            if found is not None:
+                now, y = found.t, dense(found.t)
+        q, v, ranks = _projected(motion, now, y, rows, size, ranks)
+        t, y, stepper.rank = now, np.concatenate([q, v]), ranks.all
+        if found is not None or now >= end:
+            proposed = stepper.proposal(before)
+            break
+        stepper.go_on_from(y)
+    state = replace(
+        state, t=t, q=tuple(q.tolist()), v=tuple(v.tolist()), steps=steps, step=proposed
+    )
+    return state, found, short
+
+
+def _projected(
+    motion: Motion, t: float, y: Vector, rows: Sequence[int], size: Vector, ranks: Ranks
+) -> tuple[Vector, Vector, Ranks]:
+    """q and v (n) on the constraints, and how many of `rows` are independent there."""
+    n = motion.system.n
+    q, v = y[:n], y[n:]
+    if not rows:
+        return q, v, ranks
+    q = project_positions(motion, t, q, v, rows, size, ranks.positions)
+    terms = motion.terms(t, q, v)
+    ranks = motion.ranks(terms, rows)
+    return q, project_velocities(terms.of(rows), v), ranks
+
+
+class _Stepper:
+    """One of SciPy's integrators on the index-1 equations of one mode."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        settings: Settings,
+        rows: tuple[Sequence[int], int],
+        t: float,
+        y: Vector,
+        end: float,
+        first: float,
+    ) -> None:
+        self.motion, self.settings, self.end = motion, settings, end
+        self.rows, self.rank = rows
+        size = np.array(settings.size)
+        self.weights = settings.tolerance * np.concatenate([size, settings.rate * size])
+        self.method: Any = self._begin(t, y, first)
+
+    @property
+    def t(self) -> float:
+        """Where it stands [s]."""
+        return float(self.method.t)
+
+    @property
+    def length(self) -> float:
+        """Of the latest step [s]."""
+        return float(self.method.step_size)
+
+    def step(self, t: float, y: Vector) -> tuple[float, Vector]:
+        """One accepted step from (t, y): the length [s] that was tried for it, and y at its end.
+
+        A step on which the equations cannot be evaluated is tried again, shorter.
+        """
+        for _ in range(CROWD):
+            tried = float(self.method.h_abs)
+            try:
+                message = self.method.step()
+            except StepFailureError as error:
+                shorter = tried / 4
+                if not t + shorter > t:
+                    raise
+                cause = error
+                self.method = self._begin(t, y, shorter)
+                continue
+            if self.method.status == "failed":
+                raise StepFailureError(f"step size underflow at t = {self.t!r} s: {message}")
+            return tried, self.method.y
+        raise cause
+
+    def dense(self) -> Any:
+        """The continuous extension of the latest step: y(t)."""
+        return self.method.dense_output()
+
+    def go_on_from(self, y: Vector) -> None:
+        """Let the next step begin at y instead of where the latest ended."""
+        self.method.y, self.method.f = y, self._rates(self.t, y)
+
+    def proposal(self, tried: float) -> float:
+        """The next step [s]: the latest was cut at the end, so that it says little itself."""
+        return max(tried, float(self.method.h_abs))
+
+    def _begin(self, t: float, y: Vector, first: float) -> Any:
+        settings = self.settings
+        longest = settings.maximum_step or np.inf
+        return INTEGRATORS[settings.method](
+            self._rates,
+            t,
+            y,
+            self.end,
+            max_step=longest,
+            rtol=settings.tolerance,
+            atol=self.weights,
+            first_step=min(first, self.end - t, longest) or None,
+        )
+
+    def _rates(self, t: float, y: Vector) -> Vector:
+        """(v, vdot) at y = (q, v)."""
+        n = len(y) // 2
+        terms = self.motion.terms(t, y[:n], y[n:]).of(self.rows)
+        vdot, _, _ = self.motion.accelerations(terms, self.rank)
+        return np.concatenate([y[n:], vdot])

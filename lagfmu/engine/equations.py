@@ -1,0 +1,112 @@
+"""The equations between two settings of the inputs: M vdot = F + G^T lambda, G vdot = gamma, f = 0, G v = nu.
+
+What Python's functions cannot compute (a division by zero, a root of a negative number), or what is not
+finite, is a StepFailureError: the integrator takes it for a step that was too long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..numeric.failure import StepFailureError, plain
+from ..numeric.system import NONHOLONOMIC, Matrix, System, Vector
+from .linear import Rows, rows_of, solve
+
+
+class Terms(NamedTuple):
+    """M (n, n), F (n), and of the rows that act G (m, n), nu (m), gamma (m) at one state."""
+
+    M: Matrix
+    F: Vector
+    G: Matrix
+    nu: Vector
+    gamma: Vector
+
+    def of(self, rows: Sequence[int]) -> Terms:
+        """With these rows alone."""
+        some = list(rows)
+        return Terms(self.M, self.F, self.G[some], self.nu[some], self.gamma[some])
+
+
+class Ranks(NamedTuple):
+    """How many of the holonomic rows that act are independent, and how many of all that act.
+
+    Taken where the rows hold, and kept until the next such point: off the constraints, by the error of a
+    step, redundant rows seem independent, and their multipliers would be noise.
+    """
+
+    positions: int
+    all: int
+
+
+class Motion:
+    """A system with its parameters p, and its inputs u as they were set at the time `since` [s]."""
+
+    def __init__(
+        self, system: System, u: Sequence[float], p: Sequence[float], since: float
+    ) -> None:
+        self.system, self.u, self.p, self.since = system, u, p, since
+        self.eliminate = system.formulation == "nullspace"
+
+    def inputs(self, t: float) -> list[float]:
+        """The inputs at t [s]: held, prescribed motions by their rates."""
+        return self.system.inputs_at(self.u, t - self.since)
+
+    def terms(self, t: float, q: Vector, v: Vector) -> Terms:
+        """Of all rows.  Raises StepFailureError."""
+        try:
+            terms = Terms(*self.system.assemble(t, q, v, self.inputs(t), self.p))
+        except (ArithmeticError, ValueError) as error:
+            raise StepFailureError(
+                f"the equations cannot be evaluated at t = {t!r} s: {plain(error)}"
+            ) from None
+        for name, value in zip(("M", "F", "G", "nu", "gamma"), terms, strict=True):
+            if not np.isfinite(value).all():
+                raise StepFailureError(f"{name} is not finite at t = {t!r} s")
+        return terms
+
+    def residual(self, t: float, q: Vector) -> Vector:
+        """f of each row (m), 0 of nonholonomic ones.  Raises StepFailureError."""
+        assert self.system.residual is not None
+        try:
+            f = np.array(self.system.residual(t, q.tolist(), self.inputs(t), self.p), dtype=float)
+        except (ArithmeticError, ValueError) as error:
+            raise StepFailureError(
+                f"the constraints cannot be evaluated at t = {t!r} s: {plain(error)}"
+            ) from None
+        if not np.isfinite(f).all():
+            raise StepFailureError(f"a constraint is not finite at t = {t!r} s")
+        return f
+
+    def accelerations(self, terms: Terms, rank: int | None = None) -> tuple[Vector, Vector, Rows]:
+        """vdot (n), lambda (m) of the rows in `terms`, and these rows decomposed."""
+        rows = rows_of(terms.M, terms.G, rank)
+        vdot, lam = solve(terms.M, terms.F, rows, terms.gamma, self.eliminate)
+        return vdot, lam, rows
+
+    def holonomic(self, rows: Sequence[int]) -> list[int]:
+        """Those of the rows that tie positions."""
+        return [k for k in rows if self.system.rows[k].kind != NONHOLONOMIC]
+
+    def ranks(self, terms: Terms, rows: Sequence[int]) -> Ranks:
+        """Of `rows`, at a state on the constraints with the `terms` of all rows."""
+        tied = self.holonomic(rows)
+        total = rows_of(terms.M, terms.G[list(rows)]).rank
+        some = total if len(tied) == len(rows) else rows_of(terms.M, terms.G[tied]).rank
+        return Ranks(some, total)
+
+    def whole(self, t: float, q: Vector, v: Vector) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Coordinates and velocities of the model: of an embedding q = phi(s, t), v = J sdot + dphi/dt."""
+        embedding = self.system.embedding
+        if embedding is None:
+            return tuple(q.tolist()), tuple(v.tolist())
+        try:
+            places, rates = embedding.embed(t, q.tolist(), v.tolist(), self.inputs(t), self.p)
+        except (ArithmeticError, ValueError) as error:
+            raise StepFailureError(
+                f"the embedding cannot be evaluated at t = {t!r} s: {plain(error)}"
+            ) from None
+        return tuple(map(float, places)), tuple(map(float, rates))

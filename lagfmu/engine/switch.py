@@ -1,0 +1,194 @@
+"""What happens at an instant: contacts that close are struck, those that pull open, surfaces that jump are
+met.
+
+A state is taken to the one from which the motion goes on: on the constraints as they stand now, no contact
+approached, and a choice of closed contacts that is consistent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from ..numeric.system import Vector
+from .contacts import (
+    as_flags,
+    closed_at_rest,
+    closed_rows,
+    gap_of_rounding,
+    speed_of_rounding,
+)
+from .equations import Motion, Terms
+from .events import Found
+from .impact import Impact, coefficients, strike
+from .linear import rows_of
+from .projection import project_positions, project_velocities
+from .state import Event, Settings, State
+
+
+def begun(motion: Motion, settings: Settings, state: State) -> State:
+    """The state with which a communication step begins, its inputs being set.
+
+    A surface whose prescribed motion was set to another place or speed than it went to takes a closed
+    contact along if, pressed as it is, the contact could have followed within the latest communication
+    step; otherwise it has jumped away, and the contact departs.
+    """
+    system = motion.system
+    if not system.m:
+        return state
+    q, v = np.array(state.q), np.array(state.v)
+    terms, closed = motion.terms(state.t, q, v), closed_rows(system, state.closed)
+    if system.prescribed:
+        left = _left_behind(motion, settings, state, terms)
+        closed -= left
+        f, small = motion.residual(state.t, q), gap_of_rounding(terms, q, settings)
+        met = frozenset(k for k in system.contacts if k not in closed and f[k] < -small[k])
+        rows = system.active(as_flags(system, closed | met))
+        q = project_positions(motion, state.t, q, v, rows, np.array(settings.size))
+        terms = motion.terms(state.t, q, v)
+        if not met:
+            v = project_velocities(terms.of(system.active(as_flags(system, closed))), v)
+        closed |= met
+    elif not system.contacts:
+        return state
+    return _settled(motion, settings, state, q, v, closed)
+
+
+def at_event(motion: Motion, settings: Settings, state: State, found: Found) -> State:
+    """The state after contacts closed or departed at the time of `state`."""
+    system = motion.system
+    q, v = np.array(state.q), np.array(state.v)
+    closed = closed_rows(system, state.closed)
+    together = system.active(as_flags(system, closed | found.closing))
+    q = project_positions(motion, state.t, q, v, together, np.array(settings.size))
+    return _settled(motion, settings, state, q, v, closed, found.departing)
+
+
+def _settled(
+    motion: Motion,
+    settings: Settings,
+    state: State,
+    q: Vector,
+    v: Vector,
+    closed: frozenset[int],
+    departing: frozenset[int] = frozenset(),
+) -> State:
+    """The state after the impacts of all contacts that touch, with those closed that then press."""
+    system, t = motion.system, state.t
+    terms, f = motion.terms(t, q, v), motion.residual(t, q)
+    small, slow = gap_of_rounding(terms, q, settings), speed_of_rounding(terms, v, settings)
+    touching = closed | {k for k in system.contacts if f[k] <= small[k]}
+    s = terms.G @ v - terms.nu
+    before, struck = v, None
+    if any(s[k] < -slow[k] for k in touching):
+        struck = _struck(motion, settings, terms, v, touching, closed, small)
+        v, state = struck.v, replace(state, dissipated=state.dissipated + struck.lost)
+        terms = motion.terms(t, q, v)
+        s = terms.G @ v - terms.nu
+    resting = {k for k in touching if abs(s[k]) <= slow[k]}
+    now = _chosen(motion, terms, closed, resting, departing)
+    if now != closed or struck is not None:
+        rows = system.active(as_flags(system, now))
+        v = project_velocities(terms.of(rows), v)
+    state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()), closed=as_flags(system, now))
+    return _told(motion, state, q, before, closed, struck, slow, terms)
+
+
+def _chosen(
+    motion: Motion,
+    terms: Terms,
+    closed: frozenset[int],
+    resting: Collection[int],
+    departing: frozenset[int],
+) -> frozenset[int]:
+    """The contacts that are closed.
+
+    One whose multiplier has just fallen through 0 departs, if it opens then.
+    """
+    if not resting:
+        return frozenset()
+    others = frozenset(resting) - departing
+    if departing:
+        now = closed_at_rest(motion, terms, closed - departing, others)
+        rows = motion.system.active(as_flags(motion.system, now))
+        vdot, _, _ = motion.accelerations(terms.of(rows))
+        opening = terms.G @ vdot - terms.gamma
+        size = np.abs(terms.G) @ np.abs(vdot) + np.abs(terms.gamma)
+        if all(opening[k] >= -1e-6 * size[k] for k in departing):
+            return now
+    return closed_at_rest(motion, terms, closed, resting)
+
+
+def _struck(
+    motion: Motion,
+    settings: Settings,
+    terms: Terms,
+    v: Vector,
+    touching: Collection[int],
+    closed: frozenset[int],
+    small: Vector,
+) -> Impact:
+    """The impact; a contact that would rise by no more than touching contacts may be apart does not rebound:
+    so bounces that would never end do end."""
+    e = coefficients(motion)
+    hit = strike(motion, terms, v, touching, e, settings)
+    s = terms.G @ hit.v - terms.nu
+    rising = [k for k in touching if hit.impulses[k] > 0 and s[k] > 0 and e[k] > 0]
+    if rising:
+        rows = motion.system.active(as_flags(motion.system, closed - frozenset(rising)))
+        vdot, _, _ = motion.accelerations(terms.of(rows))
+        fall = terms.gamma - terms.G @ vdot
+        spent = [k for k in rising if s[k] ** 2 <= 2 * fall[k] * small[k]]
+        if spent:
+            e[spent] = 0.0
+            hit = strike(motion, terms, v, touching, e, settings)
+    return hit
+
+
+def _left_behind(motion: Motion, settings: Settings, state: State, terms: Terms) -> frozenset[int]:
+    """The closed contacts that cannot have followed their surface to where it stands now."""
+    system = motion.system
+    closed = closed_rows(system, state.closed)
+    if not closed:
+        return frozenset()
+    q, v = np.array(state.q), np.array(state.v)
+    rows = system.active(state.closed)
+    _, lam, decomposed = motion.accelerations(terms.of(rows))
+    pressed = {
+        k: max(x, 0.0) * size**2
+        for k, x, size in zip(rows, lam.tolist(), decomposed.length.tolist(), strict=True)
+    }  # the accelerations with which they would follow
+    f, s, h = motion.residual(state.t, q), terms.G @ v - terms.nu, state.span
+    small, slow = gap_of_rounding(terms, q, settings), speed_of_rounding(terms, v, settings)
+    return frozenset(
+        k
+        for k in closed
+        if f[k] > small[k] + pressed[k] * h**2 / 2 or s[k] > slow[k] + pressed[k] * h
+    )
+
+
+def _told(
+    motion: Motion,
+    state: State,
+    q: Vector,
+    before: Vector,
+    was: frozenset[int],
+    struck: Impact | None,
+    slow: Vector,
+    terms: Terms,
+) -> State:
+    """The same with what happened to each contact written down."""
+    system, t = motion.system, state.t
+    length = rows_of(terms.M, terms.G).length
+    where = motion.whole(t, q, before)
+    departures, closings = list(state.departures), list(state.closings)
+    for c, k in enumerate(system.contacts):
+        impulse = 0.0 if struck is None else float(struck.impulses[k])
+        blow = impulse * length[k] ** 2 > slow[k]
+        if blow or (state.closed[c] and k not in was):
+            closings[c] = Event(closings[c].count + 1, t, *where, impulse)
+        elif k in was and not state.closed[c] and struck is None:
+            departures[c] = Event(departures[c].count + 1, t, *where)
+    return replace(state, departures=tuple(departures), closings=tuple(closings))
