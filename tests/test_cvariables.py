@@ -14,9 +14,6 @@ from conftest import FILES
 from runtime import RUNTIME_FILES, compile_library
 
 from lagfmu.methods import NUMBERS
-from lagfmu.solver.initial import start
-from lagfmu.solver.observe import observe
-from lagfmu.solver.state import Settings
 from lagfmu.testing import Prepared, model_source, string, variables_source
 
 NAMES = sorted(set(FILES) - {"SlippingSphere"})  # the table of places has no frictions here
@@ -40,13 +37,6 @@ class CVariable(ctypes.Structure):
         ("max", ctypes.c_double),
         ("positive", ctypes.c_int),
     ]
-
-
-def places() -> list[str]:
-    """The enumerators of Place, from the header, in order."""
-    header = RUNTIME_FILES["variables.h"].read_text(encoding="utf-8")
-    inside = re.sub(r"/\*.*?\*/", "", header[header.index("AT_PARAMETER") :], flags=re.DOTALL)
-    return re.findall(r"AT_(\w+)", inside[: inside.index("}")])
 
 
 def methods() -> dict[str, int]:
@@ -117,84 +107,6 @@ def test_states_are_those_that_are_stepped(table: Any, name: str) -> None:
     found = {row.state: row.name.decode() for row in rows if ROLES[row.role] == "start"}
     assert [found[j] for j in range(len(order))] == order
     assert all(row.state == -1 for row in rows if ROLES[row.role] != "start")
-
-
-def arrays(p: Prepared) -> dict[str, Any]:
-    """What the C solver observes at the start, by place, from what the Python solver observes."""
-    system = p.system
-    full = system if system.embedding is None else system.embedding.full
-    value = {v.name: v.start for v in p.table.variables}
-    u = [float(value[str(s)]) for s in p.equations.u]
-    parameters = [float(value[str(s)]) for s in p.equations.p]
-    q0 = [float(value[c]) for c in system.coordinates]
-    v0 = [float(value[f"der({c})"]) for c in system.coordinates]
-    state = start(system, Settings(), 0.0, q0, v0, u, parameters).state
-    seen = observe(system, state, u, parameters)
-    coordinates, rows = full.coordinates, [row.name for row in full.rows]
-    entries = [(rows[k], coordinates[j]) for k, j in zip(*full.jacobian, strict=True)]
-    contacts = [system.rows[k].name for k in system.contacts]
-    count = len(contacts)  # at the start nothing has closed
-    seen |= {v.name: 0 for v in p.table.variables if v.of.head == "closing"}
-    seen |= {"energy.dissipated": 0.0}
-    return {
-        "seen": seen,
-        "PARAMETER": parameters,
-        "INPUT": u,
-        "Q": [seen[c] for c in coordinates],
-        "V": [seen[f"der({c})"] for c in coordinates],
-        "VDOT": [seen[f"der({c},2)"] for c in coordinates],
-        "S": [seen[c] for c in system.coordinates],
-        "SDOT": [seen[f"der({c})"] for c in system.coordinates],
-        "SDDOT": [seen[f"der({c},2)"] for c in system.coordinates],
-        "LAMBDA": [seen[f"lambda.{r}"] for r in rows],
-        "UNIQUE": [seen[f"unique.{r}"] for r in rows],
-        "RESIDUAL": [seen[f"residual.{r}"] for r in rows],
-        "FORCE": [seen[f"Q.{c}"] for c in coordinates],
-        "SHARE": [seen[f"Q.{r}.{c}"] for r, c in entries],
-        "KINETIC": [seen["energy.kinetic"]],
-        "POTENTIAL": [seen.get("energy.potential")],
-        "TOTAL": [seen.get("energy.total")],
-        "LOST": [0.0],
-        "OUTPUT": [seen[own.name] for own in full.outputs],
-        "CONTACT": [seen[f"contact.{c}"] for c in contacts],
-        "DEPARTURE_COUNT": [[seen[f"departure.{c}.count"]] for c in contacts],
-        "DEPARTURE_TIME": [[seen[f"departure.{c}.time"]] for c in contacts],
-        "DEPARTURE_Q": [[seen[f"departure.{c}.{q}"] for q in coordinates] for c in contacts],
-        "DEPARTURE_V": [
-            [seen[f"departure.{c}.velocity.{q}"] for q in coordinates] for c in contacts
-        ],
-        "IMPULSE": [0] * count,
-        "CLOSING_COUNT": [[0]] * count,
-        "CLOSING_TIME": [[0]] * count,
-        "CLOSING_Q": [[0] * full.n] * count,
-        "CLOSING_V": [[0] * full.n] * count,
-        "STEPS": [seen["solver.steps"]],
-    }
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_places_hold_what_the_names_say(table: Any, name: str) -> None:
-    """Read by place and index, each output is the value that the Python solver reports by name."""
-    p, _, rows = table(name)
-    where, at = places(), arrays(p)
-    own = [str(c) for c in p.equations.q]
-    for row in rows:
-        place, full_name = where[row.place], row.name.decode()
-        if ROLES[row.role] == "solver":
-            assert full_name == f"solver.{place.lower()}"
-            continue
-        if ROLES[row.role] in ("parameter", "input"):
-            assert place == ROLES[row.role].upper()
-            assert at[place][row.index] == row.start
-            continue
-        if place in ("S", "SDOT", "SDDOT"):
-            assert re.sub(r"der\((\w+).*", r"\1", full_name) not in own
-        values = at[place]
-        if place.startswith(("DEPARTURE_", "CLOSING_")):
-            values = values[row.contact]
-        assert values[row.index] == at["seen"][full_name]
-    used = [(row.place, row.index, row.contact) for row in rows]
-    assert len(set(used)) == len(used)
 
 
 def test_strings_are_escaped() -> None:

@@ -29,8 +29,6 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import SimulationError
-from lagfmu.solver.friction import heading
-from lagfmu.solver.state import Slide
 from lagfmu.testing import find_compiler, load, prepare, write
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -182,15 +180,6 @@ def test_two_rows_come_to_rest(native: Make) -> None:
     at_rest = run[run["sticks.grip"]]
     assert (at_rest["x"] == at_rest["x"][0]).all()
     assert at_rest["lambda.along"] == pytest.approx(-m_g_sin(0.3), rel=1e-12)
-
-
-def test_beyond_its_stop_a_slide_goes_on_as_before() -> None:
-    """Trials of an event reach beyond it.  With -s/|s| there, friction would hold a puck that stops all but
-    along a line (s = 2e-13 m/s beside it) in next to no steps, a million of them; the direction stays."""
-    slide = Slide(direction=(0.6, 0.8), noise=1e-12)
-    for s in ((-0.6, -0.8), (-1.0, 0.1), (-1e-10, 0.0), (3e-13, -4e-13)):
-        assert heading(slide, np.array(s)).tolist() == [0.6, 0.8]
-    assert heading(slide, np.array([4.0, 3.0])) == pytest.approx([0.8, 0.6], abs=1e-15)
 
 
 def test_a_puck_stops_in_both_directions_at_once(native: Make) -> None:

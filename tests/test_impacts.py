@@ -18,16 +18,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Model, Parameter, Scene, simulate
 from lagfmu.errors import LagfmuError
-from lagfmu.solver.complementarity import complementary
-from lagfmu.solver.impact import impact, impacts
-from lagfmu.solver.instant import Instant
 from lagfmu.testing import (
-    CONTACT,
-    HOLONOMIC,
-    NONHOLONOMIC,
-    Row,
-    StepFailureError,
-    System,
     find_compiler,
     prepare,
     write,
@@ -167,143 +158,6 @@ def test_a_ball_rebounds_from_a_block_that_lies(run):
     assert top(result)[-1] == pytest.approx(0.1 + 0.36, rel=1e-9)
 
 
-# --------------------------------------------------------------------------- the law
-
-
-def linear_system(M: Any, A: Any, values: Any, kinds: Any = None) -> System:
-    """Contacts A q >= 0 with constant M and coefficients of restitution `values`; or rows of `kinds`."""
-    m, n = A.shape
-    rows = tuple(kinds or (Row(f"c{k}", CONTACT) for k in range(m)))
-    i, j = np.tril_indices(n)
-    zeros = [0.0] * m
-    return System(
-        coordinates=tuple(f"q{k}" for k in range(n)),
-        rows=rows,
-        mass=(i, j),
-        jacobian=tuple(np.indices(A.shape).reshape(2, -1)),
-        dynamics=lambda *_: (M[i, j].tolist(), [0.0] * n, A.ravel().tolist(), zeros, zeros),
-        residual=lambda *_: zeros,
-        energies=None,
-        restitution=lambda _: list(values),
-    )
-
-
-def random_mass(rng: Any, n: int) -> Any:
-    B = rng.standard_normal((n, n))
-    return B @ B.T + 0.1 * np.eye(n)
-
-
-def approached(rng: Any, A: Any) -> Any:
-    """A velocity that approaches every contact: A v < 0 for rows that point one way."""
-    v = -np.abs(rng.standard_normal(A.shape[1]))
-    return v * (np.abs(A) @ np.abs(v)).max()
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_newtons_law_with_complementarity(seed):
-    """For each struck contact 0 <= Lambda, 0 <= s+ + e s-, one of them zero; M (v+ - v-) = G^T Lambda;
-    1/2 Lambda^T (s+ + s-) <= 0 is the change of the kinetic energy; and the order does not matter."""
-    rng = np.random.default_rng(seed)
-    n, count = int(rng.integers(1, 5)), int(rng.integers(1, 7))
-    M, A, values = random_mass(rng, n), rng.standard_normal((count, n)), rng.uniform(0, 1, count)
-    v = rng.standard_normal(n)
-    A *= -np.sign(A @ v)[:, None]  # every contact is approached
-    found = impact(Instant(linear_system(M, A, values), 0.0, [], []), v, v, range(count))
-    before, after = A @ v, A @ found.v
-    size = np.abs(found.Lambda).max(), np.abs(before).max()
-    w = after + values * before
-    assert (found.Lambda >= -1e-9 * size[0]).all()
-    assert (w >= -1e-9 * size[1]).all()
-    assert np.abs(found.Lambda * w).max() < 1e-9 * size[0] * size[1]
-    np.testing.assert_allclose(M @ (found.v - v), A.T @ found.Lambda, atol=1e-9 * size[0])
-    gained = (found.v @ M @ found.v - v @ M @ v) / 2
-    assert gained == pytest.approx(found.Lambda @ (before + after) / 2, abs=1e-9 * (v @ M @ v))
-    assert gained <= 1e-12 * (v @ M @ v)
-    order = rng.permutation(count)
-    other = linear_system(M, A[order], values[order])
-    again = impact(Instant(other, 0.0, [], []), v, v, range(count))
-    np.testing.assert_allclose(again.v, found.v, atol=1e-9 * np.abs(found.v).max())
-
-
-def balls(v: Any, value: float) -> tuple[Instant, Any]:
-    """Three equal balls on a line that touch."""
-    A = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
-    system = linear_system(np.eye(3), A, [value, value])
-    return Instant(system, 0.0, [], []), np.array(v, float)
-
-
-def test_a_contact_that_separates_takes_no_part_and_is_driven_back():
-    """Ball 1 comes with 1, ball 3 goes with 1/4: first 1 strikes 2, which goes with 1 and then strikes 3
-    at the same instant: (0, 1/4, 1)."""
-    at, v = balls([1.0, 0.0, 0.25], 1.0)
-    after, struck = impacts(at, v, v, {0, 1}, np.full(2, 1e-9))
-    np.testing.assert_allclose(after, [0, 0.25, 1], atol=1e-15)
-    assert struck == pytest.approx({0: 1.0, 1: 0.75})  # N s: ball 1 stops, ball 3 gains 3/4
-
-
-def test_impacts_without_end_come_to_an_end():
-    """A light ball between two heavy ones, both of which it keeps striking: with e = 1/2 the three go on
-    together, with the momentum that there was."""
-    A = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
-    M = np.diag([1.0, 1e-3, 1.0])
-    at = Instant(linear_system(M, A, [0.5, 0.5]), 0.0, [], [])
-    after, _ = impacts(at, np.zeros(3), np.array([1.0, 0.5, 0.6]), {0, 1}, np.full(2, 1e-12))
-    assert (A @ after >= -1e-12).all()
-    assert np.ones(3) @ M @ after == pytest.approx(1.6005, rel=1e-14)
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_rows_that_act_with_a_contact_never_raise_the_energy(seed):
-    """A rough contact (no slip while it is closed) beside a smooth one: whatever the masses and e near 1,
-    the impact takes energy or keeps it, and it leaves no contact approached."""
-    rng = np.random.default_rng(seed)
-    n = 3
-    M, A = random_mass(rng, n), rng.standard_normal((4, n))
-    v = rng.standard_normal(n)
-    A[[0, 2]] *= -np.sign(A[[0, 2]] @ v)[:, None]
-    kinds = [
-        Row("c0", CONTACT),
-        Row("grip", NONHOLONOMIC, 0),
-        Row("c1", CONTACT),
-        Row("rod", HOLONOMIC),
-    ]
-    A[3] -= (A[3] @ v) / (v @ v) * v  # the bilateral row is satisfied before
-    at = Instant(linear_system(M, A, [0.99, 0.0, 0.95, 0.0], kinds), 0.0, [], [])
-    found = impact(at, v, v, [0, 1])
-    after = A @ found.v
-    assert found.v @ M @ found.v <= v @ M @ v * (1 + 1e-12)
-    assert after[[0, 2]].min() > -1e-9
-    assert abs(after[3]) < 1e-9
-    assert found.Lambda[[0, 2]].min() >= -1e-9
-
-
-def test_contacts_driven_against_each_other_are_refused_by_name():
-    """Between two walls that close in with 1 m/s each there is no velocity for a particle."""
-    system = linear_system(np.eye(1), np.array([[1.0], [-1.0]]), [0.0, 0.0])
-    closing = lambda *_: ([1.0], [0.0], [1.0, -1.0], [1.0, 1.0], [0.0, 0.0])  # noqa: E731
-    object.__setattr__(system, "dynamics", closing)
-    zero = np.zeros(1)
-    with pytest.raises(StepFailureError, match="'c0', 'c1' together: they are driven against"):
-        impact(Instant(system, 0.5, [], []), zero, zero, [0, 1])
-
-
-def test_rounding_of_a_fast_motion_does_not_jam_a_slow_impact():
-    """A particle runs at 1e3 m/s between two walls that it touches, Gv being rounding; elsewhere another one
-    strikes with 1e-6 m/s: it rebounds, and the first runs on."""
-    a = 0.3
-    along, across = np.array([np.cos(a), np.sin(a), 0]), np.array([-np.sin(a), np.cos(a), 0])
-    third = np.array([0.0, 0.0, 1.0])
-    A = np.array([across, -1.1 * across, third])
-    at = Instant(linear_system(np.eye(3), A, [0.0, 0.0, 0.5]), 0.0, [], [])
-    seen = set()
-    for k in range(50):
-        v = (1e3 + k) * along - 1e-6 * third
-        seen.add(tuple(np.sign(A[:2] @ v)))
-        found = impact(at, v, v, range(3))
-        np.testing.assert_allclose(found.v, v + 1.5e-6 * third, rtol=1e-14, atol=1e-12)
-    assert (-1, -1) in seen  # roundings that drive it into both walls
-
-
 def test_a_ball_bounces_from_a_table_that_rises(run):
     """Relative to a table that rises with V = 2 m/s a ball falls with w and rebounds with e w; seen from the
     ground it gains speed: v+ = V + e (V - v-)."""
@@ -322,26 +176,6 @@ def test_a_ball_bounces_from_a_table_that_rises(run):
     np.testing.assert_allclose(result["der(z)"][after], 2 + 0.5 * 5, rtol=1e-13)
     tau = result["time"][after] - 0.2
     np.testing.assert_allclose(result["z"][after], 0.4 + 4.5 * tau, rtol=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_complementarity_is_met_with_dependent_rows(seed):
-    """z >= 0, w = A z + b >= 0, z w = 0 for A of less than full rank; w does not depend on the order."""
-    rng = np.random.default_rng(seed)
-    k, rank = int(rng.integers(1, 9)), int(rng.integers(1, 5))
-    W = rng.standard_normal((k, rank))
-    A, b = W @ W.T, W @ rng.standard_normal(rank)
-    found = complementary(A, b)
-    assert found is not None
-    z, w = found
-    assert z.min() >= 0
-    assert w.min() >= 0
-    assert np.abs(z * w).max() == 0
-    np.testing.assert_allclose(A @ z + b, w, atol=1e-9)
-    order = rng.permutation(k)
-    again = complementary(A[np.ix_(order, order)], b[order])
-    assert again is not None
-    np.testing.assert_allclose(again[1], w[order], atol=1e-9)
 
 
 # --------------------------------------------------------------------------- what is refused

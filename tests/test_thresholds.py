@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 from pathlib import Path
 
@@ -32,21 +31,6 @@ def test_python_reads_what_c_compiles(tmp_path: Path) -> None:
     assert {n: float.fromhex(v) for n, v in compiled.items()} == {
         n: float(thresholds._VALUES[n]) for n in NAMES
     }
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_both_engines_decide_by_it(name: str) -> None:
-    """A threshold in the header is used by the C runtime and by the python engine."""
-    word = re.compile(rf"\b{name}\b")
-    c = [f for f in PACKAGE.glob("runtime/*/*.[ch]") if f.name != "thresholds.h"]
-    python = [
-        *PACKAGE.glob("numeric/*.py"),
-        *PACKAGE.glob("solver/*.py"),
-        PACKAGE / "fmu" / "slave.py",
-    ]
-    python.remove(PACKAGE / "numeric" / "thresholds.py")
-    assert any(word.search(f.read_text()) for f in c), "not in the C runtime"
-    assert any(word.search(f.read_text()) for f in python), "not in the python engine"
 
 
 def test_a_name_that_is_not_there_is_an_import_error() -> None:
