@@ -30,9 +30,9 @@ from rich.text import Text
 from lagfmu import LagfmuError, Verification, verify
 from lagfmu.api import package, settled
 from lagfmu.cli.terminal import prepare_streams
-from lagfmu.fmu.compiler import HOST, find_compiler
+from lagfmu.fmu.compiler import HOST
 from lagfmu.fmu.native import takes_long
-from lagfmu.fmu.write import TARGETS
+from lagfmu.fmu.target import NATIVE, PYTHON, TARGETS, missing_for_native
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import Prepared, prepare
 
@@ -117,9 +117,10 @@ def main(
     prepare_streams()
     console = Console()
     places = tuple(platforms or [HOST])
-    targets = TARGETS if find_compiler() is not None else ("python",)
-    if targets != TARGETS:
-        console.print("no C compiler: python FMUs only; pip install ziglang for the others")
+    missing = missing_for_native()
+    targets = (PYTHON,) if missing else TARGETS
+    if missing:
+        console.print(f"{missing}; python FMUs only", soft_wrap=True)
     problems: list[str] = []
     work: list[tuple[Path, str]] = []
     for name in models or ():
@@ -133,7 +134,7 @@ def main(
         except LagfmuError as error:
             problems.append(str(error))
     width = max((len(name) for _, name in work), default=0)
-    if work and "native" in targets and takes_long(places):
+    if work and NATIVE in targets and takes_long(places):
         console.print("the C runtime is compiled first")
     console.print(_line(width, "", "FMU", "target", "ms/s", "worst", "of"), style="bold")
     rows: list[tuple[str, ...]] = []

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
+from .fmu.target import NATIVE, PYTHON, target_of
 from .fmu.write import as_fmu, put, write
 from .live.playable import playable
 from .live.render import render
@@ -45,7 +46,7 @@ def build_fmu(
     out: str | os.PathLike[str] = ".",
     scene: Scene | None = None,
     closed_forms: Sequence[ClosedForm | Conserved] = (),
-    target: str = "python",
+    target: str | None = None,
     platforms: Sequence[str] = (HOST,),
     check: bool = True,
     reference: bool = False,
@@ -54,7 +55,9 @@ def build_fmu(
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
-    `target` is 'python' or 'native'; a native FMU has binaries for `platforms`, see compiler.PLATFORMS.
+    `target` is 'native' or 'python'; without one it is native where a C compiler is at hand, else python,
+    with a warning that names what to install.  A native FMU has binaries for `platforms`, see
+    compiler.PLATFORMS.
     A scene with an `accuracy` takes some runs more: its tolerance is found by bisection.
 
     `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them.  With `check` the
@@ -70,6 +73,7 @@ def build_fmu(
     Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
     VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
+    target = target_of(target)
     scene, choice = settled(model, scene or Scene(model.name), target)
     prepared = prepare(model, scene)
     built = package(
@@ -111,7 +115,7 @@ def show(model: Model | str | os.PathLike[str], scene: Scene | None = None) -> S
 
 
 def verify(
-    target: Model | str | os.PathLike[str],
+    source: Model | str | os.PathLike[str],
     start_values: Mapping[str, Any] | None = None,
     stop_time: float | None = None,
     step_size: float | None = None,
@@ -124,7 +128,7 @@ def verify(
 ) -> Verification:
     """verification.verify.verify() of an FMU; a model, or a model file with its closed forms, is built first
     (natively where a compiler is at hand)."""
-    with as_fmu(target, scene, closed_forms) as fmu:
+    with as_fmu(source, scene, closed_forms) as fmu:
         return verify_fmu(fmu, start_values, stop_time, step_size, tolerance, inputs, reference)
 
 
@@ -132,7 +136,7 @@ def package(
     prepared: Prepared,
     out: str | os.PathLike[str],
     closed_forms: Sequence[ClosedForm | Conserved] = (),
-    target: str = "python",
+    target: str = NATIVE,
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
     check: bool = True,
@@ -143,7 +147,7 @@ def package(
     """What `prepare` made as an FMU: built once, verified once, its figures put in."""
     live = render(playable(prepared)) if page else ""
     path = write(prepared, out, closed_forms, target, platforms, choice, live, sources)
-    runs_here = target == "python" or host() in chosen(platforms)
+    runs_here = target == PYTHON or host() in chosen(platforms)
     found = verify_fmu(path) if check and runs_here else None
     more = layered(path, found) if reference and runs_here else {}
     if found is not None or more:

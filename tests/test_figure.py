@@ -96,7 +96,7 @@ def test_eight_curves_are_told_apart() -> None:
     """Each has a colour of its own, and on paper without colours half of them are dashed."""
     table = np.zeros(5, dtype=[("time", float), *((f"x{k}", float) for k in range(8))])
     table["time"] = np.arange(5)
-    (axes,) = figure_of(Result(table, {}, "Eight"), {}, [f"x{k}" for k in range(8)]).axes
+    (axes,) = figure_of(Result(table, {}, "Eight", "native"), {}, [f"x{k}" for k in range(8)]).axes
     colours = [line.get_color() for line in axes.lines]
     assert len(set(colours)) == 8
     rgb = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in colours])
@@ -115,7 +115,7 @@ def test_the_names_of_events_stand_above_the_curves() -> None:
     for of, moment in (("a", 0.3), ("b", 0.301), ("c", 0.995)):
         table[f"departure.wheel_{of}.count"] = table["time"] >= moment
         table[f"departure.wheel_{of}.time"] = moment
-    figure = figure_of(Result(table, {}, "Wheels"), {}, ["lambda.a"], title="Wheels")
+    figure = figure_of(Result(table, {}, "Wheels", "native"), {}, ["lambda.a"], title="Wheels")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure).draw()

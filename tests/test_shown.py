@@ -95,7 +95,7 @@ def test_a_zero_has_no_sign() -> None:
     """-0.0 is rounding's way to say 0."""
     table = np.zeros(2, dtype=[("time", float), ("x", float)])
     table["x"] = -0.0
-    assert "-0" not in repr(Result(table, {"x": "m"}, "Zero"))
+    assert "-0" not in repr(Result(table, {"x": "m"}, "Zero", "native"))
 
 
 def test_every_slip_is_marked_in_the_figure() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import inspect
 from collections.abc import Callable, Mapping
 from functools import wraps
@@ -12,16 +11,10 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from ..errors import UnitError, UsageError
+from ..fmu.target import TARGETS
 from ..names import METHOD
 
 Names = list[str] | None
-
-
-class Target(enum.StrEnum):
-    """What an FMU is made of."""
-
-    python = "python"
-    native = "native"
 
 
 OUTPUTS = (
@@ -99,6 +92,13 @@ Name = Annotated[
     typer.Option(help="Another name for the FMU.", rich_help_panel="What the scene needs"),
 ]
 
+Target = Annotated[
+    str | None,
+    typer.Option(
+        metavar="|".join(TARGETS),
+        help="native: compiled C, the default where there is a C compiler. python: run by SciPy.",
+    ),
+]
 ModelPath = Annotated[Path, typer.Argument(help="A Python file that defines a Model.")]
 FmuPath = Annotated[Path, typer.Argument(help="An FMU built by lagfmu.")]
 Settings = Annotated[

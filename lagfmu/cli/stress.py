@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ..errors import BuildError, TemporaryFolderError, UsageError
+from ..fmu.target import target_of
 from ..fmu.write import write, write_whole
 from ..model.file import ModelFile
 from ..model.scene import Scene
@@ -41,7 +42,7 @@ def stress(
     paths: Sequence[Path],
     out: Path,
     console: Console,
-    target: str = "python",
+    target: str | None = None,
     scenes: Sequence[str] = (),
     quick: bool = False,
     limit: float = LIMIT,
@@ -58,8 +59,9 @@ def stress(
     def study(name: str, fmu: Path) -> Report:
         return report(name, _one(fmu, out, console, quick, limit))
 
+    kind = target_of(target)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        made = partial(build, folder=Path(folder) / target, target=target, console=console)
+        made = partial(build, folder=Path(folder), target=kind, console=console)
         tried = studied(paths, scenes, made, study)
     found = [t.found for t in tried if t.found is not None]
     if found:

@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
 from ..errors import UsageError
-from ..fmu.compiler import find_compiler
+from ..fmu.target import target_of
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile
@@ -68,7 +68,7 @@ def compare(
 ) -> list[Report]:
     """Measure model files and FMUs, print tables, write OUT/TARGET/NAME.json, .svg and .png.
 
-    Without a `target` native FMUs where there is a compiler, else python ones; `full`: every decade.
+    `full`: every decade.
     What cannot be built or run does not keep the others from it.  Raises UsageError.
     """
     wrong = [m for m in methods if m not in INTEGRATORS]
@@ -79,13 +79,12 @@ def compare(
         raise UsageError("the communication step and repeats must be positive numbers")
     if problems := [p for p in map(tolerance_problem, tolerances) if p]:
         raise UsageError("; ".join(problems))
-    kind = target or ("python" if find_compiler() is None else "native")
+    kind = target_of(target)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
 
         def build(file: ModelFile, scene: Scene) -> Path:
             with console.status(f"building {scene.name}"):
-                prepared = prepare(file.model, scene)
-                return write(prepared, Path(folder) / kind, file.closed_forms, target=kind)
+                return write(prepare(file.model, scene), folder, file.closed_forms, kind)
 
         def study(name: str, fmu: Path) -> Report:
             with Importer(fmu) as importer:

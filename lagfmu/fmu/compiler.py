@@ -30,6 +30,7 @@ HOST, ALL = "host", "all"
 TIMEOUT = 600  # seconds for one call of the compiler
 LITTLE = 100_000  # bytes of room, in which a compiler that fails has failed for want of it
 CACHE = "LAGFMU_CACHE"
+REMEDY = "no C compiler was found: pip install ziglang"
 FLAGS = (
     "-std=c99",
     "-fPIC",
@@ -163,7 +164,7 @@ def compile_libraries(
     """
     compiler = find_compiler()
     if compiler is None:
-        raise BuildError("no C compiler was found: pip install ziglang, or install cc")
+        raise BuildError(REMEDY)
     foreign = [p.folder for p in platforms if p != host()] if not compiler.cross else []
     if foreign:
         raise BuildError(

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import names
-from ..errors import BuildError, SettingError, UsageError
+from ..errors import BuildError, SettingError
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import load
 from ..model.model import Contact, Model
@@ -28,10 +28,10 @@ from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
 from .closed_forms import pack_closed_forms
-from .compiler import HOST, find_compiler
+from .compiler import HOST
+from .target import NATIVE, target_of
 
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
-TARGETS = ("python", "native")
 PAGE = "documentation/index.html"
 LIVE = "documentation/play.html"  # beside it, which has a link to it
 REFERENCES = "documentation/fmi-ls-ref.txt"  # likewise, as FMI-LS-REF recommends
@@ -42,7 +42,7 @@ def write(
     prepared: Prepared,
     out: str | os.PathLike[str] = ".",
     closed_forms: Sequence[ClosedForm | Conserved] = (),
-    target: str = "python",
+    target: str | None = None,
     platforms: Sequence[str] = (HOST,),
     choice: str = "",
     live: str = "",
@@ -55,12 +55,11 @@ def write(
     the rest see api.build_fmu.  Warns of each start value that is moved onto the constraints.  Raises
     ModelError if one in the model's `start` moves by more than 1e-6 of its coordinate's size.
     """
-    if target not in TARGETS:
-        raise UsageError(f"target {target!r} is unknown, expected one of {', '.join(TARGETS)}")
+    target = target_of(target)
     moved, missed = prepared.structure.start.moved, prepared.structure.missed
     check_given(prepared.model.name, moved, missed)
     tell(moved)
-    prepared = _as_built(prepared, target)
+    prepared = as_built(prepared, target)
     extra = {
         PAGE: page(prepared, choice, bool(live)).encode(),
         "resources/lagfmu.json": pack_closed_forms(
@@ -80,7 +79,7 @@ def write(
         extra[pictures.IN_FMU] = pictures.as_bytes(picture)
     if (preset := presets.preset_of(prepared)) is not None:
         extra[presets.IN_FMU] = presets.as_bytes(preset)
-    if target == "native":
+    if target == NATIVE:
         content = native.build(prepared, extra, platforms, sources)
     else:
         content = python.build(prepared, extra)
@@ -93,7 +92,7 @@ def write(
 
 @contextlib.contextmanager
 def as_fmu(
-    target: Model | str | os.PathLike[str],
+    source: Model | str | os.PathLike[str],
     scene: Scene | str | None = None,
     closed_forms: Sequence[ClosedForm | Conserved] = (),
     peaks: Sequence[str] = (),
@@ -101,10 +100,10 @@ def as_fmu(
     """An FMU as it is; of a model, or a model file, one that is built (natively where a compiler is at hand)
     into a folder that goes again.  `scene`: of a file also by name, else its first.  `peaks`: outputs whose
     extremes a native FMU that is built shall tell."""
-    if isinstance(target, Model):
-        model, chosen = target, scene if isinstance(scene, Scene) else Scene(target.name)
+    if isinstance(source, Model):
+        model, chosen = source, scene if isinstance(scene, Scene) else Scene(source.name)
     else:
-        path = Path(target)
+        path = Path(source)
         if path.suffix != ".py":
             if scene is not None:
                 raise SettingError(
@@ -121,10 +120,10 @@ def as_fmu(
             raise SettingError(f"{path}: no FMU is called {scene!r}; known: {', '.join(names)}")
         else:
             chosen = file.scenes[0 if scene is None else names.index(scene)]
-    kind = "native" if find_compiler() is not None else "python"
+    kind = target_of()
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         prepared = prepare(model, chosen)
-        if kind == "native":
+        if kind == NATIVE:
             prepared = with_peaks(prepared, peaks)
         yield write(prepared, folder, closed_forms, kind)
 
@@ -157,7 +156,7 @@ def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]
     write_whole(path, pack(contents))
 
 
-def _as_built(prepared: Prepared, target: str) -> Prepared:
+def as_built(prepared: Prepared, target: str) -> Prepared:
     """With the nominal values of states; a python FMU has no model exchange and no native variables."""
     table = prepared.table if target == "native" else python.offered(prepared)
     table = table.with_nominals(_nominals(prepared))

@@ -27,22 +27,29 @@ def as_text(value: Any, digits: int = 6) -> str:
 class Result(np.ndarray):  # type: ignore[type-arg]
     """A row a communication point: result["time"] [s], result["lambda.rod"], ...
 
-    `units` maps the columns to their units, `name` is the FMU's or the scene's.  A column is a plain array.
+    `units` maps the columns to their units, `name` is the FMU's or the scene's, `target` what has run: native
+    or python.  A column is a plain array.
     """
 
     units: Mapping[str, str]
     name: str
+    target: str
 
-    def __new__(cls, table: Any, units: Mapping[str, str], name: str) -> Result:
+    def __new__(cls, table: Any, units: Mapping[str, str], name: str, target: str) -> Result:
         """A view on a structured array with a field `time`."""
         made = np.asarray(table).view(cls)
         made.units = {"time": "s", **units}
-        made.name = name
+        made.name, made.target = name, target
         return made
 
     def __array_finalize__(self, other: Any) -> None:
         self.units = getattr(other, "units", {})
         self.name = getattr(other, "name", "")
+        self.target = getattr(other, "target", "")
+
+    @property
+    def _heading(self) -> str:
+        return f"{self.name} ({self.target}): {len(self)} points"
 
     def __getitem__(self, key: Any) -> Any:
         found = super().__getitem__(key)
@@ -82,7 +89,7 @@ class Result(np.ndarray):  # type: ignore[type-arg]
         hidden = len(lines) - 1 - SHOWN
         if hidden > 0:
             lines = [*lines[: SHOWN + 1], f"and {hidden} more: to_dataframe(), or by name"]
-        return "\n".join([f"{self.name}: {len(self)} points", *(line.rstrip() for line in lines)])
+        return "\n".join([self._heading, *(line.rstrip() for line in lines)])
 
     __str__ = __repr__
 
@@ -93,7 +100,7 @@ class Result(np.ndarray):  # type: ignore[type-arg]
         body = "".join(
             "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in self._rows()
         )
-        caption = f"<caption>{escape(self.name)}: {len(self)} points</caption>"
+        caption = f"<caption>{escape(self._heading)}</caption>"
         return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
     def plot(self, *names: str, out: str | Path | None = None) -> Any:

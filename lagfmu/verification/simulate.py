@@ -1,4 +1,4 @@
-"""simulate(): a model directly, or an FMU through fmpy; the same columns from both."""
+"""simulate(): a model, or an FMU through fmpy; the same columns from both."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import difflib
 import os
 import re
 import shutil
+import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,17 +21,21 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import SettingError, SimulationError
+from ..fmu import native
 from ..fmu.archive import unpack
 from ..fmu.described import (
     Trajectory,
     asked,
     experiment_of,
     has_error_bars,
+    is_python,
     items_of,
     read_description,
 )
 from ..fmu.python import offered, slave_of
 from ..fmu.slave import Refused
+from ..fmu.target import NATIVE, PYTHON, target_of
+from ..fmu.write import as_built
 from ..methods import IN_PYTHON, NUMBERS, unknown
 from ..model.model import Model
 from ..model.scene import Scene
@@ -49,7 +54,7 @@ class ErrorBarWarning(UserWarning):
 
 
 def simulate(
-    target: Model | Prepared | str | os.PathLike[str],
+    source: Model | Prepared | str | os.PathLike[str],
     stop_time: float | None = None,
     step_size: float | None = None,
     tolerance: float | None = None,
@@ -58,15 +63,19 @@ def simulate(
     scene: Scene | None = None,
     besides: Sequence[str] = (),
     error_bars: bool = False,
+    target: str | None = None,
 ) -> Result:
     """Outputs at every communication point, as a structured array with the FMU's variable names and units.
 
-    `target` is a Model (integrated in this process, in `scene`) or the path of an FMU (simulated by
-    fmpy).  Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to
-    values; `inputs` is a structured array with 'time' and one field an input, interpolated linearly.
-    What is left out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables
-    and inputs to be recorded too.  `error_bars`: a model's outputs have `error.NAME` beside them
-    (docs/error_bars.md), as those of an FMU have that was built with them.
+    `source` is a Model (in `scene`) or the path of an FMU.  A model runs as `target`: 'native', compiled for
+    this run, or 'python', integrated in this process; without one it is native where a C compiler is at
+    hand, else python, with a warning that names what to install.
+
+    Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to values;
+    `inputs` is a structured array with 'time' and one field an input, interpolated linearly.  What is left
+    out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables and inputs to be
+    recorded too.  `error_bars`: a model's outputs have `error.NAME` beside them (docs/error_bars.md), as
+    those of an FMU have that was built with them.
 
     Warns of each start value that is moved onto the constraints (starts.py), and of error bars that are
     lost.  Raises ModelError for a model
@@ -79,17 +88,26 @@ def simulate(
             raise SettingError(f"{what} = {number!r} s, expected a positive number")
     if tolerance is not None and (problem := tolerance_problem(tolerance)):
         raise SettingError(problem)
-    if isinstance(target, Model):
-        target = prepare(target, scene)
-    if isinstance(target, Prepared) and error_bars and not target.asked.error_bars:
-        target = prepare(target.model, replace(target.asked, error_bars=True))
-    if isinstance(target, Prepared):
-        check_inputs(inputs, target.table.variables)
-        table = _simulate_model(target, stop_time, step_size, tolerance, values, inputs, besides)
-        every = target.table.variables
+    if isinstance(source, Model):
+        source = prepare(source, scene)
+    if isinstance(source, Prepared) and error_bars and not source.asked.error_bars:
+        source = prepare(source.model, replace(source.asked, error_bars=True))
+    run = (stop_time, step_size, tolerance, values, inputs, besides)
+    if isinstance(source, Prepared):
+        check_inputs(inputs, source.table.variables)
+        name, kind, every = source.scene.name, target_of(target), source.table.variables
+        if kind == PYTHON:
+            table = _simulate_model(source, *run)
+        else:
+            with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+                fmu = Path(folder, f"{name}.fmu")
+                fmu.write_bytes(native.build(as_built(source, kind), {}, sources=False))
+                table = _simulate_fmu(fmu, name, *run)
         units = {v.name: v.unit.name for v in every if v.unit is not None}
-        return Result(table, units, target.scene.name)
-    path = Path(target)
+        return Result(table, units, name, kind)
+    if target is not None:
+        raise SettingError(f"target {target!r} is for a model: {str(source)!r} is an FMU already")
+    path = Path(source)
     description = read_description(path)
     if error_bars and not has_error_bars(description.modelVariables):
         raise SimulationError(
@@ -97,9 +115,9 @@ def simulate(
             "lagfmu build --error-bars"
         )
     check_inputs(inputs, description.modelVariables)
-    table = _simulate_fmu(path, stop_time, step_size, tolerance, values, inputs, besides)
+    table = _simulate_fmu(path, repr(str(path)), *run)
     units = {v.name: v.unit for v in description.modelVariables if v.unit}
-    return Result(table, units, description.modelName)
+    return Result(table, units, description.modelName, PYTHON if is_python(path) else NATIVE)
 
 
 def missing(name: str, known: Iterable[str], what: str = "is not in the FMU") -> str:
@@ -252,6 +270,7 @@ def _check_values(what: str, settable: Mapping[str, _Settable], values: Mapping[
 
 def _simulate_fmu(
     path: Path,
+    called: str,
     stop_time: float | None,
     step_size: float | None,
     tolerance: float | None,
@@ -262,12 +281,15 @@ def _simulate_fmu(
     description = read_description(path)
     messages: list[str] = []
     moved: list[str] = []
+    lost: list[str] = []
 
     def logger(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
         if status >= 2:  # discard, error, fatal
             messages.append(message.decode(errors="replace").strip())
         elif STARTS.search(text := message.decode(errors="replace").strip()):
             moved.append(text)
+        elif status == 1 and text.startswith("error bars"):
+            lost.append(text)
 
     experiment = experiment_of(description, stop_time, step_size)
     stop, step = experiment.stop_time, experiment.step_size
@@ -282,7 +304,7 @@ def _simulate_fmu(
         for v in description.modelVariables
         if v.causality in ("parameter", "input") or v.initial in ("exact", "approx")
     }
-    _check_values(str(path), settable, values)
+    _check_values(called, settable, values)
     variables = {v.name: v for v in description.modelVariables}
     values = {
         k: settable[k].items.get(v, v) if isinstance(v, str) else asked(variables[k], v)
@@ -305,24 +327,26 @@ def _simulate_fmu(
                 debug_logging=True,
             )
     except FMICallException as error:
-        raise SimulationError(_told(path, error, messages)) from None
+        raise SimulationError(_told(called, error, messages)) from None
     except Exception as error:
-        raise SimulationError(f"{str(path)!r} cannot be simulated: {error}") from None
+        raise SimulationError(f"{called} cannot be simulated: {error}") from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     tell(moved)
+    for text in lost:
+        warnings.warn(text, ErrorBarWarning, stacklevel=3)
     reached = float(result["time"][-1])
     if reached < stop * (1 - 1e-9):  # fmpy ends a run at fmi2Discard without a word
         cause = "; ".join(messages) or "no message was logged"
         raise SimulationError(
-            f"{str(path)!r}: the run ends at t = {reached!r} s, before {stop!r} s ({cause})"
+            f"{called}: the run ends at t = {reached!r} s, before {stop!r} s ({cause})"
         )
     return result
 
 
-def _told(path: Path, error: FMICallException, messages: Sequence[str]) -> str:
+def _told(called: str, error: FMICallException, messages: Sequence[str]) -> str:
     """The FMU's own reason; pythonfmu's binary wraps it in the name of the exception."""
     raised = re.search(r"""Refused\((["'])(.*)\1\)""", " ".join("; ".join(messages).split()))
     if raised:
-        return f"{str(path)!r}: {error.function} is refused: {raised[2]}"
-    return f"{str(path)!r}: {error} ({'; '.join(messages) or 'no message was logged'})"
+        return f"{called}: {error.function} is refused: {raised[2]}"
+    return f"{called}: {error} ({'; '.join(messages) or 'no message was logged'})"

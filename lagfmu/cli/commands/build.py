@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from ...errors import UsageError, VerificationError
 from ...fmu.compiler import HOST, NAMES
+from ...fmu.target import NATIVE, PYTHON, target_of
 from ...verification.pipeline import FAILS
 from ..options import (
     NARROWING,
@@ -40,9 +41,7 @@ def build(
     reference: Annotated[
         bool, typer.Option("--reference", help="Put reference results inside (FMI-LS-REF).")
     ] = False,
-    target: Annotated[
-        Target, typer.Option(help="python: needs Python where it runs. native: compiled C.")
-    ] = Target.python,
+    target: Target = None,
     platforms: Annotated[
         list[str] | None,
         typer.Option(
@@ -71,7 +70,7 @@ def build(
     needs: Needs,
     add_output: AddOutput = None,
 ) -> None:
-    """Build the FMUs of a model file into OUT/python/NAME.fmu or OUT/native/NAME.fmu, and verify them."""
+    """Build the FMUs of a model file into OUT/native/NAME.fmu or OUT/python/NAME.fmu, and verify them."""
     from ...api import package
     from ...model.goal import parse
     from ...prepare.prepare import prepare
@@ -81,13 +80,13 @@ def build(
     from ..tradeoff import chosen_for
 
     failed = False
-    kind = target.value
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
     with plainly():
-        if platforms and target is Target.python:
+        if platforms and target == PYTHON:
             raise UsageError(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
+        kind = target_of(NATIVE if platforms else target)
         file = loaded(model, add_output, arguments)
         for s in narrowed(chosen(file, scene), {**needs, "accuracy": accuracy}):
             choice = ""
@@ -95,7 +94,7 @@ def build(
                 measured = chosen_for(file, s, parse(s.accuracy), kind, console)
                 s, choice = measured.scene, section(measured)
             with console.status(
-                f"building {'and verifying ' if check else ''}{s.name}{_first_time(target, places)}"
+                f"building {'and verifying ' if check else ''}{s.name}{_first_time(kind, places)}"
             ):
                 prepared = prepare(file.model, s)
                 less = any(needs[n] is not None for n in NARROWING)
@@ -142,10 +141,10 @@ def _keep_the_full_one(path: Path, table: VariableTable) -> None:
             )
 
 
-def _first_time(target: Target, platforms: tuple[str, ...]) -> str:
+def _first_time(target: str, platforms: tuple[str, ...]) -> str:
     """A word of patience where the runtime has to be compiled first."""
     from ...fmu.native import takes_long
 
-    if target is Target.native and takes_long(platforms):
+    if target == NATIVE and takes_long(platforms):
         return " (the runtime is compiled first: for Windows the C library too, about a minute)"
     return ""

@@ -19,6 +19,7 @@ from ..options import (
     Settings,
     StepSize,
     StopTime,
+    Target,
     Tolerance,
     assignments,
 )
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    source: Annotated[
+        Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or an FMU.")
+    ],
     set_: Settings = None,
     stop_time: StopTime = None,
     step_size: StepSize = None,
@@ -50,6 +53,7 @@ def simulate(
     ] = None,
     inputs: InputFile = None,
     error_bars: ErrorBars = None,
+    target: Target = None,
     add_output: AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest.
@@ -66,13 +70,12 @@ def simulate(
     from ..scenes import chosen, loaded, narrowed
 
     with plainly():
-        source: Any = target
-        if target.suffix == ".py":
-            file = loaded(target, add_output, arguments)
+        run: Any = source
+        if source.suffix == ".py":
+            file = loaded(source, add_output, arguments)
             scenes = chosen(file, None if scene is None else [scene])
-            source = prepare(file.model, narrowed(scenes, {"error_bars": error_bars})[0])
-            name = source.scene.name
-            variables = source.table.variables
+            run = prepare(file.model, narrowed(scenes, {"error_bars": error_bars})[0])
+            name, variables = run.scene.name, run.table.variables
         elif arguments:
             raise UsageError(f"-p {arguments[0]} is for a model file: an FMU is one of its family")
         elif add_output:
@@ -80,7 +83,7 @@ def simulate(
                 "--add-output is for a model file: an FMU has the outputs it was built with"
             )
         else:
-            description = read_description(target)
+            description = read_description(source)
             name, variables = description.modelName, description.modelVariables
         known = {v.name: v.causality for v in variables if v.causality != "parameter"}
         besides = _besides(variable or (), known)
@@ -88,7 +91,7 @@ def simulate(
         with console.status(f"simulating {name}"):
             signals = None if inputs is None else read_table(inputs)
             result = simulated(
-                source,
+                run,
                 stop_time,
                 step_size,
                 tolerance,
@@ -96,9 +99,10 @@ def simulate(
                 signals,
                 besides=besides,
                 error_bars=bool(error_bars),
+                target=target,
             )
         written = any(f is not None for f in (csv, plot_, animate))
-        _print_last(name, result, variable or (_first_of(result) if written else ()))
+        _print_last(result, variable or (_first_of(result) if written else ()))
         if csv is not None:
             _save(csv, result)
             console.print(f"[green]wrote[/] {escape(str(csv))}", soft_wrap=True)
@@ -109,7 +113,7 @@ def simulate(
             )
         if animate is not None:
             with console.status(f"drawing {name}"):
-                film(told_by(source), result, given, animate, name)
+                film(told_by(run), result, given, animate, name)
             console.print(f"[green]wrote[/] {escape(str(animate))}", soft_wrap=True)
 
 
@@ -137,13 +141,14 @@ def _first_of(result: Result) -> list[str]:
     return default_names(known) + those(known, DEPARTURE_TIME, SLIP_TIME)
 
 
-def _print_last(name: str, result: Result, names: Sequence[str] = ()) -> None:
+def _print_last(result: Result, names: Sequence[str] = ()) -> None:
     """The last values of the named variables, of all outputs without names."""
     from ...model.units import for_reading
     from ...page.table import new_table, print_whole
     from ...verification.result import NOT_YET, as_text
 
-    table = new_table(f"{name} at t = {result['time'][-1]:g} s", "variable", "value", "unit")
+    title = f"{result.name} ({result.target}) at t = {result['time'][-1]:g} s"
+    table = new_table(title, "variable", "value", "unit")
     table.columns[0].justify = table.columns[2].justify = "left"
     for n in names or list(result.dtype.names or ())[1:]:
         text = as_text(result[n][-1], 9) if result.known(n)[-1] else NOT_YET

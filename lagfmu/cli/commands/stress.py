@@ -18,7 +18,7 @@ def stress(
         list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist/stress"),
-    target: Annotated[Target, typer.Option(help="What is built of model files.")] = Target.python,
+    target: Target = None,
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
     ] = None,
@@ -32,5 +32,5 @@ def stress(
     from ..stress import stress as probed
 
     with plainly():
-        done = probed(targets, out, console, target.value, scene or (), quick, limit)
+        done = probed(targets, out, console, target, scene or (), quick, limit)
         finish("stress", done, json, junit)

@@ -18,12 +18,7 @@ def tradeoff(
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path(
         "dist/tradeoff"
     ),
-    target: Annotated[
-        Target | None,
-        typer.Option(
-            help="What is built of model files: native where there is a compiler, else python."
-        ),
-    ] = None,
+    target: Target = None,
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
     ] = None,
@@ -55,7 +50,7 @@ def tradeoff(
             targets,
             out,
             console,
-            None if target is None else target.value,
+            target,
             step_size,
             tolerance or (),
             method or (),

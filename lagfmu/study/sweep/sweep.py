@@ -47,7 +47,7 @@ Progress = Callable[[int, int, int], None]  # runs done, of how many, of those r
 
 
 def sweep(
-    target: str | os.PathLike[str] | Model,
+    source: str | os.PathLike[str] | Model,
     vary: Mapping[str, Sequence[float] | Values] | None = None,
     *,
     sample: Mapping[str, Any] | None = None,
@@ -90,7 +90,7 @@ def sweep(
     _require()
     path_out = None if out is None else Path(out)
     _check_options(workers, seed, tolerance, path_out, resume, timeout)
-    with as_fmu(target, scene, peaks=peaked(keep)) as path:
+    with as_fmu(source, scene, peaks=peaked(keep)) as path:
         varied = _design(vary, sample, runs, seed, sampling, rows)
         times = _times(path, stop_time, step_size)
         study = _study(path, varied, keep, times, tolerance, inputs, command)

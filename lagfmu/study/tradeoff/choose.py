@@ -64,7 +64,7 @@ class Choice:
 
 
 def choose(
-    model: Model, scene: Scene, goal: Goal, tick: Tick | None = None, target: str = "python"
+    model: Model, scene: Scene, goal: Goal, tick: Tick | None = None, target: str | None = None
 ) -> Choice:
     """Raises BuildError naming the best that was reached if nothing holds."""
     wide = replace(scene, methods=METHODS, reals_only=False, error_bars=False)
