@@ -67,7 +67,7 @@ def test_every_command_has_the_options_that_the_readme_gives_it(command):
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
-def test_the_commands_and_the_examples_run_as_printed(tmp_path, monkeypatch, python_fmu):
+def test_the_commands_and_the_examples_run_as_printed(tmp_path, monkeypatch, native_fmu):
     """In a folder with bead.py and the repository's models, one after the other; then the lines of Python."""
     (tmp_path / "bead.py").write_text(BLOCKS[0], encoding="utf-8")
     for folder in ("models", "tests"):
@@ -78,7 +78,7 @@ def test_the_commands_and_the_examples_run_as_printed(tmp_path, monkeypatch, pyt
     for command in done:
         ended = CliRunner().invoke(app, command)
         assert ended.exit_code == 0, (command, ended.output[-1000:])
-    shutil.copy(python_fmu("Hemisphere"), "dist/python/Hemisphere.fmu")  # as build_fmus.py makes it
+    shutil.copy(native_fmu("Hemisphere"), "dist/native/Hemisphere.fmu")  # as build_fmus.py makes it
     blocks = [b for b in BLOCKS if "import fmpy" in b or "import EcosSimulation" in b]
     assert len(blocks) == 2
     for block in blocks:

@@ -10,7 +10,7 @@ from ..errors import LagfmuError, UsageError
 TEMPLATE = '''"""A bead on a parabola z = k x^2.  Change it into your own system, then:
 
     lagfmu show {file}                      equations of motion, constraints, degrees of freedom
-    lagfmu build {file}                     dist/python/{name}.fmu, verified; --target native for compiled C
+    lagfmu build {file}                     dist/native/{name}.fmu, compiled and verified
     lagfmu simulate {file} --plot out.svg   curves of every lambda and coordinate
     lagfmu page {file}                      one HTML file in which it moves, with sliders
 """
