@@ -19,14 +19,16 @@ from .codegen.c.solve import solve_source
 from .codegen.c.variables import variables_source
 from .codegen.py.equations import lower
 from .fmu import compiler, native
+from .fmu import target as targets
 from .fmu.archive import version as archive_version
 from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
-from .fmu.described import Trajectory, file_stem, items_of, read_description
+from .fmu.described import Trajectory, file_stem, is_python, items_of, read_description
 from .fmu.description import model_description
 from .fmu.formula import LONGEST_SUM, read_formula, text_of
 from .fmu.native import GENERATED
 from .fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, RefusalError, Session, plug
+from .fmu.target import NoCompilerWarning
 from .fmu.write import write
 from .live import moving, wasm
 from .live.moving import Moving

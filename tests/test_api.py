@@ -9,8 +9,21 @@ import pytest
 from fmpy import read_model_description
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
+from typer.testing import CliRunner
 
-from lagfmu import ClosedForm, Contact, Model, Parameter, Scene, VerificationError, build_fmu
+from lagfmu import (
+    ClosedForm,
+    Contact,
+    Model,
+    Parameter,
+    Scene,
+    VerificationError,
+    build_fmu,
+    simulate,
+    verify,
+)
+from lagfmu.errors import SettingError
+from lagfmu.testing import NoCompilerWarning, app, is_python, targets
 
 m, g = symbols("m g", positive=True)
 z = dynamicsymbols("z")
@@ -76,3 +89,57 @@ def test_an_fmu_for_other_machines_builds(tmp_path):
     path = build_fmu(RESTING, tmp_path, None, [WEIGHT], "native", [foreign])
     with zipfile.ZipFile(path) as archive:
         assert any(n.startswith(f"binaries/{foreign}/") for n in archive.namelist())
+
+
+@pytest.mark.parametrize("asked", [None, "native", "python"])
+def test_the_floor_carries_the_weight_on_the_target_that_the_result_names(asked):
+    """lambda = m g on both; native where none is asked for, and the first line that is printed says it."""
+    run = simulate(RESTING, 0.1, target=asked)
+    assert run["lambda.floor"] == pytest.approx(2.0 * 9.81, rel=1e-12)
+    assert run.target == run[-3:].target == (asked or "native")
+    assert repr(run).startswith(f"Resting ({run.target}): ")
+    assert f"Resting ({run.target}): " in run._repr_html_()
+
+
+def test_without_a_compiler_a_weight_is_carried_in_python_and_the_remedy_is_named(
+    tmp_path, monkeypatch
+):
+    """What would be native is python, with a warning that names the package; what is asked for stays."""
+    monkeypatch.setattr(targets, "find_compiler", lambda: None)
+    with pytest.warns(NoCompilerWarning, match=r"pip install ziglang; the target is python"):
+        run = simulate(RESTING, 0.1)
+    assert run.target == "python"
+    assert run["lambda.floor"] == pytest.approx(2.0 * 9.81, rel=1e-12)
+    with pytest.warns(NoCompilerWarning):
+        assert is_python(build_fmu(RESTING, tmp_path, closed_forms=[WEIGHT]))
+    with pytest.warns(NoCompilerWarning):
+        assert verify(RESTING, closed_forms=[WEIGHT]).passed
+    assert simulate(tmp_path / "Resting.fmu", 0.1).target == "python"
+
+
+def test_without_a_compiler_the_command_says_what_it_builds(tmp_path, monkeypatch):
+    """`lagfmu build` and `lagfmu simulate` of the particle at rest: python, as folder and title say."""
+    monkeypatch.setattr(targets, "find_compiler", lambda: None)
+    (tmp_path / "resting.py").write_text(
+        "from sympy import symbols\nfrom sympy.physics.mechanics import dynamicsymbols\n"
+        "from lagfmu import Contact, Model, Parameter\n"
+        "m, g, z = *symbols('m g', positive=True), dynamicsymbols('z')\n"
+        "model = Model('Resting', lagrangian=m*z.diff()**2/2 - m*g*z, coordinates={z: 'm'},\n"
+        "    constraints=[Contact('floor', z)],\n"
+        "    parameters=[Parameter(m, 2.0, 'kg'), Parameter(g, 9.81, 'm/s^2')])\n"
+    )
+    for command in (["build", "--out", str(tmp_path), "--no-check"], ["simulate"]):
+        done = CliRunner().invoke(app, [command[0], str(tmp_path / "resting.py"), *command[1:]])
+        assert done.exit_code == 0, done.output
+        assert done.output.count("pip install ziglang") == 1
+    assert "Resting (python) at t = " in done.output
+    assert is_python(tmp_path / "python" / "Resting.fmu")
+    assert not (tmp_path / "native").exists()
+
+
+def test_an_fmu_runs_as_what_it_is(tmp_path):
+    """The target is fixed when it is built: another one is refused by name."""
+    path = build_fmu(RESTING, tmp_path, check=False)
+    assert simulate(path, 0.1).target == "native"
+    with pytest.raises(SettingError, match="target 'python' is for a model"):
+        simulate(path, 0.1, target="python")

@@ -53,12 +53,12 @@ def lagfmu(*arguments, code=0) -> str:
 
 
 def test_build_writes_and_verifies_every_fmu_of_a_file(small, tmp_path):
-    """OUT/python/NAME.fmu for each scene; each is held against its closed forms."""
+    """OUT/native/NAME.fmu for each scene; each is held against its closed forms."""
     text = lagfmu("build", small, "--out", tmp_path / "dist")
     assert "Link: pass" in text
     assert "LinkMinimal: pass" in text
     assert "lambda.link" in text
-    made = sorted(p.name for p in (tmp_path / "dist" / "python").iterdir())
+    made = sorted(p.name for p in (tmp_path / "dist" / "native").iterdir())
     assert made == ["Link.fmu", "LinkMinimal.fmu"]
 
 
@@ -66,7 +66,7 @@ def test_build_takes_one_scene_and_may_skip_the_check(small, tmp_path):
     """--scene and --no-check."""
     text = lagfmu("build", small, "-o", tmp_path, "--scene", "LinkMinimal", "--no-check")
     assert "pass" not in text
-    assert [p.name for p in (tmp_path / "python").iterdir()] == ["LinkMinimal.fmu"]
+    assert [p.name for p in (tmp_path / "native").iterdir()] == ["LinkMinimal.fmu"]
     text = lagfmu("build", small, "-o", tmp_path, "--scene", "Chain", code=2)
     assert "no FMU is called 'Chain'; known: Link, LinkMinimal" in text
 
@@ -77,13 +77,13 @@ def test_a_closed_form_that_is_missed_makes_build_fail(tmp_path):
     file.write_text(SMALL.replace("WRONG", "1"))
     text = lagfmu("build", file, "--out", tmp_path, "--scene", "Link", code=1)
     assert "Link: FAIL" in text
-    assert lagfmu("verify", tmp_path / "python" / "Link.fmu", code=1).count("FAIL") >= 2
+    assert lagfmu("verify", tmp_path / "native" / "Link.fmu", code=1).count("FAIL") >= 2
 
 
 def test_the_fmus_documentation_carries_the_verification(small, tmp_path):
     """After the check the figures stand in documentation/index.html."""
     lagfmu("build", small, "--out", tmp_path, "--scene", "Link")
-    with zipfile.ZipFile(tmp_path / "python" / "Link.fmu") as archive:
+    with zipfile.ZipFile(tmp_path / "native" / "Link.fmu") as archive:
         page = archive.read("documentation/index.html").decode()
     assert "lambda.link" in page
     assert "pass" in page
@@ -368,11 +368,11 @@ def test_a_narrowed_scene_never_replaces_the_full_fmu(small, tmp_path):
     out = tmp_path / "dist"
     narrow = ("build", small, "-o", out, "--no-check", "--scene", "Link", "--outputs", "x")
     lagfmu("build", small, "-o", out, "--no-check", "--scene", "Link")
-    full = (out / "python" / "Link.fmu").read_bytes()
+    full = (out / "native" / "Link.fmu").read_bytes()
     text = lagfmu(*narrow, code=2)
     assert "Link.fmu is there and shows more than this scene" in text
     assert "--name" in text
-    assert (out / "python" / "Link.fmu").read_bytes() == full
+    assert (out / "native" / "Link.fmu").read_bytes() == full
     for _ in range(2):
         lagfmu(*narrow, "--name", "Short")
     assert lagfmu("build", small, "-o", tmp_path / "x", *narrow[4:])

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, Scene, multiplier, simulate
-from lagfmu.testing import find_compiler, prepare, write
+from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 g = 9.81  # m/s^2
@@ -258,9 +257,7 @@ SYSTEMS: dict[str, Any] = {
 
 @pytest.mark.parametrize("target", ["native", "python"])
 @pytest.mark.parametrize("name", sorted(SYSTEMS))
-def test_motion_is_that_of_modes_and_events_written_by_hand(
-    name: str, target: str, tmp_path: Path
-) -> None:
+def test_motion_is_that_of_modes_and_events_written_by_hand(name: str, target: str) -> None:
     """Every coordinate and velocity, and when it sticks, at 30 instants through all its transitions."""
     model, by_hands, columns, grip = SYSTEMS[name]
     states, modes = by_hands(TIMES)
@@ -268,10 +265,7 @@ def test_motion_is_that_of_modes_and_events_written_by_hand(
     assert (np.diff(modes) != 0).sum() >= 3
     options = {"stop_time": 3.0, "step_size": 0.1, "tolerance": 1e-10}
     scene = Scene(name.title())
-    if target == "native":
-        run = simulate(write(prepare(model(), scene), tmp_path, (), target="native"), **options)
-    else:
-        run = simulate(model(), scene=scene, **options)
+    run = simulate(model(), scene=scene, target=target, **options)
     for column, expected in zip(columns, states.T, strict=True):
         assert run[column] == pytest.approx(expected, abs=2e-8 * max(1.0, np.abs(expected).max()))
     assert (run[f"sticks.{grip}"] == (modes == 0)).all()

@@ -118,7 +118,7 @@ def test_the_residual_of_a_row_is_its_missed_velocity_in_every_mode(
     if target == "native":
         found = simulate(belt, **run)
     else:
-        found = simulate(load(MODELS / "belt.py").model, scene=Scene("Belt"), **run)
+        found = simulate(load(MODELS / "belt.py").model, scene=Scene("Belt"), target=target, **run)
     assert {*found["sticks.grip"]} == {0, 1}
     assert found["residual.ride"] == pytest.approx(found["der(x)"] - 0.2, abs=1e-15)
     assert found["residual.ride"] == pytest.approx(found["slip.ride"], abs=1e-15)
@@ -141,9 +141,7 @@ def test_friction_moves_no_start_value(belt: Path, values: dict[str, float]) -> 
 
 @pytest.mark.parametrize("target", ["native", "python"])
 @pytest.mark.parametrize("friction", [0.0, 0.2, 0.9])
-def test_two_rough_feet_that_land_together_share_one_impact(
-    tmp_path: Path, target: str, friction: float
-) -> None:
+def test_two_rough_feet_that_land_together_share_one_impact(target: str, friction: float) -> None:
     """A body dropped flat onto both feet with v along the floor: without turning over, friction takes
     min(v, mu v_n) of it; the feet carry m v_n, and what is lost is heat."""
     height, v = 0.2, 2.0
@@ -151,10 +149,7 @@ def test_two_rough_feet_that_land_together_share_one_impact(
     values = {"mu": friction, "alpha": 0.0, "y": 0.5 + height, "der(x)": v}
     end = fall / g + 1e-7
     run = {"stop_time": end, "step_size": end, "start_values": values, "tolerance": 1e-10}
-    if target == "native":
-        last = simulate(build(feet(), "Feet", tmp_path), **run)[-1]
-    else:
-        last = simulate(feet(), scene=Scene("Feet"), **run)[-1]
+    last = simulate(feet(), scene=Scene("Feet"), target=target, **run)[-1]
     assert last["contact.low"]
     assert last["contact.up"]
     assert last["der(x)"] == pytest.approx(max(0.0, v - friction * fall), abs=2e-6)

@@ -29,16 +29,14 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*follows? from the others")
 
 
 @pytest.fixture(params=["python", "native"])
-def run(request: pytest.FixtureRequest, tmp_path: Path) -> Run:
-    """run(model, stop, step, ...): the model in this process, or its native FMU."""
+def run(request: pytest.FixtureRequest) -> Run:
+    """run(model, stop, step, ...) on either target."""
     if request.param == "native" and find_compiler() is None:
         pytest.skip("no C compiler on this machine")
 
     def simulated(model: Model, stop: float, step: float, values: Any = None) -> Any:
-        one: Any = prepare(model, Scene(model.name, stop_time=stop))
-        if request.param == "native":
-            one = write(one, tmp_path, [], target="native")
-        return simulate(one, stop, step, 1e-10, values)
+        scene = Scene(model.name, stop_time=stop)
+        return simulate(model, stop, step, 1e-10, values, scene=scene, target=request.param)
 
     return simulated
 
