@@ -27,7 +27,7 @@ int bench_observe(Bench *b);
 int bench_motion(Bench *b, double t, const double *q, const double *v, const int *active);
 int bench_project(Bench *b, double t, double *q, double *v, const int *active);
 int bench_modes(Bench *b, const double *q, const double *v, int *closed, const int *touching,
-                const int *leaving);
+                const int *departing);
 int bench_impact(Bench *b, const double *q, double *v, const int *entering, int plastic,
                  double *Lambda);
 int bench_impacts(Bench *b, const double *q, double *v, const int *touching, const double *slow,
@@ -116,9 +116,9 @@ int bench_project(Bench *b, double t, double *q, double *v, const int *active) {
 }
 
 int bench_modes(Bench *b, const double *q, const double *v, int *closed, const int *touching,
-                const int *leaving) {
+                const int *departing) {
     return contacts_modes(&b->solver, instant(b, b->solver.state.now.t), q, v, closed, touching,
-                          leaving);
+                          departing);
 }
 
 int bench_impact(Bench *b, const double *q, double *v, const int *entering, int plastic,

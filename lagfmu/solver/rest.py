@@ -19,11 +19,11 @@ import numpy as np
 from ..numeric.failure import StepFailureError
 from ..numeric.system import Vector
 from ..numeric.thresholds import (
-    SLIDES_ANGLES,
-    SLIDES_BACK,
-    SLIDES_MOST,
-    SLIDES_ROUNDS,
-    SLIDES_SLACK,
+    FRICTION_ANGLES,
+    FRICTION_BACK,
+    FRICTION_MOST,
+    FRICTION_ROUNDS,
+    FRICTION_SLACK,
 )
 from .instant import Instant, Motion
 from .motion import motion
@@ -61,7 +61,7 @@ def _pulling(now: Now, found: Motion, slides: Sequence[Slide]) -> list[int]:
         for i, slide in enumerate(slides)
         if not slide.sticks
         and not frictions[i].gated
-        and found.press.normal[i] < -SLIDES_SLACK * abs(found.lam).max(initial=0.0)
+        and found.press.normal[i] < -FRICTION_SLACK * abs(found.lam).max(initial=0.0)
     ]
 
 
@@ -94,7 +94,7 @@ class Rest:
             if found is None:
                 break
             slides, now = found
-            over = [i for i in sticking if now.press.reserve[i] < -SLIDES_SLACK]
+            over = [i for i in sticking if now.press.reserve[i] < -FRICTION_SLACK]
             if not over:
                 return slides
             worst = min(over, key=lambda i: now.press.reserve[i])
@@ -108,7 +108,9 @@ class Rest:
     def _within_cones(self, guess: dict[int, tuple[float, float]]) -> tuple[Slide, ...] | None:
         """The combination with most sticking in which all that stick are within their cones."""
         for slides, now in self._all(guess):
-            if all(now.press.reserve[i] >= -SLIDES_SLACK for i in self.resting if slides[i].sticks):
+            if all(
+                now.press.reserve[i] >= -FRICTION_SLACK for i in self.resting if slides[i].sticks
+            ):
                 return slides
         return None
 
@@ -137,7 +139,7 @@ class Rest:
         towards = dict(guess)
         slipping = [i for i in self.resting if i not in sticking]
         slides = self._with(sticking, towards)
-        for _ in range(SLIDES_ROUNDS):
+        for _ in range(FRICTION_ROUNDS):
             try:
                 slides = list(signed(self.now, slides))
                 turned = False
@@ -160,7 +162,7 @@ class Rest:
         self, guess: dict[int, tuple[float, float]]
     ) -> Iterator[tuple[tuple[Slide, ...], Motion]]:
         """Every combination, those with most sticking first."""
-        free = self.resting[:SLIDES_MOST]
+        free = self.resting[:FRICTION_MOST]
         for count in range(len(free) + 1):
             for slipping in itertools.combinations(free, count):
                 sticking = [i for i in self.resting if i not in slipping]
@@ -181,7 +183,7 @@ class Rest:
         mass = now.M.diagonal()
         forces = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
         free = np.maximum(np.abs(now.vdot), forces / np.where(mass > 0, mass, np.inf))
-        floor = SLIDES_BACK * (np.abs(now.gamma[rows]) + np.abs(now.G[rows]) @ free).sum()
+        floor = FRICTION_BACK * (np.abs(now.gamma[rows]) + np.abs(now.G[rows]) @ free).sum()
         return rate, float(floor)
 
     def _steered(self, slides: list[Slide], i: int) -> tuple[float, float] | None:
@@ -213,8 +215,8 @@ class Rest:
         c, along, floor = across(0.0)
         if abs(c) <= floor and along >= -floor:
             return at(0.0)
-        step = 2 * np.pi / SLIDES_ANGLES
-        for k in range(SLIDES_ANGLES // 2 + 1):  # nearest first, both ways
+        step = 2 * np.pi / FRICTION_ANGLES
+        for k in range(FRICTION_ANGLES // 2 + 1):  # nearest first, both ways
             for side in (1.0, -1.0):
                 low, high = side * k * step, side * (k + 1) * step
                 f_low, f_high = across(low)[0], across(high)[0]

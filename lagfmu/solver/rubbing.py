@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..numeric.system import Matrix, Vector
-from ..numeric.thresholds import RUBBING_CLOSE, RUBBING_ROUGH, RUBBING_SWEEPS
+from ..numeric.thresholds import FRICTIONAL_CLOSE, FRICTIONAL_ROUGH, FRICTIONAL_SWEEPS
 from .friction import Law, law
 from .impact import Impulse, Struck, base_rows, bounded
 from .instant import Instant
@@ -83,7 +83,7 @@ def _swept(now: Struck, x: _Rows, coefficients: Law) -> Impulse | None:
     place = {k: i for i, k in enumerate(rows)}
     groups = [[place[k] for k in system.frictions[i].rows] for i in x.frictions]
     z, change = np.zeros(len(rows)), np.inf
-    for _ in range(RUBBING_SWEEPS):
+    for _ in range(FRICTIONAL_SWEEPS):
         before = z.copy()
         for i in range(x.count):
             if x.A[i, i] > 0:
@@ -100,9 +100,9 @@ def _swept(now: Struck, x: _Rows, coefficients: Law) -> Impulse | None:
             if length > radius:
                 z[group] *= radius / length
         change = float(np.abs(z - before).max())
-        if change <= RUBBING_CLOSE * np.abs(z).max():
+        if change <= FRICTIONAL_CLOSE * np.abs(z).max():
             break
-    if not change <= RUBBING_ROUGH * np.abs(z).max():
+    if not change <= FRICTIONAL_ROUGH * np.abs(z).max():
         return None
     base = base_rows(system, set(now.contacts))
     found = solve(now.M, now.G[rows].T @ z, now.G[base], -now.slip[base], nearest=True)

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from ..numeric.system import Matrix, System, Vector
-from ..numeric.thresholds import SHARE_DEPENDENT, SHARE_ROUNDS, SHARE_WIDE
+from ..numeric.thresholds import NONUNIQUE_DEPENDENT, NONUNIQUE_ROUNDS, NONUNIQUE_WIDE
 
 
 def best_share(
@@ -34,7 +34,7 @@ def best_share(
     _, grows, turned = np.linalg.svd(
         C / np.maximum(np.abs(C).max(axis=1, keepdims=True), np.finfo(float).tiny) @ Z.T
     )
-    Z = turned[(grows > SHARE_DEPENDENT).sum() :] @ Z
+    Z = turned[(grows > NONUNIQUE_DEPENDENT).sum() :] @ Z
     if not len(Z):
         return lam, lam
 
@@ -54,11 +54,11 @@ def best_share(
                     slope = slope - Z[:, mine] @ (t / force)
         return least, slope
 
-    wide = SHARE_WIDE * max(float(np.abs(lam).max()), float(np.abs(load).max(initial=0.0)))
+    wide = NONUNIQUE_WIDE * max(float(np.abs(lam).max()), float(np.abs(load).max(initial=0.0)))
     best = _highest(worst, len(Z), wide)
     low, high = 0.0, 1.0
     if worst(0 * best)[0] < 0:
-        for _ in range(SHARE_ROUNDS):
+        for _ in range(NONUNIQUE_ROUNDS):
             middle = (low + high) / 2
             low, high = (middle, high) if worst(middle * best)[0] < 0 else (low, middle)
         low = high
@@ -69,7 +69,7 @@ def dependencies(G: Matrix, rows: Sequence[int]) -> Matrix:
     """Z (dependent rows, m), orthonormal: Z G = 0, of rows that are scaled to one size first."""
     norm = np.linalg.norm(G[rows], axis=1)
     norm = np.where(norm > 0, norm, 1.0)
-    found = scipy.linalg.null_space((G[rows] / norm[:, None]).T, rcond=SHARE_DEPENDENT)
+    found = scipy.linalg.null_space((G[rows] / norm[:, None]).T, rcond=NONUNIQUE_DEPENDENT)
     Z = np.zeros((found.shape[1], len(G)))
     Z[:, rows] = np.linalg.qr(found / norm[:, None])[0].T
     return Z
@@ -82,7 +82,7 @@ def _highest(worst: object, count: int, wide: float) -> Vector:
     best, top = y, worst(y)[0]
     if count == 1:
         low, high = -wide, wide
-        for _ in range(2 * SHARE_ROUNDS):
+        for _ in range(2 * NONUNIQUE_ROUNDS):
             y = np.array([(low + high) / 2])
             value, slope = worst(y)
             if value > top:
@@ -91,7 +91,7 @@ def _highest(worst: object, count: int, wide: float) -> Vector:
         return best
     P = np.eye(count) * wide**2
     n = float(count)
-    for _ in range(SHARE_ROUNDS * count * count):
+    for _ in range(NONUNIQUE_ROUNDS * count * count):
         value, slope = worst(y)
         if value > top:
             best, top = y, value

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..numeric.failure import StepFailureError
 from ..numeric.system import Matrix, System, Vector
-from ..numeric.thresholds import SLIDES_BACK, SLIDES_JUMP, SLIDES_ROUNDS, SLIDES_SLACK
+from ..numeric.thresholds import FRICTION_BACK, FRICTION_JUMP, FRICTION_ROUNDS, FRICTION_SLACK
 from .flow import Flow
 from .friction import heading, loaded, slip_velocity
 from .instant import Instant, Motion
@@ -41,7 +41,7 @@ class Contacts:
 def noises(system: System, G: Matrix, nu: Vector, speed: Vector) -> Vector:
     """The slip velocity [m/s] of each friction that rounding of velocities of the size `speed` makes."""
     unit = np.abs(G) @ np.abs(speed) + np.abs(nu)
-    return np.array([SLIDES_SLACK * unit[list(f.rows)].sum() for f in system.frictions])
+    return np.array([FRICTION_SLACK * unit[list(f.rows)].sum() for f in system.frictions])
 
 
 def _noises(at: Instant, q: Vector, v: Vector, state: State) -> Vector:
@@ -86,7 +86,7 @@ def settle(
     the edge of their cone, where rounding must not decide.
     """
     stuck = [slide.sticks for slide in at.slides]
-    for _ in range(SLIDES_ROUNDS):
+    for _ in range(FRICTION_ROUNDS):
         at = replace(at, slides=_choose(at, q, v, closed, ended, begins))
         found = contacts.settled(at, closed)
         if found == closed:
@@ -118,7 +118,7 @@ def _choose(
     for i, slide in enumerate(at.slides):
         length = float(np.hypot(s[i, 0], s[i, 1]))
         still = length <= slide.noise
-        still |= (slide.sticks or i in ended) and length <= SLIDES_JUMP * slide.noise
+        still |= (slide.sticks or i in ended) and length <= FRICTION_JUMP * slide.noise
         if on[i] and still:
             resting.append(i)
         else:
@@ -176,7 +176,7 @@ def _parts(now: Motion, row: int) -> bool:
     mass = now.M.diagonal()
     forces = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
     reach = np.maximum(np.abs(now.vdot), forces / np.where(mass > 0, mass, np.inf))
-    floor = SLIDES_BACK * (abs(now.gamma[row]) + np.abs(now.G[row]) @ reach)
+    floor = FRICTION_BACK * (abs(now.gamma[row]) + np.abs(now.G[row]) @ reach)
     return bool(now.G[row] @ now.vdot - now.gamma[row] > floor)
 
 
@@ -210,7 +210,7 @@ def renewed(at: Instant, state: State) -> State:
     slides = [replace(x, noise=float(n)) for x, n in zip(state.slides, noise, strict=True)]
     moved, slippings = [], list(state.slippings)
     for i, (slide, x) in enumerate(zip(slides, s, strict=True)):
-        away = slide.sticks and np.hypot(x[0], x[1]) > SLIDES_JUMP * slide.noise
+        away = slide.sticks and np.hypot(x[0], x[1]) > FRICTION_JUMP * slide.noise
         moved.append(_along(slide, x) if away else slide)
         if away:
             slippings[i] = Departure(slippings[i].count + 1, state.t, state.q, state.v)

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import names
 from ..numeric.system import System, Vector
-from ..numeric.thresholds import SLIDES_SLACK
+from ..numeric.thresholds import FRICTION_SLACK
 from .flow import Flow
 from .friction import loaded
 from .instant import Motion
@@ -90,7 +90,7 @@ def ranges(flow: Flow) -> list[Range]:
     found = []
     for slide in flow.state.slides:
         found += [
-            Range(0.0, slack=SLIDES_SLACK if slide.sticks else slide.noise, rises=True),
+            Range(0.0, slack=FRICTION_SLACK if slide.sticks else slide.noise, rises=True),
             Range(0.0),
         ]
     return found

@@ -240,11 +240,11 @@ class _System:
     def _coulomb(self) -> dict[str, list[Result]]:
         laws = self.eom.frictions
         mu = [(e, f"{what} of {a.name}") for a in laws for e, what in _coefficients(a)]
-        pressing = [(c, f"{a.name}, {name}") for a in laws for name, c in a.normal.items()]
+        normal = [(c, f"{a.name}, {name}") for a in laws for name, c in a.normal.items()]
         return {
             "coefficients": [Result(sp.sympify(e), text) for e, text in mu],
             "load": [Result(sp.sympify(a.load), a.name) for a in laws],
-            "pressing": [Result(sp.sympify(c), text) for c, text in pressing],
+            "normal": [Result(sp.sympify(c), text) for c, text in normal],
         }
 
     def _functions(self) -> dict[str, str]:

@@ -12,7 +12,7 @@ AT_EVENTS = {"events_find": "events.c"}
 AT_CONTACTS = {
     "contacts_modes": "contacts.c",
     "impact_check": "impact.c",
-    "landing_lift": "landing.c",
+    "landing_bring_back": "landing.c",
     "switch_modes": "switch.c",
     "switch_released": "switch.c",
     "switch_contradicted": "switch.c",
@@ -20,8 +20,16 @@ AT_CONTACTS = {
 PEAKS, PASSAGE = "peaks.c", "passage.c"  # behind PEAKS and PASSAGE
 BEHIND_BOTH = "extreme.c"
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
-FRICTION = (  # behind SLIDES
-    *("friction.c", "painleve.c", "rest.c", "rubbing.c", "share.c", "slides.c", "slipping.c"),
+FRICTION = (  # behind FRICTION_EVENTS
+    *(
+        "friction.c",
+        "friction_events.c",
+        "frictional_impact.c",
+        "nonunique.c",
+        "painleve.c",
+        "slip.c",
+    ),
+    "stick_slip.c",
 )
 NO_RUNGS = """
 #include "dependent.h"
@@ -72,7 +80,7 @@ def optional_source(
     rows += ["    .jumps = &JUMPS,\n"] if system.floors else []
     rows += ["    .peaks = &PEAKS,\n"] if peaks else []
     rows += ["    .passage = &PASSAGE,\n"] if _may_pass(system) else []
-    rows += ["    .slides = &SLIDES,\n"] if system.frictions else []
+    rows += ["    .friction = &FRICTION_EVENTS,\n"] if system.frictions else []
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""

@@ -90,7 +90,7 @@ OURS = """
     places shared blocks vdot Q dvdot dlambda dQ w dw other dother
     sign heaviside cubic Cubic
     Kind Formulation Row System Plan Type Role Place Variable near far small interface
-    linux unix i386 main Friction coefficients load pressing
+    linux unix i386 main Friction coefficients load normal
 """
 TAKEN = frozenset(
     [

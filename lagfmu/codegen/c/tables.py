@@ -64,10 +64,10 @@ class Tables:
             self._integers("dimension", dimension),
             self._integers("extent_dimension", extent),
         ]
-        frictions, press = self._frictions()
+        frictions, normal_rows = self._frictions()
         if frictions:
             parts.append(self._array("const Friction", "frictions", frictions))
-            parts.append(self._integers("press", press))
+            parts.append(self._integers("normal_row", normal_rows))
         folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
         if self.floors:
             parts.append(self._integers("floors", [int(x) for x in self.floors]))
@@ -144,9 +144,9 @@ class Tables:
         if frictions:
             fields |= {
                 "frictions": len(frictions),
-                "presses": len(press),
+                "normal_rows": len(normal_rows),
                 "friction": f"{p}frictions",
-                "press": f"{p}press",
+                "normal_row": f"{p}normal_row",
                 "coulomb": f"{p}coulomb",
             }
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
@@ -200,20 +200,20 @@ class Tables:
         return items or ['{"", HOLONOMIC, -1, 0}']
 
     def _frictions(self) -> tuple[list[str], list[int]]:
-        """The frictions as Friction in system.h, and the rows that press."""
+        """The frictions as Friction in system.h, and the rows whose multipliers make up N."""
         position = {c.name: k for k, c in enumerate(self.constraints)}
         items: list[str] = []
-        press: list[int] = []
+        normal_rows: list[int] = []
         for law in self.eom.frictions:
             rows = [position[name] for name in law.of]
             normal = [position[name] for name in law.normal]
             gated = law.load == 0 and all(isinstance(self.constraints[k], Contact) for k in normal)
             items.append(
-                f'{{"{law.name}", {len(rows)}, {{{", ".join(map(str, rows))}}}, {len(press)}, '
+                f'{{"{law.name}", {len(rows)}, {{{", ".join(map(str, rows))}}}, {len(normal_rows)}, '
                 f"{len(normal)}, {int(gated and bool(normal))}}}"
             )
-            press += normal
-        return items, press
+            normal_rows += normal
+        return items, normal_rows
 
     def _dimensions(self) -> tuple[list[int], list[int], int]:
         """One number for each dimension of coordinates; that of each parameter; that of angles; -1: none."""

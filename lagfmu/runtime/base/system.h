@@ -4,7 +4,7 @@
  *
  * n coordinates, m constraint rows.  M and G are passed as the lists of their structurally non-zero
  * values: M's lower triangle (row >= column), G row by row, both sorted by (row, column).  That
- * layout is decided by the code printer (ccode.py) and described by the patterns below.  SI units.
+ * layout is decided by the code printer (codegen/c/) and described by the patterns below.  SI units.
  * model.c, which is generated, defines one `const System`. */
 #ifndef LAGFMU_SYSTEM_H
 #define LAGFMU_SYSTEM_H
@@ -24,8 +24,8 @@ typedef struct {
 } Row;
 
 /* Coulomb friction: |lambda| of one or two rows is at most a part of N = load + sum_k c_k lambda_k, over
- * the rows press[first .. first + normals - 1].  gated: these are contacts alone, and there is no load, so
- * that while they are open nothing presses. */
+ * the rows normal_row[first .. first + normals - 1].  gated: these are contacts alone, and there is no load, so
+ * that while they are open there is no normal force. */
 typedef struct {
     const char *name;
     int rows, row[2];
@@ -129,12 +129,12 @@ struct System {
     const System *full;
 
     /* Frictions; 0 and NULL without. */
-    int frictions, presses;
+    int frictions, normal_rows;
     const Friction *friction;  /* (frictions) */
-    const int *press;          /* (presses) rows whose multipliers make up the normal forces */
-    /* static and kinetic coefficient (2 frictions), load (frictions) [N], c (presses) of the normal forces */
+    const int *normal_row;     /* (normal_rows) rows whose multipliers make up the normal forces */
+    /* static and kinetic coefficient (2 frictions), load (frictions) [N], c (normal_rows) of the normal forces */
     void (*coulomb)(double t, const double *q, const double *v, const double *u, const double *p,
-                    double *coefficients, double *load, double *pressing);
+                    double *coefficients, double *load, double *normal);
 };
 
 /* 1 where a row acts while the contacts stand as in `closed` (one entry a contact); 0 for rows that hold by

@@ -82,18 +82,18 @@ static const double CONTACT_PULL = 1e-12; /* a multiplier this small, relative t
 enum { IMPACT_ROUNDS = 1000 }; /* at one instant, after which the rest is one plastic impact */
 static const double IMPACT_ROUNDING = 1e-14; /* of the terms of a speed: one that is none; rest does not jam */
 static const double IMPACT_PULL = 1e-9;      /* of the largest impulse: a negative one that is rounding */
-enum { RUBBING_SWEEPS = 20000 };
-static const double RUBBING_CLOSE = 1e-15; /* of the largest impulse: what a sweep may still change */
-static const double RUBBING_ROUGH = 1e-9;  /* beyond which the sweeps have not arrived */
+enum { FRICTIONAL_SWEEPS = 20000 };
+static const double FRICTIONAL_CLOSE = 1e-15; /* of the largest impulse: what a sweep may still change */
+static const double FRICTIONAL_ROUGH = 1e-9;  /* beyond which the sweeps have not arrived */
 
 /* ---- friction ---- */
-enum { SLIDES_MOST = 6, SLIDES_ROUNDS = 50, SLIDES_ANGLES = 48 }; /* frictions tried together, directions */
-static const double SLIDES_SLACK = 1e-12; /* of the cone, and of slip velocities that rounding leaves */
-static const double SLIDES_BACK = 1e-9;   /* of the accelerations at work, against its own direction: none */
-static const double SLIDES_JUMP = 1e3;    /* times the noise: a slip velocity that no rounding makes */
-static const double SHARE_DEPENDENT = 1e-9; /* of a row's norm, left over by the others: nothing */
-static const double SHARE_WIDE = 1e2;       /* times the forces at work: how far is looked */
-enum { SHARE_ROUNDS = 60 };                 /* bisections, and ellipsoids for each pair of unknowns */
+enum { FRICTION_MOST = 6, FRICTION_ROUNDS = 50, FRICTION_ANGLES = 48 }; /* frictions tried together, directions */
+static const double FRICTION_SLACK = 1e-12; /* of the cone, and of slip velocities that rounding leaves */
+static const double FRICTION_BACK = 1e-9;   /* of the accelerations at work, against its own direction: none */
+static const double FRICTION_JUMP = 1e3;    /* times the noise: a slip velocity that no rounding makes */
+static const double NONUNIQUE_DEPENDENT = 1e-9; /* of a row's norm, left over by the others: nothing */
+static const double NONUNIQUE_WIDE = 1e2;       /* times the forces at work: how far is looked */
+enum { NONUNIQUE_ROUNDS = 60 };                 /* bisections, and ellipsoids for each pair of unknowns */
 static const double PAINLEVE_SAFE = 1e-9;   /* 1 + A below this counts as not positive */
 enum { PAINLEVE_OPENED = 8, PAINLEVE_ROWS = 16 }; /* contacts that are combined, and their rows */
 

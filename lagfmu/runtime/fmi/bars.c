@@ -129,7 +129,7 @@ static void turn(Instance *x) {
 
 /* ------------------------------------------------------------------ bars */
 
-static int slides_paired(const Slide *a, const Slide *b) {
+static int modes_paired(const StickSlip *a, const StickSlip *b) {
     const double turn = a->direction[0] * b->direction[0] + a->direction[1] * b->direction[1];
     return a->sticks == b->sticks && (a->sticks || (a->sign == b->sign && turn >= 0));
 }
@@ -144,7 +144,7 @@ static int have_met_the_same(const Solver *a, const Solver *b) {
             paired &= x->latest[k].count[i] == y->latest[k].count[i];
     for (int c = 0; c < s->contacts; c++) paired &= x->closed[c] == y->closed[c];
     for (int k = 0; k < s->jumps; k++) paired &= x->level[k] == y->level[k];
-    for (int k = 0; k < s->frictions; k++) paired &= slides_paired(&x->slide[k], &y->slide[k]);
+    for (int k = 0; k < s->frictions; k++) paired &= modes_paired(&x->stick_slip[k], &y->stick_slip[k]);
     return paired;
 }
 

@@ -112,10 +112,10 @@ Status exchange_multipliers(Instance *x) {
 
 /* What frictions dissipate [W], of the latest motion. */
 static double friction_power(const Mechanism *b) {
-    const struct Frictions *f = b->friction;
+    const struct FrictionForces *f = b->friction;
     double power = 0;
     for (int i = 0; i < 2 * b->system->frictions; i++)
-        if (!f->slide[i / 2].sticks) power -= f->tangential[i] * f->slip[i];
+        if (!f->stick_slip[i / 2].sticks) power -= f->tangential[i] * f->slip[i];
     return power;
 }
 
@@ -166,7 +166,7 @@ Status exchange_indicators(Instance *x, double *indicators) {
                 range_inside(OPTIONAL.jumps->range(s, k), indicators[system->contacts + k]);
     if (system->frictions > 0) {
         const int first = indicators_first_of_frictions(system);
-        OPTIONAL.slides->indicators(s, indicators + first);
+        OPTIONAL.friction->indicators(s, indicators + first);
         for (int i = 0; i < 2 * system->frictions; i++)
             indicators[first + i] += indicators_range(s, first + i).slack;
     }

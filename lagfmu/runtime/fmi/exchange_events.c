@@ -80,9 +80,9 @@ static Status find_happened(Instance *x, int *any) {
     }
     if (s->system->frictions == 0) return OK;
     const int first = indicators_first_of_frictions(s->system);
-    OPTIONAL.slides->indicators(s, s->work_slides);
+    OPTIONAL.friction->indicators(s, s->work_friction);
     for (int i = 0; i < 2 * s->system->frictions; i++) {
-        x->happened[first + i] = s->work_slides[i] < -indicators_range(s, first + i).slack;
+        x->happened[first + i] = s->work_friction[i] < -indicators_range(s, first + i).slack;
         *any |= x->happened[first + i];
     }
     return OK;
@@ -108,7 +108,7 @@ static Status judge_step(Instance *x, int *event) {
         double *y = s->work_advance;
         memcpy(y, s->state.q, (size_t)s->system->n * sizeof *y);
         memcpy(y + s->system->n, s->state.v, (size_t)s->system->n * sizeof *y);
-        if (OPTIONAL.slides->turn(s, s->state.now.t, y) != OK) return FAILED;
+        if (OPTIONAL.friction->turn(s, s->state.now.t, y) != OK) return FAILED;
     }
     *event = *event || any || worst > DRIFT_LIMIT;
     return OK;
@@ -169,11 +169,11 @@ static Status pass_event(Instance *x) {
     if (!any && !(jumped && s->system->contacts + s->system->frictions > 0)) return OK;
     x->evaluated = 0;
     if (s->system->frictions > 0 &&
-        OPTIONAL.slides->stop(s, segment_instant(s, s->state.now.t),
+        OPTIONAL.friction->stop(s, segment_instant(s, s->state.now.t),
                               x->happened + indicators_first_of_frictions(s->system)) != OK)
         return FAILED;
     const double inside = losses_energy(s, segment_instant(s, s->state.now.t));
-    if (OPTIONAL.landing_lift(s, x->happened, x->pull) != OK) return FAILED;
+    if (OPTIONAL.landing_bring_back(s, x->happened, x->pull) != OK) return FAILED;
     s->state.now.lost += inside - losses_energy(s, segment_instant(s, s->state.now.t));
     if (OPTIONAL.switch_modes(s, x->happened) != OK) return FAILED;
     return choose_rows(x);

@@ -402,7 +402,7 @@ static void warn_of_shares(Instance *x) {
     segment_begin(s);
     if (segment_motion(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return;
     for (int i = 0; i < s->system->frictions; i++) {
-        if (x->shared[i] || b->sliding->presses_uniquely(b, i)) continue;
+        if (x->shared[i] || b->sliding->unique_normal(b, i)) continue;
         x->shared[i] = 1;
         (void)snprintf(x->note, sizeof x->note,
                        "friction %s: its normal force is not unique, and the motion may depend on it: taken is that "

@@ -234,14 +234,14 @@ static Status ways(Instance *x, const Solver *s) {
 }
 
 /* How frictions stand: a mode, a sign and, once it has been found, a unit vector. */
-static Status slides(Instance *x, const Solver *s) {
+static Status friction_modes(Instance *x, const Solver *s) {
     for (int k = 0; k < s->system->frictions; k++) {
-        const Slide *slide = &s->state.slide[k];
-        const double length = hypot(slide->direction[0], slide->direction[1]);
-        if (x->started && fabs(slide->sign) != 1) return restored_none(x, "sign", slide->sign);
-        if (slide->sticks < 0 || slide->sticks > 1) return restored_none(x, "modes", slide->sticks);
-        if (!(slide->noise >= 0 && slide->noise <= DBL_MAX))
-            return restored_none(x, "slip velocity of rounding", slide->noise);
+        const StickSlip *mode = &s->state.stick_slip[k];
+        const double length = hypot(mode->direction[0], mode->direction[1]);
+        if (x->started && fabs(mode->sign) != 1) return restored_none(x, "sign", mode->sign);
+        if (mode->sticks < 0 || mode->sticks > 1) return restored_none(x, "modes", mode->sticks);
+        if (!(mode->noise >= 0 && mode->noise <= DBL_MAX))
+            return restored_none(x, "slip velocity of rounding", mode->noise);
         if (!(length <= 1 + 1e-9 && (!x->started || length >= 1 - 1e-9)))
             return restored_none(x, "direction of slip", length);
     }
@@ -263,7 +263,7 @@ static Status check_bounds(Instance *x) {
 Status restored_solver(Instance *x, const Solver *s) {
     if (each(x, s, s, OF_SOLVER, sizeof OF_SOLVER / sizeof *OF_SOLVER) != OK) return FAILED;
     if (together_in_solver(x, s) != OK || ways(x, s) != OK) return FAILED;
-    return slides(x, s);
+    return friction_modes(x, s);
 }
 
 Status instance_restored(Instance *x) {

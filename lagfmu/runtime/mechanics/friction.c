@@ -19,14 +19,14 @@
 static void layout_sliding(Mechanism *b, Arena *arena) {
     const System *s = b->system;
     const int n = s->n, m = s->m, count = s->frictions;
-    struct Frictions *f = arena_take(arena, 1, sizeof *f), counted;
+    struct FrictionForces *f = arena_take(arena, 1, sizeof *f), counted;
     if (f == NULL) f = &counted; /* the pass that only counts */
-    f->slide = NULL;
+    f->stick_slip = NULL;
     f->acting = arena_ints(arena, m);
     f->loaded = arena_ints(arena, count);
     f->mu = arena_doubles(arena, 2 * count);
     f->load = arena_doubles(arena, count);
-    f->c = arena_doubles(arena, s->presses);
+    f->c = arena_doubles(arena, s->normal_rows);
     f->normal = arena_doubles(arena, count);
     f->slip = arena_doubles(arena, 2 * count);
     f->tangential = arena_doubles(arena, 2 * count);
@@ -41,7 +41,7 @@ static void layout_sliding(Mechanism *b, Arena *arena) {
     f->pushed = arena_doubles(arena, count * m);
     f->A = arena_doubles(arena, count * count);
     f->minor = arena_doubles(arena, count * count);
-    f->share = arena_take(arena, share_doubles(s), sizeof(double));
+    f->nonunique = arena_take(arena, nonunique_doubles(s), sizeof(double));
     for (int k = 0; k < m && f->zero != NULL; k++) f->zero[k] = 0;
     b->friction = f == &counted ? NULL : f;
 }
@@ -56,18 +56,18 @@ double friction_normal(const Mechanism *b, int i, const double *lambda) {
     const Friction *law = &b->system->friction[i];
     double sum = b->friction->load[i];
     for (int k = law->first; k < law->first + law->normals; k++)
-        sum += b->friction->c[k] * lambda[b->system->press[k]];
+        sum += b->friction->c[k] * lambda[b->system->normal_row[k]];
     return sum;
 }
 
 /* Mostly of one row. */
 static double length_of(const double x[2]) { return x[1] == 0 ? fabs(x[0]) : hypot(x[0], x[1]); }
 
-void friction_heading(const Slide *slide, const double s[2], double e[2]) {
+void friction_heading(const StickSlip *mode, const double s[2], double e[2]) {
     const double length = length_of(s);
-    e[0] = slide->direction[0];
-    e[1] = slide->direction[1];
-    if (!(length > slide->noise) || (s[1] == 0 && e[1] == 0)) return;
+    e[0] = mode->direction[0];
+    e[1] = mode->direction[1];
+    if (!(length > mode->noise) || (s[1] == 0 && e[1] == 0)) return;
     if (s[0] * e[0] + s[1] * e[1] < 0) return;
     e[0] = s[0] / length;
     e[1] = s[1] / length;
@@ -79,26 +79,26 @@ static void find_loaded(Mechanism *b, const int *active) {
     for (int i = 0; i < s->frictions; i++) {
         const Friction *law = &s->friction[i];
         int on = !law->gated;
-        for (int k = law->first; k < law->first + law->normals; k++) on |= active[s->press[k]];
+        for (int k = law->first; k < law->first + law->normals; k++) on |= active[s->normal_row[k]];
         b->friction->loaded[i] = on;
     }
 }
 
 static const int *acting(Mechanism *b, const int *active) {
     const System *s = b->system;
-    struct Frictions *f = b->friction;
+    struct FrictionForces *f = b->friction;
     find_loaded(b, active);
     memcpy(f->acting, active, (size_t)s->m * sizeof *active);
     for (int i = 0; i < s->frictions; i++)
         for (int r = 0; r < s->friction[i].rows; r++)
-            f->acting[s->friction[i].row[r]] = f->loaded[i] && f->slide[i].sticks;
+            f->acting[s->friction[i].row[r]] = f->loaded[i] && f->stick_slip[i].sticks;
     return f->acting;
 }
 
 /* Coefficients at the state. */
 static Status find_law(Mechanism *b, Instant at, const double *q, const double *v) {
     const System *s = b->system;
-    struct Frictions *f = b->friction;
+    struct FrictionForces *f = b->friction;
     s->coulomb(at.t, q, v, at.u, at.p, f->mu, f->load, f->c);
     for (int i = 0; i < s->frictions; i++) {
         if (0 <= f->mu[2 * i + 1] && f->mu[2 * i + 1] <= f->mu[2 * i] && f->mu[2 * i] < HUGE_VAL)
@@ -115,7 +115,7 @@ static Status find_law(Mechanism *b, Instant at, const double *q, const double *
 /* d = G_t^T e of friction i. */
 static void find_push(Mechanism *b, int i) {
     const System *s = b->system;
-    struct Frictions *f = b->friction;
+    struct FrictionForces *f = b->friction;
     for (int j = 0; j < s->n; j++) f->d[j] = 0;
     for (int r = 0; r < s->friction[i].rows; r++) {
         const int k = s->friction[i].row[r];
@@ -125,9 +125,9 @@ static void find_push(Mechanism *b, int i) {
 }
 
 /* The normal forces of those that slip, and what they add to vdot and lambda. */
-static Status slide(Mechanism *b, double t, int count) {
+static Status solve_sliding(Mechanism *b, double t, int count) {
     const System *s = b->system;
-    struct Frictions *f = b->friction;
+    struct FrictionForces *f = b->friction;
     const int n = s->n, m = s->m;
     for (int g = 0; g < count; g++) {
         find_push(b, f->sliding[g]);
@@ -136,19 +136,19 @@ static Status slide(Mechanism *b, double t, int count) {
     }
     for (int h = 0; h < count; h++) {
         const int i = f->sliding[h];
-        f->right[h] = f->slide[i].sign * friction_normal(b, i, b->lambda);
+        f->right[h] = f->stick_slip[i].sign * friction_normal(b, i, b->lambda);
         for (int g = 0; g < count; g++) {
             const double own = friction_normal(b, i, f->pushed + g * m) - f->load[i];
-            f->A[h * count + g] = f->slide[i].sign * f->mu[2 * f->sliding[g] + 1] * own;
+            f->A[h * count + g] = f->stick_slip[i].sign * f->mu[2 * f->sliding[g] + 1] * own;
         }
         const double own = f->A[h * count + h];
         const double least = s->friction[i].gated ? 1 + own : 1 - fabs(own);
-        if (!(least > PAINLEVE_SAFE)) return friction_paradox(b, t, &i, 1, least);
+        if (!(least > PAINLEVE_SAFE)) return painleve_paradox(b, t, &i, 1, least);
         f->A[h * count + h] += 1;
     }
     memcpy(f->minor, f->A, (size_t)(count * count) * sizeof *f->A);
-    const double determinant = friction_eliminate(count, f->A, f->right);
-    if (!(determinant > PAINLEVE_SAFE)) return friction_paradox(b, t, f->sliding, count, determinant);
+    const double determinant = painleve_eliminate(count, f->A, f->right);
+    if (!(determinant > PAINLEVE_SAFE)) return painleve_paradox(b, t, f->sliding, count, determinant);
     for (int g = 0; g < count; g++) {
         const int i = f->sliding[g];
         const double strength = f->mu[2 * i + 1] * f->right[g];
@@ -162,7 +162,7 @@ static Status slide(Mechanism *b, double t, int count) {
             b->lambda[s->friction[i].row[r]] =
                 -f->mu[2 * i + 1] * f->normal[i] * f->towards[2 * i + r];
     }
-    return friction_opened(b, t, count, determinant);
+    return painleve_departures(b, t, count, determinant);
 }
 
 static double tangential(const Mechanism *b, int i, const double *lambda, double force[2]) {
@@ -181,21 +181,21 @@ static int is_unique(const Mechanism *b, int i) {
 }
 
 /* Normal force and reserve of those that stick. */
-static void hold(Mechanism *b) {
+static void find_reserves(Mechanism *b) {
     const System *s = b->system;
-    struct Frictions *f = b->friction;
+    struct FrictionForces *f = b->friction;
     const double *best = b->lambda;
     int unique = 1;
     for (int i = 0; i < s->frictions; i++)
-        if (f->loaded[i] && f->slide[i].sticks) unique &= is_unique(b, i);
+        if (f->loaded[i] && f->stick_slip[i].sticks) unique &= is_unique(b, i);
     if (!unique) {
-        share_best(b, f->first);
+        nonunique_best(b, f->first);
         best = f->first;
     }
     for (int i = 0; i < s->frictions; i++) {
         double force[2];
         f->reserve[i] = 0;
-        if (!f->loaded[i] || !f->slide[i].sticks) continue;
+        if (!f->loaded[i] || !f->stick_slip[i].sticks) continue;
         f->normal[i] = fabs(friction_normal(b, i, b->lambda));
         const double held = f->mu[2 * i] * fabs(friction_normal(b, i, best));
         const double asked = tangential(b, i, best, force);
@@ -206,7 +206,7 @@ static void hold(Mechanism *b) {
 static Status motion_with_friction(Mechanism *b, Instant at, const double *q, const double *v,
                                    const int *active) {
     const System *s = b->system;
-    struct Frictions *f = b->friction;
+    struct FrictionForces *f = b->friction;
     int sliding = 0, sticking = 0;
     if (find_law(b, at, q, v) != OK) return FAILED;
     if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
@@ -215,20 +215,20 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
         f->normal[i] = f->reserve[i] = 0;
         friction_slip(b, i, v, f->slip + 2 * i);
         if (!f->loaded[i]) continue;
-        sticking |= f->slide[i].sticks;
-        if (f->slide[i].sticks) continue;
-        friction_heading(&f->slide[i], f->slip + 2 * i, f->towards + 2 * i);
+        sticking |= f->stick_slip[i].sticks;
+        if (f->stick_slip[i].sticks) continue;
+        friction_heading(&f->stick_slip[i], f->slip + 2 * i, f->towards + 2 * i);
         f->sliding[sliding++] = i;
     }
-    if (sliding > 0 && slide(b, at.t, sliding) != OK) return FAILED;
+    if (sliding > 0 && solve_sliding(b, at.t, sliding) != OK) return FAILED;
     if (b->stage) return OK;
-    if (sticking) hold(b);
+    if (sticking) find_reserves(b);
     for (int i = 0; i < s->frictions; i++) tangential(b, i, b->lambda, f->tangential + 2 * i);
     return OK;
 }
 
-static int presses_uniquely(Mechanism *b, int i) {
-    return !b->friction->loaded[i] || share_presses_uniquely(b, i);
+static int unique_normal(Mechanism *b, int i) {
+    return !b->friction->loaded[i] || normal_is_unique(b, i);
 }
 
-SHARED_VALUE const Sliding SLIDING = {layout_sliding, acting, motion_with_friction, presses_uniquely};
+SHARED_VALUE const Sliding SLIDING = {layout_sliding, acting, motion_with_friction, unique_normal};

@@ -3,7 +3,7 @@
  *   sticks   G_t v = nu_t ,  |lambda_t| <= mu_s N
  *   slips    lambda_t = -mu_k N s/|s| ,  s = G_t v - nu_t      (Pfeiffer & Glocker 1996, ch. 5)
  *
- * Which of them stick is decided in rest.c. */
+ * Which of them stick is decided in stick_slip.c. */
 #ifndef LAGFMU_FRICTION_H
 #define LAGFMU_FRICTION_H
 
@@ -15,29 +15,29 @@
 typedef struct {
     int sticks;
     double sign, direction[2], noise;
-} Slide;
+} StickSlip;
 
 /* What frictions do at the state of the latest motion; two entries a friction where a row is meant, the
  * second 0 where there is only one. */
-struct Frictions {
-    const Slide *slide;  /* (frictions) the modes that hold */
+struct FrictionForces {
+    const StickSlip *stick_slip; /* (frictions) the modes that hold */
     int *acting;         /* (m) rows that act, those that stick by friction among them */
-    int *loaded;         /* (frictions) 1: something presses */
+    int *loaded;         /* (frictions) 1: a normal force acts */
     double *mu;          /* (2 frictions) static, kinetic */
     double *load;        /* (frictions) [N] */
-    double *c;           /* (presses) */
+    double *c;           /* (normal_rows) */
     double *normal;      /* (frictions) [N]: with its sign while it slips, its magnitude while it sticks */
     double *slip;        /* (2 frictions) [m/s] */
     double *tangential;  /* (2 frictions) multipliers */
     double *towards;     /* (2 frictions) direction of slip */
-    double *reserve;     /* (frictions) mu_s N - |lambda_t| over their sum, of the best share */
+    double *reserve;     /* (frictions) mu_s N - |lambda_t| over their sum, of the best lambda */
     /* scratch: */
     int *sliding;        /* (frictions) those that slip */
     double *d, *zero, *first, *right; /* (n), (m), (m), (frictions) */
     double *answer;      /* (frictions n) accelerations, to each d alone */
     double *pushed;      /* (frictions m) multipliers, to each d alone */
     double *A, *minor;   /* (frictions^2), and 1 + A of those that slip */
-    double *share;       /* of share.c */
+    double *nonunique;   /* of nonunique.c */
 };
 
 /* What a Mechanism with frictions does besides (optional.h); NULL in an FMU without. */
@@ -51,25 +51,25 @@ SHARED double friction_normal(const Mechanism *b, int i, const double *lambda);
 
 /* The unit vector of the slip velocity s; beyond a stop it goes on as before, so that the equations of a
  * segment stay smooth there. */
-SHARED void friction_heading(const Slide *slide, const double s[2], double e[2]);
+SHARED void friction_heading(const StickSlip *mode, const double s[2], double e[2]);
 
 /* painleve.c -- the refusal of a sliding problem that has no acceleration, or several. */
-SHARED Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value);
+SHARED Status painleve_paradox(const Mechanism *b, double t, const int *which, int count, double value);
 
 /* FAILED where that is so with some of the contacts open; `determinant` of 1 + A, which is in f->minor, of
  * the `count` frictions that slip. */
-SHARED Status friction_opened(Mechanism *b, double t, int count, double determinant);
+SHARED Status painleve_departures(Mechanism *b, double t, int count, double determinant);
 
 /* Gauss's elimination with row exchanges of A x = right, (size, size); the determinant. */
-SHARED double friction_eliminate(int size, double *A, double *right);
+SHARED double painleve_eliminate(int size, double *A, double *right);
 
-/* share.c -- redundant sticking: of the multipliers that hold the same motion, b->lambda becomes the one of
+/* nonunique.c -- redundant sticking: of the multipliers that hold the same motion, b->lambda becomes the one of
  * least norm within the cones, or the nearest to it; `best` (m): those of the largest least reserve. */
-SHARED size_t share_doubles(const System *s);
-SHARED void share_best(Mechanism *b, double *best);
+SHARED size_t nonunique_doubles(const System *s);
+SHARED void nonunique_best(Mechanism *b, double *best);
 
 /* 0 if the normal force of friction i is not the only one with the motion that was evaluated last: rows that
  * depend on each other share it. */
-SHARED int share_presses_uniquely(Mechanism *b, int i);
+SHARED int normal_is_unique(Mechanism *b, int i);
 
 #endif

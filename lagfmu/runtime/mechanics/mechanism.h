@@ -12,7 +12,7 @@
 
 #include <math.h>
 
-struct Frictions;
+struct FrictionForces;
 typedef struct Mechanism Mechanism;
 
 /* A time [s] with the inputs and parameters then. */
@@ -27,8 +27,8 @@ typedef struct {
     /* (m) `active` with the rows that stick by friction */
     const int *(*acting)(Mechanism *b, const int *active);
     Status (*motion)(Mechanism *b, Instant at, const double *q, const double *v, const int *active);
-    /* 0: friction i is pressed by a force that is not the only one with the latest motion */
-    int (*presses_uniquely)(Mechanism *b, int i);
+    /* 0: the normal force of friction i is not the only one with the latest motion */
+    int (*unique_normal)(Mechanism *b, int i);
 } Sliding;
 
 struct Mechanism {
@@ -43,7 +43,7 @@ struct Mechanism {
     int stage;                      /* 1: of motion(), the accelerations alone are asked for */
     Why *why;
     const Sliding *sliding;     /* NULL without frictions */
-    struct Frictions *friction; /* what `sliding` works with */
+    struct FrictionForces *friction; /* what `sliding` works with */
 };
 
 /* `sliding`: what a system with frictions needs, not used without. */

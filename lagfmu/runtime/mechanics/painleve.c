@@ -12,7 +12,7 @@
 #include "digits.h"
 #include "thresholds.h"
 
-Status friction_paradox(const Mechanism *b, double t, const int *which, int count, double value) {
+Status painleve_paradox(const Mechanism *b, double t, const int *which, int count, double value) {
     fail(b->why, "friction ");
     for (int i = 0; i < count; i++)
         why_append(b->why, "%s'%s'", i > 0 ? ", " : "", b->system->friction[which[i]].name);
@@ -25,7 +25,7 @@ Status friction_paradox(const Mechanism *b, double t, const int *which, int coun
     return FAILED;
 }
 
-double friction_eliminate(int size, double *A, double *right) {
+double painleve_eliminate(int size, double *A, double *right) {
     double determinant = 1;
     for (int k = 0; k < size; k++) {
         int top = k;
@@ -93,7 +93,7 @@ static int opens(const Mechanism *b, int k, const int *rows, int contacts, unsig
         closed |= rows[c] == k || rows[c] == row->while_closed;
         if (row->friction == 0) continue;
         const Friction *law = &s->friction[row->friction - 1];
-        for (int n = law->first; n < law->first + law->normals; n++) closed |= rows[c] == s->press[n];
+        for (int n = law->first; n < law->first + law->normals; n++) closed |= rows[c] == s->normal_row[n];
     }
     return !closed;
 }
@@ -106,24 +106,24 @@ static double minor(const double *X, int count, const int *which) {
     for (int i = 0, at = 0; i < count; i++)
         for (int j = 0; j < count && which[i]; j++)
             if (which[j]) part[at++] = X[i * count + j];
-    return friction_eliminate(size, part, none);
+    return painleve_eliminate(size, part, none);
 }
 
 /* Column r of K^-1 and of B^-1: multipliers to a unit acceleration of row r. */
 static Status respond_to_row(Mechanism *b, int sliding, const int *rows, int count, int r, double *K,
                              double *B) {
     const System *s = b->system;
-    struct Frictions *f = b->friction;
+    struct FrictionForces *f = b->friction;
     f->zero[rows[r]] = 1;
     const Status solved = linear_solve(&b->linear, NULL, f->zero, f->d, f->first);
     f->zero[rows[r]] = 0;
     if (solved != OK) return FAILED;
     for (int h = 0; h < sliding; h++) {
         const int i = f->sliding[h];
-        f->right[h] = f->slide[i].sign * (friction_normal(b, i, f->first) - f->load[i]);
+        f->right[h] = f->stick_slip[i].sign * (friction_normal(b, i, f->first) - f->load[i]);
     }
     memcpy(f->A, f->minor, (size_t)(sliding * sliding) * sizeof *f->A);
-    (void)friction_eliminate(sliding, f->A, f->right);
+    (void)painleve_eliminate(sliding, f->A, f->right);
     for (int j = 0; j < count; j++) {
         K[j * count + r] = B[j * count + r] = f->first[rows[j]];
         for (int h = 0; h < sliding; h++)
@@ -133,7 +133,7 @@ static Status respond_to_row(Mechanism *b, int sliding, const int *rows, int cou
     return OK;
 }
 
-Status friction_opened(Mechanism *b, double t, int sliding, double determinant) {
+Status painleve_departures(Mechanism *b, double t, int sliding, double determinant) {
     double K[PAINLEVE_ROWS * PAINLEVE_ROWS], B[PAINLEVE_ROWS * PAINLEVE_ROWS];
     int rows[PAINLEVE_ROWS], which[PAINLEVE_ROWS], contacts;
     const int count = find_sliding_rows(b, rows, &contacts);
@@ -142,7 +142,7 @@ Status friction_opened(Mechanism *b, double t, int sliding, double determinant) 
     for (unsigned mask = 1; count > 0 && mask < 1u << contacts; mask++) {
         for (int r = 0; r < count; r++) which[r] = opens(b, rows[r], rows, contacts, mask);
         const double left = determinant * minor(B, count, which) / minor(K, count, which);
-        if (!(left > PAINLEVE_SAFE)) return friction_paradox(b, t, b->friction->sliding, sliding, left);
+        if (!(left > PAINLEVE_SAFE)) return painleve_paradox(b, t, b->friction->sliding, sliding, left);
     }
     return OK;
 }

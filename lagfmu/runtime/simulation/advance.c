@@ -26,7 +26,7 @@ static const Method *method_of(const Solver *s) {
  * at a fixed step, which divides the communication step; not where a slip may come to rest on the way. */
 static int runs_ahead(const Solver *s) {
     if (s->system->inputs > 0 || method_of(s)->fixed) return 0;
-    return s->system->frictions == 0 || !OPTIONAL.slides->turns(s);
+    return s->system->frictions == 0 || !OPTIONAL.friction->turns(s);
 }
 
 static void restart(Solver *s, double t, const double *y, double h) {
@@ -77,9 +77,9 @@ static Status slide_on(Solver *s, const double *y1) {
     double lost;
     now->lost_old = now->lost_ahead;
     if (now->event_count > 0) return OK; /* the work is done as far as the event: meet() */
-    if (OPTIONAL.slides->work(s, i->t_old, i->t, &lost) != OK) return FAILED;
+    if (OPTIONAL.friction->work(s, i->t_old, i->t, &lost) != OK) return FAILED;
     now->lost_ahead += lost;
-    return OPTIONAL.slides->turn(s, i->t, y1);
+    return OPTIONAL.friction->turn(s, i->t, y1);
 }
 
 /* To where the integrator stood at t, before a step that failed or cannot be used; h: to try next. */
@@ -210,7 +210,7 @@ static Status count_loss(Solver *s, double t) {
     double lost;
     now->lost = now->lost_ahead;
     if (i->t == t && now->event_count == 0) return OK;
-    if (OPTIONAL.slides->work(s, i->t_old, t, &lost) != OK) return FAILED;
+    if (OPTIONAL.friction->work(s, i->t_old, t, &lost) != OK) return FAILED;
     now->lost = now->lost_old + lost;
     return OK;
 }

@@ -55,7 +55,7 @@ static void accelerations_of_forces(const Mechanism *b, const double *forces, do
 
 /* The contact whose mode contradicts the accelerations most; NONE if none does. */
 static Status most_wrong(Solver *s, Instant at, const double *q, const double *v, const int *modes,
-                         const int *touching, const int *leaving, int *found) {
+                         const int *touching, const int *departing, int *found) {
     Mechanism *b = &s->stepped;
     double *forces = s->work_contacts, *reach = forces + s->system->n, worst = 0;
     int *active = s->iwork_contacts;
@@ -74,7 +74,7 @@ static Status most_wrong(Solver *s, Instant at, const double *q, const double *v
                 worst = excess;
                 *found = c;
             }
-        } else if (touching[c] && !(leaving != NULL && leaving[c])) {
+        } else if (touching[c] && !(departing != NULL && departing[c])) {
             double approach = b->gamma[k] - mechanism_row(b, k, b->vdot);
             double floor = CONTACT_PULL * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
             if (approach > floor && approach > worst) {
@@ -89,13 +89,13 @@ static Status most_wrong(Solver *s, Instant at, const double *q, const double *v
 /* The active set.  It is a map from modes to modes: where it goes in a circle it meets `mark`,
  * which is put forward after 1, 2, 4, ... changes (Brent 1980).  `settled`: it ended. */
 static Status follow_modes(Solver *s, Instant at, const double *q, const double *v, int *modes, int *mark,
-                           const int *touching, const int *leaving, int *settled) {
+                           const int *touching, const int *departing, int *settled) {
     size_t bytes = (size_t)s->system->contacts * sizeof *modes;
     unsigned count = 0, power = 1;
     memcpy(mark, modes, bytes);
     for (;;) {
         int wrong;
-        if (most_wrong(s, at, q, v, modes, touching, leaving, &wrong) == FAILED) return FAILED;
+        if (most_wrong(s, at, q, v, modes, touching, departing, &wrong) == FAILED) return FAILED;
         *settled = wrong == NONE;
         if (*settled) return OK;
         modes[wrong] = !modes[wrong];
@@ -110,7 +110,7 @@ static Status follow_modes(Solver *s, Instant at, const double *q, const double 
 
 /* All combinations of the contacts that touch, closed before open. */
 static Status try_all_modes(Solver *s, Instant at, const double *q, const double *v, const int *closed,
-                            int *modes, const int *touching, const int *leaving, int *settled) {
+                            int *modes, const int *touching, const int *departing, int *settled) {
     const int contacts = s->system->contacts;
     int undecided = 0;
     for (int c = 0; c < contacts; c++) undecided += touching[c];
@@ -121,9 +121,9 @@ static Status try_all_modes(Solver *s, Instant at, const double *q, const double
         for (int c = 0; c < contacts && bit > 0; c++)
             if (touching[c]) {
                 bit--;
-                modes[c] = !(choice >> bit & 1u) && !(leaving != NULL && leaving[c]);
+                modes[c] = !(choice >> bit & 1u) && !(departing != NULL && departing[c]);
             }
-        if (most_wrong(s, at, q, v, modes, touching, leaving, &wrong) == FAILED) return FAILED;
+        if (most_wrong(s, at, q, v, modes, touching, departing, &wrong) == FAILED) return FAILED;
         *settled = wrong == NONE;
         if (*settled) return OK;
     }
@@ -144,13 +144,13 @@ static Status no_contact_modes(Solver *s, Instant at, const int *touching) {
 }
 
 Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, int *closed,
-                      const int *touching, const int *leaving) {
+                      const int *touching, const int *departing) {
     const int contacts = s->system->contacts;
     size_t bytes = (size_t)contacts * sizeof *closed;
     int *modes = s->iwork_contacts + s->system->m, *mark = modes + contacts, settled = 0;
     memcpy(modes, closed, bytes);
-    if (follow_modes(s, at, q, v, modes, mark, touching, leaving, &settled) == FAILED) return FAILED;
-    if (!settled && try_all_modes(s, at, q, v, closed, modes, touching, leaving, &settled) == FAILED)
+    if (follow_modes(s, at, q, v, modes, mark, touching, departing, &settled) == FAILED) return FAILED;
+    if (!settled && try_all_modes(s, at, q, v, closed, modes, touching, departing, &settled) == FAILED)
         return FAILED;
     if (!settled) return no_contact_modes(s, at, touching);
     memcpy(closed, modes, bytes);

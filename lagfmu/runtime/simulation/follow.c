@@ -38,7 +38,7 @@ Status solver_follow(Solver *s) {
     if (!s->state.now.ahead && s->system->jumps > 0)
         OPTIONAL.jumps->settle(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (s->system->prescribed_count > 0 && carry(s) != OK) return FAILED;
-    if (s->system->frictions > 0 && OPTIONAL.slides->renew(s) != OK) return FAILED;
+    if (s->system->frictions > 0 && OPTIONAL.friction->renew(s) != OK) return FAILED;
     if (!s->drive.turned) return OK;
     if (follow_contacts(s) != OK || follow_jumps(s, &changed) != OK) return FAILED;
     return changed ? follow_contacts(s) : OK;

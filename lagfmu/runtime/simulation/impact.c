@@ -128,7 +128,7 @@ static Status newton_impact(Struck *x, double time, const Impulse *found) {
     const System *system = x->s->system;
     memset(x->holding, 0, (size_t)system->contacts * sizeof *x->holding);
     for (int i = 0; i < x->k; i++) x->holding[x->contact[i]] = 1;
-    for (int lifted = 1; lifted;) {
+    for (int departed = 1; departed;) {
         set_base(x);
         if (reduce_impact(x, found) != OK) return FAILED;
         if (!complementarity_solve(x->k, x->A, x->c, x->z, x->w, x->work, x->iwork)) {
@@ -136,12 +136,12 @@ static Status newton_impact(Struck *x, double time, const Impulse *found) {
             memset(x->e, 0, (size_t)system->m * sizeof *x->e);
             continue; /* rows that act with a contact leave no room to rebound */
         }
-        lifted = 0;
+        departed = 0;
         for (int i = 0; i < x->k; i++) {
             const int c = x->contact[i];
             if (!(x->w[i] > 0) || !x->holding[c]) continue;
             x->holding[c] = 0;
-            lifted |= acts_with(system, c);
+            departed |= acts_with(system, c);
         }
     }
     return finish_impact(x, found);
@@ -203,7 +203,7 @@ static Status strike_together(Struck *x, Instant at, const double *q, const doub
     int done = 0;
     if (x->s->system->frictions > 0) {
         set_restitution(x, is_plastic);
-        if (OPTIONAL.slides->rub(x->s, at, q, v, entering, x->slip, x->e, *plastic, *found, &done) != OK)
+        if (OPTIONAL.friction->impact(x->s, at, q, v, entering, x->slip, x->e, *plastic, *found, &done) != OK)
             return FAILED;
     }
     if (done) {

@@ -3,7 +3,7 @@
  *   contact, closed   lambda >= 0
  *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch
  *   jump              h on the side of its level
- *   friction          see slipping.c */
+ *   friction          see slip.c */
 #include "indicators.h"
 
 #include <math.h>
@@ -29,7 +29,7 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
     for (int c = 0; c < system->contacts; c++)
         if (s->state.closed[c]) values[c] = b->lambda[system->contact[c]];
     if (system->frictions > 0)
-        OPTIONAL.slides->indicators(s, values + indicators_first_of_frictions(system));
+        OPTIONAL.friction->indicators(s, values + indicators_first_of_frictions(system));
     return OK;
 }
 
@@ -50,7 +50,7 @@ Status indicators_at(Solver *s, double t, const double *y, double *values) {
 Range indicators_range(const Solver *s, int indicator) {
     const System *system = s->system;
     const int of_friction = indicator - indicators_first_of_frictions(system);
-    if (of_friction >= 0) return OPTIONAL.slides->range(s, of_friction);
+    if (of_friction >= 0) return OPTIONAL.friction->range(s, of_friction);
     if (indicator >= system->contacts) return OPTIONAL.jumps->range(s, indicator - system->contacts);
     return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator], 0};
 }

@@ -184,7 +184,7 @@ static Status find_modes(const Start *x) {
                                                 touching, NULL) == FAILED)
         return afar_refused(x->s);
     if (s->frictions > 0 &&
-        OPTIONAL.slides->begin(x->s, x->at, state->closed, touching) == FAILED)
+        OPTIONAL.friction->begin(x->s, x->at, state->closed, touching) == FAILED)
         return afar_refused(x->s);
     system_active(s, state->closed, x->s->active);
     if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,

@@ -28,7 +28,7 @@ static void set_changes(Solver *s, const int *happened, const double *pull, cons
     }
 }
 
-Status landing_lift(Solver *s, const int *happened, const double *pull) {
+Status landing_bring_back(Solver *s, const int *happened, const double *pull) {
     const System *system = s->system;
     const Instant at = segment_instant(s, s->state.now.t);
     Mechanism *b = &s->stepped;

@@ -7,6 +7,6 @@
 
 /* Contacts that lie inside (f < 0), the open ones and those flagged in `happened`, go back to f = 0
  * together.  `pull` (contacts): the acceleration towards each of them. */
-SHARED Status landing_lift(Solver *s, const int *happened, const double *pull);
+SHARED Status landing_bring_back(Solver *s, const int *happened, const double *pull);
 
 #endif

@@ -90,9 +90,9 @@ static Status observe_residuals(const Solver *s, Instant at, Mechanism *b, Obser
 
 /* What frictions do, of the latest motion. */
 static void observe_frictions(const Solver *s, Observed *o) {
-    const struct Frictions *f = s->stepped.friction;
+    const struct FrictionForces *f = s->stepped.friction;
     for (int i = 0; i < s->system->frictions; i++) {
-        const int slips = !f->slide[i].sticks;
+        const int slips = !f->stick_slip[i].sticks;
         const double *force = f->tangential + 2 * i, *slip = f->slip + 2 * i;
         o->sticks[i] = f->loaded[i] && !slips;
         o->slip[2 * i] = slip[0];

@@ -14,7 +14,7 @@
 #include "passage.h"
 #include "peaks.h"
 #include "rattle.h"
-#include "slides.h"
+#include "friction_events.h"
 #include "switch.h"
 
 typedef struct {
@@ -28,9 +28,9 @@ typedef struct {
     Status (*events_find)(Solver *s, const double *y1);
     /* What happens at contacts; NULL where there are none. */
     Status (*contacts_modes)(Solver *s, Instant at, const double *q, const double *v, int *closed,
-                             const int *touching, const int *leaving);
+                             const int *touching, const int *departing);
     Status (*impact_check)(Solver *s);
-    Status (*landing_lift)(Solver *s, const int *happened, const double *pull);
+    Status (*landing_bring_back)(Solver *s, const int *happened, const double *pull);
     Status (*switch_modes)(Solver *s, const int *happened);
     Status (*switch_released)(Solver *s, double span, double drift);
     Status (*switch_contradicted)(Solver *s);
@@ -41,7 +41,7 @@ typedef struct {
     /* Of singular configurations; NULL with less than two constraints, or with frictions. */
     const Passage *passage;
     /* What constraints that hold by friction need; NULL where there are none. */
-    const Slides *slides;
+    const FrictionEvents *friction;
 } Optional;
 
 SHARED const Optional OPTIONAL;

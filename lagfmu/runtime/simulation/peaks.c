@@ -5,7 +5,7 @@
  * between the neighbours; at an end, where the motion may go on otherwise, it has one inside if it grows on
  * the way in.  Those that could pass the record are found by extreme.c; dense output knows less than a step
  * does, so that the motion is integrated once more as far as there.  Where these two do not agree that a record
- * is passed, none is: at the end of a slide in two directions the direction of friction is rounding's.
+ * is passed, none is: at the end of a slip in two directions the direction of friction is rounding's.
  * Differences of ROUNDING of the quantity say nothing. */
 #include "peaks.h"
 

@@ -74,7 +74,7 @@ static int is_plain(const Solver *s) {
 
 static Status jacobian(void *context, double t, const double *y, double *J, double *dfdt) {
     Solver *s = context;
-    if (s->system->frictions > 0) return OPTIONAL.slides->jacobian(s, t, y, J, dfdt);
+    if (s->system->frictions > 0) return OPTIONAL.friction->jacobian(s, t, y, J, dfdt);
     return sensitivity_jacobian(&s->sensitivity, &s->stepped, segment_instant(s, t), solver_rows(s), y, J,
                                 dfdt);
 }

@@ -30,7 +30,7 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
         x->latest[k].v = arena_doubles(saved, count * n);
     }
     x->impulse = arena_doubles(saved, contacts);
-    x->slide = arena_take(saved, (size_t)s->frictions, sizeof *x->slide);
+    x->stick_slip = arena_take(saved, (size_t)s->frictions, sizeof *x->stick_slip);
     x->indicator = arena_doubles(saved, indicators);
     integrator_layout(i, saved, scratch, 2 * n, OPTIONAL.methods, METHOD_COUNT);
     x->y = i->y;
@@ -53,8 +53,8 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->peak = arena_doubles(saved, peaks_saved(s->peaks));
     integrator_layout(&s->probe, scratch, scratch, 2 * n, OPTIONAL.methods, METHOD_COUNT);
     mechanism_layout(&s->stepped, scratch, system, &s->why,
-                     OPTIONAL.slides != NULL ? OPTIONAL.slides->sliding : NULL);
-    if (s->stepped.friction != NULL) s->stepped.friction->slide = s->state.slide;
+                     OPTIONAL.friction != NULL ? OPTIONAL.friction->sliding : NULL);
+    if (s->stepped.friction != NULL) s->stepped.friction->stick_slip = s->state.stick_slip;
     sensitivity_layout(&s->sensitivity, scratch, system);
     s->active_full = NULL;
     if (system->embed != NULL && system->full->dynamics != NULL) {
@@ -80,11 +80,11 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     }
     s->work_gap = arena_doubles(scratch, minimum_gap_doubles(system));
     const int frictions = system->frictions, some = frictions > 0;
-    s->work_rub = arena_take(scratch, some ? OPTIONAL.slides->doubles(system) : 0, sizeof(double));
-    s->iwork_rub = arena_take(scratch, some ? OPTIONAL.slides->ints(system) : 0, sizeof(int));
-    s->trial_slides = arena_take(scratch, (size_t)frictions, sizeof *s->trial_slides);
-    s->work_slides = arena_doubles(scratch, some * (2 * frictions + 4 * n));
-    s->iwork_slides = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
+    s->work_frictional = arena_take(scratch, some ? OPTIONAL.friction->doubles(system) : 0, sizeof(double));
+    s->iwork_frictional = arena_take(scratch, some ? OPTIONAL.friction->ints(system) : 0, sizeof(int));
+    s->trial_modes = arena_take(scratch, (size_t)frictions, sizeof *s->trial_modes);
+    s->work_friction = arena_doubles(scratch, some * (2 * frictions + 4 * n));
+    s->iwork_friction = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
     s->iwork_events = arena_ints(scratch, 6 * contacts);
     s->work_switch = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + n);
     s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(n, m, contacts));

@@ -57,11 +57,11 @@ typedef struct Solver {
     double *work_gap;    /* of minimum_gap.c */
     Observed peak_seen;        /* of peaks.c, with */
     double *work_peaks;
-    double *work_rub;          /* of rubbing.c */
-    int *iwork_rub;
-    Slide *trial_slides;       /* (frictions) of rest.c, with */
-    double *work_slides;       /* (2 frictions + 4 n) */
-    int *iwork_slides;         /* (4 frictions + 2 contacts) */
+    double *work_frictional;   /* of frictional_impact.c */
+    int *iwork_frictional;
+    StickSlip *trial_modes;    /* (frictions) of stick_slip.c, with */
+    double *work_friction;     /* (2 frictions + 4 n) */
+    int *iwork_friction;       /* (4 frictions + 2 contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and switch.c */
     double *work_switch;       /* (m + n) of switch.c */
     double *work_impact;       /* of impact.c, see there */

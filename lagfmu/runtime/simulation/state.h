@@ -92,7 +92,7 @@ typedef struct {
     int *left;                /* (indicators) its range at the event ahead: 1 upwards, -1 downwards */
     Latest latest[EVENT_KINDS]; /* of each contact, or friction */
     double *impulse;          /* (contacts) [of lambda times s] of the latest closing; 0: none */
-    Slide *slide;             /* (frictions) how they stand */
+    StickSlip *stick_slip;    /* (frictions) how they stand */
     double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
     double *y, *f, *y_old, *f_old, *dense; /* the integrator's own, shared with it */
     char *block;              /* all of the arrays above */

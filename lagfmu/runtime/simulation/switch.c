@@ -16,8 +16,8 @@
 
 /* What is said of each contact while an event is met: flags (contacts). */
 typedef struct {
-    int *closed;   /* before the event, without those that are leaving; then the modes after it */
-    int *leaving;  /* opened because the multiplier passed through zero */
+    int *closed;   /* before the event, without those that depart; then the modes after it */
+    int *departing; /* the multiplier passed through zero */
     int *near;     /* an impact can reach it */
     int *struck;   /* it landed, or took an impulse */
     int *touching; /* f and df/dt are zero: the accelerations decide */
@@ -42,7 +42,7 @@ static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
     }
     for (int c = 0; c < system->contacts; c++) {
         const int shut = s->state.closed[c];
-        x->leaving[c] = happened[c] && shut;
+        x->departing[c] = happened[c] && shut;
         x->closed[c] = shut && !happened[c];
         x->struck[c] = 0;
         x->near[c] = x->closed[c] || (happened[c] && !shut) ||
@@ -56,13 +56,13 @@ static Status strike_contacts(Solver *s, Instant at, const int *happened, Flags 
     int landed = 0;
     const int contacts = s->system->contacts;
     double *slow = s->work_switch;
-    for (int c = 0; c < contacts; c++) landed |= happened[c] && !x->leaving[c];
+    for (int c = 0; c < contacts; c++) landed |= happened[c] && !x->departing[c];
     if (!landed) return OK;
     if (mechanism_evaluate(&s->stepped, at, s->state.q, s->state.v) != OK) return FAILED;
     find_slow(s, slow);
     if (impacts(s, at, s->state.q, s->state.v, x->near, slow, x->struck) != OK) return FAILED;
     for (int c = 0; c < contacts; c++) {
-        if (x->struck[c]) x->leaving[c] = 0;
+        if (x->struck[c]) x->departing[c] = 0;
         if (happened[c] && !s->state.closed[c]) x->struck[c] = 1;
     }
     return OK;
@@ -100,11 +100,11 @@ static Status settle_modes(Solver *s, Instant at, Flags *x) {
         x->touching[c] = x->near[c] && fabs(mechanism_slip(&s->stepped, k, v)) <= slow[k];
         x->closed[c] = x->touching[c] && (shut[c] || x->struck[c]);
     }
-    if (contacts_modes(s, at, q, v, x->closed, x->touching, x->leaving) != OK) return FAILED;
+    if (contacts_modes(s, at, q, v, x->closed, x->touching, x->departing) != OK) return FAILED;
     system_active(system, x->closed, s->active);
     if (mechanism_motion(&s->stepped, at, q, v, s->active) != OK) return FAILED;
     if (!find_low(s, slow, shut, x)) return OK;
-    return contacts_modes(s, at, q, v, x->closed, x->touching, x->leaving);
+    return contacts_modes(s, at, q, v, x->closed, x->touching, x->departing);
 }
 
 /* Rows that come back with a contact keep the level f = offset at which they do. */
@@ -150,8 +150,8 @@ Status switch_modes(Solver *s, const int *happened) {
                flags + 4 * contacts};
     if (find_near(s, at, happened, &x) != OK || strike_contacts(s, at, happened, &x) != OK) return FAILED;
     if (settle_modes(s, at, &x) != OK || set_levels(s, at, x.closed) != OK) return FAILED;
-    if (rubs && OPTIONAL.slides->change(s, at, happened + indicators_first_of_frictions(system),
-                                        x.closed, x.touching, x.leaving) != OK)
+    if (rubs && OPTIONAL.friction->change(s, at, happened + indicators_first_of_frictions(system),
+                                        x.closed, x.touching, x.departing) != OK)
         return FAILED;
     system_active(system, x.closed, s->active);
     if (losses_project(s, at, 0) != OK) return FAILED;
@@ -230,7 +230,7 @@ static Status find_contradicted(Solver *s, Instant at, int *left, int *any) {
     *any = memcmp(modes, s->state.closed, bytes) != 0;
     for (int c = 0; c < contacts; c++) *any |= modes[c] && b->lambda[system->contact[c]] < 0;
     if (*any || system->frictions == 0) return OK;
-    return OPTIONAL.slides->contradicted(s, at, left + indicators_first_of_frictions(system), any);
+    return OPTIONAL.friction->contradicted(s, at, left + indicators_first_of_frictions(system), any);
 }
 
 Status switch_contradicted(Solver *s) {

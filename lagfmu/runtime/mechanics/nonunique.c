@@ -1,4 +1,4 @@
-/* share.c -- redundant sticking: which of the multipliers that hold the same motion lies within the cones.
+/* nonunique.c -- redundant sticking: which of the multipliers that hold the same motion lies within the cones.
  *
  * Where rows depend on each other lambda is one of lambda + Z^T y, with Z G = 0.  Normal forces are those of the
  * lambda of least norm, sticking or slipping: by a strain of its own a body could hold whatever one likes.
@@ -12,7 +12,7 @@
 #include "friction.h"
 #include "thresholds.h"
 
-size_t share_doubles(const System *s) {
+size_t nonunique_doubles(const System *s) {
     const size_t m = (size_t)s->m, n = (size_t)s->n;
     return m * n + 2 * m * m + 3 * m + n + m * m + 5 * m; /* basis, made, Z, there, y, best, P, ... */
 }
@@ -25,7 +25,7 @@ typedef struct {
     double *y, *best;     /* (count) */
     double *slope, *g, *Pg; /* (count) */
     double *P;            /* (count, count) */
-} Share;
+} Nonunique;
 
 static double dot(int count, const double *a, const double *b) {
     double sum = 0;
@@ -37,7 +37,7 @@ static void add_part(int count, double part, const double *a, double *to) {
     for (int i = 0; i < count; i++) to[i] += part * a[i];
 }
 
-static void orthonormalize(Share *x) {
+static void orthonormalize(Nonunique *x) {
     const int m = x->b->system->m;
     for (int i = 0; i < x->count; i++) {
         double *z = x->Z + i * m;
@@ -48,7 +48,7 @@ static void orthonormalize(Share *x) {
 }
 
 /* Z: each row that acts eliminated by those before it, twice (Kahan). */
-static void find_null_space(Share *x, double *basis, double *made, double *rest) {
+static void find_null_space(Nonunique *x, double *basis, double *made, double *rest) {
     const Mechanism *b = x->b;
     const System *s = b->system;
     const int n = s->n, m = s->m;
@@ -70,7 +70,7 @@ static void find_null_space(Share *x, double *basis, double *made, double *rest)
                 add_part(m, -part, made + i * m, of);
             }
         const double left = sqrt(dot(n, rest, rest));
-        if (!(left > SHARE_DEPENDENT * norm)) {
+        if (!(left > NONUNIQUE_DEPENDENT * norm)) {
             x->count += 1;
             continue;
         }
@@ -82,25 +82,25 @@ static void find_null_space(Share *x, double *basis, double *made, double *rest)
 }
 
 /* By how much the normal force of friction i grows along z, relative to its coefficients. */
-static double press_row(const Mechanism *b, int i, const double *z) {
+static double normal_along(const Mechanism *b, int i, const double *z) {
     const Friction *law = &b->system->friction[i];
     double sum = 0, most = 0;
     for (int k = law->first; k < law->first + law->normals; k++) {
-        sum += b->friction->c[k] * z[b->system->press[k]];
+        sum += b->friction->c[k] * z[b->system->normal_row[k]];
         most = fmax(most, fabs(b->friction->c[k]));
     }
     return most > 0 ? sum / most : 0;
 }
 
-/* Of Z what presses friction i as before. */
-static void keep_normal(Share *x, int i) {
+/* Of Z what leaves the normal force of friction i as it is. */
+static void keep_normal(Nonunique *x, int i) {
     const int m = x->b->system->m;
     int pivot = 0;
     for (int j = 0; j < x->count; j++) {
-        x->slope[j] = press_row(x->b, i, x->Z + j * m);
+        x->slope[j] = normal_along(x->b, i, x->Z + j * m);
         if (fabs(x->slope[j]) > fabs(x->slope[pivot])) pivot = j;
     }
-    if (x->count == 0 || !(fabs(x->slope[pivot]) > SHARE_DEPENDENT)) return;
+    if (x->count == 0 || !(fabs(x->slope[pivot]) > NONUNIQUE_DEPENDENT)) return;
     for (int j = 0; j < x->count; j++)
         if (j != pivot) add_part(m, -x->slope[j] / x->slope[pivot], x->Z + pivot * m, x->Z + j * m);
     x->count -= 1;
@@ -109,17 +109,17 @@ static void keep_normal(Share *x, int i) {
 }
 
 /* The least reserve at part * y [N]; its slope in y. */
-static double worst_cone(Share *x, double part, const double *y) {
+static double worst_cone(Nonunique *x, double part, const double *y) {
     const Mechanism *b = x->b;
     const System *s = b->system;
-    const struct Frictions *f = b->friction;
+    const struct FrictionForces *f = b->friction;
     const int m = s->m;
     double least = HUGE_VAL;
     memcpy(x->there, b->lambda, (size_t)m * sizeof *x->there);
     for (int i = 0; i < x->count; i++) add_part(m, part * y[i], x->Z + i * m, x->there);
     for (int i = 0; i < s->frictions; i++) {
         const Friction *law = &s->friction[i];
-        if (!f->loaded[i] || !f->slide[i].sticks) continue;
+        if (!f->loaded[i] || !f->stick_slip[i].sticks) continue;
         double force = 0;
         for (int r = 0; r < law->rows; r++) force = hypot(force, x->there[law->row[r]]);
         const double value = f->mu[2 * i] * fabs(friction_normal(b, i, b->lambda)) - force;
@@ -136,16 +136,16 @@ static double worst_cone(Share *x, double part, const double *y) {
     return least;
 }
 
-static void note_best(Share *x, double value, double *top) {
+static void note_best(Nonunique *x, double value, double *top) {
     if (!(value > *top)) return;
     *top = value;
     memcpy(x->best, x->y, (size_t)x->count * sizeof *x->y);
 }
 
-static void bisect(Share *x, double wide) {
+static void bisect(Nonunique *x, double wide) {
     double low = -wide, high = wide, zero = 0, top = worst_cone(x, 0, &zero);
     x->best[0] = 0;
-    for (int round = 0; round < 2 * SHARE_ROUNDS; round++) {
+    for (int round = 0; round < 2 * NONUNIQUE_ROUNDS; round++) {
         x->y[0] = (low + high) / 2;
         note_best(x, worst_cone(x, 1, x->y), &top);
         if (x->slope[0] > 0)
@@ -155,7 +155,7 @@ static void bisect(Share *x, double wide) {
     }
 }
 
-static void shrink_ellipsoid(Share *x, double wide) {
+static void shrink_ellipsoid(Nonunique *x, double wide) {
     const int count = x->count;
     const double n = count;
     double top = -HUGE_VAL;
@@ -163,7 +163,7 @@ static void shrink_ellipsoid(Share *x, double wide) {
     memset(x->best, 0, (size_t)count * sizeof *x->best);
     for (int i = 0; i < count * count; i++) x->P[i] = 0;
     for (int i = 0; i < count; i++) x->P[i * count + i] = wide * wide;
-    for (int round = 0; round < SHARE_ROUNDS * count * count; round++) {
+    for (int round = 0; round < NONUNIQUE_ROUNDS * count * count; round++) {
         note_best(x, worst_cone(x, 1, x->y), &top);
         for (int i = 0; i < count; i++) x->Pg[i] = dot(count, x->P + i * count, x->slope);
         const double size = dot(count, x->slope, x->Pg);
@@ -178,11 +178,11 @@ static void shrink_ellipsoid(Share *x, double wide) {
 }
 
 /* With the null space of the rows that act. */
-static Share share_of(Mechanism *b) {
+static Nonunique nonunique_of(Mechanism *b) {
     const System *s = b->system;
     const int n = s->n, m = s->m;
-    double *place = b->friction->share, *basis = place, *made = basis + m * n;
-    Share x = {b, 0, made + m * m, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    double *place = b->friction->nonunique, *basis = place, *made = basis + m * n;
+    Nonunique x = {b, 0, made + m * m, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     double *rest = x.Z + m * m;
     x.there = rest + n;
     x.y = x.there + m;
@@ -195,17 +195,17 @@ static Share share_of(Mechanism *b) {
     return x;
 }
 
-int share_presses_uniquely(Mechanism *b, int i) {
-    const Share x = share_of(b);
+int normal_is_unique(Mechanism *b, int i) {
+    const Nonunique x = nonunique_of(b);
     for (int j = 0; j < x.count; j++)
-        if (fabs(press_row(b, i, x.Z + j * b->system->m)) > SHARE_DEPENDENT) return 0;
+        if (fabs(normal_along(b, i, x.Z + j * b->system->m)) > NONUNIQUE_DEPENDENT) return 0;
     return 1;
 }
 
-void share_best(Mechanism *b, double *best) {
+void nonunique_best(Mechanism *b, double *best) {
     const System *s = b->system;
     const int m = s->m;
-    Share x = share_of(b);
+    Nonunique x = nonunique_of(b);
     memcpy(best, b->lambda, (size_t)m * sizeof *best);
     for (int i = 0; i < s->frictions; i++)
         if (b->friction->loaded[i]) keep_normal(&x, i);
@@ -214,11 +214,11 @@ void share_best(Mechanism *b, double *best) {
     for (int k = 0; k < m; k++) wide = fmax(wide, fabs(b->lambda[k]));
     for (int i = 0; i < s->frictions; i++) wide = fmax(wide, fabs(b->friction->load[i]));
     if (x.count == 1)
-        bisect(&x, SHARE_WIDE * wide);
+        bisect(&x, NONUNIQUE_WIDE * wide);
     else
-        shrink_ellipsoid(&x, SHARE_WIDE * wide);
+        shrink_ellipsoid(&x, NONUNIQUE_WIDE * wide);
     if (worst_cone(&x, 0, x.best) < 0) {
-        for (int round = 0; round < SHARE_ROUNDS; round++) {
+        for (int round = 0; round < NONUNIQUE_ROUNDS; round++) {
             const double middle = (low + high) / 2;
             if (worst_cone(&x, middle, x.best) < 0)
                 low = middle;

@@ -1,12 +1,12 @@
-/* slides.h -- which frictions stick and which slip, and what is watched until that changes.
+/* friction_events.h -- which frictions stick and which slip, and what is watched until that changes.
  *
  * At s = 0 a friction sticks if the sticking solution lies within its cone, |lambda_t| <= mu_s N.  If not, it
  * slips in the direction in which it begins to move under the force of that very slip: s/|s| = s'/|s'| with
  * s' = G_t vdot - gamma_t of the equations of sliding (Pfeiffer & Glocker 1996, chs. 5 and 6).
  *
  * All of it is reached by one pointer (optional.h), NULL in an FMU without frictions. */
-#ifndef LAGFMU_SLIDES_H
-#define LAGFMU_SLIDES_H
+#ifndef LAGFMU_FRICTION_EVENTS_H
+#define LAGFMU_FRICTION_EVENTS_H
 
 #include "friction.h"
 #include "impact.h"
@@ -16,12 +16,12 @@
 
 typedef struct {
     const Sliding *sliding;
-    size_t (*doubles)(const System *s), (*ints)(const System *s); /* workspace of `rub` */
+    size_t (*doubles)(const System *s), (*ints)(const System *s); /* workspace of `impact` */
     /* At the start, with the contacts as they would be without frictions: all modes together. */
     Status (*begin)(Solver *s, Instant at, int *closed, const int *touching);
-    /* At an event, `left` being the frictions' indicators: modes, levels, starts of slipping. */
+    /* At an event, `left` being the frictions' indicators: modes, offsets, starts of slipping. */
     Status (*change)(Solver *s, Instant at, const int *left, int *closed, const int *touching,
-                     const int *leaving);
+                     const int *departing);
     /* Where `left` says that a slip has ended, the state (q and v) is moved to where it is 0. */
     Status (*stop)(Solver *s, Instant at, const int *left);
     /* What of each friction the forces of now contradict, in `left` (2 frictions) as at an event; of the latest
@@ -40,18 +40,18 @@ typedef struct {
     Status (*work)(Solver *s, double t0, double t1, double *work);
     /* d(y')/dy and dy'/dt by differences. */
     Status (*jacobian)(Solver *s, double t, const double *y, double *J, double *dfdt);
-    /* An impact with friction, and one without rebound; done: 0 where no contact that is struck presses a
-     * friction, or none was found (rubbing.c). */
-    Status (*rub)(Solver *s, Instant at, const double *q, const double *v, const int *entering,
+    /* An impact with friction, and one without rebound; done: 0 where no contact that is struck is of a normal force,
+     * or none was found (frictional_impact.c). */
+    Status (*impact)(Solver *s, Instant at, const double *q, const double *v, const int *entering,
                   const double *slip, double *e, Impulse plastic, Impulse found, int *done);
-} Slides;
+} FrictionEvents;
 
-/* Workspace of rubbing.c, and its function. */
-SHARED size_t rubbing_doubles(const System *s);
-SHARED size_t rubbing_ints(const System *s);
-SHARED Status rubbing(Solver *s, Instant at, const double *q, const double *v, const int *entering,
+/* Workspace of frictional_impact.c, and its function. */
+SHARED size_t frictional_impact_doubles(const System *s);
+SHARED size_t frictional_impact_ints(const System *s);
+SHARED Status frictional_impact(Solver *s, Instant at, const double *q, const double *v, const int *entering,
                       const double *slip, double *e, Impulse plastic, Impulse found, int *done);
 
-SHARED const Slides SLIDES;
+SHARED const FrictionEvents FRICTION_EVENTS;
 
 #endif

@@ -1,5 +1,5 @@
-/* slipping.c -- while a friction slips: the way it goes, the work that it takes, and when it stops. */
-#include "slipping.h"
+/* slip.c -- while a friction slips: the way it goes, the work that it takes, and when it stops. */
+#include "slip.h"
 
 #include <string.h>
 
@@ -7,43 +7,43 @@
 #include "segment.h"
 #include "thresholds.h"
 
-void slipping_indicators(const Solver *s, double *values) {
-    const struct Frictions *f = s->stepped.friction;
+void slip_indicators(const Solver *s, double *values) {
+    const struct FrictionForces *f = s->stepped.friction;
     for (int i = 0; i < s->system->frictions; i++) {
-        const Slide *slide = &f->slide[i];
+        const StickSlip *mode = &f->stick_slip[i];
         double *value = values + 2 * i;
         value[0] = value[1] = 1;
         if (!f->loaded[i]) continue;
-        value[0] = slide->sticks ? f->reserve[i]
-                                 : f->slip[2 * i] * slide->direction[0] +
-                                       f->slip[2 * i + 1] * slide->direction[1];
-        if (!slide->sticks && !s->system->friction[i].gated) value[1] = f->normal[i];
+        value[0] = mode->sticks ? f->reserve[i]
+                                 : f->slip[2 * i] * mode->direction[0] +
+                                       f->slip[2 * i + 1] * mode->direction[1];
+        if (!mode->sticks && !s->system->friction[i].gated) value[1] = f->normal[i];
     }
 }
 
-Range slipping_range(const Solver *s, int which) {
-    const Slide *slide = &s->state.slide[which / 2];
+Range slip_range(const Solver *s, int which) {
+    const StickSlip *mode = &s->state.stick_slip[which / 2];
     if (which % 2 == 1) return (Range){0, HUGE_VAL, 0, 0};
-    return (Range){0, HUGE_VAL, slide->sticks ? SLIDES_SLACK : slide->noise, 1};
+    return (Range){0, HUGE_VAL, mode->sticks ? FRICTION_SLACK : mode->noise, 1};
 }
 
-int slipping_turns(const Solver *s) {
+int slip_turns(const Solver *s) {
     for (int i = 0; i < s->system->frictions; i++)
-        if (s->system->friction[i].rows > 1 && !s->state.slide[i].sticks) return 1;
+        if (s->system->friction[i].rows > 1 && !s->state.stick_slip[i].sticks) return 1;
     return 0;
 }
 
-Status slipping_turn(Solver *s, double t, const double *y) {
+Status slip_turn(Solver *s, double t, const double *y) {
     Mechanism *b = &s->stepped;
-    if (!slipping_turns(s)) return OK;
+    if (!slip_turns(s)) return OK;
     const double *v = y + s->system->n;
     if (mechanism_evaluate(b, segment_instant(s, t), y, v) != OK) return FAILED;
     for (int i = 0; i < s->system->frictions; i++) {
         double slip[2], e[2];
-        if (s->state.slide[i].sticks) continue;
+        if (s->state.stick_slip[i].sticks) continue;
         friction_slip(b, i, v, slip);
-        friction_heading(&s->state.slide[i], slip, e);
-        memcpy(s->state.slide[i].direction, e, sizeof e);
+        friction_heading(&s->state.stick_slip[i], slip, e);
+        memcpy(s->state.stick_slip[i].direction, e, sizeof e);
     }
     return OK;
 }
@@ -60,20 +60,20 @@ static Status move_near(Solver *s, double t, const double *y) {
                                  s->state.offset, s->state.size);
 }
 
-Status slipping_work(Solver *s, double t0, double t1, double *lost) {
-    const struct Frictions *f = s->stepped.friction;
+Status slip_work(Solver *s, double t0, double t1, double *lost) {
+    const struct FrictionForces *f = s->stepped.friction;
     const Integrator *integrator = &s->integrator;
-    double *y = s->work_slides + 2 * s->system->frictions;
+    double *y = s->work_friction + 2 * s->system->frictions;
     int slipping = 0;
     *lost = 0;
-    for (int i = 0; i < s->system->frictions; i++) slipping |= !s->state.slide[i].sticks;
+    for (int i = 0; i < s->system->frictions; i++) slipping |= !s->state.stick_slip[i].sticks;
     if (!slipping || !(t1 > t0)) return OK;
     for (int k = 0; k < 5; k++) {
         const double t = t0 + (t1 - t0) * (1 + NODES[k]) / 2;
         integrator->method->dense(integrator, t, y);
         if (move_near(s, t, y) != OK) return FAILED;
         for (int i = 0; i < 2 * s->system->frictions; i++)
-            if (!f->slide[i / 2].sticks)
+            if (!f->stick_slip[i / 2].sticks)
                 *lost -= WEIGHTS[k] * (t1 - t0) / 2 * f->tangential[i] * f->slip[i];
     }
     return OK;
@@ -86,10 +86,10 @@ static Status rate(Solver *s, double t, const double *y, double *vdot) {
     return OK;
 }
 
-Status slipping_jacobian(Solver *s, double t, const double *y, double *J, double *dfdt) {
+Status slip_jacobian(Solver *s, double t, const double *y, double *J, double *dfdt) {
     const double part = 1.4901161193847656e-8; /* 2^-26: half of a double's digits */
     const int n = s->system->n, ny = 2 * n;
-    double *moved = s->work_slides + 2 * s->system->frictions, *at = moved + ny, *there = at + n;
+    double *moved = s->work_friction + 2 * s->system->frictions, *at = moved + ny, *there = at + n;
     if (rate(s, t, y, at) != OK) return FAILED;
     memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
     memset(dfdt, 0, (size_t)n * sizeof *dfdt);

@@ -1,13 +1,13 @@
-/* slides.c -- the modes of frictions: at the start, and at events. */
-#include "slides.h"
+/* friction_events.c -- the modes of frictions: at the start, and at events. */
+#include "friction_events.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "losses.h"
-#include "rest.h"
 #include "segment.h"
-#include "slipping.h"
+#include "slip.h"
+#include "stick_slip.h"
 #include "thresholds.h"
 
 static const double UNDONE = 10; /* times what accelerations did since a slip was 0, at most */
@@ -25,11 +25,11 @@ static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
             speed[j] = fmax(speed[j], sqrt(s->state.size[j]) * sqrt(fabs(b->F[j]) / b->M[e]));
     }
     for (int i = 0; i < system->frictions; i++)
-        s->state.slide[i] = (Slide){0, 1, {1, 0}, 0};
-    rest_set_noise(s, speed, s->state.slide);
-    for (int i = 0; i < system->frictions; i++) rest_slide_along(b, i, s->state.v, &s->state.slide[i]);
-    Rest x = rest_of(s, at);
-    if (rest_finish(&x, rest_settle(&x, closed, NULL, touching, NULL)) != OK) return FAILED;
+        s->state.stick_slip[i] = (StickSlip){0, 1, {1, 0}, 0};
+    stick_slip_set_noise(s, speed, s->state.stick_slip);
+    for (int i = 0; i < system->frictions; i++) stick_slip_along(b, i, s->state.v, &s->state.stick_slip[i]);
+    Settling x = stick_slip_try(s, at);
+    if (stick_slip_finish(&x, stick_slip_settle(&x, closed, NULL, touching, NULL)) != OK) return FAILED;
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     for (int k = 0; k < system->m; k++)
         if (system->rows[k].friction != 0) s->state.offset[k] = b->f[k];
@@ -41,30 +41,30 @@ static void note_change(Solver *s, EventKind kind, int i) {
 }
 
 static Status change(Solver *s, Instant at, const int *left, int *closed, const int *touching,
-                     const int *leaving) {
+                     const int *departing) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
-    Rest x = rest_of(s, at);
-    int *ended = s->iwork_slides + 3 * system->frictions;
-    rest_renew_noise(s, x.slides);
+    Settling x = stick_slip_try(s, at);
+    int *ended = s->iwork_friction + 3 * system->frictions;
+    stick_slip_renew_noise(s, x.modes);
     for (int i = 0; i < system->frictions; i++) {
-        x.begins[i] = left[2 * i] && s->state.slide[i].sticks;
-        ended[i] = left[2 * i] && !s->state.slide[i].sticks;
-        if (left[2 * i + 1]) x.slides[i].sign = -x.slides[i].sign; /* the normal force turns over */
+        x.begins[i] = left[2 * i] && s->state.stick_slip[i].sticks;
+        ended[i] = left[2 * i] && !s->state.stick_slip[i].sticks;
+        if (left[2 * i + 1]) x.modes[i].sign = -x.modes[i].sign; /* the normal force turns over */
     }
-    const Status settled = rest_settle(&x, closed, ended, touching, leaving);
-    b->friction->slide = s->state.slide;
+    const Status settled = stick_slip_settle(&x, closed, ended, touching, departing);
+    b->friction->stick_slip = s->state.stick_slip;
     if (settled != OK) return FAILED;
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     for (int i = 0; i < system->frictions; i++) {
         const Friction *law = &system->friction[i];
-        const int stuck = s->state.slide[i].sticks, sticks = x.slides[i].sticks;
+        const int stuck = s->state.stick_slip[i].sticks, sticks = x.modes[i].sticks;
         for (int r = 0; r < law->rows && sticks && !stuck; r++)
             s->state.offset[law->row[r]] = b->f[law->row[r]];
         if (b->friction->loaded[i] && stuck != sticks) note_change(s, sticks ? STICKING : SLIPPING, i);
     }
-    return rest_finish(&x, OK);
+    return stick_slip_finish(&x, OK);
 }
 
 /* x^T M x. */
@@ -97,13 +97,13 @@ static Status stop(Solver *s, Instant at, const int *left) {
     const System *system = s->system;
     const int n = system->n;
     Mechanism *b = &s->stepped;
-    Slide *held = s->trial_slides;
-    double *q = s->work_slides + 2 * system->frictions, *v = q + n, *change = v + n;
+    StickSlip *held = s->trial_modes;
+    double *q = s->work_friction + 2 * system->frictions, *v = q + n, *change = v + n;
     const double lost = s->state.now.lost, pull = squared(b, b->vdot);
     double since = 0;
     int any = 0;
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
-    memcpy(held, s->state.slide, (size_t)system->frictions * sizeof *held);
+    memcpy(held, s->state.stick_slip, (size_t)system->frictions * sizeof *held);
     for (int i = 0; i < system->frictions; i++) {
         const Friction *law = &system->friction[i];
         if (!left[2 * i] || held[i].sticks) continue;
@@ -114,9 +114,9 @@ static Status stop(Solver *s, Instant at, const int *left) {
     if (!any) return OK;
     memcpy(q, s->state.q, (size_t)n * sizeof *q);
     memcpy(v, s->state.v, (size_t)n * sizeof *v);
-    b->friction->slide = held;
+    b->friction->stick_slip = held;
     const Status stopped = losses_project(s, at, 1);
-    b->friction->slide = s->state.slide;
+    b->friction->stick_slip = s->state.stick_slip;
     for (int j = 0; j < n; j++) change[j] = s->state.v[j] - v[j];
     if (stopped == OK && squared(b, change) <= UNDONE * UNDONE * since * since * pull) return OK;
     memcpy(s->state.q, q, (size_t)n * sizeof *q);
@@ -127,51 +127,51 @@ static Status stop(Solver *s, Instant at, const int *left) {
 
 static Status contradicted(Solver *s, Instant at, int *left, int *any) {
     const int count = s->system->frictions;
-    const struct Frictions *f = s->stepped.friction;
-    slipping_indicators(s, s->work_slides);
+    const struct FrictionForces *f = s->stepped.friction;
+    slip_indicators(s, s->work_friction);
     for (int k = 0; k < 2 * count; k++) {
-        left[k] = s->work_slides[k] < -slipping_range(s, k).slack;
+        left[k] = s->work_friction[k] < -slip_range(s, k).slack;
         *any |= left[k];
     }
     if (*any) return OK;
-    Rest x = rest_of(s, at);
+    Settling x = stick_slip_try(s, at);
     Status status = OK;
     for (int i = 0; i < count && status == OK; i++) {
-        const Slide *slide = &s->state.slide[i];
+        const StickSlip *mode = &s->state.stick_slip[i];
         int agrees = 1;
-        if (!f->loaded[i] || slide->sticks || hypot(f->slip[2 * i], f->slip[2 * i + 1]) > slide->noise)
+        if (!f->loaded[i] || mode->sticks || hypot(f->slip[2 * i], f->slip[2 * i + 1]) > mode->noise)
             continue;
-        status = rest_agrees(&x, i, &agrees);
+        status = stick_slip_agrees(&x, i, &agrees);
         left[2 * i] = !agrees;
         *any |= !agrees;
     }
-    (void)rest_finish(&x, FAILED);
+    (void)stick_slip_finish(&x, FAILED);
     return status;
 }
 
 static Status renew(Solver *s) {
     Mechanism *b = &s->stepped;
     int any = 0;
-    for (int i = 0; i < s->system->frictions; i++) any |= s->state.slide[i].sticks;
+    for (int i = 0; i < s->system->frictions; i++) any |= s->state.stick_slip[i].sticks;
     if (!any || s->system->inputs == 0) return OK;
     const Instant at = segment_instant(s, s->state.now.t);
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
-    rest_renew_noise(s, s->state.slide); /* at the start nothing may have been at work */
+    stick_slip_renew_noise(s, s->state.stick_slip); /* at the start nothing may have been at work */
     for (int i = 0; i < s->system->frictions; i++) {
         double slip[2];
         friction_slip(b, i, s->state.v, slip);
-        if (!s->state.slide[i].sticks) continue;
-        if (hypot(slip[0], slip[1]) <= SLIDES_JUMP * s->state.slide[i].noise) continue;
-        rest_slide_along(b, i, s->state.v, &s->state.slide[i]);
+        if (!s->state.stick_slip[i].sticks) continue;
+        if (hypot(slip[0], slip[1]) <= FRICTION_JUMP * s->state.stick_slip[i].noise) continue;
+        stick_slip_along(b, i, s->state.v, &s->state.stick_slip[i]);
         note_change(s, SLIPPING, i);
     }
     return OK;
 }
 
-SHARED_VALUE const Slides SLIDES = {
-    .sliding = &SLIDING, .doubles = rubbing_doubles, .ints = rubbing_ints,
+SHARED_VALUE const FrictionEvents FRICTION_EVENTS = {
+    .sliding = &SLIDING, .doubles = frictional_impact_doubles, .ints = frictional_impact_ints,
     .begin = begin, .change = change, .stop = stop, .contradicted = contradicted, .renew = renew,
-    .indicators = slipping_indicators, .range = slipping_range,
-    .turns = slipping_turns, .turn = slipping_turn,
-    .work = slipping_work, .jacobian = slipping_jacobian, .rub = rubbing,
+    .indicators = slip_indicators, .range = slip_range,
+    .turns = slip_turns, .turn = slip_turn,
+    .work = slip_work, .jacobian = slip_jacobian, .impact = frictional_impact,
 };

@@ -1,4 +1,4 @@
-/* rubbing.c -- impacts with friction: Coulomb's cone on the impulses of contacts that are struck.
+/* frictional_impact.c -- impacts with friction: Coulomb's cone on the impulses of contacts that are struck.
  *
  *   0 <= Lambda_n  _|_  s_n+ + e s_n- >= 0 ,   |Lambda_t| <= mu_k N ,  N = sum c Lambda_n ,
  *   Lambda_t = -mu_k N s_t+/|s_t+|  where s_t+ is not 0
@@ -10,38 +10,38 @@
 #include <math.h>
 #include <string.h>
 
-#include "slides.h"
+#include "friction_events.h"
 #include "thresholds.h"
 
-/* The contacts' rows, then those of the frictions that they press. */
+/* The contacts' rows, then those of the frictions whose normal force is theirs. */
 typedef struct {
     Solver *s;
     Mechanism *b;
     int *rows, count, contacts; /* rows, of which the first are contacts */
-    int *pressed;               /* (frictions) */
+    int *loaded;                /* (frictions) */
     double *A, *free, *z, *before; /* (count^2), (count): s- as the base rows leave it, impulses */
     double *slip, *zero, *right;   /* (m) */
     double *force, *dv;            /* (n) */
-} Rub;
+} FrictionalImpact;
 
-size_t rubbing_doubles(const System *s) {
+size_t frictional_impact_doubles(const System *s) {
     const size_t rows = (size_t)(s->contacts + 2 * s->frictions), m = (size_t)s->m, n = (size_t)s->n;
     return rows * rows + 3 * rows + 4 * m + 3 * n;
 }
 
-size_t rubbing_ints(const System *s) {
+size_t frictional_impact_ints(const System *s) {
     return (size_t)(s->contacts + 2 * s->frictions + s->frictions + s->m);
 }
 
 /* G_k^T times a number, added to the force. */
-static void add_row(const Rub *x, int k, double part) {
+static void add_row(const FrictionalImpact *x, int k, double part) {
     const System *s = x->s->system;
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
         x->force[s->entry_column[e]] += part * x->b->G[e];
 }
 
-/* Rows that press, frictions that are pressed; 0 if there are none. */
-static int find_struck_rows(Rub *x, const int *entering) {
+/* Rows that are struck, frictions that have a normal force of them; 0 if there are none. */
+static int find_struck_rows(FrictionalImpact *x, const int *entering) {
     const System *s = x->s->system;
     x->count = 0;
     for (int c = 0; c < s->contacts; c++)
@@ -49,16 +49,16 @@ static int find_struck_rows(Rub *x, const int *entering) {
     x->contacts = x->count;
     for (int i = 0; i < s->frictions; i++) {
         const Friction *law = &s->friction[i];
-        x->pressed[i] = 0;
+        x->loaded[i] = 0;
         for (int k = law->first; law->gated && k < law->first + law->normals; k++)
-            for (int r = 0; r < x->contacts; r++) x->pressed[i] |= x->rows[r] == s->press[k];
-        for (int r = 0; r < law->rows && x->pressed[i]; r++) x->rows[x->count++] = law->row[r];
+            for (int r = 0; r < x->contacts; r++) x->loaded[i] |= x->rows[r] == s->normal_row[k];
+        for (int r = 0; r < law->rows && x->loaded[i]; r++) x->rows[x->count++] = law->row[r];
     }
     return x->count > x->contacts;
 }
 
 /* Factors the rows that act with both signs; A and the free slip velocities of the others. */
-static Status reduce_rubbing(Rub *x, const int *entering, int *active, double *Lambda) {
+static Status reduce_frictional(FrictionalImpact *x, const int *entering, int *active, double *Lambda) {
     const System *s = x->s->system;
     Linear *l = &x->b->linear;
     system_active(s, entering, active);
@@ -86,21 +86,21 @@ static Status reduce_rubbing(Rub *x, const int *entering, int *active, double *L
 }
 
 /* A z + free + e s- of row i. */
-static double slip_after(const Rub *x, int i, const double *e) {
+static double slip_after(const FrictionalImpact *x, int i, const double *e) {
     double sum = x->free[i] + (i < x->contacts ? e[x->rows[i]] * x->slip[x->rows[i]] : 0);
     for (int j = 0; j < x->count; j++) sum += x->A[i * x->count + j] * x->z[j];
     return sum;
 }
 
 /* One friction: its impulses moved against the slip, and back into the cone. */
-static void rub(Rub *x, int i, int first, const double *e) {
+static void solve_cone(FrictionalImpact *x, int i, int first, const double *e) {
     const System *s = x->s->system;
     const Friction *law = &s->friction[i];
-    const struct Frictions *f = x->b->friction;
+    const struct FrictionForces *f = x->b->friction;
     double normal = 0, most = 0, length = 0, moved[2] = {0, 0};
     for (int k = law->first; k < law->first + law->normals; k++)
         for (int r = 0; r < x->contacts; r++)
-            if (x->rows[r] == s->press[k]) normal += f->c[k] * x->z[r];
+            if (x->rows[r] == s->normal_row[k]) normal += f->c[k] * x->z[r];
     for (int r = 0; r < law->rows; r++)
         most = fmax(most, x->A[(first + r) * x->count + first + r]);
     if (!(most > 0)) return;
@@ -112,19 +112,19 @@ static void rub(Rub *x, int i, int first, const double *e) {
 }
 
 /* The impulses; 0 if the sweeps do not arrive. */
-static int sweep(Rub *x, const double *e) {
+static int sweep(FrictionalImpact *x, const double *e) {
     const System *s = x->s->system;
     double change = HUGE_VAL, most = 0;
     memset(x->z, 0, (size_t)x->count * sizeof *x->z);
-    for (int round = 0; round < RUBBING_SWEEPS; round++) {
+    for (int round = 0; round < FRICTIONAL_SWEEPS; round++) {
         memcpy(x->before, x->z, (size_t)x->count * sizeof *x->z);
         for (int i = 0; i < x->contacts; i++) {
             const double own = x->A[i * x->count + i];
             if (own > 0) x->z[i] = fmax(0, x->z[i] - slip_after(x, i, e) / own);
         }
         for (int i = 0, first = x->contacts; i < s->frictions; i++) {
-            if (!x->pressed[i]) continue;
-            rub(x, i, first, e);
+            if (!x->loaded[i]) continue;
+            solve_cone(x, i, first, e);
             first += s->friction[i].rows;
         }
         change = most = 0;
@@ -132,13 +132,13 @@ static int sweep(Rub *x, const double *e) {
             change = fmax(change, fabs(x->z[i] - x->before[i]));
             most = fmax(most, fabs(x->z[i]));
         }
-        if (change <= RUBBING_CLOSE * most) break;
+        if (change <= FRICTIONAL_CLOSE * most) break;
     }
-    return change <= RUBBING_ROUGH * most;
+    return change <= FRICTIONAL_ROUGH * most;
 }
 
 /* Velocities and all impulses that go with z. */
-static Status finish_rubbing(Rub *x, double *dv, double *Lambda) {
+static Status finish_frictional(FrictionalImpact *x, double *dv, double *Lambda) {
     const System *s = x->s->system;
     memset(x->force, 0, (size_t)s->n * sizeof *x->force);
     for (int i = 0; i < x->count; i++) add_row(x, x->rows[i], x->z[i]);
@@ -150,14 +150,14 @@ static Status finish_rubbing(Rub *x, double *dv, double *Lambda) {
     return status;
 }
 
-Status rubbing(Solver *s, Instant at, const double *q, const double *v, const int *entering,
+Status frictional_impact(Solver *s, Instant at, const double *q, const double *v, const int *entering,
                const double *slip, double *e, Impulse plastic, Impulse found, int *done) {
     const System *system = s->system;
     const int rows = system->contacts + 2 * system->frictions, m = system->m;
-    Rub x = {.s = s, .b = &s->stepped, .rows = s->iwork_rub, .A = s->work_rub};
+    FrictionalImpact x = {.s = s, .b = &s->stepped, .rows = s->iwork_frictional, .A = s->work_frictional};
     int *active;
-    x.pressed = x.rows + rows;
-    active = x.pressed + system->frictions;
+    x.loaded = x.rows + rows;
+    active = x.loaded + system->frictions;
     x.free = x.A + rows * rows;
     x.z = x.free + rows;
     x.before = x.z + rows;
@@ -170,10 +170,10 @@ Status rubbing(Solver *s, Instant at, const double *q, const double *v, const in
     *done = 0;
     if (!find_struck_rows(&x, entering)) return OK;
     system->coulomb(at.t, q, v, at.u, at.p, x.b->friction->mu, x.b->friction->load, x.b->friction->c);
-    if (reduce_rubbing(&x, entering, active, plastic.Lambda) != OK) return FAILED;
+    if (reduce_frictional(&x, entering, active, plastic.Lambda) != OK) return FAILED;
     if (!sweep(&x, e)) return OK;
-    if (finish_rubbing(&x, found.dv, found.Lambda) != OK) return FAILED;
+    if (finish_frictional(&x, found.dv, found.Lambda) != OK) return FAILED;
     memset(e, 0, (size_t)m * sizeof *e);
     *done = sweep(&x, e);
-    return *done ? finish_rubbing(&x, plastic.dv, plastic.Lambda) : OK;
+    return *done ? finish_frictional(&x, plastic.dv, plastic.Lambda) : OK;
 }
