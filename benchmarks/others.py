@@ -8,7 +8,7 @@ is the tension of every rod at every 0.1 s; its error is the largest over sample
 largest tension, against a reference that shares no code with any of them (rods.py).  Printed are error and
 cost at each setting, then the costs at errors of 1e-3, 1e-6 and 1e-9, and the least error that was reached.
 A cost is the processor time of stepping and reading, in microseconds a simulated second; building the model
-is not counted.  Programs run interleaved, N rounds; medians.  What each does differently: benchmarks/RESULTS.md.
+is not counted.  Programs run interleaved, N rounds; medians.  What each does differently: RESULTS.md.
 Needs gcc for the C host.
 """
 
