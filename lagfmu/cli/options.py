@@ -18,7 +18,7 @@ Names = list[str] | None
 
 
 OUTPUTS = (
-    "Only these variables as outputs, e.g. lambda.surface,Q.* or 'der(x)'; all else is pruned."
+    "Only these variables as outputs, e.g. lambda.surface,Q.* or 'der(x)'; all else is removed."
 )
 FIXED = "Parameters that become numbers: m,g at the model's values, g=1.62 at another; * all."
 INPUTS = "Only these inputs are driven; the others keep their start values. '' for none."
@@ -47,7 +47,7 @@ Frictions = Annotated[Names, _option(FRICTIONS)]
 Methods = Annotated[Names, _option(METHODS)]
 Method = Annotated[
     str | None,
-    typer.Option(help="The integrator by default.", rich_help_panel="What the scene needs"),
+    typer.Option(help="The default method.", rich_help_panel="What the scene needs"),
 ]
 Formulation = Annotated[
     str | None,
@@ -66,7 +66,7 @@ AddOutput = Annotated[
     typer.Option(
         "--add-output",
         metavar="'NAME = EXPRESSION [UNIT]'",
-        help="An output besides those of the file, of the FMU's names: "
+        help="A further output, in the FMU's variable names: "
         "'tension = -2*L*lambda.rod \\[N]'; repeatable.",
         rich_help_panel="What the scene needs",
     ),
@@ -83,7 +83,7 @@ ErrorBars = Annotated[
     bool | None,
     typer.Option(
         "--error-bars",
-        help="Outputs error.NAME: an estimate of how far this run may be off. Co-simulation only.",
+        help="Outputs error.NAME: an estimate of how far a run is off. Co-simulation only.",
         rich_help_panel="What the scene needs",
     ),
 ]
@@ -106,14 +106,14 @@ Settings = Annotated[
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter or start value; repeatable."),
 ]
 JsonFile = Annotated[Path | None, typer.Option(help="Write everything as JSON.")]
-JunitFile = Annotated[Path | None, typer.Option(help="Write JUnit's XML, a suite an FMU.")]
+JunitFile = Annotated[Path | None, typer.Option(help="Write JUnit XML, one suite for each FMU.")]
 Tolerance = Annotated[
     float | None, typer.Option(help="Relative tolerance: speed against accuracy.")
 ]
 StopTime = Annotated[float | None, typer.Option(help="Stop time in s.")]
 StepSize = Annotated[float | None, typer.Option(help="Communication step in s.")]
 InputFile = Annotated[
-    Path | None, typer.Option("--input", help="CSV with a column time and one an input.")
+    Path | None, typer.Option("--input", help="CSV with a column time and one for each input.")
 ]
 
 

@@ -60,11 +60,11 @@ def build(
     ] = None,
     page_: Annotated[
         bool,
-        typer.Option("--page", help="Put the page in which the FMU runs into its documentation."),
+        typer.Option("--page", help="Put the live page into the FMU's documentation."),
     ] = False,
     sources: Annotated[
         bool,
-        typer.Option(help="Whether a native FMU carries its C files, to be compiled anew."),
+        typer.Option(help="Whether a native FMU carries its C sources."),
     ] = True,
     *,
     needs: Needs,

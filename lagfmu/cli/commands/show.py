@@ -21,7 +21,7 @@ def show(
 ) -> None:
     """Print equations of motion, classification of constraints, degrees of freedom and units.
 
-    Of a scene that needs less than everything, also what was pruned and what that saved.
+    For a scene that needs less than everything, print also what is removed and what that saves.
     """
     from ...errors import CannotStartError
     from ...page.text import show as show_prepared

@@ -22,12 +22,12 @@ def stress(
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Some of the probes only.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Half of the probes.")] = False,
     limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = LIMIT,
     json: JsonFile = None,
     junit: JunitFile = None,
 ) -> None:
-    """Push FMUs to the extremes: each row is right, refused with a clear message, or wrong."""
+    """Try FMUs at extreme values: each probe is right, refused with a reason, or wrong."""
     from ..finish import finish
     from ..stress import stress as probed
 

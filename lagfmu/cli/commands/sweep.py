@@ -35,12 +35,14 @@ def sweep(
             "truncnormal(mean, sd, low, high).",
         ),
     ] = None,
-    runs: Annotated[int | None, typer.Option(help="How many samples.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
+    runs: Annotated[int | None, typer.Option(help="Number of samples.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the samples.")] = 0,
     sampling: Annotated[str, typer.Option(help="latin-hypercube or sobol.")] = "latin-hypercube",
     rows: Annotated[
         Path | None,
-        typer.Option("--from", help="A .csv or .parquet file, a row a run under the names."),
+        typer.Option(
+            "--from", help="A .csv or .parquet file: a column for each name, a row for each run."
+        ),
     ] = None,
     keep: Annotated[
         list[str] | None,
@@ -72,10 +74,10 @@ def sweep(
     ] = None,
     timeout: Annotated[
         float | None,
-        typer.Option(help="A run that takes longer [s] is given up; its row says so."),
+        typer.Option(help="Time limit of one run in s; its row then has the status timeout."),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on where an interrupted sweep stopped.")
+        bool, typer.Option("--resume", help="Continue an interrupted sweep.")
     ] = False,
     figure: Annotated[
         Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")

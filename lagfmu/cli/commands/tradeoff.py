@@ -37,10 +37,9 @@ def tradeoff(
     json: JsonFile = None,
     junit: JunitFile = None,
 ) -> None:
-    """Measure the error of lambda against wall time, over methods and their tolerances.
+    """Measure the error of lambda and the wall time of each method and tolerance.
 
-    A closed form that is missed at a tolerance is marked in the table: a trade-off measures, it does not
-    judge.
+    The table marks a closed form that a setting misses; the exit code does not judge it.
     """
     from ..finish import finish
     from ..tradeoff import compare

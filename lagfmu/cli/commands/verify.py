@@ -33,20 +33,22 @@ def verify(
     tolerance: Tolerance = None,
     inputs: InputFile = None,
     reference: Annotated[
-        Path | None, typer.Option(help="CSV of a run that this one is held against besides.")
+        Path | None, typer.Option(help="CSV of reference results to compare with.")
     ] = None,
     rtol: Annotated[
         list[str] | None,
         typer.Option(
             metavar="RTOL|NAME=RTOL",
-            help="Allowed part of a reference column's largest value (default 1e-6); repeatable.",
+            help="Allowed error relative to a reference column's largest value (default 1e-6); repeatable.",
         ),
     ] = None,
-    atol: Annotated[float, typer.Option(help="Allowed besides, in the column's unit.")] = 0.0,
+    atol: Annotated[
+        float, typer.Option(help="Allowed absolute error, in the column's unit.")
+    ] = 0.0,
     json: JsonFile = None,
     junit: JunitFile = None,
 ) -> None:
-    """Simulate FMUs through fmpy and hold them against the closed forms that they carry.
+    """Simulate FMUs through fmpy and check them against their closed forms and a reference.
 
     The exit code is the largest of all FMUs'.
     """
