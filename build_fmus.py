@@ -1,4 +1,4 @@
-"""Build every model in models/ as an FMU of either target and verify each through fmpy.
+"""Build every model in models/ as an FMU of either target, where both can, and verify each through fmpy.
 
 One line an FMU, as soon as it is done: wall time of a simulated second in ms, and of all its closed
 forms the error that comes nearest to what is allowed.  All of them stand in OUT/verification.csv.
@@ -32,6 +32,7 @@ from lagfmu.api import package, settled
 from lagfmu.cli.terminal import prepare_streams
 from lagfmu.fmu.compiler import HOST
 from lagfmu.fmu.native import takes_long
+from lagfmu.fmu.python import refusals
 from lagfmu.fmu.target import NATIVE, PYTHON, TARGETS, missing_for_native
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import Prepared, prepare
@@ -46,7 +47,8 @@ load_once = cache(load)
 
 @dataclass(frozen=True)
 class Made:
-    """One FMU: where it stands and what it cost [s], or why it could not be built."""
+    """One FMU: where it stands and what it cost [s], or why it could not be built, or is `refused`: what of
+    its scene the python target does not do."""
 
     scene: str
     target: str
@@ -55,6 +57,7 @@ class Made:
     found: Verification | None = None
     seconds: float = 0.0
     error: str = ""
+    refused: str = ""
     notes: tuple[str, ...] = ()
 
 
@@ -72,8 +75,12 @@ def build_scene(
             warnings.simplefilter("always")
             try:
                 begun = time.perf_counter()
+                prepared = prepared or prepare(file.model, scene)
+                if target == PYTHON and (reasons := refusals(prepared)):
+                    made.append(Made(name, target, refused="; ".join(reasons)))
+                    continue
                 asked, choice = settled(file.model, scene, target)
-                if prepared is None or prepared.asked != asked:
+                if prepared.asked != asked:
                     prepared = prepare(file.model, asked)
                 folder, forms = out / target, file.closed_forms
                 fmu = package(prepared, folder, forms, target, platforms, choice, reference=True)
@@ -138,6 +145,7 @@ def main(
         console.print("the C runtime is compiled first")
     console.print(_line(width, "", "FMU", "target", "ms/s", "worst", "of"), style="bold")
     rows: list[tuple[str, ...]] = []
+    total = 0
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     shown = console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
@@ -145,6 +153,7 @@ def main(
         for scene in build_all(work, targets, out, places):
             for made in scene:
                 problems += _report(console, width, made)
+                total += not made.refused
                 rows += _rows(made)
             progress.advance(task)
     if rows:
@@ -153,9 +162,8 @@ def main(
         console.print(f"every statement: {file_of_all}", highlight=False, soft_wrap=True)
     for problem in problems:
         console.print(Text(f"FAIL {problem}", style="bold red"), soft_wrap=True)
-    if problems or not work:
+    if problems or not total:
         sys.exit(1)
-    total = len(work) * len(targets)
     count = f"all {total} FMUs in {out} hold" if total > 1 else f"the FMU in {out} holds"
     closed = "their closed forms" if total > 1 else "its closed forms"
     console.print(Text(f"{count} {closed}", style="green"), soft_wrap=True)
@@ -163,6 +171,10 @@ def main(
 
 def _report(console: Console, width: int, made: Made) -> list[str]:
     """Prints the line of one FMU and its notes; returns what is wrong with it."""
+    if made.refused:
+        line = _line(width, "", made.scene, made.target)
+        console.print(Text(f"{line}  refused: {made.refused}"), soft_wrap=True)
+        return []
     name, found = f"{made.target}/{made.scene}", made.found
     problems = [f"{name}: {made.error}"] if found is None else []
     notes = list(made.notes)

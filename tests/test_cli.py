@@ -425,9 +425,10 @@ def test_python_m_lagfmu_is_the_same_command():
 
 
 def test_build_fmus_prints_a_line_an_fmu(tmp_path):
-    """python build_fmus.py incline_disk --out DIR, from another folder: two FMUs of each target, each
-    with its verdict, its worst error and whose that is, within 80 columns; every statement in a file."""
-    command = [sys.executable, str(REPOSITORY / "build_fmus.py"), "incline_disk"]
+    """python build_fmus.py incline_disk belt --out DIR, from another folder: disks of each target and a block
+    that slips, which is native alone, each with its verdict, its worst error and whose that is, within 80
+    columns; every statement in a file."""
+    command = [sys.executable, str(REPOSITORY / "build_fmus.py"), "incline_disk", "belt"]
     command += ["--out", "out"]
     run = subprocess.run(
         command,
@@ -449,11 +450,13 @@ def test_build_fmus_prints_a_line_an_fmu(tmp_path):
     assert {r["verdict"] for r in rows} == {"pass"}
     for target in ("python", "native"):
         made = {p.stem for p in (tmp_path / "out" / target).glob("*.fmu")}
-        assert made == {"InclineDisk", "InclineDiskMinimal"}
+        assert made - {"Belt"} == {"InclineDisk", "InclineDiskMinimal"}
+        assert ("Belt" in made) == (target == "native")
     for name in made:
         assert name in run.stdout
+    assert re.search(r"Belt +python +refused: it does not slip \(friction 'grip'\)", run.stdout)
     assert "FAIL" not in run.stdout
-    assert "all 4 FMUs" in " ".join(run.stdout.split())
+    assert "all 5 FMUs" in " ".join(run.stdout.split())
 
 
 def test_build_fmus_fails_where_it_cannot_write(tmp_path):
