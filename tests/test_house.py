@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -171,6 +172,32 @@ def test_a_name_of_the_runtime_stands_in_one_file() -> None:
         for name in OWN_NAMES[0].findall(TOKENS.sub("", path.read_text(encoding="utf-8"))):
             places.setdefault(name, []).append(path.name)
     assert {name: files for name, files in places.items() if len(files) > 1} == {}
+
+
+DECLARED = re.compile(r"^SHARED[^;{]*;", re.MULTILINE)
+FUNCTION = re.compile(
+    r"^(?:static inline )?(?!static|typedef|return)(?:[A-Za-z]\w*[ *]+)+(\w+)\([^;{]*\) \{",
+    re.MULTILINE,
+)
+TAKEN = re.compile(r"(?<![\w.>])(\w+)\b(?=[(,;)}])")  # called, or handed on; no member
+
+
+def test_files_of_the_runtime_call_each_other_in_no_circle() -> None:
+    """Of two files that call each other neither can be read alone: what both need has an owner below them."""
+    texts: dict[str, str] = {}
+    owner: dict[str, str] = {}
+    for path in sorted(ROOT.joinpath("runtime").rglob("*.[ch]")):
+        text = DECLARED.sub("", TOKENS.sub("", path.read_text(encoding="utf-8")))
+        inline = "static inline " if path.suffix == ".c" else " "  # of a .c file: its own
+        own = [m for m in FUNCTION.finditer(text) if not m[0].startswith(inline)]
+        owner |= {m[1]: path.stem for m in own}
+        texts[path.stem] = texts.get(path.stem, "") + text
+    calls = {
+        stem: {owner[name] for name in TAKEN.findall(text) if name in owner} - {stem}
+        for stem, text in texts.items()
+    }
+    assert {"mechanism", "nominals"} <= calls["segment"]
+    TopologicalSorter(calls).prepare()  # CycleError names the files
 
 
 def test_values_that_files_of_the_runtime_share_are_defined_so() -> None:

@@ -1,49 +1,22 @@
-/* friction.c -- the equations of sliding,
- *
- *   M vdot = F - sum_f mu_f N_f d_f + G^T lambda ,  G vdot = gamma ,   d_f = G_t^T s/|s| ,
- *
- * with N = sign (load + c lambda) of the same instant, are linear: with (x0, lambda0) for F alone and
- * (x_f, lambda_f) for d_f alone, from the ladder of linear.c, lambda = lambda0 - sum_f mu_f N_f lambda_f and
- *
- *   (1 + A) N = sign (load + c lambda0) ,   A_fg = sign_f mu_g c_f lambda_g .
- *
- * 1 + A is G_n M^-1 (G_n^T - sign mu G_t^T s/|s|) over G_n M^-1 G_n^T; where it is not positive there is no
- * acceleration, or there are several (Painleve 1895; Genot & Brogliato 1999): refused by name. */
+/* friction.c -- Coulomb's law of a friction at one state: coefficients, normal force, slip velocity. */
 #include "friction.h"
 
-#include <string.h>
-
 #include "digits.h"
-#include "thresholds.h"
 
-static void layout_sliding(Mechanism *b, Arena *arena) {
+Status friction_coefficients(Mechanism *b, Instant at, const double *q, const double *v) {
     const System *s = b->system;
-    const int n = s->n, m = s->m, count = s->frictions;
-    struct FrictionForces *f = arena_take(arena, 1, sizeof *f), counted;
-    if (f == NULL) f = &counted; /* the pass that only counts */
-    f->stick_slip = NULL;
-    f->acting = arena_ints(arena, m);
-    f->loaded = arena_ints(arena, count);
-    f->mu = arena_doubles(arena, 2 * count);
-    f->load = arena_doubles(arena, count);
-    f->c = arena_doubles(arena, s->normal_rows);
-    f->normal = arena_doubles(arena, count);
-    f->slip = arena_doubles(arena, 2 * count);
-    f->tangential = arena_doubles(arena, 2 * count);
-    f->towards = arena_doubles(arena, 2 * count);
-    f->reserve = arena_doubles(arena, count);
-    f->sliding = arena_ints(arena, count);
-    f->d = arena_doubles(arena, n);
-    f->zero = arena_doubles(arena, m);
-    f->first = arena_doubles(arena, m);
-    f->right = arena_doubles(arena, count);
-    f->answer = arena_doubles(arena, count * n);
-    f->pushed = arena_doubles(arena, count * m);
-    f->A = arena_doubles(arena, count * count);
-    f->minor = arena_doubles(arena, count * count);
-    f->nonunique = arena_take(arena, nonunique_doubles(s), sizeof(double));
-    for (int k = 0; k < m && f->zero != NULL; k++) f->zero[k] = 0;
-    b->friction = f == &counted ? NULL : f;
+    struct FrictionForces *f = b->friction;
+    s->coulomb(at.t, q, v, at.u, at.p, f->mu, f->load, f->c);
+    for (int i = 0; i < s->frictions; i++) {
+        if (0 <= f->mu[2 * i + 1] && f->mu[2 * i + 1] <= f->mu[2 * i] && f->mu[2 * i] < HUGE_VAL)
+            continue;
+        return fail(b->why,
+                    "friction '%s' has the coefficients static = %s and kinetic = %s at t = %s s, "
+                    "expected 0 <= kinetic <= static",
+                    s->friction[i].name, digits(f->mu[2 * i]).text, digits(f->mu[2 * i + 1]).text,
+                    digits(at.t).text);
+    }
+    return OK;
 }
 
 void friction_slip(const Mechanism *b, int i, const double *v, double s[2]) {
@@ -73,162 +46,9 @@ void friction_heading(const StickSlip *mode, const double s[2], double e[2]) {
     e[1] = s[1] / length;
 }
 
-/* f->loaded for contacts and constraints that act as in `active`. */
-static void find_loaded(Mechanism *b, const int *active) {
-    const System *s = b->system;
-    for (int i = 0; i < s->frictions; i++) {
-        const Friction *law = &s->friction[i];
-        int on = !law->gated;
-        for (int k = law->first; k < law->first + law->normals; k++) on |= active[s->normal_row[k]];
-        b->friction->loaded[i] = on;
-    }
-}
-
-static const int *acting(Mechanism *b, const int *active) {
-    const System *s = b->system;
-    struct FrictionForces *f = b->friction;
-    find_loaded(b, active);
-    memcpy(f->acting, active, (size_t)s->m * sizeof *active);
-    for (int i = 0; i < s->frictions; i++)
-        for (int r = 0; r < s->friction[i].rows; r++)
-            f->acting[s->friction[i].row[r]] = f->loaded[i] && f->stick_slip[i].sticks;
-    return f->acting;
-}
-
-/* Coefficients at the state. */
-static Status find_law(Mechanism *b, Instant at, const double *q, const double *v) {
-    const System *s = b->system;
-    struct FrictionForces *f = b->friction;
-    s->coulomb(at.t, q, v, at.u, at.p, f->mu, f->load, f->c);
-    for (int i = 0; i < s->frictions; i++) {
-        if (0 <= f->mu[2 * i + 1] && f->mu[2 * i + 1] <= f->mu[2 * i] && f->mu[2 * i] < HUGE_VAL)
-            continue;
-        return fail(b->why,
-                    "friction '%s' has the coefficients static = %s and kinetic = %s at t = %s s, "
-                    "expected 0 <= kinetic <= static",
-                    s->friction[i].name, digits(f->mu[2 * i]).text, digits(f->mu[2 * i + 1]).text,
-                    digits(at.t).text);
-    }
-    return OK;
-}
-
-/* d = G_t^T e of friction i. */
-static void find_push(Mechanism *b, int i) {
-    const System *s = b->system;
-    struct FrictionForces *f = b->friction;
-    for (int j = 0; j < s->n; j++) f->d[j] = 0;
-    for (int r = 0; r < s->friction[i].rows; r++) {
-        const int k = s->friction[i].row[r];
-        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
-            f->d[s->entry_column[e]] += b->G[e] * f->towards[2 * i + r];
-    }
-}
-
-/* The normal forces of those that slip, and what they add to vdot and lambda. */
-static Status solve_sliding(Mechanism *b, double t, int count) {
-    const System *s = b->system;
-    struct FrictionForces *f = b->friction;
-    const int n = s->n, m = s->m;
-    for (int g = 0; g < count; g++) {
-        find_push(b, f->sliding[g]);
-        if (linear_solve(&b->linear, f->d, f->zero, f->answer + g * n, f->pushed + g * m) != OK)
-            return FAILED;
-    }
-    for (int h = 0; h < count; h++) {
-        const int i = f->sliding[h];
-        f->right[h] = f->stick_slip[i].sign * friction_normal(b, i, b->lambda);
-        for (int g = 0; g < count; g++) {
-            const double own = friction_normal(b, i, f->pushed + g * m) - f->load[i];
-            f->A[h * count + g] = f->stick_slip[i].sign * f->mu[2 * f->sliding[g] + 1] * own;
-        }
-        const double own = f->A[h * count + h];
-        const double least = s->friction[i].gated ? 1 + own : 1 - fabs(own);
-        if (!(least > PAINLEVE_SAFE)) return painleve_paradox(b, t, &i, 1, least);
-        f->A[h * count + h] += 1;
-    }
-    memcpy(f->minor, f->A, (size_t)(count * count) * sizeof *f->A);
-    const double determinant = painleve_eliminate(count, f->A, f->right);
-    if (!(determinant > PAINLEVE_SAFE)) return painleve_paradox(b, t, f->sliding, count, determinant);
-    for (int g = 0; g < count; g++) {
-        const int i = f->sliding[g];
-        const double strength = f->mu[2 * i + 1] * f->right[g];
-        f->normal[i] = f->right[g];
-        for (int j = 0; j < n; j++) b->vdot[j] -= strength * f->answer[g * n + j];
-        for (int k = 0; k < m; k++) b->lambda[k] -= strength * f->pushed[g * m + k];
-    }
-    for (int g = 0; g < count; g++) {
-        const int i = f->sliding[g];
-        for (int r = 0; r < s->friction[i].rows; r++)
-            b->lambda[s->friction[i].row[r]] =
-                -f->mu[2 * i + 1] * f->normal[i] * f->towards[2 * i + r];
-    }
-    return painleve_departures(b, t, count, determinant);
-}
-
-static double tangential(const Mechanism *b, int i, const double *lambda, double force[2]) {
+double friction_tangential(const Mechanism *b, int i, const double *lambda, double force[2]) {
     const Friction *law = &b->system->friction[i];
     force[1] = 0;
     for (int r = 0; r < law->rows; r++) force[r] = lambda[law->row[r]];
     return length_of(force);
 }
-
-/* Are the multipliers of a friction that sticks the only ones? */
-static int is_unique(const Mechanism *b, int i) {
-    const Friction *law = &b->system->friction[i];
-    int all = 1;
-    for (int r = 0; r < law->rows; r++) all &= b->linear.unique[law->row[r]];
-    return all;
-}
-
-/* Normal force and reserve of those that stick. */
-static void find_reserves(Mechanism *b) {
-    const System *s = b->system;
-    struct FrictionForces *f = b->friction;
-    const double *best = b->lambda;
-    int unique = 1;
-    for (int i = 0; i < s->frictions; i++)
-        if (f->loaded[i] && f->stick_slip[i].sticks) unique &= is_unique(b, i);
-    if (!unique) {
-        nonunique_best(b, f->first);
-        best = f->first;
-    }
-    for (int i = 0; i < s->frictions; i++) {
-        double force[2];
-        f->reserve[i] = 0;
-        if (!f->loaded[i] || !f->stick_slip[i].sticks) continue;
-        f->normal[i] = fabs(friction_normal(b, i, b->lambda));
-        const double held = f->mu[2 * i] * fabs(friction_normal(b, i, best));
-        const double asked = tangential(b, i, best, force);
-        if (held + asked > 0) f->reserve[i] = (held - asked) / (held + asked);
-    }
-}
-
-static Status motion_with_friction(Mechanism *b, Instant at, const double *q, const double *v,
-                                   const int *active) {
-    const System *s = b->system;
-    struct FrictionForces *f = b->friction;
-    int sliding = 0, sticking = 0;
-    if (find_law(b, at, q, v) != OK) return FAILED;
-    if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
-    if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) != OK) return FAILED;
-    for (int i = 0; i < s->frictions; i++) {
-        f->normal[i] = f->reserve[i] = 0;
-        friction_slip(b, i, v, f->slip + 2 * i);
-        if (!f->loaded[i]) continue;
-        sticking |= f->stick_slip[i].sticks;
-        if (f->stick_slip[i].sticks) continue;
-        friction_heading(&f->stick_slip[i], f->slip + 2 * i, f->towards + 2 * i);
-        f->sliding[sliding++] = i;
-    }
-    if (sliding > 0 && solve_sliding(b, at.t, sliding) != OK) return FAILED;
-    if (b->stage) return OK;
-    if (sticking) find_reserves(b);
-    for (int i = 0; i < s->frictions; i++) tangential(b, i, b->lambda, f->tangential + 2 * i);
-    return OK;
-}
-
-static int unique_normal(Mechanism *b, int i) {
-    return !b->friction->loaded[i] || normal_is_unique(b, i);
-}
-
-SHARED_VALUE const Sliding SLIDING = {layout_sliding, acting, motion_with_friction, unique_normal};

@@ -40,14 +40,18 @@ struct FrictionForces {
     double *nonunique;   /* of nonunique.c */
 };
 
-/* What a Mechanism with frictions does besides (optional.h); NULL in an FMU without. */
+/* sliding.c -- what a Mechanism with frictions does besides (optional.h); NULL in an FMU without. */
 SHARED const Sliding SLIDING;
 
 /* G_t v - nu_t of friction i at the state that was evaluated last. */
 SHARED void friction_slip(const Mechanism *b, int i, const double *v, double s[2]);
 
-/* load + c lambda of friction i. */
+/* mu, load and c at a state.  FAILED if they are no coefficients of friction. */
+SHARED Status friction_coefficients(Mechanism *b, Instant at, const double *q, const double *v);
+
+/* load + c lambda of friction i; its tangential multipliers, and their length. */
 SHARED double friction_normal(const Mechanism *b, int i, const double *lambda);
+SHARED double friction_tangential(const Mechanism *b, int i, const double *lambda, double force[2]);
 
 /* The unit vector of the slip velocity s; beyond a stop it goes on as before, so that the equations of a
  * segment stay smooth there. */

@@ -88,6 +88,20 @@ Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double 
     return FAILED;
 }
 
+void mechanism_at_work(const Mechanism *b, double *forces, double *reach) {
+    const System *s = b->system;
+    for (int j = 0; j < s->n; j++) {
+        forces[j] = fabs(b->F[j]);
+        reach[j] = fabs(b->vdot[j]);
+    }
+    for (int e = 0; e < s->entries; e++)
+        forces[s->entry_column[e]] += fabs(b->G[e] * b->lambda[s->entry_row[e]]);
+    for (int e = 0; e < s->masses; e++) {
+        const int j = s->mass_row[e];
+        if (s->mass_column[e] == j && b->M[e] > 0) reach[j] = fmax(reach[j], forces[j] / b->M[e]);
+    }
+}
+
 /* The largest |f - offset| of the rows, relative to the terms of G size. */
 static Status find_off(Mechanism *b, Instant at, const double *q, const int *active,
                        const double *offset, const double *size, double *off) {

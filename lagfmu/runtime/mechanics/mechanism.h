@@ -88,6 +88,10 @@ SHARED Status mechanism_motion(Mechanism *b, Instant at, const double *q, const 
 SHARED Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
                                     const int *active, const double *offset, const double *size);
 
+/* Of the latest motion, for each coordinate all forces at work (n), those of constraint included, and its
+ * acceleration, or the one that these could give it if they did not balance: what |vdot| is the rounding of. */
+SHARED void mechanism_at_work(const Mechanism *b, double *forces, double *reach);
+
 /* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
  * v are moved in place.  For states that are nearly consistent; initial.c deals with the others.
  * `size` (n) are the coordinates' magnitudes, which say what rounding is.  On failure q and v are

@@ -16,14 +16,6 @@
 
 enum { NONE = -1 };
 
-/* For each coordinate all forces at work (n), those of constraint included. */
-static void forces_at_work(const Mechanism *b, double *forces) {
-    const System *s = b->system;
-    for (int j = 0; j < s->n; j++) forces[j] = fabs(b->F[j]);
-    for (int e = 0; e < s->entries; e++)
-        forces[s->entry_column[e]] += fabs(b->G[e] * b->lambda[s->entry_row[e]]);
-}
-
 /* The multiplier with which row k would carry all forces alone.  FAILED: a double does not hold it. */
 static Status find_force_scale(Solver *solver, int k, const double *forces, double *scale) {
     const Mechanism *b = &solver->stepped;
@@ -42,17 +34,6 @@ static Status find_force_scale(Solver *solver, int k, const double *forces, doub
     return OK;
 }
 
-/* For each coordinate its acceleration, or the one that the forces at work could give it if they
- * did not balance: what |vdot| is the rounding of. */
-static void accelerations_of_forces(const Mechanism *b, const double *forces, double *reach) {
-    const System *s = b->system;
-    for (int j = 0; j < s->n; j++) reach[j] = fabs(b->vdot[j]);
-    for (int e = 0; e < s->masses; e++) {
-        int j = s->mass_row[e];
-        if (s->mass_column[e] == j && b->M[e] > 0) reach[j] = fmax(reach[j], forces[j] / b->M[e]);
-    }
-}
-
 /* The contact whose mode contradicts the accelerations most; NONE if none does. */
 static Status most_wrong(Solver *s, Instant at, const double *q, const double *v, const int *modes,
                          const int *touching, const int *departing, int *found) {
@@ -62,8 +43,7 @@ static Status most_wrong(Solver *s, Instant at, const double *q, const double *v
     *found = NONE;
     system_active(s->system, modes, active);
     if (mechanism_motion(b, at, q, v, active) == FAILED) return FAILED;
-    forces_at_work(b, forces);
-    accelerations_of_forces(b, forces, reach);
+    mechanism_at_work(b, forces, reach);
     for (int c = 0; c < s->system->contacts; c++) {
         int k = s->system->contact[c];
         if (modes[c]) {

@@ -50,3 +50,10 @@ Status solver_look(Solver *s) {
     s->state.looking = 0;
     return status;
 }
+
+void solver_inputs_changed(Solver *s) {
+    Numbers *now = &s->state.now;
+    now->ahead = 0;
+    now->event_count = 0;
+    now->fresh = 1;
+}

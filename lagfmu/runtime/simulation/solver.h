@@ -75,7 +75,7 @@ static inline const int *solver_rows(const Solver *s) {
     return s->state.now.dependent ? s->state.basis : s->active;
 }
 
-/* Takes all memory of the solver: what must be saved from `saved`, the rest from `scratch`.  Of
+/* layout.c -- takes all memory of the solver: what must be saved from `saved`, the rest from `scratch`.  Of
  * `saved` the first state.block_size bytes are the state's arrays; the drive and p follow.  To be
  * called once with arenas that count (base = NULL) and once with memory. */
 SHARED void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system);
@@ -107,6 +107,9 @@ SHARED Status solver_follow(Solver *s);
 /* The same, with nothing counted, for a caller that then puts the saved state back. */
 SHARED Status solver_look(Solver *s);
 
+/* The inputs were set: what was integrated ahead with the old ones is dropped. */
+SHARED void solver_inputs_changed(Solver *s);
+
 /* q and v at the communication point, where they are still to be found (on_demand).  FAILED: they cannot
  * be projected onto the constraints. */
 SHARED Status solver_arrive(Solver *s);
@@ -114,9 +117,6 @@ SHARED Status solver_arrive(Solver *s);
 /* The same where the integrator has been beyond t_end already, and q and v there are found on demand: nothing
  * is left to do, and nothing can fail.  0: it has not been there, and nothing was done. */
 SHARED int solver_pass(Solver *s, double t_end);
-
-/* The inputs were set: what was integrated ahead with the old ones is dropped. */
-SHARED void solver_inputs_changed(Solver *s);
 
 SHARED void observed_layout(Observed *o, Arena *arena, const System *system);
 

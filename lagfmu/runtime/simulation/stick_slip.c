@@ -85,25 +85,6 @@ static void aim(Settling *x, int i) {
         x->guess[2 * i + r] = length > 0 ? -force[r] / length : x->modes[i].direction[r];
 }
 
-/* (n) For each coordinate its acceleration, or the one that the forces at work could give it if they did not
- * balance. */
-static const double *accelerations_at_work(const Settling *x) {
-    const Mechanism *b = &x->s->stepped;
-    const System *s = b->system;
-    double *forces = x->s->work_contacts, *reach = forces + s->n;
-    for (int j = 0; j < s->n; j++) {
-        forces[j] = fabs(b->F[j]);
-        reach[j] = fabs(b->vdot[j]);
-    }
-    for (int e = 0; e < s->entries; e++)
-        forces[s->entry_column[e]] += fabs(b->G[e] * b->lambda[s->entry_row[e]]);
-    for (int e = 0; e < s->masses; e++) {
-        const int j = s->mass_row[e];
-        if (s->mass_column[e] == j && b->M[e] > 0) reach[j] = fmax(reach[j], forces[j] / b->M[e]);
-    }
-    return reach;
-}
-
 /* G vdot - gamma of row k, in the motion that was evaluated last, and what of it is rounding. */
 static double rate_of_row(const Mechanism *b, int k, const double *reach, double *floor) {
     *floor = FRICTION_BACK * (fabs(b->gamma[k]) + mechanism_row_size(b, k, reach));
@@ -114,7 +95,8 @@ static double rate_of_row(const Mechanism *b, int k, const double *reach, double
 static Status find_slip_rate(Settling *x, int i, double rate[2], double *floor) {
     const Friction *law = &x->s->system->friction[i];
     if (motion_of_modes(x) != OK) return FAILED;
-    const double *reach = accelerations_at_work(x);
+    double *forces = x->s->work_contacts, *reach = forces + x->s->system->n;
+    mechanism_at_work(&x->s->stepped, forces, reach);
     rate[1] = *floor = 0;
     for (int r = 0; r < law->rows; r++) {
         double own;
@@ -366,7 +348,8 @@ static int turn_contacts(const System *s, int i, int shut, int *closed, const in
 static int departs(const Settling *x, int i, const int *touching) {
     const System *s = x->s->system;
     const Friction *law = &s->friction[i];
-    const double *reach = accelerations_at_work(x);
+    double *forces = x->s->work_contacts, *reach = forces + x->s->system->n;
+    mechanism_at_work(&x->s->stepped, forces, reach);
     for (int c = 0; c < s->contacts; c++)
         for (int k = law->first; k < law->first + law->normals; k++) {
             double floor;

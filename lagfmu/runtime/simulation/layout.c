@@ -1,4 +1,4 @@
-/* solver.c -- the memory of a simulation, taken in two passes (arena.h). */
+/* layout.c -- the memory of a simulation, taken in two passes (arena.h). */
 #include "solver.h"
 
 #include "event_search.h"
@@ -89,13 +89,6 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_switch = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + n);
     s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(n, m, contacts));
     s->iwork_impact = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));
-}
-
-void solver_inputs_changed(Solver *s) {
-    Numbers *now = &s->state.now;
-    now->ahead = 0;
-    now->event_count = 0;
-    now->fresh = 1;
 }
 
 void observed_layout(Observed *o, Arena *arena, const System *system) {
