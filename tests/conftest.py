@@ -2,7 +2,7 @@
 
 How builds and runs are shared:
 
-- `python_fmu`, `native_fmu`, `fmu` (both targets), `library`, `prepared`, `playable`, `page_file`: models/;
+- `native_fmu`, `python_fmu`, `fmu` (both), `library`, `prepared`, `playable`, `page_file`: models/;
   a model of a test's own is built in a fixture of its module;
 - `shared_folder` with `once(folder, make)` of once.py, for what tests in several files build;
 - `objects` and `compile_library` of runtime.py: the runtime's C files, compiled once for what they hold, also
@@ -10,8 +10,8 @@ How builds and runs are shared:
 - `simulate_fmu` of runs.py: an FMU that runs many times is unpacked once.
 
 What is no fact about one model, but about what lagfmu makes of any, is tried on one of each kind (KINDS).
-What both targets tell alike is told by native in every case, and in files or tests that are marked
-`python_cases(n)` by python in n of them, spread over all.
+What an FMU tells is told by native FMUs; the python target is tried by the contract, by what it refuses, by
+its states, and against native on every scene (test_targets_agree.py).
 """
 
 from __future__ import annotations
@@ -66,24 +66,6 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
 # one of each kind: forces alone, multipliers eliminated, a contact and velocities, an input, a table and an
 # output and a prescribed motion, nothing left to integrate by rows
 KINDS = ("PendulumAngle", "Hemisphere", "KnifeEdge", "CartPendulum", "HalfCar", "BouncingBall")
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Of the cases of a test that is marked python_cases(n), n run in python."""
-    cases: dict[str, list[pytest.Item]] = {}
-    for item in items:
-        marker, call = item.get_closest_marker("python_cases"), getattr(item, "callspec", None)
-        if marker is not None and call is not None and call.params.get("target") == "python":
-            cases.setdefault(item.nodeid.split("[")[0], []).append(item)
-    gone: set[pytest.Item] = set()
-    for found in cases.values():
-        marker = found[0].get_closest_marker("python_cases")
-        assert marker is not None
-        most, last = marker.args[0], len(found) - 1
-        kept = {round(k * last / max(most - 1, 1)) for k in range(min(most, len(found)))}
-        gone |= {item for k, item in enumerate(found) if k not in kept}
-    config.hook.pytest_deselected(items=[item for item in items if item in gone])
-    items[:] = [item for item in items if item not in gone]
 
 
 @pytest.fixture(scope="session")
@@ -152,15 +134,9 @@ def library(native_fmu: Fmu, tmp_path_factory: pytest.TempPathFactory) -> Callab
 
 
 @pytest.fixture(scope="session", params=["python", "native"])
-def target(request: pytest.FixtureRequest) -> str:
-    """What holds for an FMU holds for both targets."""
-    return str(request.param)
-
-
-@pytest.fixture(scope="session")
-def fmu(target: str, request: pytest.FixtureRequest) -> Fmu:
-    """fmu(NAME): path of the FMU of the present target."""
-    made: Fmu = request.getfixturevalue(f"{target}_fmu")
+def fmu(request: pytest.FixtureRequest) -> Fmu:
+    """fmu(NAME): path of the FMU of either target: for what each has code of its own for."""
+    made: Fmu = request.getfixturevalue(f"{request.param}_fmu")
     return made
 
 

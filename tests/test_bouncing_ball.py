@@ -7,8 +7,6 @@ import pytest
 from instance import instance
 from runs import simulate_fmu
 
-pytestmark = pytest.mark.python_cases(3)
-
 G = 9.81
 CASES = {  # m [kg], e, h [m], v0 [m/s]
     "dropped": (1.0, 0.7, 1.0, 0.0),
@@ -41,14 +39,14 @@ def start(case):
 
 @EVERY
 @pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 2e-9)])
-def test_every_parabola_is_where_the_bounces_put_it(fmu, case, tolerance, allowed):
+def test_every_parabola_is_where_the_bounces_put_it(native_fmu, case, tolerance, allowed):
     """The ball leaves the floor with w, e w, e^2 w, ... at t1, t1 + 2 e w/g, ...: between two bounces it
     flies y = v tau - g tau^2/2, and after all of them it lies.  (It rests as soon as it would rise by
     1e-9 of its first height.)"""
     times, speeds, end = bounces(case)
     stop = 1.2 * end
     result = simulate_fmu(
-        str(fmu("BouncingBall")),
+        str(native_fmu("BouncingBall")),
         stop_time=stop,
         output_interval=stop / 400,
         step_size=stop / 400,
@@ -67,7 +65,7 @@ def test_every_parabola_is_where_the_bounces_put_it(fmu, case, tolerance, allowe
 
 
 @EVERY
-def test_it_rests_when_the_bounces_have_accumulated(fmu, case):
+def test_it_rests_when_the_bounces_have_accumulated(native_fmu, case):
     """All the bounces are over at t1 + 2 e w/(g (1 - e)), for a drop sqrt(2 h/g)(1 + e)/(1 - e); just
     before the ball is still bouncing, just after it lies with lambda = m g, and so ever after."""
     m, e, h, v0 = case
@@ -77,7 +75,7 @@ def test_it_rests_when_the_bounces_have_accumulated(fmu, case):
     # it rests once v^2/(2 g) is 1e-9 of the coordinate's size; the rest of the bounces would have taken
     size = h or 1.0
     early = 2 * np.sqrt(2e-9 * size / G) / (1 - e) + 1e-8 * end
-    with instance(fmu("BouncingBall")) as one:
+    with instance(native_fmu("BouncingBall")) as one:
         one.start(start(case), tolerance=1e-10)
         one.step(end - 1.01 * early)
         assert not one.get("contact.floor")
@@ -92,21 +90,24 @@ def test_it_rests_when_the_bounces_have_accumulated(fmu, case):
 
 
 @pytest.mark.parametrize("points", [1, 30, 1000])
-def test_infinitely_many_bounces_fit_into_one_communication_step(fmu, points):
+def test_infinitely_many_bounces_fit_into_one_communication_step(native_fmu, points):
     """Rest is reached whether the whole run is one communication step or a thousand."""
     result = simulate_fmu(
-        str(fmu("BouncingBall")), stop_time=5.0, output_interval=5 / points, step_size=5 / points
+        str(native_fmu("BouncingBall")),
+        stop_time=5.0,
+        output_interval=5 / points,
+        step_size=5 / points,
     )
     assert result["contact.floor"][-1]
     assert result["y"][-1] == 0
     assert result["lambda.floor"][-1] == pytest.approx(9.81, rel=1e-14)
 
 
-def test_each_bounce_keeps_e_squared_of_the_energy(fmu):
+def test_each_bounce_keeps_e_squared_of_the_energy(native_fmu):
     """Between the bounces the energy is m g h e^2k, falling in steps that all have the ratio e^2."""
     e = 0.8
     result = simulate_fmu(
-        str(fmu("BouncingBall")),
+        str(native_fmu("BouncingBall")),
         stop_time=3.0,
         output_interval=1e-2,
         relative_tolerance=1e-12,
@@ -119,10 +120,10 @@ def test_each_bounce_keeps_e_squared_of_the_energy(fmu):
     assert (np.diff(levels) >= 0).all()
 
 
-def test_an_elastic_ball_bounces_for_ever(fmu):
+def test_an_elastic_ball_bounces_for_ever(native_fmu):
     """With e = 1 the bounces never end: after a hundred of them the ball is at the height it fell from."""
     period = 2 * np.sqrt(2 / G)
-    with instance(fmu("BouncingBall")) as one:
+    with instance(native_fmu("BouncingBall")) as one:
         one.start({"e": 1.0}, tolerance=1e-12)
         one.step(100 * period)
         assert one.get("y") == pytest.approx(1.0, abs=1e-8)

@@ -8,8 +8,6 @@ from instance import instance
 from runs import simulate_fmu
 from scipy.integrate import romb
 
-pytestmark = pytest.mark.python_cases(3)
-
 DEFAULT = {"M": 2.0, "m": 1.0, "g": 9.81, "L": 1.0}
 LIGHT = {"M": 0.05, "m": 0.7, "g": 3.7, "L": 0.3}
 HEAVY = {"M": 20.0, "m": 3.0, "g": 9.81, "L": 2.0}
@@ -61,12 +59,12 @@ def varying_force(count, scale):
 @pytest.mark.parametrize(
     ("world", "friction"), [(DEFAULT, 0.0), (LIGHT, 0.0), (DEFAULT, 0.4), (HEAVY, 5.0)]
 )
-def test_energy_changes_by_the_work_of_the_force_and_of_friction(fmu, world, friction):
+def test_energy_changes_by_the_work_of_the_force_and_of_friction(native_fmu, world, friction):
     """E(t) - E(0) = sum F_k (s_k+1 - s_k) - integral of c s'^2 while the force jumps at communication
     points: the rod's force does no work."""
     count = 12 * HOLD
     force = varying_force(count, 3 * world["m"] * world["g"])
-    result = run(fmu("CartPendulum"), {**start(world), "c": friction}, force, count)
+    result = run(native_fmu("CartPendulum"), {**start(world), "c": friction}, force, count)
     work = np.concatenate([[0.0], np.cumsum(force * np.diff(result["s"]))])[::HOLD]
     rate = result["der(s)"] ** 2  # smooth while the force is held: Romberg's rule
     lost = [romb(rate[k : k + HOLD + 1], dx=STEP) for k in range(0, count, HOLD)]
@@ -79,10 +77,10 @@ def test_energy_changes_by_the_work_of_the_force_and_of_friction(fmu, world, fri
 
 
 @WORLDS
-def test_a_free_cart_keeps_the_momentum(fmu, world):
+def test_a_free_cart_keeps_the_momentum(native_fmu, world):
     """With c = 0 and F = 0 nothing pushes sideways: M s' + m x' is constant, and so is the energy."""
     values = {**start(world, 2.5, v=0.7, spin=-4.0), "c": 0.0}
-    result = run(fmu("CartPendulum"), values)
+    result = run(native_fmu("CartPendulum"), values)
     p = world["M"] * result["der(s)"] + world["m"] * result["der(x)"]
     size = np.abs(world["m"] * result["der(x)"]).max()
     assert np.abs(p - p[0]).max() < 1e-13 * size
@@ -92,11 +90,11 @@ def test_a_free_cart_keeps_the_momentum(fmu, world):
 
 
 @WORLDS
-def test_force_and_friction_change_the_momentum(fmu, world):
+def test_force_and_friction_change_the_momentum(native_fmu, world):
     """d/dt (M s' + m x' + c s) = F: the impulse of the force arrives in full, whatever the rod does."""
     count = 12 * HOLD
     force = varying_force(count, world["m"] * world["g"])
-    result = run(fmu("CartPendulum"), {**start(world), "c": 0.4}, force, count)
+    result = run(native_fmu("CartPendulum"), {**start(world), "c": 0.4}, force, count)
     p = world["M"] * result["der(s)"] + world["m"] * result["der(x)"] + 0.4 * result["s"]
     impulse = STEP * np.concatenate([[0.0], np.cumsum(force)])
     assert np.abs(p - p[0] - impulse).max() < 1e-11 * np.abs(p).max()
@@ -112,10 +110,10 @@ def expected_multiplier(result, world, force, friction):
 
 
 @WORLDS
-def test_lambda_of_a_driven_cart(fmu, world):
+def test_lambda_of_a_driven_cart(native_fmu, world):
     """lambda = -T/(2 L) follows from the state and the force alone; the rod keeps its length."""
     force = 2 * world["m"] * world["g"]
-    result = run(fmu("CartPendulum"), {**start(world), "F": force, "c": 0.3}, count=200)
+    result = run(native_fmu("CartPendulum"), {**start(world), "F": force, "c": 0.3}, count=200)
     expected = expected_multiplier(result, world, force, 0.3)
     assert np.abs(result["lambda.rod"] - expected).max() < 1e-12 * np.abs(expected).max()
     length = np.hypot(result["x"] - result["s"], result["y"])
@@ -123,11 +121,11 @@ def test_lambda_of_a_driven_cart(fmu, world):
     assert (np.abs(length - world["L"]) < rounding).all()
 
 
-def test_a_new_force_is_felt_before_the_next_step(fmu):
+def test_a_new_force_is_felt_before_the_next_step(native_fmu):
     """Accelerations, lambda and Q belong to the force that is set now: a push of F on the cart changes
     them at once, with no step in between, while positions and velocities stay."""
     world, friction = DEFAULT, 0.1
-    with instance(fmu("CartPendulum")) as one:
+    with instance(native_fmu("CartPendulum")) as one:
         one.start({**start(world, 0.8, v=0.5, spin=1.0), "c": friction})
         one.step(0.3)
         still = ("s", "x", "y", "der(s)", "der(x)", "der(y)", "energy.kinetic")
@@ -149,9 +147,9 @@ def test_a_new_force_is_felt_before_the_next_step(fmu):
         assert one.outputs() == before
 
 
-def test_a_force_before_the_start_is_felt_at_the_start(fmu):
+def test_a_force_before_the_start_is_felt_at_the_start(native_fmu):
     """At rest with the rod hanging down, a force F gives the cart F/M at once and the bob nothing."""
-    with instance(fmu("CartPendulum")) as one:
+    with instance(native_fmu("CartPendulum")) as one:
         one.start({**start(DEFAULT, 0.0), "F": 6.0})
         assert one.get("der(s,2)") == pytest.approx(3.0, rel=1e-14)
         assert one.get("der(x,2)") == pytest.approx(0.0, abs=1e-14)

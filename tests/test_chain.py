@@ -15,8 +15,6 @@ from scipy.special import roots_laguerre
 from lagfmu import derive, simulate
 from lagfmu.testing import Form, lower
 
-pytestmark = pytest.mark.python_cases(3)
-
 FILE = Path(__file__).parent.parent / "models" / "chain.py"
 G, MASS, LENGTH = 9.81, 0.1, 0.25
 
@@ -47,9 +45,9 @@ def hang(path, angles, stop, points=1, tolerance=1e-12):
     )
 
 
-def test_at_rest_every_link_carries_what_hangs_below_it(fmu):
+def test_at_rest_every_link_carries_what_hangs_below_it(native_fmu):
     """Hanging straight down the tension of link k is (n - k + 1) m g: lambda = -T/(2 l)."""
-    result = hang(fmu("Chain"), np.zeros(4), 1.0, 5)
+    result = hang(native_fmu("Chain"), np.zeros(4), 1.0, 5)
     for k in range(1, 5):
         tension = (4 - k + 1) * MASS * G
         np.testing.assert_allclose(
@@ -78,18 +76,18 @@ def mode(n, j):
 
 
 @pytest.mark.parametrize("j", range(4))
-def test_small_oscillations_have_the_frequencies_of_laguerre(fmu, j):
+def test_small_oscillations_have_the_frequencies_of_laguerre(native_fmu, j):
     """Hung from one end, n equal bobs have the modes x_k = L_n-k(z) with w^2 = z g/l, L_n(z) = 0: after
     half a period all are on the other side, after a whole one where they were."""
     z, angles = mode(4, j)
     period = 2 * np.pi / np.sqrt(z * G / LENGTH)
-    result = hang(fmu("Chain"), 1e-5 * angles / np.abs(angles).max(), 2 * period, 4)
+    result = hang(native_fmu("Chain"), 1e-5 * angles / np.abs(angles).max(), 2 * period, 4)
     for k in range(1, 5):
         x = result[f"x{k}"]
         np.testing.assert_allclose(x, x[0] * np.array([1, -1, 1, -1, 1]), atol=3e-8 * LENGTH * 1e-2)
 
 
-def test_the_chain_in_angles_moves_the_same(fmu):
+def test_the_chain_in_angles_moves_the_same(native_fmu):
     """m l sum_j min(n-j, n-k) (cos(a_k - a_j) a_j'' + sin(a_k - a_j) a_j'^2) + (n-k) m g sin a_k = 0 for
     the absolute angles, j, k = 0, ..., n - 1, integrated alone: the same bobs."""
     n = 4
@@ -108,15 +106,15 @@ def test_the_chain_in_angles_moves_the_same(fmu):
     found = solve_ivp(rhs, (0, 1.5), start, "DOP853", t_eval=times, rtol=1e-13, atol=1e-13)
     x = np.cumsum(LENGTH * np.sin(found.y[:n]), axis=0)
     y = np.cumsum(-LENGTH * np.cos(found.y[:n]), axis=0)
-    result = hang(fmu("Chain"), np.full(n, 1.0), 1.5, 15)
+    result = hang(native_fmu("Chain"), np.full(n, 1.0), 1.5, 15)
     for k in range(n):
         assert np.abs(result[f"x{k + 1}"] - x[k]).max() < 1e-8
         assert np.abs(result[f"y{k + 1}"] - y[k]).max() < 1e-8
 
 
-def test_the_energy_stays_and_the_links_keep_their_length(fmu):
+def test_the_energy_stays_and_the_links_keep_their_length(native_fmu):
     """Over ten seconds of a motion without any order the energy and the lengths stay."""
-    result = hang(fmu("Chain"), np.full(4, 1.0), 10.0, 100)
+    result = hang(native_fmu("Chain"), np.full(4, 1.0), 10.0, 100)
     energy = result["energy.total"]
     assert np.abs(energy - energy[0]).max() < 1e-9 * 10 * MASS * G * LENGTH
     for k in range(1, 5):

@@ -139,10 +139,19 @@ def test_show_takes_one_scene():
     assert "PendulumCartesian, PendulumAngle, PendulumNullspace" in text
 
 
-def test_verify_obeys_changed_parameters_and_settings(fmu):
+def test_verify_obeys_changed_parameters_and_settings(native_fmu):
     """The closed forms follow --set; tolerance, stop time and step size are passed on."""
     text = lagfmu(
-        *("verify", fmu("Hemisphere"), "--set", "theta=0.3", "--set", "g=3.7", "--set", "m=2"),
+        *(
+            "verify",
+            native_fmu("Hemisphere"),
+            "--set",
+            "theta=0.3",
+            "--set",
+            "g=3.7",
+            "--set",
+            "m=2",
+        ),
         *("--stop-time", "1.5", "--step-size", "0.05", "--tolerance", "1e-10"),
     )
     assert "Hemisphere: pass" in text
@@ -150,10 +159,10 @@ def test_verify_obeys_changed_parameters_and_settings(fmu):
 
 
 @pytest.mark.parametrize("command", ["verify", "simulate"])
-def test_a_value_may_have_a_unit(fmu, command):
+def test_a_value_may_have_a_unit(native_fmu, command):
     """2000 g is 2 kg, 90 deg no mass: `--set` converts what has a unit of its own, everything else is SI."""
-    lagfmu(command, fmu("Hemisphere"), "--set", "m=2000g", "--set", "theta=17.2 deg", code=0)
-    text = lagfmu(command, fmu("Hemisphere"), "--set", "m=90deg", code=2)
+    lagfmu(command, native_fmu("Hemisphere"), "--set", "m=2000g", "--set", "theta=17.2 deg", code=0)
+    text = lagfmu(command, native_fmu("Hemisphere"), "--set", "m=90deg", code=2)
     assert "--set 'm=90deg': value = '90deg' has unit rad, expected kg" in text
 
 
@@ -169,19 +178,19 @@ def test_a_value_may_have_a_unit(fmu, command):
     ],
 )
 @pytest.mark.parametrize("command", ["verify", "simulate"])
-def test_settings_that_cannot_be_are_one_message(fmu, command, arguments, parts):
+def test_settings_that_cannot_be_are_one_message(native_fmu, command, arguments, parts):
     """Exit status 2, wrong usage; the setting and what was expected."""
-    text = lagfmu(command, fmu("Hemisphere"), *arguments, code=2)
+    text = lagfmu(command, native_fmu("Hemisphere"), *arguments, code=2)
     assert "error:" in text
     for part in parts:
         assert part in text
 
 
-def test_simulate_writes_a_figure_and_a_table(fmu, tmp_path):
+def test_simulate_writes_a_figure_and_a_table(native_fmu, tmp_path):
     """--plot and --csv; the CSV has every output at every communication point."""
     figure, table = tmp_path / "new" / "out.svg", tmp_path / "new" / "out.csv"
     text = lagfmu(
-        *("simulate", fmu("Hemisphere"), "--plot", figure, "--csv", table),
+        *("simulate", native_fmu("Hemisphere"), "--plot", figure, "--csv", table),
         *("--stop-time", "2", "--step-size", "0.1", "--set", "theta=0.1"),
     )
     assert "departure.surface.time" in text

@@ -16,8 +16,6 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Contact, Model, Parameter, Scene, build_fmu
 from lagfmu.testing import find_compiler
 
-pytestmark = pytest.mark.python_cases(3)
-
 x, y = dynamicsymbols("x y")
 m, a, H, w, R = symbols("m a H w R", positive=True)
 PULL = 9.81  # m/s^2, upwards: a flight that dips and comes back
@@ -59,15 +57,15 @@ def table():
 
 
 @pytest.fixture(scope="module")
-def own(target, tmp_path_factory):
+def own(tmp_path_factory):
     """own(MODEL): its FMU."""
-    if target == "native" and find_compiler() is None:
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    folder = tmp_path_factory.mktemp(target)
+    folder = tmp_path_factory.mktemp("own")
 
     def build(model):
         made = model()
-        return build_fmu(made, folder, Scene(made.name), target=target, check=False)
+        return build_fmu(made, folder, Scene(made.name), target="native", check=False)
 
     return cache(build)
 

@@ -7,8 +7,6 @@ import pytest
 from runs import simulate_fmu
 from scipy.integrate import solve_ivp
 
-pytestmark = pytest.mark.python_cases(2)
-
 G = 9.81
 CASES = {  # m1, m2 [kg], L1, L2 [m], both angles [rad] and their rates [rad/s]
     "default": (1.0, 0.5, 1.0, 0.8, 1.0, 1.5, 0.0, 0.0),
@@ -63,9 +61,9 @@ def alone(case, times):
 
 
 @EVERY
-def test_the_bobs_are_where_the_two_angles_say(fmu, case):
+def test_the_bobs_are_where_the_two_angles_say(native_fmu, case):
     """The motion in x and y with two rods is the motion in two angles without any."""
-    result = swing(fmu("DoublePendulum"), case)
+    result = swing(native_fmu("DoublePendulum"), case)
     expected = bobs(case, *alone(case, result["time"]))
     for name, right in zip(NAMES, expected, strict=True):
         scale = np.abs(right).max()
@@ -73,11 +71,11 @@ def test_the_bobs_are_where_the_two_angles_say(fmu, case):
 
 
 @EVERY
-def test_the_tensions_are_newtons(fmu, case):
+def test_the_tensions_are_newtons(native_fmu, case):
     """T2 is what the lower bob's acceleration asks for, T1 what that of both asks for, with the
     accelerations of the angles integrated alone: lambda = -T/(2 L)."""
     m1, m2, L1, L2 = case[:4]
-    result = swing(fmu("DoublePendulum"), case)
+    result = swing(native_fmu("DoublePendulum"), case)
     a, b, adot, bdot = alone(case, result["time"])
     c = np.cos(a - b)
     one = m1 * (L1 * adot**2 + G * np.cos(a))
@@ -89,10 +87,10 @@ def test_the_tensions_are_newtons(fmu, case):
 
 
 @EVERY
-def test_the_rods_keep_their_lengths_and_the_energy_stays(fmu, case):
+def test_the_rods_keep_their_lengths_and_the_energy_stays(native_fmu, case):
     """f of both rods is at rounding level, and m g h + m v^2/2 of the two bobs is what it was."""
     m1, m2, L1, L2 = case[:4]
-    result = swing(fmu("DoublePendulum"), case, stop=20.0, points=100)
+    result = swing(native_fmu("DoublePendulum"), case, stop=20.0, points=100)
     assert np.abs(result["residual.upper"]).max() < 1e-14 * L1**2
     assert np.abs(result["residual.lower"]).max() < 1e-14 * (L1 + L2) ** 2
     energy = result["energy.total"]
@@ -100,20 +98,20 @@ def test_the_rods_keep_their_lengths_and_the_energy_stays(fmu, case):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_the_small_oscillations_are_two_modes(fmu, sign):
+def test_the_small_oscillations_are_two_modes(native_fmu, sign):
     """Equal masses on equal rods hang in modes with w^2 = (2 -+ sqrt 2) g/l, in which the lower angle is
     +-sqrt 2 times the upper: after a period the bobs are where they were."""
     a = 1e-5
     case = (1.0, 1.0, 0.7, 0.7, a, sign * np.sqrt(2) * a, 0.0, 0.0)
     period = 2 * np.pi / np.sqrt((2 - sign * np.sqrt(2)) * G / 0.7)
-    result = swing(fmu("DoublePendulum"), case, stop=2 * period, points=4)
+    result = swing(native_fmu("DoublePendulum"), case, stop=2 * period, points=4)
     for name in ("x1", "x2"):
         start = result[name][0]
         np.testing.assert_allclose(result[name] / start, [1, -1, 1, -1, 1], atol=1e-7)
 
 
-def test_at_rest_the_upper_rod_carries_both_and_the_lower_one(fmu):
+def test_at_rest_the_upper_rod_carries_both_and_the_lower_one(native_fmu):
     """Hanging at rest T1 = (m1 + m2) g and T2 = m2 g."""
-    result = swing(fmu("DoublePendulum"), (3.0, 0.2, 1.5, 0.6, 0, 0, 0, 0), points=3)
+    result = swing(native_fmu("DoublePendulum"), (3.0, 0.2, 1.5, 0.6, 0, 0, 0, 0), points=3)
     np.testing.assert_allclose(result["lambda.upper"], -3.2 * G / (2 * 1.5), rtol=1e-14)
     np.testing.assert_allclose(result["lambda.lower"], -0.2 * G / (2 * 0.6), rtol=1e-14)

@@ -18,9 +18,9 @@ m, g = symbols("m g", positive=True)
 
 
 @pytest.fixture(scope="module")
-def driven(target, tmp_path_factory):
+def driven(tmp_path_factory):
     """The FMU of a block of 2 kg on a table at the height u."""
-    if target == "native" and find_compiler() is None:
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine: native FMUs are not tested")
     model = Model(
         name="Driven",
@@ -32,7 +32,7 @@ def driven(target, tmp_path_factory):
         start={y: 0.0},
     )
     return build_fmu(
-        model, tmp_path_factory.mktemp(target), Scene("Driven"), target=target, check=False
+        model, tmp_path_factory.mktemp("own"), Scene("Driven"), target="native", check=False
     )
 
 

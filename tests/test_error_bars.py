@@ -20,7 +20,6 @@ from instance import instance
 from scipy.special import ellipj, ellipk
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from test_forged_states import forged_text
 from typer.testing import CliRunner
 
 from lagfmu import Model, Output, Parameter, Scene, simulate, sweep
@@ -33,9 +32,9 @@ Barred = Callable[[str], Path]
 
 
 @pytest.fixture(scope="module")
-def barred(target: str, tmp_path_factory: pytest.TempPathFactory) -> Barred:
-    """barred(NAME): an FMU of models/ with error bars, built once a target."""
-    if target == "native" and find_compiler() is None:
+def barred(tmp_path_factory: pytest.TempPathFactory) -> Barred:
+    """barred(NAME): an FMU of models/ with error bars, built once."""
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine")
     folder, made = tmp_path_factory.mktemp("barred"), {}
 
@@ -44,7 +43,7 @@ def barred(target: str, tmp_path_factory: pytest.TempPathFactory) -> Barred:
             file = load(MODELS / f"{EVERY[name]}.py")
             (asked,) = (s for s in file.scenes if s.name == name)
             scene = replace(asked, error_bars=True)
-            made[name] = write(prepare(file.model, scene), folder, target=target)
+            made[name] = write(prepare(file.model, scene), folder, target="native")
         return made[name]
 
     return get
@@ -77,12 +76,10 @@ def test_the_multiplier_of_the_pendulum_lies_within_its_bar(barred, name):
         assert bar[-1] < 1e4 * tolerance
 
 
-def test_no_point_of_a_run_misses_its_bar(barred, target):
+def test_no_point_of_a_run_misses_its_bar(barred):
     """Runs count, and their first points most: 120 pendulums from rest at angles up to 2.5 rad, tolerances
     from 1e-4 to 1e-11 and three communication steps, held against Jacobi's elliptic functions (rounding of
     these: 1e-13).  In 99 of 100 runs no bar is missed, and half of the bars are less than 100 errors."""
-    if target == "python":
-        pytest.skip("the python target has its own companion")
     chance, held, sharp = np.random.default_rng(11), [], []
     for step in (0.02, 0.1, 0.3):
         angle, tolerance = chance.uniform(0.1, 2.5, 40), 10 ** chance.uniform(-11, -4, 40)
@@ -101,10 +98,8 @@ def test_no_point_of_a_run_misses_its_bar(barred, target):
     assert np.median(sharp) < 100
 
 
-def test_the_first_point_of_a_run_lies_within_its_bar(barred, target):
+def test_the_first_point_of_a_run_lies_within_its_bar(barred):
     """A pendulum from 98 degrees after one communication step of 0.1 s, where one or two steps decide."""
-    if target == "python":
-        pytest.skip("the python target has its own companion")
     angle = 1.7041670222167058
     with instance(barred("PendulumCartesian")) as one:
         one.start({"x": math.sin(angle), "y": -math.cos(angle)}, tolerance=2.334e-7)
@@ -124,11 +119,11 @@ def test_the_time_of_departure_lies_within_its_bar(barred):
         assert abs(found[name][-1] - exact[name][-1]) <= bar < 1e3 * tolerance
 
 
-def test_an_event_in_the_middle_of_a_long_step_lies_within_its_bar(barred, target):
+def test_an_event_in_the_middle_of_a_long_step_lies_within_its_bar(barred):
     """A particle that slides down with friction leaves; both runs take the same step to where it does, whose
     error the companion must not share: the time, and the flight that follows from it."""
     names = ("departure.surface.time", "r", "theta")
-    tolerances = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9) if target == "native" else (1e-5, 1e-8)
+    tolerances = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
     for step in (0.25, 0.5):
         exact = run(barred("RoughHemisphere"), 1.5, step, relative_tolerance=1e-13)
         for tolerance in tolerances:
@@ -139,11 +134,11 @@ def test_an_event_in_the_middle_of_a_long_step_lies_within_its_bar(barred, targe
             assert found[bar_of(names[0])][-1] < 10 * tolerance
 
 
-def test_the_time_at_which_slipping_starts_lies_within_its_bar(barred, target):
+def test_the_time_at_which_slipping_starts_lies_within_its_bar(barred):
     """A block on a belt sticks, and slips when the spring pulls as hard as friction can: again and again."""
-    name, tight = "slipping.grip.time", {"native": 1e-13, "python": 1e-10}[target]
-    exact = run(barred("Belt"), 4.0, 0.1, relative_tolerance=tight)
-    for tolerance in (1e-5, 1e-8) if target == "native" else (1e-6,):
+    name = "slipping.grip.time"
+    exact = run(barred("Belt"), 4.0, 0.1, relative_tolerance=1e-13)
+    for tolerance in (1e-5, 1e-8):
         found = run(barred("Belt"), 4.0, 0.1, relative_tolerance=tolerance)
         count = found["slipping.grip.count"]
         assert (count == exact["slipping.grip.count"]).all()
@@ -152,10 +147,8 @@ def test_the_time_at_which_slipping_starts_lies_within_its_bar(barred, target):
         assert found[bar_of(name)][-1] < 1e3 * tolerance
 
 
-def test_rattle_has_bars_by_the_step_halved(barred, target):
+def test_rattle_has_bars_by_the_step_halved(barred):
     """Of order 6: the companion of half the step is off by a 64th of the delivered run's error."""
-    if target == "python":
-        pytest.skip("rattle is in native FMUs alone")
     with instance(barred("PendulumCartesian")) as one:
         one.start({"solver.method": "rattle", "solver.step": 0.05}, tolerance=1e-6)
         for _ in range(20):
@@ -165,10 +158,10 @@ def test_rattle_has_bars_by_the_step_halved(barred, target):
         assert one.get("solver.steps") == 40
 
 
-def test_a_run_is_the_same_with_error_bars_and_without(barred, fmu):
+def test_a_run_is_the_same_with_error_bars_and_without(barred, native_fmu):
     """The companion runs beside it and touches nothing: every value of every output, bit for bit."""
     with_bars = run(barred("Hemisphere"), 2.0, 0.05)
-    without = run(fmu("Hemisphere"), 2.0, 0.05)
+    without = run(native_fmu("Hemisphere"), 2.0, 0.05)
     for name in without.dtype.names:
         assert np.array_equal(with_bars[name], without[name]), name
     assert not any(n.startswith("error.") for n in without.dtype.names)
@@ -215,19 +208,16 @@ def test_reading_bars_does_not_change_them(barred):
         assert one.outputs() == other.outputs()
 
 
-def test_a_fixed_step_has_bars_by_the_step_halved(barred, target):
-    """rk4 of order 4: the run of half the step is off by a fifteenth of the difference.  The native target's
-    companion takes it; the python target delivers it, and says so."""
+def test_a_fixed_step_has_bars_by_the_step_halved(barred):
+    """rk4 of order 4: the run of half the step is off by a fifteenth of the difference.
+    The companion takes it."""
     with instance(barred("PendulumCartesian")) as one:
         one.start({"solver.method": "rk4", "solver.step": 0.02}, tolerance=1e-6)
         for _ in range(20):
             one.step(0.1)
         off = abs(one.get("lambda.rod") - multiplier(np.array([one.time]))[0])
         assert off <= one.get("error.lambda.rod") < 100 * off
-        assert one.get("solver.steps") == {"native": 100, "python": 200}[target]
-        told = [text for status, _, text in one.log if status == 1]
-        halved = any("0.01 s in place of 0.02 s" in text for text in told)
-        assert halved == (target == "python"), one.log
+        assert one.get("solver.steps") == 100
 
 
 def test_only_what_has_a_bar_has_one_and_bars_go_with_their_outputs(prepared):
@@ -266,11 +256,9 @@ def test_between_the_two_departures_the_bars_are_infinite(barred):
 
 
 @pytest.fixture(scope="module")
-def root(target: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A mass on a spring by rk4, and an output that is not defined beyond x = d: two steps from x = 1 to the
     middle end 5 mm short of it, the four of the companion 0.3 mm."""
-    if target == "python":
-        pytest.skip("the python target has its own companion")
     if find_compiler() is None:
         pytest.skip("no C compiler on this machine")
     x, (m, k, d) = dynamicsymbols("x"), symbols("m k d", positive=True)
@@ -286,7 +274,7 @@ def root(target: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = Scene(
         "Root", stop_time=half, step_size=half, method="rk4", step=half / 2, error_bars=True
     )
-    return write(prepare(model, scene), tmp_path_factory.mktemp("root"), target=target)
+    return write(prepare(model, scene), tmp_path_factory.mktemp("root"), target="native")
 
 
 def test_a_companion_that_cannot_follow_is_told_and_the_run_goes_on(root):
@@ -304,23 +292,20 @@ def test_a_companion_that_cannot_follow_is_told_and_the_run_goes_on(root):
         assert "root" in told[0]
 
 
-def test_an_fmu_with_error_bars_is_for_co_simulation(barred, target, tmp_path):
+def test_an_fmu_with_error_bars_is_for_co_simulation(barred, tmp_path):
     """In Model Exchange the importer integrates: no interface is offered, and none is given silently."""
     path = barred("PendulumCartesian")
     description = fmpy.read_model_description(str(path))
     assert description.modelExchange is None
     assert description.numberOfEventIndicators == 0
     assert not [v.name for v in description.modelVariables if v.reinit]
-    if target == "native":
-        refused = Library(path, tmp_path)(kind=EXCHANGE)
-        assert refused.handle.value is None
-        assert "take co-simulation" in refused.log[-1][2]
+    refused = Library(path, tmp_path)(kind=EXCHANGE)
+    assert refused.handle.value is None
+    assert "take co-simulation" in refused.log[-1][2]
 
 
-def test_a_bar_has_no_derivative(barred, target):
+def test_a_bar_has_no_derivative(barred):
     """The difference of two runs is no function of the state."""
-    if target == "python":
-        pytest.skip("python FMUs have no directional derivatives")
     with instance(barred("PendulumCartesian")) as one:
         one.start()
         one.step(0.1)
@@ -332,48 +317,24 @@ def test_a_bar_has_no_derivative(barred, target):
         assert "'error.x' is not defined" in one.log[-1][2]
 
 
-def test_a_forged_companion_is_refused_or_harmless(barred, target, tmp_path):
+def test_a_forged_companion_is_refused_or_harmless(barred, tmp_path):
     """Modes, times and differences that no companion has, with the right checksum: refused in words, or
     finite to read."""
-    if target == "native":
-        attack = str(Path(__file__).with_name("test_forged_states.py"))
-        done = subprocess.run(
-            [sys.executable, attack, str(barred("Hemisphere")), str(tmp_path), "steps", "1", "200"],
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-        )
-        assert done.returncode == 0, (done.returncode, done.stderr[-2000:])
-        return
-    changes = {
-        "no bars": lambda whole: whole.update(bars=None),
-        "two parts": lambda whole: whole["bars"].pop(),
-        "too few": lambda whole: whole["bars"][1].pop(),
-        "below zero": lambda whole: whole["bars"][1].__setitem__(0, -1.0),
-        "not a number": lambda whole: whole["bars"][2].__setitem__(0, math.nan),
-        "no state": lambda whole: whole["bars"].__setitem__(0, "{}"),
-    }
-    with instance(barred("Hemisphere")) as one:
-        one.start()
-        one.step(0.05)
-        saved = one.fmu.serializeFMUState(one.fmu.getFMUState())
-        good = one.outputs()
-        for name, change in changes.items():
-            forged = forged_text(saved, lambda whole, inner, change=change: change(whole))
-            with pytest.raises(FMICallException):
-                one.fmu.setFMUState(one.fmu.deSerializeFMUstate(forged))
-            assert "none of this FMU's" in one.log[-1][2], name
-            assert one.outputs() == good
+    attack = str(Path(__file__).with_name("test_forged_states.py"))
+    done = subprocess.run(
+        [sys.executable, attack, str(barred("Hemisphere")), str(tmp_path), "steps", "1", "200"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, (done.returncode, done.stderr[-2000:])
 
 
-def test_simulate_gives_the_bars_of_the_fmu_and_plots_them_as_bands(prepared, barred, target):
-    """A model that is simulated and its FMU are one solver; a band stands about each curve."""
+def test_simulate_gives_the_bars_of_the_fmu_and_plots_them_as_bands(barred):
+    """A band stands about each curve."""
     options = {"stop_time": 2.0, "step_size": 0.05, "tolerance": 1e-6}
-    found = simulate(prepared("Hemisphere"), error_bars=True, target=target, **options)
-    same = simulate(barred("Hemisphere"), error_bars=True, **options)
-    for name in found.dtype.names:
-        assert np.array_equal(found[name], same[name]), name
+    found = simulate(barred("Hemisphere"), error_bars=True, **options)
     drawn = ["lambda.surface", "theta", "der(theta)", "der(theta,2)"]
     figure = figure_of(found, found.units, drawn)
     bands = dict(zip(drawn, (len(axis.collections) for axis in figure.axes), strict=True))
@@ -433,15 +394,15 @@ def test_nothing_of_it_is_in_an_fmu_without(native_fmu, python_fmu):
         assert [n for n in archive.namelist() if n.endswith("/bars.py")] == []
 
 
-def test_an_output_called_a_time_is_no_event(target: str, tmp_path: Path) -> None:
+def test_an_output_called_a_time_is_no_event(tmp_path: Path) -> None:
     """A bob that swings through and a clock of its own: lap.time beside a lap.count that moves all the while
     is off by rounding."""
-    if target == "native" and find_compiler() is None:
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine")
     file = load(MODELS / "pendulum.py")
     t, x = dynamicsymbols._t, next(iter(file.model.coordinates))
     own = (Output("lap.time", t, "s"), Output("lap.count", x**2, "m^2"))
     model = replace(file.model, outputs=own)
-    fmu = write(prepare(model, Scene("Lap", error_bars=True)), tmp_path, target=target)
+    fmu = write(prepare(model, Scene("Lap", error_bars=True)), tmp_path, target="native")
     bars = run(fmu, 1.0, 0.25)[bar_of("lap.time")]
     assert (bars < 1e-13).all()

@@ -31,8 +31,6 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu, names, simulate
 from lagfmu.testing import RedundantConstraintWarning, find_compiler
 
-pytestmark = pytest.mark.python_cases(4)
-
 g0 = 9.81  # m/s^2
 m, g, L = symbols("m g L", positive=True)
 x, y, z = dynamicsymbols("x y z")
@@ -41,11 +39,11 @@ Build = Callable[..., Path]
 
 
 @pytest.fixture(scope="module")
-def build(target: str, tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """build(model): its FMU for the present target, built once."""
-    if target == "native" and find_compiler() is None:
+def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """build(model): its native FMU, built once."""
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    folder = tmp_path_factory.mktemp(f"extremes_{target}")
+    folder = tmp_path_factory.mktemp("extremes")
     made: dict[str, Path] = {}
 
     def get(model: Model, **scene: Any) -> Path:
@@ -53,7 +51,7 @@ def build(target: str, tmp_path_factory: pytest.TempPathFactory) -> Build:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RedundantConstraintWarning)
                 made[model.name] = build_fmu(
-                    model, folder, Scene(model.name, **scene), target=target, check=False
+                    model, folder, Scene(model.name, **scene), target="native", check=False
                 )
         return made[model.name]
 
@@ -331,13 +329,6 @@ def test_lambda_scales_as_its_unit_says(native_fmu, name, units):
     """By 1e+-9, which rounds every number anew: along a run in steps of a fixed part of the motion's own
     time lambda, Q, energies and the times of events scale as their units say, to 1e-12."""
     check_decades(native_fmu(name), units)
-
-
-@pytest.mark.parametrize("scale", ["masses", "lengths", "times", "all"])
-@pytest.mark.parametrize("name", ["PendulumCartesian", "Loop"])
-def test_lambda_scales_as_its_unit_says_in_the_python_fmu(python_fmu, name, scale):
-    """The same of the other target: a pendulum, and a loop that the particle falls off."""
-    check_decades(python_fmu(name), DECADES[scale])
 
 
 def test_a_stiff_system_scales_as_far_as_its_spring_lets_it(native_fmu):
@@ -757,12 +748,12 @@ def check_invariants(
         assert abs(seen["energy.total"] - first["energy.total"]) <= grown * size + 1e-300
 
 
-def test_a_prescribed_motion_may_jump(target, tmp_path):
+def test_a_prescribed_motion_may_jump(tmp_path):
     """A point that is set to a new place at each communication point, its rate left at zero: the mass
     follows onto the constraint, which is no singular configuration."""
-    if target == "native" and find_compiler() is None:
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine")
-    path = build_fmu(absorber, tmp_path, target=target, check=False)
+    path = build_fmu(absorber, tmp_path, target="native", check=False)
     with instance(path) as one:
         one.start()
         for k in range(1, 6):

@@ -23,21 +23,33 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu
 from lagfmu.testing import name_of
 
-pytestmark = pytest.mark.python_cases(6)
-ALL = sorted(FILES)
+Case = tuple[str, str]  # target, name
+PYTHON = [("python", name) for name in ("CartPendulum", "Hemisphere")]
+ALL = [*(("native", name) for name in sorted(FILES)), *PYTHON]
+EACH = [*(("native", name) for name in KINDS), *PYTHON]
 REPOSITORY = Path(__file__).parent.parent
 
 
-@pytest.fixture(params=ALL)
-def name(request) -> str:
-    """Every FMU of models/."""
+@pytest.fixture(params=ALL, ids="-".join)
+def case(request) -> Case:
+    """Every native FMU of models/, and two of the python target."""
     return request.param
 
 
 @pytest.fixture
-def path(name, fmu) -> Path:
+def target(case) -> str:
+    return case[0]
+
+
+@pytest.fixture
+def name(case) -> str:
+    return case[1]
+
+
+@pytest.fixture
+def path(target, name, request) -> Path:
     """The built FMU."""
-    return fmu(name)
+    return request.getfixturevalue(f"{target}_fmu")(name)
 
 
 @pytest.fixture
@@ -70,13 +82,13 @@ def listed(xml, what) -> dict[str, list[str]]:
 # ---------------------------------------------------------------------------- checkers
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("case", EACH, ids="-".join)
 def test_fmpy_reports_no_problem(path):
     """fmpy validate is silent."""
     assert validate_fmu(str(path)) == []
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("case", EACH, ids="-".join)
 def test_fmutool_reports_no_error(path):
     """fmutool -check (fmu-manipulation-toolbox): schema and rules of the standard."""
     command = [
@@ -539,9 +551,10 @@ def test_the_documentation_stands_by_itself(name, path):
     assert "<script" not in page
 
 
-def test_the_slave_script_is_numeric(name, python_fmu):
+@pytest.mark.parametrize("case", PYTHON, ids="-".join)
+def test_the_slave_script_is_numeric(path):
     """No SymPy, no lagfmu in the resources but in names of the FMU's own package."""
-    with zipfile.ZipFile(python_fmu(name)) as archive:
+    with zipfile.ZipFile(path) as archive:
         for entry in archive.namelist():
             if (
                 entry.startswith("resources/")
@@ -585,7 +598,7 @@ def record(one, steps=5, size=0.05) -> list[dict]:
     return found
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("case", EACH, ids="-".join)
 def test_a_second_experiment_after_reset_gives_the_same_numbers(path):
     """Also after parameters were changed, and right after instantiation."""
     with instance(path) as one:
@@ -637,7 +650,7 @@ def test_calls_with_no_variables_are_accepted(path):
         one.step(0.01)
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("case", EACH, ids="-".join)
 def test_an_experiment_may_start_late(name, path):
     """Started at t = 10 s: an autonomous system repeats what it does from t = 0."""
     with instance(path) as one, instance(path) as late:
@@ -654,7 +667,7 @@ def test_an_experiment_may_start_late(name, path):
                     assert b[output] == pytest.approx(a[output], rel=1e-5, abs=1e-6), output
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("case", EACH, ids="-".join)
 def test_a_communication_step_of_any_size_follows_any_other(path):
     """1e-9, 0.1, 1e-3 s: the coordinates are those of one single step."""
     with instance(path) as one, instance(path) as single:

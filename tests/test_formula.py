@@ -154,8 +154,8 @@ def forged(source, target, record):
     return target
 
 
-def record_of(fmu):
-    with zipfile.ZipFile(fmu) as archive:
+def record_of(native_fmu):
+    with zipfile.ZipFile(native_fmu) as archive:
         return json.loads(archive.read(RECORD))
 
 

@@ -255,9 +255,8 @@ SYSTEMS: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("target", ["native", "python"])
 @pytest.mark.parametrize("name", sorted(SYSTEMS))
-def test_motion_is_that_of_modes_and_events_written_by_hand(name: str, target: str) -> None:
+def test_motion_is_that_of_modes_and_events_written_by_hand(name: str) -> None:
     """Every coordinate and velocity, and when it sticks, at 30 instants through all its transitions."""
     model, by_hands, columns, grip = SYSTEMS[name]
     states, modes = by_hands(TIMES)
@@ -265,7 +264,7 @@ def test_motion_is_that_of_modes_and_events_written_by_hand(name: str, target: s
     assert (np.diff(modes) != 0).sum() >= 3
     options = {"stop_time": 3.0, "step_size": 0.1, "tolerance": 1e-10}
     scene = Scene(name.title())
-    run = simulate(model(), scene=scene, target=target, **options)
+    run = simulate(model(), scene=scene, **options)
     for column, expected in zip(columns, states.T, strict=True):
         assert run[column] == pytest.approx(expected, abs=2e-8 * max(1.0, np.abs(expected).max()))
     assert (run[f"sticks.{grip}"] == (modes == 0)).all()

@@ -109,16 +109,10 @@ def test_no_directional_derivatives_are_offered(belt: Path) -> None:
         assert "without derivatives of its outputs" in one.log[-1][2]
 
 
-@pytest.mark.parametrize("target", ["native", "python"])
-def test_the_residual_of_a_row_is_its_missed_velocity_in_every_mode(
-    belt: Path, target: str
-) -> None:
+def test_the_residual_of_a_row_is_its_missed_velocity_in_every_mode(belt: Path) -> None:
     """Riding, sliding and riding again: residual.ride = x' - speed, and lambda of the row is unique."""
     run = {"stop_time": 1.0, "step_size": 0.02}
-    if target == "native":
-        found = simulate(belt, **run)
-    else:
-        found = simulate(load(MODELS / "belt.py").model, scene=Scene("Belt"), target=target, **run)
+    found = simulate(belt, **run)
     assert {*found["sticks.grip"]} == {0, 1}
     assert found["residual.ride"] == pytest.approx(found["der(x)"] - 0.2, abs=1e-15)
     assert found["residual.ride"] == pytest.approx(found["slip.ride"], abs=1e-15)
@@ -139,9 +133,8 @@ def test_friction_moves_no_start_value(belt: Path, values: dict[str, float]) -> 
         assert not [text for _, _, text in one.log if "projected" in text]
 
 
-@pytest.mark.parametrize("target", ["native", "python"])
 @pytest.mark.parametrize("friction", [0.0, 0.2, 0.9])
-def test_two_rough_feet_that_land_together_share_one_impact(target: str, friction: float) -> None:
+def test_two_rough_feet_that_land_together_share_one_impact(friction: float) -> None:
     """A body dropped flat onto both feet with v along the floor: without turning over, friction takes
     min(v, mu v_n) of it; the feet carry m v_n, and what is lost is heat."""
     height, v = 0.2, 2.0
@@ -149,7 +142,7 @@ def test_two_rough_feet_that_land_together_share_one_impact(target: str, frictio
     values = {"mu": friction, "alpha": 0.0, "y": 0.5 + height, "der(x)": v}
     end = fall / g + 1e-7
     run = {"stop_time": end, "step_size": end, "start_values": values, "tolerance": 1e-10}
-    last = simulate(feet(), scene=Scene("Feet"), target=target, **run)[-1]
+    last = simulate(feet(), scene=Scene("Feet"), **run)[-1]
     assert last["contact.low"]
     assert last["contact.up"]
     assert last["der(x)"] == pytest.approx(max(0.0, v - friction * fall), abs=2e-6)

@@ -8,8 +8,6 @@ from instance import instance
 from runs import simulate_fmu
 from scipy.integrate import quad
 
-pytestmark = pytest.mark.python_cases(3)
-
 # m [kg], g [m/s^2], a [m]
 EARTH = {"m": 1.0, "g": 9.81, "a": 1.0}
 MOON = {"m": 3e-3, "g": 1.62, "a": 25.0}
@@ -46,35 +44,37 @@ def departure_miss(result, theta0, share):
 @pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
 @pytest.mark.parametrize("theta0", [1e-6, 0.01, 0.3, 1.2])
 def test_it_leaves_where_two_thirds_of_the_height_and_the_speed_say(
-    fmu, theta0, tolerance, allowed
+    native_fmu, theta0, tolerance, allowed
 ):
     """The particle leaves the sphere at cos theta = (2/3) cos theta0 + v0^2/(3 g a), from rest and
     from every speed up to a part in a million of the one at which it leaves at once."""
     stop = 25.0 if theta0 < 1e-3 else 14.0
     for share in (0.0, 0.1, 0.5, 0.9, 0.999, 1 - 1e-6):
-        result = slide(fmu("Hemisphere"), EARTH, theta0, share, tolerance, stop)
+        result = slide(native_fmu("Hemisphere"), EARTH, theta0, share, tolerance, stop)
         assert abs(departure_miss(result, theta0, share)) < allowed, share
 
 
 @pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
 @pytest.mark.parametrize("name", [name for name in WORLDS if name != "earth"])
 def test_mass_gravity_and_radius_do_not_change_the_angle_of_departure(
-    fmu, name, tolerance, allowed
+    native_fmu, name, tolerance, allowed
 ):
     """In v0^2/(g a) the departure's angle is the same for every mass, gravity and radius: lengths
     scaled by 1e6 and 1e-6 and times by 1e-6 included."""
     for theta0, share in ((1e-6, 0.0), (0.01, 0.3), (1.2, 0.999)):
         stop = 25.0 if theta0 < 1e-3 else 14.0
-        result = slide(fmu("Hemisphere"), WORLDS[name], theta0, share, tolerance, stop)
+        result = slide(native_fmu("Hemisphere"), WORLDS[name], theta0, share, tolerance, stop)
         assert abs(departure_miss(result, theta0, share)) < allowed, (theta0, share)
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
-def test_the_motion_does_not_depend_on_the_unit_of_length(fmu, factor):
+def test_the_motion_does_not_depend_on_the_unit_of_length(native_fmu, factor):
     """A sphere and a gravity 1e6 times as large or small, in metres, are the same motion: same times
     and angles, lengths in proportion, forces too."""
     world = {"m": 1.0, "g": 9.81 * factor, "a": factor}
-    here, there = (slide(fmu("Hemisphere"), w, 0.1, 0.2, 1e-10, 3.0, 20) for w in (EARTH, world))
+    here, there = (
+        slide(native_fmu("Hemisphere"), w, 0.1, 0.2, 1e-10, 3.0, 20) for w in (EARTH, world)
+    )
     for name, unit in (
         ("departure.surface.time", 1.0),
         ("departure.surface.theta", 1.0),
@@ -86,23 +86,23 @@ def test_the_motion_does_not_depend_on_the_unit_of_length(fmu, factor):
         np.testing.assert_allclose(there[name] / unit, here[name], rtol=1e-9, atol=1e-9)
 
 
-def test_started_ever_nearer_to_the_top_it_leaves_at_two_thirds(fmu):
+def test_started_ever_nearer_to_the_top_it_leaves_at_two_thirds(native_fmu):
     """As theta0 -> 0 from rest the particle leaves at cos theta = 2/3, and what is missing falls as
     theta0^2/3."""
     for theta0 in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8):
-        result = slide(fmu("Hemisphere"), EARTH, theta0, tolerance=1e-12, stop=35.0)
+        result = slide(native_fmu("Hemisphere"), EARTH, theta0, tolerance=1e-12, stop=35.0)
         short = 2 / 3 - np.cos(result["departure.surface.theta"][-1])
         assert short == pytest.approx(theta0**2 / 3, rel=theta0**2, abs=1e-11)
 
 
 @pytest.mark.parametrize("theta0", [0.01, 0.5])
-def test_the_time_of_departure_does_not_depend_on_the_communication_step(fmu, theta0):
+def test_the_time_of_departure_does_not_depend_on_the_communication_step(native_fmu, theta0):
     """When the particle leaves is physics: communication steps of 1 ms, 50 ms and a single one over
     the whole run give the same time, which is the integral of d theta/theta'."""
     stop = 2.0
     times = [
         simulate_fmu(
-            str(fmu("Hemisphere")),
+            str(native_fmu("Hemisphere")),
             stop_time=stop,
             output_interval=step,
             step_size=step,
@@ -138,11 +138,11 @@ def slide_time(theta0, g):
     ],
 )
 def test_multiplier_is_the_normal_force_until_it_is_nothing(
-    fmu, world, theta0, share, tolerance, allowed
+    native_fmu, world, theta0, share, tolerance, allowed
 ):
     """lambda = m g (3 cos theta - 2 cos theta0) - m v0^2/a [N] while the particle is on the sphere,
     positive; from the departure on it is exactly 0, and so is Q."""
-    result = slide(fmu("Hemisphere"), world, theta0, share, tolerance, 8.0, 400)
+    result = slide(native_fmu("Hemisphere"), world, theta0, share, tolerance, 8.0, 400)
     weight = world["m"] * world["g"]
     closed = result["contact.surface"]
     normal = weight * (3 * np.cos(result["theta"]) - (2 + share) * np.cos(theta0))
@@ -160,11 +160,11 @@ def test_multiplier_is_the_normal_force_until_it_is_nothing(
 
 @pytest.mark.parametrize("world", [EARTH, MOON, HEAVY], ids=["earth", "moon", "heavy"])
 @pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
-def test_after_the_departure_it_flies_a_parabola(fmu, world, tolerance, allowed):
+def test_after_the_departure_it_flies_a_parabola(native_fmu, world, tolerance, allowed):
     """Off the sphere only gravity acts: x = r sin theta grows evenly and z = r cos theta falls by
     g tau^2/2 from the departure's state; the energy stays what it was at rest, m g a cos theta0."""
     theta0, a, g = 0.2, world["a"], world["g"]
-    result = slide(fmu("Hemisphere"), world, theta0, 0.0, tolerance, 6.0, 300)
+    result = slide(native_fmu("Hemisphere"), world, theta0, 0.0, tolerance, 6.0, 300)
     flying = ~result["contact.surface"]
     assert flying.sum() > 50
     last = result[-1]
@@ -184,9 +184,9 @@ def test_after_the_departure_it_flies_a_parabola(fmu, world, tolerance, allowed)
     assert np.abs(result["energy.total"] - energy).max() < allowed * energy
 
 
-def test_no_departure_no_departure_state(fmu):
+def test_no_departure_no_departure_state(native_fmu):
     """Exactly on the top the particle balances: lambda = m g, and the departure is a finite zero."""
-    result = slide(fmu("Hemisphere"), EARTH, 0.0, stop=10.0, points=5)
+    result = slide(native_fmu("Hemisphere"), EARTH, 0.0, stop=10.0, points=5)
     assert (result["contact.surface"]).all()
     np.testing.assert_allclose(result["lambda.surface"], 9.81, rtol=1e-14)
     for name in ("count", "time", "r", "theta", "velocity.r", "velocity.theta"):
@@ -210,10 +210,10 @@ def check_parabola(result, radius, theta0, speed, g=9.81):
     assert np.abs(r * np.cos(theta) - z).max() < 1e-11
 
 
-def test_a_start_inside_the_sphere_is_moved_onto_its_surface(fmu):
+def test_a_start_inside_the_sphere_is_moved_onto_its_surface(native_fmu):
     """A particle put at r = 1.5 inside a sphere of a = 2 is put on its surface, r = 2, with a warning
     that names the value, and slides from there."""
-    with instance(fmu("Hemisphere")) as one:
+    with instance(native_fmu("Hemisphere")) as one:
         one.start({"a": 2.0, "r": 1.5, "theta": 0.3}, tolerance=1e-12)
         assert one.get("r") == 2.0
         assert one.get("theta") == 0.3
@@ -228,10 +228,10 @@ def test_a_start_inside_the_sphere_is_moved_onto_its_surface(fmu):
         assert np.cos(angle) == pytest.approx(2 / 3 * np.cos(0.3), abs=1e-11)
 
 
-def test_a_start_above_the_sphere_is_in_flight(fmu):
+def test_a_start_above_the_sphere_is_in_flight(native_fmu):
     """r = 1.25 over a sphere of a = 0.5: the particle is in free flight from the start, nothing is moved,
     lambda is 0, and no departure is counted."""
-    with instance(fmu("Hemisphere")) as one:
+    with instance(native_fmu("Hemisphere")) as one:
         one.start({"a": 0.5, "r": 1.25, "theta": 1.4}, tolerance=1e-12)
         assert one.get("r") == 1.25
         assert not one.get("contact.surface")
@@ -239,7 +239,7 @@ def test_a_start_above_the_sphere_is_in_flight(fmu):
         assert one.get("residual.surface") == 0.75
         assert one.log == []
     result = simulate_fmu(
-        str(fmu("Hemisphere")),
+        str(native_fmu("Hemisphere")),
         stop_time=0.3,
         output_interval=0.01,
         relative_tolerance=1e-12,
@@ -252,11 +252,11 @@ def test_a_start_above_the_sphere_is_in_flight(fmu):
 
 
 @pytest.mark.parametrize("share", [1 + 1e-6, 1.1, 4.0])
-def test_too_fast_for_the_sphere_it_flies_at_once(fmu, share):
+def test_too_fast_for_the_sphere_it_flies_at_once(native_fmu, share):
     """With v0^2 > g a cos theta0 gravity cannot hold the particle on the sphere: it starts open and
     flies a parabola, and since it was never on the surface no departure is counted."""
     theta0 = 0.3
-    result = slide(fmu("Hemisphere"), EARTH, theta0, share, 1e-12, 1.0, 20)
+    result = slide(native_fmu("Hemisphere"), EARTH, theta0, share, 1e-12, 1.0, 20)
     assert not result["contact.surface"].any()
     assert (result["lambda.surface"] == 0).all()
     assert (result["departure.surface.count"] == 0).all()
@@ -265,11 +265,11 @@ def test_too_fast_for_the_sphere_it_flies_at_once(fmu, share):
 
 
 @pytest.mark.parametrize(("rise", "rests"), [(1e-13, True), (1e-6, False)])
-def test_what_parts_too_slowly_to_be_seen_rests(fmu, rise, rests):
+def test_what_parts_too_slowly_to_be_seen_rests(native_fmu, rise, rests):
     """At the top it would rise by v^2/(2 g): by less than the gap within which contacts touch, 1e-9 of the
     radius, it rests as after an impact, lambda = m g, instead of a flight that ends at no certain time;
     by more, it flies."""
-    with instance(fmu("Hemisphere")) as one:
+    with instance(native_fmu("Hemisphere")) as one:
         one.start({"theta": 0.0, "der(r)": np.sqrt(2 * 9.81 * rise)})
         assert bool(one.get("contact.surface")) == rests
         assert one.get("lambda.surface") == pytest.approx(9.81 if rests else 0.0, rel=1e-12)

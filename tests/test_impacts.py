@@ -28,15 +28,15 @@ Run = Callable[..., Any]
 pytestmark = pytest.mark.filterwarnings("ignore:.*follows? from the others")
 
 
-@pytest.fixture(params=["python", "native"])
-def run(request: pytest.FixtureRequest) -> Run:
-    """run(model, stop, step, ...) on either target."""
-    if request.param == "native" and find_compiler() is None:
+@pytest.fixture
+def run() -> Run:
+    """run(model, stop, step, ...) of its native FMU."""
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine")
 
     def simulated(model: Model, stop: float, step: float, values: Any = None) -> Any:
         scene = Scene(model.name, stop_time=stop)
-        return simulate(model, stop, step, 1e-10, values, scene=scene, target=request.param)
+        return simulate(model, stop, step, 1e-10, values, scene=scene)
 
     return simulated
 
@@ -303,13 +303,11 @@ def test_a_rod_dropped_flat_lies_flat_in_model_exchange(tmp_path, order):
         assert min(result["residual.left"].min(), result["residual.right"].min()) > -1e-8
 
 
-@pytest.mark.parametrize("target", ["python", "native"])
-def test_a_bounce_is_told_with_its_time_and_impulse(target, request):
+def test_a_bounce_is_told_with_its_time_and_impulse(native_fmu):
     """A ball of 1 kg falls 1 m: it strikes the floor at sqrt(2 h/g) with m sqrt(2 g h) (1 + e), and again
     after its flight of 2 e sqrt(2 h/g) with e times that, though no communication point sees it; bounces
     within one step are told as the latest of them."""
-    fmu = request.getfixturevalue(f"{target}_fmu")("BouncingBall")
-    with instance(fmu) as one:
+    with instance(native_fmu("BouncingBall")) as one:
         one.start(stop_time=3.0)
         for _ in range(6):
             one.step(0.5)

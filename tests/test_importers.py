@@ -217,14 +217,14 @@ def test_what_cannot_be_is_an_error_in_the_engine_with_its_reason(native_fmu, en
     assert reason in str(stopped.value)
 
 
-def test_the_readmes_example_prints_the_time_of_departure(fmu, tmp_path):
+def test_the_readmes_example_prints_the_time_of_departure(native_fmu, tmp_path):
     """The README's lines for libcosim, as they stand, with the FMU of either target where they look."""
     pytest.importorskip("libcosimpy", reason="the engine libcosimpy is not installed")
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     (block,) = [b for b in blocks if "libcosimpy" in b]
     (path,) = re.findall(r'fmu_path="(.*?)"', block)
     (tmp_path / path).parent.mkdir(parents=True)
-    shutil.copy(fmu("Hemisphere"), tmp_path / path)
+    shutil.copy(native_fmu("Hemisphere"), tmp_path / path)
     command = [sys.executable, "-c", block]
     ended = subprocess.run(
         command,

@@ -8,8 +8,6 @@ import pytest
 from instance import instance
 from runs import simulate_fmu
 
-pytestmark = pytest.mark.python_cases(3)
-
 BOTH = pytest.mark.parametrize("name", ["InclineDisk", "InclineDiskMinimal"])
 DISKS = {
     "default": {"M": 1.0, "R": 0.1, "g": 9.81, "alpha": np.pi / 6},
@@ -29,10 +27,10 @@ def roll(path, disk, **start):
 
 @BOTH
 @EVERY
-def test_friction_and_acceleration_are_those_of_the_lecture(fmu, name, disk):
+def test_friction_and_acceleration_are_those_of_the_lecture(native_fmu, name, disk):
     """y'' = (2/3) g sin alpha, lambda = -M g sin(alpha)/3 = Q_y [N], up the incline, and
     Q_theta = -R lambda [N m], to 1e-12 at every moment, with the y coordinate or without."""
-    result = roll(fmu(name), disk)
+    result = roll(native_fmu(name), disk)
     pull = disk["g"] * np.sin(disk["alpha"])
     friction = -disk["M"] * pull / 3
     for variable, expected in (
@@ -50,13 +48,13 @@ def test_friction_and_acceleration_are_those_of_the_lecture(fmu, name, disk):
 
 @BOTH
 @EVERY
-def test_it_rolls_as_an_evenly_accelerated_body(fmu, name, disk):
+def test_it_rolls_as_an_evenly_accelerated_body(native_fmu, name, disk):
     """y = y0 + v0 t + (1/3) g sin(alpha) t^2 and y = R theta, also when it is first rolled uphill."""
     R, turn = disk["R"], -2.0
     start = {"theta": 3.0, "der(theta)": turn}
     if name == "InclineDisk":
         start |= {"y": 3.0 * R, "der(y)": turn * R}
-    result = roll(fmu(name), disk, **start)
+    result = roll(native_fmu(name), disk, **start)
     t = result["time"]
     theta = 3.0 + turn * t + disk["g"] * np.sin(disk["alpha"]) / R * t**2 / 3
     size = np.abs(theta).max()
@@ -67,20 +65,20 @@ def test_it_rolls_as_an_evenly_accelerated_body(fmu, name, disk):
 
 
 @BOTH
-def test_friction_does_no_work(fmu, name):
+def test_friction_does_no_work(native_fmu, name):
     """The point of contact does not move: the energy is constant though a force acts there, and
     its power on y is what it takes from theta."""
-    result = roll(fmu(name), DISKS["default"])
+    result = roll(native_fmu(name), DISKS["default"])
     energy = result["energy.total"]
     assert np.ptp(energy) <= 1e-13 * result["energy.kinetic"].max()
     power = result["Q.y"] * result["der(y)"] + result["Q.theta"] * result["der(theta)"]
     assert np.abs(power).max() <= 1e-14 * np.abs(result["Q.y"] * result["der(y)"]).max()
 
 
-def test_an_incline_of_hardly_any_angle(fmu):
+def test_an_incline_of_hardly_any_angle(native_fmu):
     """At 1e-300 rad the disk's own time is 1e150 s, and the integrator stands as far ahead: at 1 s
     y = g alpha t^2/3 all the same, to ten digits."""
-    with instance(fmu("InclineDisk")) as one:
+    with instance(native_fmu("InclineDisk")) as one:
         one.fmu.setupExperiment()
         one.set("alpha", 1e-300)
         one.fmu.enterInitializationMode()

@@ -48,11 +48,11 @@ def largest_error(path, **settings):
 
 
 @BOTH
-def test_rk4_has_order_four(fmu, name):
+def test_rk4_has_order_four(native_fmu, name):
     """Halving the step of the classical Runge-Kutta method divides its error by 2^4, with projection
     and without."""
     steps = 0.05 / 2.0 ** np.arange(1, 6)
-    errors = [error(run(fmu(name), solver_method="rk4", solver_step=h)) for h in steps]
+    errors = [error(run(native_fmu(name), solver_method="rk4", solver_step=h)) for h in steps]
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.abs(order - 4).max() < 0.15
 
@@ -61,30 +61,30 @@ def test_rk4_has_order_four(fmu, name):
     ("step", "taken"),
     [(0.06, 4), (0.05, 4), (0.0501, 4), (0.0499, 5), (0.14, 2), (1.0, 1), (0.002, 100)],
 )
-def test_fixed_steps_divide_the_communication_step(fmu, step, taken):
+def test_fixed_steps_divide_the_communication_step(native_fmu, step, taken):
     """h' = H / ceil(H / h): the steps are equal, at most solver.step long, and end at the
     communication point."""
     H = 0.2
-    result = run(fmu("PendulumAngle"), 3 * H, H, solver_method="rk4", solver_step=step)
+    result = run(native_fmu("PendulumAngle"), 3 * H, H, solver_method="rk4", solver_step=step)
     assert list(result["solver.steps"]) == [0, taken, 2 * taken, 3 * taken]
-    equal = run(fmu("PendulumAngle"), 3 * H, H, solver_method="rk4", solver_step=H / taken)
+    equal = run(native_fmu("PendulumAngle"), 3 * H, H, solver_method="rk4", solver_step=H / taken)
     np.testing.assert_array_equal(result["theta"], equal["theta"])
 
 
-def test_rk4_without_a_step_chooses_one(fmu):
+def test_rk4_without_a_step_chooses_one(native_fmu):
     """solver.step = 0 leaves the choice to the FMU: a hundredth of the pendulum's natural time, good
     for six digits."""
-    result = run(fmu("PendulumAngle"), solver_method="rk4")
+    result = run(native_fmu("PendulumAngle"), solver_method="rk4")
     assert 200 < result["solver.steps"][-1] < 5000
     assert error(result) < 1e-6
 
 
 @BOTH
-def test_the_error_of_dop853_falls_with_the_tolerance_over_nine_decades(fmu, name):
+def test_the_error_of_dop853_falls_with_the_tolerance_over_nine_decades(native_fmu, name):
     """Each tenth of the tolerance makes the error smaller, from 1e-1 to 1e-13, nine decades and more
     in all, and the error stays below twice the tolerance."""
     tolerances = 10.0 ** -np.arange(1, 14)
-    errors = np.array([largest_error(fmu(name), tolerance=tol) for tol in tolerances])
+    errors = np.array([largest_error(native_fmu(name), tolerance=tol) for tol in tolerances])
     assert (errors < 2 * tolerances).all()
     assert (np.diff(errors) < 0).all()
     assert errors[0] / errors[-1] > 1e9
@@ -93,10 +93,10 @@ def test_the_error_of_dop853_falls_with_the_tolerance_over_nine_decades(fmu, nam
 
 @BOTH
 @pytest.mark.parametrize(("method", "finest"), [("radau5", 8)])
-def test_the_error_of_the_other_methods_falls_with_the_tolerance(fmu, name, method, finest):
+def test_the_error_of_the_other_methods_falls_with_the_tolerance(native_fmu, name, method, finest):
     """A hundredth of the tolerance makes the error of radau5 at least 10 times smaller."""
     errors = [
-        largest_error(fmu(name), tolerance=10.0**-k, solver_method=method)
+        largest_error(native_fmu(name), tolerance=10.0**-k, solver_method=method)
         for k in range(2, finest + 1, 2)
     ]
     assert (np.array(errors[:-1]) / errors[1:] > 10).all()
@@ -104,10 +104,10 @@ def test_the_error_of_the_other_methods_falls_with_the_tolerance(fmu, name, meth
 
 
 @pytest.mark.parametrize("method", ["dop853", "radau5"])
-def test_the_importers_tolerance_is_obeyed(fmu, method):
+def test_the_importers_tolerance_is_obeyed(native_fmu, method):
     """fmi2SetupExperiment's tolerance is the dial; solver.tolerance goes before it; without either it
     is 1e-8, which the FMU states as its default."""
-    path = fmu("PendulumCartesian")
+    path = native_fmu("PendulumCartesian")
 
     def motion(tolerance=None, **solver):
         result = run(path, 1.0, 0.5, tolerance, solver_method=method, **solver)
@@ -123,9 +123,9 @@ def test_the_importers_tolerance_is_obeyed(fmu, method):
     assert float(stated) == 1e-8
 
 
-def test_steps_are_no_longer_than_the_largest_step(fmu):
+def test_steps_are_no_longer_than_the_largest_step(native_fmu):
     """solver.maximum_step bounds the step: 1 s in steps of at most 0.01 s are at least 100."""
-    path = fmu("PendulumAngle")
+    path = native_fmu("PendulumAngle")
     free = run(path, 1.0, 1.0, 1e-3)["solver.steps"][-1]
     bound = run(path, 1.0, 1.0, 1e-3, solver_maximum_step=0.01)["solver.steps"][-1]
     assert free < 20
@@ -133,20 +133,20 @@ def test_steps_are_no_longer_than_the_largest_step(fmu):
 
 
 @pytest.mark.parametrize("method", ["dop853", "radau5"])
-def test_a_finer_communication_step_changes_nothing_beyond_the_tolerance(fmu, method):
+def test_a_finer_communication_step_changes_nothing_beyond_the_tolerance(native_fmu, method):
     """The bob does not know when it is looked at: one step of 2 s or 200 of 10 ms."""
-    path = fmu("PendulumCartesian")
+    path = native_fmu("PendulumCartesian")
     coarse = run(path, 2.0, 2.0, 1e-10, solver_method=method)
     fine = run(path, 2.0, 0.01, 1e-10, solver_method=method)
     for name in ("x", "y", "der(x)", "der(y)", "lambda.rod"):
         assert coarse[name][-1] == pytest.approx(fine[name][-1], abs=1e-8)
 
 
-def test_a_step_that_is_far_too_large_is_refused(fmu):
+def test_a_step_that_is_far_too_large_is_refused(native_fmu):
     """rk4 with steps as long as the whole fall knows nothing of the motion: it says so."""
     with pytest.raises(SimulationError, match=r"far too large: reduce solver\.step"):
         simulate(
-            fmu("Hemisphere"),
+            native_fmu("Hemisphere"),
             20.0,
             10.0,
             start_values={"theta": 0.1, "solver.method": "rk4", "solver.step": 10.0},

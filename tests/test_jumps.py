@@ -103,14 +103,14 @@ MODELS = {
 
 
 @pytest.fixture(scope="module")
-def own(target, tmp_path_factory):
+def own(tmp_path_factory):
     """own(NAME): the FMU of one of the models above."""
-    if target == "native" and find_compiler() is None:
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    folder = tmp_path_factory.mktemp(target)
+    folder = tmp_path_factory.mktemp("own")
 
     def build(name):
-        return build_fmu(MODELS[name](), folder, Scene(name), target=target, check=False)
+        return build_fmu(MODELS[name](), folder, Scene(name), target="native", check=False)
 
     return cache(build)
 
@@ -241,11 +241,9 @@ def test_a_force_that_jumps_lifts_a_block_at_once(own):
 @pytest.mark.parametrize(
     ("name", "stop", "velocity"), [("Pulse", 2.0, 0.5), ("Stairs", 1.9, 5.4), ("Valley", 3.0, 2.0)]
 )
-def test_model_exchange_stops_at_the_jumps(own, target, name, stop, velocity):
+def test_model_exchange_stops_at_the_jumps(own, name, stop, velocity):
     """fmpy's CVODE is told of each jump by an event indicator: the impulse of the pulse, the steps of the
     stairs, and x' = +2 m/s at the bottom of the valley on the way back."""
-    if target == "python":
-        pytest.skip("python FMUs have no model exchange")
     run = simulate_fmu(
         str(own(name)),
         fmi_type="ModelExchange",
@@ -327,8 +325,7 @@ def test_the_equations_are_shown_as_they_were_written():
     assert str(force) == "F*sign(x)"
 
 
-@pytest.mark.parametrize("target", ["python", "native"])
-def test_a_pulse_shorter_than_a_step_needs_a_word(tmp_path, target):
+def test_a_pulse_shorter_than_a_step_needs_a_word(tmp_path):
     """A smooth pulse of w = 1e-4 s gives a cart at rest F w sqrt(pi)/m, with solver.maximum_step = w as
     docs/events.md says; one that begins and ends by jumps arrives in full by itself."""
     w = symbols("w", positive=True)
@@ -346,7 +343,7 @@ def test_a_pulse_shorter_than_a_step_needs_a_word(tmp_path, target):
             ],
             start={x: 0.0},
         )
-        fmu = build_fmu(model, tmp_path, target=target, check=False)
+        fmu = build_fmu(model, tmp_path, target="native", check=False)
         with instance(fmu) as one:
             one.start({"solver.maximum_step": step})
             one.step(1.0)

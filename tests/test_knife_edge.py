@@ -13,8 +13,6 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import Contact, Model, Nonholonomic, Parameter, build_fmu, simulate
 from lagfmu.errors import SimulationError
 
-pytestmark = pytest.mark.python_cases(3)
-
 DEFAULT = {"m": 1.0, "J": 0.1, "g": 9.81, "alpha": np.pi / 6}
 OTHER = {"m": 70.0, "J": 2.5, "g": 3.7, "alpha": 0.1}
 TINY = {"m": 1e-3, "J": 1e-7, "g": 9.81, "alpha": 1.2}
@@ -48,11 +46,11 @@ def skate(path, case, stop=6.0, tolerance=1e-12):
 
 @EVERY
 @pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-6), (1e-12, 1e-11)])
-def test_the_blade_drifts_across_the_slope(fmu, case, tolerance, allowed):
+def test_the_blade_drifts_across_the_slope(native_fmu, case, tolerance, allowed):
     """phi = phi0 + w t; the speed along the blade is u = u0 + (G/w)(sin phi - sin phi0) with
     G = g sin alpha; from rest x = (G/2w^2) sin^2 wt and y = (G/2w)(t - sin(2wt)/(2w)): a cycloid."""
     (world, w, phi0, u0) = case
-    result = skate(fmu("KnifeEdge"), case, tolerance=tolerance)
+    result = skate(native_fmu("KnifeEdge"), case, tolerance=tolerance)
     t = result["time"]
     G = world["g"] * np.sin(world["alpha"])
     phi = phi0 + w * t
@@ -74,11 +72,11 @@ def test_the_blade_drifts_across_the_slope(fmu, case, tolerance, allowed):
 
 
 @EVERY
-def test_lambda_is_the_sideways_force_on_the_blade(fmu, case):
+def test_lambda_is_the_sideways_force_on_the_blade(native_fmu, case):
     """lambda = -m (w u0 + G (2 sin phi - sin phi0)) [N]: from rest -2 m g sin(alpha) sin wt, twice
     the component of the weight, because the blade also turns the motion."""
     (world, w, phi0, u0) = case
-    result = skate(fmu("KnifeEdge"), case)
+    result = skate(native_fmu("KnifeEdge"), case)
     G = world["g"] * np.sin(world["alpha"])
     phi = phi0 + w * result["time"]
     expected = -world["m"] * (w * u0 + G * (2 * np.sin(phi) - np.sin(phi0)))
@@ -90,10 +88,10 @@ def test_lambda_is_the_sideways_force_on_the_blade(fmu, case):
 
 
 @EVERY
-def test_the_blade_never_slides_sideways_and_the_force_does_no_work(fmu, case):
+def test_the_blade_never_slides_sideways_and_the_force_does_no_work(native_fmu, case):
     """x' sin phi - y' cos phi = 0 at rounding level, Q is at right angles to the motion, and the
     energy is constant: the constraint holds velocities, not places."""
-    result = skate(fmu("KnifeEdge"), case)
+    result = skate(native_fmu("KnifeEdge"), case)
     speed = np.hypot(result["der(x)"], result["der(y)"]).max()
     assert np.abs(result["residual.edge"]).max() <= 4e-16 * speed
     power = result["Q.x"] * result["der(x)"] + result["Q.y"] * result["der(y)"]
@@ -102,10 +100,10 @@ def test_the_blade_never_slides_sideways_and_the_force_does_no_work(fmu, case):
     assert np.abs(energy - energy[0]).max() < 1e-11 * result["energy.kinetic"].max()
 
 
-def test_a_sideways_velocity_is_taken_away(fmu):
+def test_a_sideways_velocity_is_taken_away(native_fmu):
     """Thrown across the blade at the start, it keeps only the part along the blade."""
     result = simulate_fmu(
-        str(fmu("KnifeEdge")),
+        str(native_fmu("KnifeEdge")),
         stop_time=0.1,
         output_interval=0.1,
         start_values={"phi": 0.5, "der(x)": 1.0, "der(y)": 2.0},

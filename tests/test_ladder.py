@@ -10,8 +10,6 @@ from scipy.integrate import quad, solve_ivp
 
 from lagfmu import verify
 
-pytestmark = pytest.mark.python_cases(3)
-
 G = 9.81
 CASES = {  # m [kg], l [m], theta0 [rad], share of the rate at which it would leave the wall at once
     "default": (10.0, 2.0, 1.2, 0.0),
@@ -58,10 +56,10 @@ def highest(case):
 
 @EVERY
 @pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
-def test_it_leaves_the_wall_at_two_thirds_of_its_height(fmu, case, tolerance, allowed):
+def test_it_leaves_the_wall_at_two_thirds_of_its_height(native_fmu, case, tolerance, allowed):
     """The upper end leaves the wall at sin theta = (2/3) sin theta0 + (2/9)(l/g) theta0'^2, with
     theta'^2 = (3/2)(g/l) sin theta there, once; the lower end never leaves the floor."""
-    last = slide(fmu("Ladder"), case, tolerance)[-1]
+    last = slide(native_fmu("Ladder"), case, tolerance)[-1]
     assert last["departure.wall.count"] == 1
     assert last["departure.floor.count"] == 0
     height = np.sin(last["departure.wall.theta"])
@@ -71,11 +69,11 @@ def test_it_leaves_the_wall_at_two_thirds_of_its_height(fmu, case, tolerance, al
 
 
 @EVERY
-def test_the_forces_of_wall_and_floor(fmu, case):
+def test_the_forces_of_wall_and_floor(native_fmu, case):
     """At the wall, with theta'^2 = theta0'^2 + 3 (g/l)(sin theta0 - sin theta): the wall gives m x''
     and the floor m (g + y'').  Falling off the wall it has m (g - (l/2) sin theta theta'^2)/(1 + 3
     cos(theta)^2) from the floor and nothing from the side.  Lying, half the weight at either end."""
-    result = slide(fmu("Ladder"), case, stop=4.0, points=400)
+    result = slide(native_fmu("Ladder"), case, stop=4.0, points=400)
     m, length, theta0, _ = case
     s, c = np.sin(result["theta"]), np.cos(result["theta"])
     square = rate0(case) ** 2 + 3 * G / length * (np.sin(theta0) - s)
@@ -98,10 +96,10 @@ def test_the_forces_of_wall_and_floor(fmu, case):
 
 
 @EVERY
-def test_off_the_wall_it_slides_evenly_to_the_end_and_beyond(fmu, case):
+def test_off_the_wall_it_slides_evenly_to_the_end_and_beyond(native_fmu, case):
     """Nothing pushes it sideways any more: x' keeps the value of the departure, also when it lies; the
     fall ends flat, theta = 0, without a rebound."""
-    result = slide(fmu("Ladder"), case, stop=4.0, points=400)
+    result = slide(native_fmu("Ladder"), case, stop=4.0, points=400)
     length, last = case[1], result[-1]
     off, lying = ~result["contact.wall"], result["contact.top"]
     speed = last["departure.wall.velocity.x"]
@@ -119,7 +117,7 @@ def test_off_the_wall_it_slides_evenly_to_the_end_and_beyond(fmu, case):
     assert result["energy.total"][-1] == pytest.approx(case[0] * speed**2 / 2, rel=1e-12)
 
 
-def test_the_times_are_those_of_the_angle_alone(fmu):
+def test_the_times_are_those_of_the_angle_alone(native_fmu):
     """theta'' = -(3/2)(g/l) cos theta at the wall, integrated alone, reaches the departure and (with the
     floor's equation from there) the floor when the FMU says."""
     case = CASES["default"]  # as the FMU starts
@@ -147,7 +145,7 @@ def test_the_times_are_those_of_the_angle_alone(fmu):
     y0 = [np.arcsin(s), -np.sqrt(square(s))]
     ended = solve_ivp(fall, (0, 2), y0, "DOP853", events=flat, rtol=1e-13, atol=1e-13)
     landing = time + ended.t_events[0][0]
-    with instance(fmu("Ladder")) as one:
+    with instance(native_fmu("Ladder")) as one:
         one.start(tolerance=1e-12)
         one.step(landing - 1e-9)
         assert one.get("departure.wall.time") == pytest.approx(time, abs=1e-10)
@@ -156,9 +154,9 @@ def test_the_times_are_those_of_the_angle_alone(fmu):
         assert one.get("contact.top")
 
 
-def test_upright_it_stands(fmu):
+def test_upright_it_stands(native_fmu):
     """Exactly upright the ladder balances on the floor, which carries it all, and leans on nothing."""
-    result = slide(fmu("Ladder"), (10.0, 2.0, np.pi / 2, 0.0), stop=2.0, points=10)
+    result = slide(native_fmu("Ladder"), (10.0, 2.0, np.pi / 2, 0.0), stop=2.0, points=10)
     np.testing.assert_allclose(result["lambda.floor"], 10 * G, rtol=1e-12)
     assert np.abs(result["lambda.wall"]).max() < 1e-12
     np.testing.assert_allclose(result["theta"], np.pi / 2, rtol=1e-14)
@@ -169,9 +167,9 @@ def test_upright_it_stands(fmu):
     [{"theta": 1e-8 - np.pi / 2}, {"l": 0.002}, {"theta": 2.0}],
     ids=["on its upper end", "dropped from 465 lengths", "leaning the other way"],
 )
-def test_its_forces_from_the_state_in_every_mode(fmu, start):
+def test_its_forces_from_the_state_in_every_mode(native_fmu, start):
     """Standing on either end alone, at the wall or off it, and lying: the closed forms hold."""
-    found = verify(fmu("Ladder"), start_values=start)
+    found = verify(native_fmu("Ladder"), start_values=start)
     assert found.passed, [c for c in found.checks if not c.passed]
     points = {c.name: c.points for c in found.checks}
     assert points["lambda.top"] + points["lambda.floor from the state"] > 50

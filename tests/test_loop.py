@@ -11,8 +11,6 @@ from scipy.special import ellipk
 
 from lagfmu import verify
 
-pytestmark = pytest.mark.python_cases(3)
-
 WORLDS = {  # m [kg], g [m/s^2], a [m]
     "earth": {"m": 1.0, "g": 9.81, "a": 1.0},
     "moon": {"m": 3e-3, "g": 1.62, "a": 25.0},
@@ -39,10 +37,12 @@ def run(path, world, square, tolerance=1e-12, stop=6.0, points=1):
 @EVERY
 @ACCURACY
 @pytest.mark.parametrize("square", [2.5, 3.0, 3.732, 4.5, 4.999])
-def test_it_leaves_where_gravity_alone_bends_the_path(fmu, world, square, tolerance, allowed):
+def test_it_leaves_where_gravity_alone_bends_the_path(
+    native_fmu, world, square, tolerance, allowed
+):
     """With 2 < v0^2/(g a) < 5 it leaves in the upper half at the height y = (v0^2/g - 2 a)/3 above the
     centre, with v^2 = g y, going up and back: there m v^2/a is the weight's part towards the centre."""
-    last = run(fmu("Loop"), world, square, tolerance, 5.0)[-1]
+    last = run(native_fmu("Loop"), world, square, tolerance, 5.0)[-1]
     g, a = world["g"], world["a"]
     assert last["departure.loop.count"] >= 1
     if last["departure.loop.count"] == 1:
@@ -57,20 +57,20 @@ def test_it_leaves_where_gravity_alone_bends_the_path(fmu, world, square, tolera
 @EVERY
 @ACCURACY
 @pytest.mark.parametrize("square", [2 + 1e-6, 2.0001, 2.001, 2.01, 2.1])
-def test_a_short_departure_is_not_stepped_over(fmu, world, square, tolerance, allowed):
+def test_a_short_departure_is_not_stepped_over(native_fmu, world, square, tolerance, allowed):
     """A little faster than to the height of the centre, the particle pulls at the loop for a moment
     only, where it turns round: it leaves and comes back, however long the steps."""
     a = world["a"]
-    last = run(fmu("Loop"), world, square, tolerance, 4.0)[-1]
+    last = run(native_fmu("Loop"), world, square, tolerance, 4.0)[-1]
     assert last["departure.loop.count"] == 1
     assert abs(last["departure.loop.y"] - a * (square - 2) / 3) < allowed * a
 
 
 @pytest.mark.parametrize("square", [5.0 + 1e-9, 5.1, 7.0, 100.0])
-def test_fast_enough_it_never_leaves(fmu, square):
+def test_fast_enough_it_never_leaves(native_fmu, square):
     """With v0^2 > 5 g a the loop pushes all the way round, six times the weight harder at the bottom
     than at the top, turn after turn."""
-    result = run(fmu("Loop"), WORLDS["earth"], square, 1e-12, 30.0, 500)
+    result = run(native_fmu("Loop"), WORLDS["earth"], square, 1e-12, 30.0, 500)
     assert result["contact.loop"].all()
     assert result["departure.loop.count"][-1] == 0
     force = 9.81 * (square - 2 - 3 * result["y"])
@@ -79,13 +79,13 @@ def test_fast_enough_it_never_leaves(fmu, square):
     assert (np.abs(np.unwrap(np.arctan2(result["x"], -result["y"]))[-1])) > 4 * np.pi
 
 
-def test_just_fast_enough_either_verdict_is_the_same_motion(fmu):
+def test_just_fast_enough_either_verdict_is_the_same_motion(native_fmu):
     """With v0^2 = 5 g a the force touches zero at the top: whether the contact is called open or closed
     there, the particle goes on round the loop, and is back at the bottom with v0 after the integral
     of d theta over theta' = sqrt((g/a)(3 + 2 cos theta))."""
     period = 2 * quad(lambda s: 1 / np.sqrt(9.81 * (3 + 2 * np.cos(s))), 0, np.pi)[0]
     for tolerance, allowed in ((1e-8, 1e-6), (1e-12, 1e-7)):
-        with instance(fmu("Loop")) as one:
+        with instance(native_fmu("Loop")) as one:
             speed = np.sqrt(5 * 9.81)
             one.start({"der(x)": speed}, tolerance=tolerance)
             one.step(period)
@@ -95,11 +95,11 @@ def test_just_fast_enough_either_verdict_is_the_same_motion(fmu):
 
 
 @pytest.mark.parametrize("square", [0.01, 1.0, 1.999])
-def test_too_slow_for_the_upper_half_it_swings(fmu, square):
+def test_too_slow_for_the_upper_half_it_swings(native_fmu, square):
     """With v0^2 < 2 g a it turns round below the centre's height and swings as a pendulum does, with the
     period 4 sqrt(a/g) K(v0/(2 sqrt(g a))) and without ever leaving."""
     period = 4 * ellipk(square / 4)
-    result = run(fmu("Loop"), WORLDS["earth"], square, 1e-12, 2 * period, 2)
+    result = run(native_fmu("Loop"), WORLDS["earth"], square, 1e-12, 2 * period, 2)
     assert result["contact.loop"].all()
     np.testing.assert_allclose(result["x"], 0, atol=1e-10)
     np.testing.assert_allclose(result["der(x)"], np.sqrt(square * 9.81), rtol=1e-10)
@@ -107,12 +107,14 @@ def test_too_slow_for_the_upper_half_it_swings(fmu, square):
 
 @EVERY
 @pytest.mark.parametrize("square", [2.2, 2 + np.sqrt(3), 4.5])
-def test_off_the_loop_it_flies_a_parabola_and_meets_it_at_three_times_the_angle(fmu, world, square):
+def test_off_the_loop_it_flies_a_parabola_and_meets_it_at_three_times_the_angle(
+    native_fmu, world, square
+):
     """Leaving at the angle alpha above the horizontal, the particle flies a parabola that meets the loop
     again after 4 sqrt(a/g) sqrt(sin alpha) cos alpha, 3 alpha below the horizontal (and through the
     very centre if v0^2 = (2 + sqrt 3) g a); there it loses the speed across the loop and
     slides on with m v^2/a + m g cos theta."""
-    result = run(fmu("Loop"), world, square, 1e-12, 6.0, 300)
+    result = run(native_fmu("Loop"), world, square, 1e-12, 6.0, 300)
     m, g, a = world["m"], world["g"], world["a"]
     first = result[result["departure.loop.count"] == 1]
     t0 = first["departure.loop.time"][0]
@@ -143,7 +145,7 @@ def test_off_the_loop_it_flies_a_parabola_and_meets_it_at_three_times_the_angle(
     assert np.abs(met["lambda.loop"] - force).max() < 1e-8 * m * g
 
 
-def test_the_way_up_takes_as_long_as_the_angle_alone_says(fmu):
+def test_the_way_up_takes_as_long_as_the_angle_alone_says(native_fmu):
     """theta'' = -(g/a) sin theta, integrated alone up to the departure, takes the time that the FMU
     reports, whatever its communication step."""
     square = 3.5
@@ -163,14 +165,14 @@ def test_the_way_up_takes_as_long_as_the_angle_alone_says(fmu):
         atol=1e-13,
     )
     for points in (1, 7, 500):
-        result = run(fmu("Loop"), WORLDS["earth"], square, 1e-12, 4.0, points)
+        result = run(native_fmu("Loop"), WORLDS["earth"], square, 1e-12, 4.0, points)
         first = result[result["departure.loop.count"] == 1]
         assert first["departure.loop.time"][0] == pytest.approx(alone.t_events[0][0], abs=1e-10)
 
 
-def test_let_go_inside_it_flies_a_parabola_until_it_lands(fmu):
+def test_let_go_inside_it_flies_a_parabola_until_it_lands(native_fmu):
     """From (0.1, 0.2) m at (1, -1) m/s the flight's closed forms hold, up to the landing."""
     start = {"x": 0.1, "y": 0.2, "der(x)": 1.0, "der(y)": -1.0}
-    found = verify(fmu("Loop"), start_values=start, stop_time=0.25)
+    found = verify(native_fmu("Loop"), start_values=start, stop_time=0.25)
     assert found.passed, [c for c in found.checks if not c.passed]
     assert {c.name: c.points for c in found.checks}["y in flight"] > 20

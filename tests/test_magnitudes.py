@@ -12,8 +12,6 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Friction, Input, Model, Nonholonomic, Parameter, build_fmu, multiplier
 
-pytestmark = pytest.mark.python_cases(4)
-
 g = 9.81  # m/s^2
 
 
@@ -26,11 +24,11 @@ def refusal(path, values) -> str:
 
 
 @pytest.mark.parametrize("omega", [1e-3, 1.0, 1e6, 1e9])
-def test_a_skate_draws_its_cycloid_however_small(fmu, omega):
+def test_a_skate_draws_its_cycloid_however_small(native_fmu, omega):
     """From rest at x = y = 0, with no length given anywhere, x = G sin(w t)^2/(2 w^2), which is 1e-18 m at
     w = 1e9/s, and lambda = -2 m G sin(w t): each to 1e-6 of its own size, G = g sin(alpha)."""
     G = g / 2
-    with instance(fmu("KnifeEdge")) as one:
+    with instance(native_fmu("KnifeEdge")) as one:
         one.start({"der(phi)": omega})
         for k in range(1, 6):
             one.step(0.7 / omega)
@@ -43,10 +41,10 @@ def test_a_skate_draws_its_cycloid_however_small(fmu, omega):
 
 
 @pytest.mark.parametrize("step", [1e-12, 1e-2, 1e6])
-def test_a_fall_from_rest_looks_the_same_on_every_scale(fmu, step):
+def test_a_fall_from_rest_looks_the_same_on_every_scale(native_fmu, step):
     """Atwood's masses, from 0 at rest, fall by a t^2/2 with a = g/3 in any communication step: nothing but
     that step says what is long and what is short."""
-    with instance(fmu("Atwood")) as one:
+    with instance(native_fmu("Atwood")) as one:
         one.start()
         for k in range(1, 4):
             one.step(step)
@@ -55,11 +53,11 @@ def test_a_fall_from_rest_looks_the_same_on_every_scale(fmu, step):
             assert one.get("x2") == pytest.approx(-fallen, rel=1e-9)
 
 
-def test_a_ball_thrown_from_the_floor_comes_back_to_it(fmu):
+def test_a_ball_thrown_from_the_floor_comes_back_to_it(native_fmu):
     """From y = 0 with v, the height v^2/(2 g) is the only length: thrown at 1 nm/s or 1 km/s, it is back
     after 2 v/g and leaves with e v, to the same relative accuracy."""
     for v in (1e-9, 1.0, 1e3):
-        with instance(fmu("BouncingBall")) as one:
+        with instance(native_fmu("BouncingBall")) as one:
             one.start({"y": 0.0, "der(y)": v})
             one.step(1.0 * v / g)
             assert one.get("y") == pytest.approx(v**2 / (2 * g), rel=1e-9)
@@ -68,22 +66,22 @@ def test_a_ball_thrown_from_the_floor_comes_back_to_it(fmu):
             assert one.get("y") == pytest.approx(rise, rel=1e-7)
 
 
-def test_an_angle_without_digits_for_a_direction_is_refused(fmu):
+def test_an_angle_without_digits_for_a_direction_is_refused(native_fmu):
     """Neighbours of 1e300 are 1e284 rad apart: no direction.  A million turns leave ten digits."""
     for name, angle in (("RollingSphere", "phi"), ("KnifeEdge", "phi"), ("Ladder", "theta")):
-        text = refusal(fmu(name), {angle: 1e300})
+        text = refusal(native_fmu(name), {angle: 1e300})
         assert f"the angle {angle} = 1e+300 rad" in text
         assert "whole turns" in text
-    with instance(fmu("RollingSphere")) as one:
+    with instance(native_fmu("RollingSphere")) as one:
         one.start({"phi": 2e6 * math.pi})
         # far turned itself, it presses on as if it were not: lambda = m g cos(theta) at rest
         assert one.get("lambda.surface") == pytest.approx(g * math.cos(0.05), rel=1e-12)
 
 
-def test_a_far_place_is_no_size_of_another_coordinate(fmu):
+def test_a_far_place_is_no_size_of_another_coordinate(native_fmu):
     """A ladder at x = 1e300 m lets its upper end fall as one at x = 1 m does, in front of no wall: the end is
     1.86 m above the floor, does not touch it, and lambda.floor = m g/(1 + 3 cos(theta)^2)."""
-    with instance(fmu("Ladder")) as one:
+    with instance(native_fmu("Ladder")) as one:
         one.start({"x": 1e300})
         assert not one.get("contact.top")
         push = 10.0 * g / (1 + 3 * math.cos(1.2) ** 2)
@@ -92,10 +90,10 @@ def test_a_far_place_is_no_size_of_another_coordinate(fmu):
         assert one.get("residual.top") < 1.86
 
 
-def test_a_rod_that_newtons_method_never_reaches_is_refused(fmu):
+def test_a_rod_that_newtons_method_never_reaches_is_refused(native_fmu):
     """L^2 = 1e-600 m^2 is no number: from 0.1 m away the bob cannot be put at |q| = L = 1e-300 m, and is not
     left at some smaller |q|.  At 1e-12 m it can, to rounding."""
-    path = fmu("PendulumCartesian")
+    path = native_fmu("PendulumCartesian")
     text = refusal(path, {"L": 1e-300, "x": 0.1, "y": 0.0})
     assert "cannot be projected" in text
     assert "'rod'" in text
@@ -104,9 +102,9 @@ def test_a_rod_that_newtons_method_never_reaches_is_refused(fmu):
         assert math.hypot(one.get("x"), one.get("y")) == pytest.approx(1e-12, rel=1e-14)
 
 
-def test_a_mass_that_has_lost_its_digits_is_refused(fmu):
+def test_a_mass_that_has_lost_its_digits_is_refused(native_fmu):
     """Below 2.2e-308 a double has fewer digits: 5e-324 kg times 9.81 m/s^2 would be 10 times 5e-324."""
-    text = refusal(fmu("BouncingBall"), {"m": 5e-324})
+    text = refusal(native_fmu("BouncingBall"), {"m": 5e-324})
     assert "the mass of y is 5e-324" in text
     assert "at least 2.23e-308" in text
 

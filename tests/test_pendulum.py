@@ -9,8 +9,6 @@ from instance import instance
 from runs import simulate_fmu
 from scipy.special import ellipj, ellipk
 
-pytestmark = pytest.mark.python_cases(3)
-
 NAMES = ("PendulumCartesian", "PendulumAngle", "PendulumNullspace")
 EVERY = pytest.mark.parametrize("name", NAMES)
 DEFAULT = {"m": 1.0, "g": 9.81, "L": 1.0}
@@ -63,11 +61,11 @@ def multiplier(theta, rate, world):
     [(1.0, 0.0, DEFAULT), (3.0, 0.0, DEFAULT), (0.4, 7.5, DEFAULT), (2.0, -0.1, OTHER)],
     ids=["one radian", "nearly upright", "rotating", "on the Moon"],
 )
-def test_three_formulations_give_one_multiplier(fmu, theta0, rate, world):
+def test_three_formulations_give_one_multiplier(native_fmu, theta0, rate, world):
     """lambda is a property of the motion: with the multiplier solved for, eliminated, or not there at
     all, the same rod pulls with the same force, and the bob is at the same place."""
     cartesian, angle, nullspace = (
-        swing(fmu(n), theta0, rate, world, tolerance=1e-13) for n in NAMES
+        swing(native_fmu(n), theta0, rate, world, tolerance=1e-13) for n in NAMES
     )  # nearly upright an error grows as exp(t sqrt(g/L))
     weight, L = world["m"] * world["g"], world["L"]
     for other in (angle, nullspace):
@@ -86,10 +84,10 @@ def test_three_formulations_give_one_multiplier(fmu, theta0, rate, world):
 
 @EVERY
 @pytest.mark.parametrize(("theta0", "allowed"), [(1e-3, 1e-10), (1.0, 1e-10), (3.0, 1e-10)])
-def test_motion_and_multiplier_are_elliptic_functions(fmu, name, theta0, allowed):
+def test_motion_and_multiplier_are_elliptic_functions(native_fmu, name, theta0, allowed):
     """sin(theta/2) = k sn(w t + K) with k = sin(theta0/2), and
     lambda = -m (L theta'^2 + g cos theta)/(2 L), for small and for nearly upright swings."""
-    result = swing(fmu(name), theta0, stop=6.0)
+    result = swing(native_fmu(name), theta0, stop=6.0)
     theta, rate = libration(result["time"], theta0, 9.81, 1.0)
     assert np.abs(result["x"] - np.sin(theta)).max() < allowed
     assert np.abs(result["y"] + np.cos(theta)).max() < allowed
@@ -100,11 +98,11 @@ def test_motion_and_multiplier_are_elliptic_functions(fmu, name, theta0, allowed
 
 @EVERY
 @pytest.mark.parametrize("theta0", [0.01, 1.0, 2.5, 3.0])
-def test_the_period_is_four_complete_elliptic_integrals(fmu, name, theta0):
+def test_the_period_is_four_complete_elliptic_integrals(native_fmu, name, theta0):
     """After T = 4 K(sin(theta0/2)) sqrt(L/g) the bob is back where it was let go and at rest; after
     T/2 it is on the other side."""
     period = 4 * ellipk(np.sin(theta0 / 2) ** 2) / np.sqrt(9.81)
-    result = swing(fmu(name), theta0, stop=period, points=2)
+    result = swing(native_fmu(name), theta0, stop=period, points=2)
     speed = np.hypot(result["der(x)"], result["der(y)"])
     # a time error dt leaves the speed g sin(theta0) dt
     assert speed[1:].max() / (9.81 * np.sin(theta0)) < 1e-10 * period
@@ -114,10 +112,10 @@ def test_the_period_is_four_complete_elliptic_integrals(fmu, name, theta0):
 
 @EVERY
 @pytest.mark.parametrize(("start", "pushes"), [(6.4, True), (7.2, False)])
-def test_a_fast_pendulum_rotates(fmu, name, start, pushes):
+def test_a_fast_pendulum_rotates(native_fmu, name, start, pushes):
     """Pushed at the bottom with theta' > 2 sqrt(g/L) it goes round and round: theta/2 is Jacobi's
     amplitude; over the top the rod pushes if theta'^2 < 5 g/L at the bottom, and else always pulls."""
-    result = swing(fmu(name), 0.0, start, stop=4.0)
+    result = swing(native_fmu(name), 0.0, start, stop=4.0)
     theta, rate = rotation(result["time"], start, 9.81, 1.0)
     assert theta[-1] > 4 * np.pi
     assert np.abs(result["x"] - np.sin(theta)).max() < 1e-10
@@ -128,18 +126,18 @@ def test_a_fast_pendulum_rotates(fmu, name, start, pushes):
 
 
 @EVERY
-def test_the_defaults_hold_the_default_tolerance(fmu, name):
+def test_the_defaults_hold_the_default_tolerance(native_fmu, name):
     """Ten seconds of the FMU as it comes, at the tolerance 1e-8 that it states: lambda stays within
     1e-6 of the elliptic function's, in units of the weight."""
-    result = swing(fmu(name), 1.0, stop=10.0, tolerance=None)
+    result = swing(native_fmu(name), 1.0, stop=10.0, tolerance=None)
     theta, rate = libration(result["time"], 1.0, 9.81, 1.0)
     assert np.abs(result["lambda.rod"] - multiplier(theta, rate, DEFAULT)).max() < 1e-6 * 9.81
 
 
-def test_the_rod_keeps_its_length_for_a_thousand_seconds(fmu):
+def test_the_rod_keeps_its_length_for_a_thousand_seconds(native_fmu):
     """|x^2 + y^2 - L^2| <= 1e-12 L^2 at every communication point of 1,000 s, and the velocity stays
     at right angles to the rod."""
-    result = swing(fmu("PendulumCartesian"), 1.0, stop=1000.0, tolerance=None, points=2000)
+    result = swing(native_fmu("PendulumCartesian"), 1.0, stop=1000.0, tolerance=None, points=2000)
     x, y = result["x"], result["y"]
     assert len(x) == 2001
     assert np.abs(x**2 + y**2 - 1).max() <= 1e-12
@@ -148,18 +146,18 @@ def test_the_rod_keeps_its_length_for_a_thousand_seconds(fmu):
     assert np.abs(result["energy.total"] - result["energy.total"][0]).max() < 1e-3
 
 
-def test_the_rods_force_does_no_work(fmu):
+def test_the_rods_force_does_no_work(native_fmu):
     """Q stands at right angles to the velocity: energy is constant, Q_x x' + Q_y y' = 0."""
-    result = swing(fmu("PendulumCartesian"), 2.0)
+    result = swing(native_fmu("PendulumCartesian"), 2.0)
     power = result["Q.x"] * result["der(x)"] + result["Q.y"] * result["der(y)"]
     assert np.abs(power).max() < 1e-13
     assert np.abs(result["energy.total"] - result["energy.total"][0]).max() < 1e-11 * 9.81
 
 
-def test_theta_determines_x_and_y(fmu):
+def test_theta_determines_x_and_y(native_fmu):
     """With the embedding theta alone is free: x = L sin theta and y = -L cos theta follow, with their
     velocities, and follow a change of L too."""
-    with instance(fmu("PendulumAngle")) as one:
+    with instance(native_fmu("PendulumAngle")) as one:
         kinds = {n: (v.causality, v.initial) for n, v in one.variables.items()}
         assert kinds["theta"] == ("output", "exact")
         for name in ("x", "y", "der(x)", "der(y)", "lambda.rod"):
@@ -173,18 +171,18 @@ def test_theta_determines_x_and_y(fmu):
 
 
 @pytest.mark.parametrize("name", ["x", "y", "der(x)"])
-def test_a_calculated_coordinate_cannot_be_set(fmu, name):
+def test_a_calculated_coordinate_cannot_be_set(native_fmu, name):
     """x of the pendulum in theta is an outcome: setting it is an error that says so."""
-    with instance(fmu("PendulumAngle")) as one:
+    with instance(native_fmu("PendulumAngle")) as one:
         with pytest.raises(Exception, match="failed with status"):
             one.start({name: 0.5})
         assert any(f"'{name}' is calculated and cannot be set" in text for _, _, text in one.log)
 
 
-def test_a_start_off_the_circle_is_moved_onto_it(fmu):
+def test_a_start_off_the_circle_is_moved_onto_it(native_fmu):
     """A bob put at (0.6, -0.9) on a rod of length 1 moves along the rod to the circle, and a velocity
     along the rod is taken away: both are reported."""
-    with instance(fmu("PendulumCartesian")) as one:
+    with instance(native_fmu("PendulumCartesian")) as one:
         one.start({"x": 0.6, "y": -0.9, "der(x)": 0.6, "der(y)": -0.9})
         length = np.hypot(0.6, 0.9)
         assert one.get("x") == pytest.approx(0.6 / length, rel=1e-14)

@@ -29,26 +29,26 @@ Pair = tuple[Path, Path]
 
 
 @pytest.fixture(scope="module")
-def pair(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Pair]:
-    """pair(NAME, TARGET): the system without redundant constraints, and with them."""
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Pair]:
+    """pair(NAME): the system without redundant constraints, and with them."""
     folder = tmp_path_factory.mktemp("redundant")
-    made: dict[tuple[str, str], Pair] = {}
+    made: dict[str, Pair] = {}
 
-    def get(name: str, target: str) -> Pair:
-        if target == "native" and find_compiler() is None:
+    def get(name: str) -> Pair:
+        if find_compiler() is None:
             pytest.skip("no C compiler on this machine")
-        if (name, target) not in made:
+        if name not in made:
             models = [SYSTEMS[name](redundant) for redundant in (False, True)]
             scenes = [Scene(m.name, stop_time=SPAN, step_size=SPAN / 20) for m in models]
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RedundantConstraintWarning)
                 warnings.simplefilter("ignore", StartMovedWarning)
                 paths = [
-                    write(prepare(m, s), folder / target / str(k), target=target)
+                    write(prepare(m, s), folder / name / str(k), target="native")
                     for k, (m, s) in enumerate(zip(models, scenes, strict=True))
                 ]
-            made[name, target] = (paths[0], paths[1])
-        return made[name, target]
+            made[name] = (paths[0], paths[1])
+        return made[name]
 
     return get
 
@@ -73,17 +73,10 @@ def test_redundant_constraints_cost_no_steps(name, pair):
     """Stages lie off the constraints, where rows that depend on each other ask for different accelerations:
     as many as are independent on the constraints say what acts."""
     for tolerance in (1e-6, 1e-9, 1e-12):
-        compare(pair(name, "native"), "dop853", tolerance)
+        compare(pair(name), "dop853", tolerance)
     for tolerance in (1e-6, 1e-9):
-        compare(pair(name, "native"), "radau5", tolerance)
-    compare(pair(name, "native"), "rk4", 1e-6)
-
-
-@pytest.mark.parametrize("name", ["closed_chain", "spatial_loop"])
-def test_redundant_constraints_cost_no_steps_in_python(name, pair):
-    """The same in SciPy's integrators."""
-    compare(pair(name, "python"), "dop853", 1e-7)
-    compare(pair(name, "python"), "radau5", 1e-4)
+        compare(pair(name), "radau5", tolerance)
+    compare(pair(name), "rk4", 1e-6)
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
@@ -100,7 +93,7 @@ def test_an_importers_integrator_does_not_meet_them_either(name, pair, monkeypat
     monkeypatch.setattr(fmpy.fmi2.FMU2Model, "getDerivatives", counted)
     for tolerance in (1e-4, 1e-6):
         found = []
-        for fmu in pair(name, "native"):
+        for fmu in pair(name):
             count = 0
             simulate_fmu(
                 str(fmu),
@@ -113,11 +106,10 @@ def test_an_importers_integrator_does_not_meet_them_either(name, pair, monkeypat
 
 
 @pytest.mark.parametrize("name", ["trammel", "platform", "closed_chain"])
-@pytest.mark.parametrize("target", ["native", "python"])
-def test_no_unit_of_mass_says_which_constraints_follow_from_others(name, target, pair):
+def test_no_unit_of_mass_says_which_constraints_follow_from_others(name, pair):
     """With all masses 2^-30 of what they were nothing moves otherwise: rows that nearly depend on each
     other, off the constraints, were taken for independent beside light masses (errors of 1e-5)."""
-    fmu = pair(name, target)[1]
+    fmu = pair(name)[1]
     ordinary, light = (
         simulate(fmu, tolerance=1e-9, start_values={"m": 1.5 * 2.0**power}) for power in (0, -30)
     )
@@ -129,7 +121,7 @@ def test_no_unit_of_mass_says_which_constraints_follow_from_others(name, target,
 def test_multipliers_of_redundant_constraints_are_shared_with_least_norm(pair):
     """Three parallel cranks carry the platform together: the force on it is that of two cranks, and what no
     measurement of the motion can tell, which crank carries how much, is flagged."""
-    plain, redundant = (run(fmu, "dop853", 1e-10) for fmu in pair("platform", "native"))
+    plain, redundant = (run(fmu, "dop853", 1e-10) for fmu in pair("platform"))
     for name in ("Q.x", "Q.y", "Q.turn"):
         np.testing.assert_allclose(redundant[name], plain[name], atol=1e-6)
     assert not redundant["unique.crank3"].any()

@@ -8,8 +8,6 @@ from instance import instance
 from runs import simulate_fmu
 from scipy.integrate import quad
 
-pytestmark = pytest.mark.python_cases(3)
-
 WORLDS = {  # m [kg], g [m/s^2], a, R [m]
     "earth": {"m": 1.0, "g": 9.81, "a": 1.0, "R": 0.2},
     "moon": {"m": 3e-3, "g": 1.62, "a": 2.0, "R": 25.0},
@@ -38,27 +36,27 @@ def roll(path, world, theta0, share=0.0, tolerance=1e-12, stop=12.0, points=1):
 @EVERY
 @pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
 def test_it_leaves_where_ten_seventeenths_of_the_height_and_the_speed_say(
-    fmu, world, tolerance, allowed
+    native_fmu, world, tolerance, allowed
 ):
     """The sphere leaves at cos theta = (10 cos theta0 + 7 v0^2/(g b))/17, b = a + R, whatever its mass
     and size: 7 v0^2/(g b) from the fraction of its energy that does not turn it."""
     for theta0, share in ((0.01, 0.0), (0.3, 0.5), (0.9, 0.99)):
-        result = roll(fmu("RollingSphere"), world, theta0, share, tolerance)
+        result = roll(native_fmu("RollingSphere"), world, theta0, share, tolerance)
         assert result["departure.surface.count"][-1] == 1
         expected = (10 + 7 * share) / 17 * np.cos(theta0)
         assert abs(np.cos(result["departure.surface.theta"][-1]) - expected) < allowed
 
 
-def test_started_ever_nearer_to_the_top_it_leaves_at_ten_seventeenths(fmu):
+def test_started_ever_nearer_to_the_top_it_leaves_at_ten_seventeenths(native_fmu):
     """As theta0 -> 0 from rest it leaves at cos theta = 10/17, later than the sliding particle's 2/3,
     and what is missing falls as (5/17) theta0^2."""
     for theta0 in (1e-1, 1e-2, 1e-3, 1e-4):
-        result = roll(fmu("RollingSphere"), WORLDS["earth"], theta0, stop=25.0)
+        result = roll(native_fmu("RollingSphere"), WORLDS["earth"], theta0, stop=25.0)
         short = 10 / 17 - np.cos(result["departure.surface.theta"][-1])
         assert short == pytest.approx(5 / 17 * theta0**2, rel=theta0**2, abs=1e-11)
 
 
-def test_rolling_takes_longer_than_sliding_by_the_root_of_seven_fifths(fmu):
+def test_rolling_takes_longer_than_sliding_by_the_root_of_seven_fifths(native_fmu):
     """theta'' = (5/7)(g/b) sin theta: the time to the departure is the integral of d theta/theta' with
     theta'^2 = (10/7)(g/b)(cos theta0 - cos theta)."""
     g, b, theta0 = 9.81, 1.2, 0.2
@@ -70,17 +68,17 @@ def test_rolling_takes_longer_than_sliding_by_the_root_of_seven_fifths(fmu):
     end = np.sqrt(np.arccos(10 / 17 * np.cos(theta0)) - theta0)
     time = quad(pace, 0, end, epsabs=1e-12, epsrel=1e-12)[0]
     for points in (1, 37, 800):
-        result = roll(fmu("RollingSphere"), WORLDS["earth"], theta0, stop=6.0, points=points)
+        result = roll(native_fmu("RollingSphere"), WORLDS["earth"], theta0, stop=6.0, points=points)
         assert result["departure.surface.time"][-1] == pytest.approx(time, abs=1e-10)
 
 
 @EVERY
-def test_the_forces_on_it_until_it_leaves(fmu, world):
+def test_the_forces_on_it_until_it_leaves(native_fmu, world):
     """On the surface the normal force is m g (17 cos theta - (10 + 7 share) cos theta0)/7 and the
     friction -(2/7) m g sin theta; the torque on the sphere is -R times that; f and the slip are zero.
     In flight there are no forces but the weight."""
     theta0, share = 0.2, 0.3
-    result = roll(fmu("RollingSphere"), world, theta0, share, stop=6.0, points=300)
+    result = roll(native_fmu("RollingSphere"), world, theta0, share, stop=6.0, points=300)
     weight, R, b = world["m"] * world["g"], world["R"], world["a"] + world["R"]
     closed = result["contact.surface"]
     assert 20 < closed.sum() < 280
@@ -103,10 +101,10 @@ def test_the_forces_on_it_until_it_leaves(fmu, world):
 
 
 @EVERY
-def test_in_flight_the_centre_falls_freely_and_the_spin_stays(fmu, world):
+def test_in_flight_the_centre_falls_freely_and_the_spin_stays(native_fmu, world):
     """After the departure the centre flies a parabola, the sphere turns evenly, and the energy of both
     is still what it was at rest."""
-    result = roll(fmu("RollingSphere"), world, 0.2, stop=6.0, points=300)
+    result = roll(native_fmu("RollingSphere"), world, 0.2, stop=6.0, points=300)
     g, b = world["g"], world["a"] + world["R"]
     flying, last = ~result["contact.surface"], result[-1]
     angle, spin = last["departure.surface.theta"], last["departure.surface.velocity.theta"]
@@ -124,10 +122,10 @@ def test_in_flight_the_centre_falls_freely_and_the_spin_stays(fmu, world):
     assert np.abs(result["energy.total"] - energy).max() < 1e-11 * energy
 
 
-def test_a_start_that_slips_is_made_to_roll(fmu):
+def test_a_start_that_slips_is_made_to_roll(native_fmu):
     """Set sliding at theta' without a word on its spin, the sphere keeps the speed that was set and is given
     the spin that rolls; the log tells it."""
-    with instance(fmu("RollingSphere")) as one:
+    with instance(native_fmu("RollingSphere")) as one:
         one.start({"theta": 0.1, "der(theta)": 0.7})
         assert one.get("der(theta)") == pytest.approx(0.7, rel=1e-14)
         assert one.get("der(phi)") == pytest.approx(0.7 * 1.2 / 0.2, rel=1e-14)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from runs import simulate_fmu
 
-pytestmark = pytest.mark.python_cases(3)
-
 CASES = {
     "default": {"m": 1.0, "omega": 2.0, "r0": 0.1, "v0": 0.0},
     "thrown inward": {"m": 0.03, "omega": 0.7, "r0": 2.0, "v0": -1.5},
@@ -30,10 +28,10 @@ def spin(path, m, omega, r0, v0, tolerance=1e-12, **start):
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 @pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
-def test_the_bead_runs_away_and_lambda_is_the_motors_torque(fmu, case, tolerance, allowed):
+def test_the_bead_runs_away_and_lambda_is_the_motors_torque(native_fmu, case, tolerance, allowed):
     """r = r0 cosh wt + (v0/w) sinh wt, and lambda = 2 m w r r' is the torque [N m] that keeps the wire
     turning: from rest m r0^2 w^2 sinh 2wt."""
-    result = spin(fmu("RotatingWire"), **case, tolerance=tolerance)
+    result = spin(native_fmu("RotatingWire"), **case, tolerance=tolerance)
     m, w, r0, v0 = case.values()
     t = result["time"]
     r = r0 * np.cosh(w * t) + v0 / w * np.sinh(w * t)
@@ -51,10 +49,10 @@ def test_the_bead_runs_away_and_lambda_is_the_motors_torque(fmu, case, tolerance
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
-def test_the_wire_turns_evenly(fmu, case):
+def test_the_wire_turns_evenly(native_fmu, case):
     """phi = w t and phi' = w to rounding: the motor does not give way, and what is left of phi'' is
     rounding in the Coriolis acceleration 2 r' w / r that it balances."""
-    result = spin(fmu("RotatingWire"), **case)
+    result = spin(native_fmu("RotatingWire"), **case)
     w = case["omega"]
     np.testing.assert_allclose(result["phi"], w * result["time"], rtol=1e-14, atol=0)
     np.testing.assert_allclose(result["der(phi)"], w, rtol=1e-14)
@@ -62,10 +60,10 @@ def test_the_wire_turns_evenly(fmu, case):
     assert (np.abs(result["der(phi,2)"]) <= 2 * np.finfo(float).eps * coriolis).all()
 
 
-def test_the_motor_feeds_the_bead(fmu):
+def test_the_motor_feeds_the_bead(native_fmu):
     """The energy is not constant: it grows by the motor's work, the integral of lambda w, while
     Jacobi's integral m (r'^2 - w^2 r^2)/2 stays."""
-    result = spin(fmu("RotatingWire"), **CASES["default"])
+    result = spin(native_fmu("RotatingWire"), **CASES["default"])
     m, w, r0, _ = CASES["default"].values()
     energy = result["energy.kinetic"]
     work = m * r0**2 * w**2 * (np.cosh(2 * w * result["time"]) - 1) / 2  # of m r0^2 w^3 sinh 2wt
@@ -75,9 +73,9 @@ def test_the_motor_feeds_the_bead(fmu):
     assert np.abs(jacobi - jacobi[0]).max() < 1e-11 * energy[-1]
 
 
-def test_a_start_that_does_not_turn_with_the_wire_is_made_to(fmu):
+def test_a_start_that_does_not_turn_with_the_wire_is_made_to(native_fmu):
     """omega changed alone leaves phi' = 2 against the motor's 3: the motor wins, r is as for 3."""
-    result = spin(fmu("RotatingWire"), 1.0, 3.0, 0.1, 0.0, **{"der(phi)": 2.0})
+    result = spin(native_fmu("RotatingWire"), 1.0, 3.0, 0.1, 0.0, **{"der(phi)": 2.0})
     assert result["der(phi)"][0] == 3.0
     expected = 0.1 * np.cosh(3.0 * result["time"])
     assert np.abs(result["r"] - expected).max() < 1e-11 * expected[-1]

@@ -35,7 +35,6 @@ from lagfmu.testing import (
     write,
 )
 
-pytestmark = pytest.mark.python_cases(3)
 FORCES = ("lambda.*", "Q.*")
 Make = Callable[..., tuple[Path, Prepared]]
 
@@ -47,14 +46,14 @@ def scene_of(name: str) -> tuple[ModelFile, Scene]:
 
 
 @pytest.fixture
-def make(target: str, tmp_path: Path) -> Make:
+def make(tmp_path: Path) -> Make:
     """make(NAME, **needs): the FMU of a model for a scene that needs less, and what was prepared."""
 
     def made(name: str, **needs: Any) -> tuple[Path, Prepared]:
         file, scene = scene_of(name)
         prepared = prepare(file.model, replace(scene, **needs))
         folder = tmp_path / str(len(list(tmp_path.iterdir())))
-        return write(prepared, folder, file.closed_forms, target=target), prepared
+        return write(prepared, folder, file.closed_forms, target="native"), prepared
 
     return made
 
@@ -277,48 +276,11 @@ def test_one_integrator_and_no_event_code_are_linked(tmp_path: Path, native_fmu:
     assert size[path] < 0.93 * size[full]
 
 
-def test_one_integrator_and_no_event_code_travel(tmp_path: Path, python_fmu: Any) -> None:
-    """The same of a python FMU: its solver consists of what the scene needs, and a full FMU of a pendulum
-    has nothing for contacts either."""
-
-    def solver(path: Path) -> dict[str, str]:
-        with zipfile.ZipFile(path) as archive:
-            names = [n for n in archive.namelist() if "/solver/" in n]
-            return {n.split("/")[-1]: archive.read(n).decode() for n in names}
-
-    file, scene = scene_of("PendulumCartesian")
-    events = {
-        "events.py",
-        "samples.py",
-        "switch.py",
-        "contacts.py",
-        "impact.py",
-        "complementarity.py",
-        "clearance.py",
-        "interval.py",
-    }
-    full, contacts = (solver(python_fmu(name)) for name in ("PendulumCartesian", "Hemisphere"))
-    assert contacts.keys() - full.keys() <= events
-    assert "from .events" not in full["optional_contacts.py"]
-    for method in ("dop853", "rk4", "radau5"):
-        asked = replace(scene, outputs=["lambda.rod"], method=method, step=1e-3)
-        path = write(prepare(file.model, asked), tmp_path / method, target="python")
-        held = solver(path)
-        others = {"dop853.py", "rk4.py"} - {f"{method}.py"}
-        assert full.keys() - held.keys() == others
-        assert f'INTEGRATORS = {{"{method}":' in held["integrators.py"]
-        twin = python_fmu("PendulumCartesian")
-        start = {"solver.method": method, "solver.step": 1e-3}
-        run, whole = simulate(path, 0.5), simulate(twin, 0.5, start_values=start)
-        assert (run["lambda.rod"] == whole["lambda.rod"]).all()
-
-
-@pytest.mark.parametrize("target", ["python", "native"])
-def test_without_constraints_there_are_no_rungs_for_them(tmp_path: Path, target: str) -> None:
+def test_without_constraints_there_are_no_rungs_for_them(tmp_path: Path) -> None:
     """A pendulum of which only its place is read is one angle, and no multiplier: what solves for dependent
     rows is not there, as in the FMU of a spring and a mass; which without its mass is still refused."""
     file, scene = scene_of("PendulumAngle")
-    place = write(prepare(file.model, replace(scene, outputs=["x"])), tmp_path, target=target)
+    place = write(prepare(file.model, replace(scene, outputs=["x"])), tmp_path, target="native")
     x = dynamicsymbols("x")
     m, k = symbols("m k", nonnegative=True)
     spring = Model(
@@ -328,13 +290,9 @@ def test_without_constraints_there_are_no_rungs_for_them(tmp_path: Path, target:
         parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1.0, "N/m")],
         start={x: 1.0},
     )
-    path = build_fmu(spring, tmp_path, target=target, check=False)
+    path = build_fmu(spring, tmp_path, target="native", check=False)
     for fmu in (place, path):
-        if target == "native":
-            held = {Path(n).stem for n in sources(fmu) if n.endswith(".c")}
-        else:
-            with zipfile.ZipFile(fmu) as archive:
-                held = {Path(n).stem for n in archive.namelist() if n.endswith(".py")}
+        held = {Path(n).stem for n in sources(fmu) if n.endswith(".c")}
         assert not {"orthogonal", "nullspace", "weighted", "cod", "leastnorm"} & held
         assert {"kkt", "schur"} <= held
     assert simulate(path, 1.0)["x"][-1] == pytest.approx(np.cos(1.0), rel=1e-7)
@@ -474,13 +432,22 @@ def test_show_tells_what_was_left_out() -> None:
     assert "operations of the right-hand side" in text
 
 
-def test_the_command_line_builds_a_scene(tmp_path: Path, target: str) -> None:
+def test_the_command_line_builds_a_scene(tmp_path: Path) -> None:
     """lagfmu build --outputs --fixed --name: the pruned FMU passes its closed forms."""
     arguments = [str(MODELS / "hemisphere.py"), "--outputs", "lambda.*,departure.surface.time"]
-    arguments += ["--fixed", "m,g", "--name", "Normal", "--target", target, "--out", str(tmp_path)]
+    arguments += [
+        "--fixed",
+        "m,g",
+        "--name",
+        "Normal",
+        "--target",
+        "native",
+        "--out",
+        str(tmp_path),
+    ]
     result = CliRunner().invoke(app, ["build", *arguments])
     assert result.exit_code == 0, result.output
-    path = tmp_path / target / "Normal.fmu"
+    path = tmp_path / "native" / "Normal.fmu"
     assert outputs(path) == ["lambda.surface", "departure.surface.time"]
     page = zipfile.ZipFile(path).read("documentation/index.html").decode()
     assert "What this scene leaves out" in page
@@ -519,18 +486,18 @@ def test_a_contact_that_holds_is_a_holonomic_constraint(name: str) -> None:
     assert "'contact'" not in prepared.text
 
 
-def test_reals_alone_tell_the_same(tmp_path, fmu, target):
+def test_reals_alone_tell_the_same(tmp_path, native_fmu):
     """With reals_only no variable is a Boolean, Integer or Enumeration: mode 1.0, count 1.0, and every number
     that of the full FMU; its closed forms hold."""
     file = load(MODELS / "hemisphere.py")
     scene = replace(file.scenes[0], name="HemisphereReals", reals_only=True, method="dop853")
-    path = write(prepare(file.model, scene), tmp_path, file.closed_forms, target=target)
+    path = write(prepare(file.model, scene), tmp_path, file.closed_forms, target="native")
     found = variables(path)
     assert {v.type for v in found.values()} == {"Real"}
     assert "solver.method" not in found
     assert all(v.unit == "1" for n, v in found.items() if n.startswith(("contact.", "unique.")))
     reals = simulate(path, stop_time=2.0, step_size=0.1)
-    full = simulate(fmu("Hemisphere"), 2.0, 0.1, start_values={"solver.method": "dop853"})
+    full = simulate(native_fmu("Hemisphere"), 2.0, 0.1, start_values={"solver.method": "dop853"})
     for name in full.dtype.names:
         np.testing.assert_array_equal(reals[name], full[name].astype(float), name)
     assert reals["contact.surface"][[0, -1]].tolist() == [1.0, 0.0]

@@ -58,20 +58,20 @@ def alone(times, tau=0.0):
 
 
 @pytest.mark.parametrize("tau", [0.0, 2.0])
-def test_it_moves_as_the_crank_and_the_load_alone(fmu, tau):
+def test_it_moves_as_the_crank_and_the_load_alone(native_fmu, tau):
     """With x put in as r cos phi + sqrt(l^2 - r^2 sin^2 phi) there are two coordinates and no rod: the
     same motion, free and driven."""
-    result = turn(fmu("SliderCrank"), points=20, tau=tau)
+    result = turn(native_fmu("SliderCrank"), points=20, tau=tau)
     names = ("phi", "x", "y", "der(phi)", "der(x)", "der(y)")
     for name, right in zip(names, alone(result["time"], tau), strict=True):
         assert np.abs(result[name] - right).max() < 1e-6 * np.abs(right).max(), name
 
 
 @pytest.mark.parametrize("tau", [0.0, 2.0])
-def test_what_the_energy_loses_heats_the_damper(fmu, tau):
+def test_what_the_energy_loses_heats_the_damper(native_fmu, tau):
     """E(0) - E(t) is the integral of c (y' - x')^2 less the torque's work, tau (phi - phi0): seen with a
     softer spring, which gives way enough to be heated."""
-    result = turn(fmu("SliderCrank"), points=2000, tau=tau, k=1e4, c=1e2)
+    result = turn(native_fmu("SliderCrank"), points=2000, tau=tau, k=1e4, c=1e2)
     heat = simpson(1e2 * (result["der(y)"] - result["der(x)"]) ** 2, x=result["time"])
     work = tau * (result["phi"][-1] - result["phi"][0])
     lost = result["energy.total"][0] - result["energy.total"][-1]
@@ -79,10 +79,10 @@ def test_what_the_energy_loses_heats_the_damper(fmu, tau):
     assert lost + work == pytest.approx(heat, rel=1e-4)
 
 
-def test_the_rods_force_is_that_on_slider_and_load(fmu):
+def test_the_rods_force_is_that_on_slider_and_load(native_fmu):
     """lambda 2 (x - r cos phi) accelerates slider and load: it is m x'' + M y''; and on the crank it is
     the torque J phi''."""
-    result = turn(fmu("SliderCrank"))
+    result = turn(native_fmu("SliderCrank"))
     pushed = result["der(x,2)"] + result["der(y,2)"]
     np.testing.assert_allclose(result["Q.x"], pushed, atol=1e-9 * np.abs(pushed).max())
     turned = 0.1 * result["der(phi,2)"]
@@ -91,12 +91,12 @@ def test_the_rods_force_is_that_on_slider_and_load(fmu):
     np.testing.assert_allclose(result["Q.x"], arm * result["lambda.rod"], rtol=1e-12)
 
 
-def test_the_load_follows_as_if_the_spring_were_rigid(fmu):
+def test_the_load_follows_as_if_the_spring_were_rigid(native_fmu):
     """The stiffer the spring (with its damper in proportion), the nearer is the motion to that of one
     slider of mass m + M, which keeps (J + (m + M) (dx/dphi)^2) phi'^2: the miss falls as 1/k."""
     misses = []
     for k in (1e5, 1e6, 1e7):
-        result = turn(fmu("SliderCrank"), k=k, c=k / 100)
+        result = turn(native_fmu("SliderCrank"), k=k, c=k / 100)
         phi = result["phi"]
         rod = np.sqrt(0.09 - 0.01 * np.sin(phi) ** 2)
         slope = -0.1 * np.sin(phi) * (1 + 0.1 * np.cos(phi) / rod)
@@ -107,13 +107,13 @@ def test_the_load_follows_as_if_the_spring_were_rigid(fmu):
         assert softer / stiffer == pytest.approx(10, rel=0.3)
 
 
-def test_an_explicit_method_pays_for_the_stiffness(fmu):
+def test_an_explicit_method_pays_for_the_stiffness(native_fmu):
     """The relative speed of slider and load dies at a rate of 1e4 to 2e4 1/s: an explicit method steps
     no further than a few of those times, whatever the accuracy; radau5 as far as the motion allows."""
     steps = {}
     for method in ("radau5", "dop853"):
         for tolerance in (1e-4, 1e-7):
-            with instance(fmu("SliderCrank")) as one:
+            with instance(native_fmu("SliderCrank")) as one:
                 one.start({"solver.method": method}, tolerance=tolerance)
                 one.step(1.0)
                 steps[method, tolerance] = one.get("solver.steps")
@@ -122,20 +122,20 @@ def test_an_explicit_method_pays_for_the_stiffness(fmu):
     assert steps["radau5", 1e-4] < steps["dop853", 1e-4] / 15
 
 
-def test_on_the_other_side_of_the_crank(fmu):
+def test_on_the_other_side_of_the_crank(native_fmu):
     """With the slider at r - l, behind the crank, its place and speed follow the other root."""
-    found = verify(fmu("SliderCrank"), start_values={"x": -0.2, "y": 0.0})
+    found = verify(native_fmu("SliderCrank"), start_values={"x": -0.2, "y": 0.0})
     assert found.passed, [c for c in found.checks if not c.passed]
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.1, 2.0])
-def test_at_rest_it_stays_at_rest_and_costs_nothing(fmu, phi):
+def test_at_rest_it_stays_at_rest_and_costs_nothing(native_fmu, phi):
     """Without a torque slider and load rest anywhere, the spring at its length to the last bit or the bits
     beside it: what k = 1e6 N/m makes of a rounding, 1e-10 N, is nothing to be resolved."""
     slider = 0.1 * np.cos(phi) + np.sqrt(0.09 - 0.01 * np.sin(phi) ** 2)
     for method in ("radau5", "auto"):
         for bits in (-1, 0, 1):
-            with instance(fmu("SliderCrank")) as one:
+            with instance(native_fmu("SliderCrank")) as one:
                 load = (slider + 0.2) * (1 + bits * np.finfo(float).eps)
                 values = {"phi": phi, "x": slider, "y": load, "der(phi)": 0.0}
                 one.start({**values, "solver.method": method})
@@ -147,10 +147,10 @@ def test_at_rest_it_stays_at_rest_and_costs_nothing(fmu, phi):
 
 
 @pytest.mark.parametrize("speed", [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
-def test_however_slowly_it_turns_the_spring_costs_nothing(fmu, speed):
+def test_however_slowly_it_turns_the_spring_costs_nothing(native_fmu, speed):
     """At 1e-4 rad/s the load's inertia bends the spring by 1e-15 m, less than y can tell: what rounding makes
     of it, 1e-10 N, is not resolved, and phi = omega t, but for the slider's share of the energy."""
-    with instance(fmu("SliderCrank")) as one:
+    with instance(native_fmu("SliderCrank")) as one:
         one.start({"der(phi)": speed})
         for _ in range(10):
             one.step(0.1)

@@ -133,9 +133,9 @@ def test_no_error_is_below_the_references_own(wire):
     assert found.error(point) == found.reference.own["lambda.drive"]
 
 
-def test_a_missed_event_is_an_infinite_error(fmu):
+def test_a_missed_event_is_an_infinite_error(native_fmu):
     """A run without the departure, or with one too many, has no right time of it."""
-    path = fmu("Hemisphere")
+    path = native_fmu("Hemisphere")
     with Importer(path) as importer:
         reference = refer(importer, communication=0.1)
         run = importer.observe(Setting("dop853", 1e-6, 0.0, 0.1))
@@ -254,9 +254,9 @@ def test_an_accuracy_may_name_outputs():
     assert parse("1e-6:lambda.surface,Q.*") == Goal(1e-6, ("lambda.surface", "Q.*"))
 
 
-def test_other_values_are_near_within_bounds_and_keep_the_contacts(fmu):
+def test_other_values_are_near_within_bounds_and_keep_the_contacts(native_fmu):
     """Each parameter and start value within 5 %; the particle still starts on the sphere."""
-    with Importer(fmu("Hemisphere")) as importer:
+    with Importer(native_fmu("Hemisphere")) as importer:
         scene = importer.observe(Setting("", 0.0, 0.0, 0.01), stop=0.01)
         for k in range(4):
             values = other_values(importer, scene, random.Random(k))
