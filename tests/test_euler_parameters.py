@@ -104,7 +104,7 @@ def test_a_top_nutates_alike_in_parameters_and_in_angles_at_any_size(tmp_path):
 
 def test_the_length_said_twice_costs_no_digits(tmp_path):
     """|p| = 1 stated twice: the multipliers are shared, and the motion is the same."""
-    once, twice = run(top(1e-3), tmp_path, "native"), run(top(1e-3, twice=True), tmp_path, "native")
+    once, twice = run(top(1e-3), tmp_path), run(top(1e-3, twice=True), tmp_path)
     for k in range(4):
         np.testing.assert_allclose(twice[f"p{k}"], once[f"p{k}"], atol=1e-6)
         np.testing.assert_allclose(twice[f"Q.p{k}"], once[f"Q.p{k}"], atol=1e-6)

@@ -453,9 +453,9 @@ def changed(a, b) -> set[str]:
 
 
 @pytest.mark.parametrize("name", sorted(SAFE))
-def test_initial_dependencies_are_true(name, fmu):
+def test_initial_dependencies_are_true(name, native_fmu):
     """Perturb each exact start value, parameter and input: what changes has listed it."""
-    path = fmu(name)
+    path = native_fmu(name)
     with zipfile.ZipFile(path) as archive:
         xml = ET.fromstring(archive.read("modelDescription.xml"))
     base = initial_outputs(path, SAFE[name])
@@ -477,9 +477,9 @@ def test_initial_dependencies_are_true(name, fmu):
 
 
 @pytest.mark.parametrize("name", ["CartPendulum"])
-def test_inputs_act_on_the_outputs_that_list_them(name, fmu):
+def test_inputs_act_on_the_outputs_that_list_them(name, native_fmu):
     """An input set between two steps changes accelerations and lambda at once, as listed, no state."""
-    path = fmu(name)
+    path = native_fmu(name)
     with zipfile.ZipFile(path) as archive:
         xml = ET.fromstring(archive.read("modelDescription.xml"))
     moved = changed(outputs_after(path, {}), outputs_after(path, {}, {"F": 5.0}))
@@ -490,10 +490,10 @@ def test_inputs_act_on_the_outputs_that_list_them(name, fmu):
 
 
 @pytest.mark.parametrize("name", sorted(SAFE))
-def test_dependencies_on_states_are_true(name, fmu):
+def test_dependencies_on_states_are_true(name, native_fmu):
     """From one consistent state to another in the same contact mode: what changes has listed one of
     the states that moved; and so has the mode, where that changes."""
-    path = fmu(name)
+    path = native_fmu(name)
     with zipfile.ZipFile(path) as archive:
         xml = ET.fromstring(archive.read("modelDescription.xml"))
     base = outputs_after(path, SAFE[name])
@@ -738,9 +738,9 @@ def test_the_log_tells_projected_starts_and_departures(fmu):
         assert any("surface opened at t = " in m for _, c, m in one.log if c == "logEvents")
 
 
-def test_a_start_above_the_surface_is_free_flight(fmu):
+def test_a_start_above_the_surface_is_free_flight(native_fmu):
     """a = 0.5 with r = 1.25: nothing is projected, lambda is 0 and the particle falls with g."""
-    with instance(fmu("Hemisphere")) as one:
+    with instance(native_fmu("Hemisphere")) as one:
         one.start({"a": 0.5, "r": 1.25, "theta": 0.0})
         assert one.get("r") == 1.25
         assert not one.get("contact.surface")
@@ -749,9 +749,9 @@ def test_a_start_above_the_surface_is_free_flight(fmu):
         assert one.get("departure.surface.count") == 0
 
 
-def test_before_the_first_departure_its_outputs_are_zero(fmu):
+def test_before_the_first_departure_its_outputs_are_zero(native_fmu):
     """Count 0 and finite zeros, as the table of variables says."""
-    with instance(fmu("Hemisphere")) as one:
+    with instance(native_fmu("Hemisphere")) as one:
         one.start()
         one.step(0.1)
         values = {n: v for n, v in one.outputs().items() if n.startswith("departure.")}
@@ -774,13 +774,13 @@ def test_the_tolerance_of_the_experiment_is_obeyed_and_the_parameter_goes_first(
     assert steps({}, 1e-8) == default
 
 
-def test_only_the_independent_coordinate_of_an_embedding_can_be_set(fmu):
+def test_only_the_independent_coordinate_of_an_embedding_can_be_set(native_fmu):
     """theta is set, x and y follow: x = L sin(theta)."""
-    description = read_model_description(str(fmu("PendulumAngle")))
+    description = read_model_description(str(native_fmu("PendulumAngle")))
     starts = {v.name for v in description.modelVariables if v.initial in ("exact", "approx")}
     assert {"theta", "der(theta)"} <= starts
     assert not {"x", "y", "der(x)", "der(y)"} & starts
-    with instance(fmu("PendulumAngle")) as one:
+    with instance(native_fmu("PendulumAngle")) as one:
         one.start({"theta": 0.5, "L": 2.0})
         assert one.get("x") == pytest.approx(2 * 0.479425538604203, rel=1e-15)
 

@@ -97,11 +97,11 @@ def test_the_full_fmu_is_the_scene_that_asks_for_everything(name: str, make: Mak
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_forces_alone_are_the_same_to_the_last_bit(name: str, fmu: Any, make: Make) -> None:
+def test_forces_alone_are_the_same_to_the_last_bit(name: str, native_fmu: Any, make: Make) -> None:
     """lambda and Q do not depend on whether anybody reads the coordinates and energies beside them."""
     _, scene = scene_of(name)
     path, prepared = make(name, outputs=FORCES, method="dop853", formulation=scene.formulation)
-    full = simulate(fmu(name), start_values={"solver.method": "dop853"})
+    full = simulate(native_fmu(name), start_values={"solver.method": "dop853"})
     run = simulate(path)
     names = [n for n in full.dtype.names if n.startswith(("lambda.", "Q."))]
     assert outputs(path) == names
@@ -111,11 +111,13 @@ def test_forces_alone_are_the_same_to_the_last_bit(name: str, fmu: Any, make: Ma
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_numbers_in_the_code_are_the_parameters_values(name: str, fmu: Any, make: Make) -> None:
+def test_numbers_in_the_code_are_the_parameters_values(
+    name: str, native_fmu: Any, make: Make
+) -> None:
     """lambda and Q with every parameter folded in differ from the full FMU's by rounding, which a run
     at the tolerance 1e-11 carries no further than 1e-8 of their size."""
     path, _ = make(name, outputs=FORCES, fixed=["*"], method="dop853")
-    full = exactly(fmu(name))
+    full = exactly(native_fmu(name))
     run = simulate(path, tolerance=1e-11)
     names = [n for n in run.dtype.names if n != "time"]
     assert largest_difference(full, run, names) < 1e-8
@@ -127,13 +129,13 @@ def test_numbers_in_the_code_are_the_parameters_values(name: str, fmu: Any, make
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_coordinates_alone_follow_the_same_motion(name: str, fmu: Any, make: Make) -> None:
+def test_coordinates_alone_follow_the_same_motion(name: str, native_fmu: Any, make: Make) -> None:
     """The motion does not depend on the formulation, nor on what is read: coordinates at the tolerance
     1e-11 agree to 1e-8 of their size."""
     file, _ = scene_of(name)
     names = [str(q.func) for q in file.model.coordinates]
     path, prepared = make(name, outputs=names, method="dop853")
-    full = exactly(fmu(name))
+    full = exactly(native_fmu(name))
     run = simulate(path, tolerance=1e-11)
     assert outputs(path) == [n for n in full.dtype.names if n in names]
     assert largest_difference(full, run, names) < 1e-8
@@ -210,10 +212,10 @@ def test_a_number_may_open_a_contact_at_the_start() -> None:
         prepare(numbers, small)
 
 
-def test_an_input_that_nothing_drives_is_a_number(fmu: Any, make: Make) -> None:
+def test_an_input_that_nothing_drives_is_a_number(native_fmu: Any, make: Make) -> None:
     """The cart under no force moves as with F = 0 held, and F is not there."""
     path, _ = make("CartPendulum", inputs=[], method="dop853")
-    full = exactly(fmu("CartPendulum"))
+    full = exactly(native_fmu("CartPendulum"))
     run = simulate(path, tolerance=1e-11)
     assert "F" not in variables(path)
     assert largest_difference(full, run, ["s", "x", "y", "lambda.rod"]) < 1e-9
@@ -318,12 +320,12 @@ def test_an_undamped_scene_has_one_integrator_by_default() -> None:
     assert frictionless.scene.selectable == ("dop853",)
 
 
-def test_a_stiff_scene_of_forces_goes_on_with_radau5(fmu: Any, make: Make) -> None:
+def test_a_stiff_scene_of_forces_goes_on_with_radau5(native_fmu: Any, make: Make) -> None:
     """A cart in syrup, c = 1e6 N s/m, is stiff for its pendulum beside it: of a scene that reads lambda
     alone `auto` still takes the implicit method, with its Jacobian, and few steps."""
     path, prepared = make("CartPendulum", outputs=["lambda.rod"], fixed=["c=1e6"])
     assert prepared.scene.selectable == ("auto",)
-    full = simulate(fmu("CartPendulum"), 1.0, start_values={"c": 1e6}, besides=())
+    full = simulate(native_fmu("CartPendulum"), 1.0, start_values={"c": 1e6}, besides=())
     run = simulate(path, 1.0, besides=["solver.steps"])
     assert run["solver.steps"][-1] < 5000
     assert largest_difference(full, run, ["lambda.rod"]) < 1e-6
