@@ -35,7 +35,8 @@ import numpy as np
 from drawn_systems import drawn
 
 from lagfmu.errors import LagfmuError
-from lagfmu.fmu.session import LAST, Plan, Session, plug
+from lagfmu.fmu.batch import LAST, Plan, run_batch
+from lagfmu.fmu.session import Session
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
 from lagfmu.model.model import Model
@@ -124,7 +125,7 @@ def swing(session: Session, model: Model, times: np.ndarray, chance: np.random.G
     found = {}
     for i in model.inputs:
         name = str(i.symbol).removesuffix("(t)")
-        if i in model.prescribed or name not in session.plug.variables:
+        if i in model.prescribed or name not in session.rules:
             continue
         found[name] = chance.uniform(0.5, 2) * np.sin(chance.uniform(1, 5) * times)
     return found
@@ -151,7 +152,7 @@ def measure(
 ) -> Iterator[Runs]:
     """`count` runs of a scene, some together."""
     description = fmpy.read_model_description(str(fmu))
-    session = Session(plug(fmu, description, fmpy.extract(str(fmu), unzipdir=folder)))
+    session = Session(fmpy.extract(str(fmu), unzipdir=folder))
     known = [v.name for v in description.modelVariables]
     names = tuple(n for n in known if bar_of(n) in known)
     chance = np.random.default_rng([seed, sum(map(ord, scene.name))])
@@ -173,7 +174,7 @@ def measure(
         )
         values = np.array([list(r.values()) for r in rows]).reshape(len(rows), -1)
         found, *fine = (
-            session.batch(plan, np.column_stack([values, np.broadcast_to(t, len(rows))]))
+            run_batch(session, plan, np.column_stack([values, np.broadcast_to(t, len(rows))]))
             for t in (tolerances, REFERENCE, SECOND)
         )
         good = np.all([o.status <= 1 for o in (found, *fine)], axis=0)
@@ -234,10 +235,9 @@ def cost(with_bars: Path, without: Path, folder: str, scene: Scene) -> float:
     """Processor time of a run with error bars, in that of one without; both read the same outputs."""
     sessions = []
     for k, fmu in enumerate((with_bars, without)):
-        description = fmpy.read_model_description(str(fmu))
         where = fmpy.extract(str(fmu), unzipdir=f"{folder}/cost{k}")
-        sessions.append(Session(plug(fmu, description, where)))
-    names = [n for n in sessions[1].plug.variables if bar_of(n) in sessions[0].plug.variables]
+        sessions.append(Session(where))
+    names = [n for n in sessions[1].rules if bar_of(n) in sessions[0].rules]
     points = int(np.ceil(scene.stop_time / scene.step_size))
     plan = Plan((), tuple((n, LAST) for n in names), np.arange(points + 1) * scene.step_size)
     ratios = []
@@ -245,7 +245,7 @@ def cost(with_bars: Path, without: Path, folder: str, scene: Scene) -> float:
         spent = []
         for session in sessions:
             begun = time.process_time()
-            session.batch(plan, np.zeros((4, 0)))
+            run_batch(session, plan, np.zeros((4, 0)))
             spent.append(time.process_time() - begun)
         ratios.append(spent[0] / spent[1])
     for session in sessions:

@@ -27,8 +27,9 @@ from rich.console import Console
 from rich.table import Table
 from sympy import Abs, sympify
 
+from lagfmu.fmu.batch import LAST, Plan, run_batch
 from lagfmu.fmu.closed_forms import carried
-from lagfmu.fmu.session import LAST, Plan, Session, plug
+from lagfmu.fmu.session import Session
 from lagfmu.fmu.write import write
 from lagfmu.methods import FIXED_STEP, MENU
 from lagfmu.model.file import load
@@ -153,7 +154,7 @@ class Bench:
         prepared = prepare(file.model, scene)
         path = write(prepared, folder, (), target="native")
         description = fmpy.read_model_description(str(path))
-        self.session = Session(plug(path, description, fmpy.extract(str(path))))
+        self.session = Session(path)
         self.read = [v for v in description.modelVariables if v.causality in ("output", "input")]
         self.settable = {
             v.name: float(v.start)
@@ -192,7 +193,7 @@ class Bench:
         plan = Plan(
             vary, tuple((v.name, LAST) for v in self.read), times, tolerance=tolerance, whole=True
         )
-        found = self.session.batch(plan, table)
+        found = run_batch(self.session, plan, table)
         for k in range(TOGETHER):
             there = int(np.searchsorted(times, found.reached[k], "right"))
             values = found.trajectory[k, :there]

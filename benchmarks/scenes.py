@@ -24,11 +24,12 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from lagfmu.fmu.session import Session
 from lagfmu.fmu.write import TARGETS, write
 from lagfmu.model.file import load
 from lagfmu.page.savings import NATIVE, OPERATIONS, PYTHON, Cost, cost
 from lagfmu.prepare.prepare import prepare
-from lagfmu.study.tradeoff.importer import Importer
+from lagfmu.study.tradeoff.observe import opened, seconds
 from lagfmu.study.tradeoff.setting import Setting
 
 MODELS = Path(__file__).parent.parent / "models"
@@ -43,7 +44,7 @@ class Entry:
     model: str
     scene: str
     cost: Cost
-    importers: dict[str, Importer]
+    sessions: dict[str, Session]
     binary: int
     sizes: dict[str, int]
     outputs: list[str]
@@ -59,12 +60,12 @@ def main() -> None:
         entries = [e for name in FMUS for e in built(name, folder, stack)]
         for _ in range(repeats):
             for entry in entries:
-                for target, importer in entry.importers.items():
-                    step = importer.step_size
+                for target, session in entry.sessions.items():
+                    step = session.experiment.step_size
                     entry.times[target].append(
-                        importer.seconds(Setting("", 0.0, 0.0, step), entry.outputs)
+                        seconds(session, Setting("", 0.0, 0.0, step), entry.outputs)
                     )
-                    entry.floors[target].append(floor(importer, entry.outputs))
+                    entry.floors[target].append(floor(session, entry.outputs))
         show(entries)
 
 
@@ -91,7 +92,7 @@ def built(name: str, folder: Path, stack: ExitStack) -> list[Entry]:
                 model=name,
                 scene=title,
                 cost=cost(prepared),
-                importers={t: stack.enter_context(Importer(p)) for t, p in paths.items()},
+                sessions={t: stack.enter_context(opened(p)) for t, p in paths.items()},
                 binary=binary,
                 sizes={t: p.stat().st_size for t, p in paths.items()},
                 outputs=[v.name for v in prepared.table.outputs if v.kind == "Real"],
@@ -131,7 +132,7 @@ def show(entries: list[Entry]) -> None:
             f"{e.sizes['native'] / 1e3:.0f}",
             f"{e.sizes['python'] / 1e3:.0f}",
         ]
-        simulated = e.importers["native"].stop_time
+        simulated = e.sessions["native"].experiment.stop_time
         own = {t: net(e, t) for t in TARGETS}
         full = {t: net(whole, t) for t in TARGETS}
         row.append(f"{1e6 * own['python'] / simulated:.0f} ({own['python'] / full['python']:.2f})")
@@ -141,9 +142,9 @@ def show(entries: list[Entry]) -> None:
     Console(width=160).print(table)
 
 
-def floor(importer: Importer, names: list[str]) -> float:
+def floor(session: Session, names: list[str]) -> float:
     """Wall time [s] of the same loop with a C function that returns at once: fmpy's own share."""
-    slave = importer.slave
+    slave = session.instance
     unsigned, size = ctypes.c_uint, ctypes.c_size_t
     pointer, real = ctypes.c_void_p, ctypes.c_double
     step, get = slave.dll["fmi2GetTypesPlatform"], slave.dll["fmi2GetTypesPlatform"]
@@ -152,7 +153,7 @@ def floor(importer: Importer, names: list[str]) -> float:
     get.argtypes = [pointer, ctypes.POINTER(unsigned), size, ctypes.POINTER(real)]
     slave.fmi2DoStep, slave.fmi2GetReal = step, get
     try:
-        return importer.seconds(Setting("", 0.0, 0.0, importer.step_size), names)
+        return seconds(session, Setting("", 0.0, 0.0, session.experiment.step_size), names)
     finally:
         del slave.fmi2DoStep, slave.fmi2GetReal
 

@@ -21,15 +21,17 @@ from .codegen.py.equations import lower
 from .fmu import compiler, native
 from .fmu import target as targets
 from .fmu.archive import version as archive_version
+from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch
 from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
-from .fmu.described import Trajectory, file_stem, is_python, items_of, read_description
+from .fmu.described import Trajectory, described_rules, file_stem, is_python, read_description
 from .fmu.description import model_description
 from .fmu.formula import LONGEST_SUM, read_formula, text_of
 from .fmu.native import GENERATED
-from .fmu.session import LAST, MAX, MEAN, TIME_OF_MAX, Plan, RefusalError, Session, plug
+from .fmu.session import RefusalError, Session, communication_points
 from .fmu.target import NoCompilerWarning
 from .fmu.write import write
+from .interface.rules import problems_of
 from .live import moving, wasm
 from .live.moving import Moving
 from .live.playable import playable, told_by
@@ -91,7 +93,8 @@ from .study.stress.closed_forms import JudgedForm, judged, magnitude
 from .study.stress.facts import Facts, facts_of
 from .study.stress.judge import EPS, Check, acts, differ, first_landing
 from .study.stress.lagrange import lagrange, lay_beside
-from .study.stress.player import Player, Run, clear
+from .study.stress.player import Run, clear
+from .study.stress.player import opened as session_of
 from .study.stress.player import play as play_of
 from .study.stress.player import table as table_of_run
 from .study.stress.probe import (
@@ -110,14 +113,14 @@ from .study.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed, as_markdow
 from .study.stress.runs import departures, started
 from .study.sweep import engine
 from .study.sweep.design import axis, design, distribution, sampled
-from .study.sweep.host import Host
 from .study.sweep.parts import PartWarning
+from .study.sweep.process import SessionProcess
 from .study.sweep.table import happened
 from .study.tradeoff.choose import bisected, choose
 from .study.tradeoff.held_out import other_values
-from .study.tradeoff.importer import Importer
 from .study.tradeoff.measure import Plan as TradeoffPlan
 from .study.tradeoff.measure import Point, Tradeoff, measure, take_turns
+from .study.tradeoff.observe import observe, opened
 from .study.tradeoff.quantities import OWN, quantities
 from .study.tradeoff.reference import refer
 from .study.tradeoff.report import table as tradeoff_table
@@ -126,5 +129,5 @@ from .verification.evaluate import Compiled, function
 from .verification.pipeline import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
-from .verification.simulate import ErrorBarWarning, communication_points
+from .verification.simulate import ErrorBarWarning
 from .verification.verify import RECORD, applies, check_closed_form

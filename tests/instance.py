@@ -11,7 +11,7 @@ from typing import Any
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 
-from lagfmu.testing import items_of
+from lagfmu.testing import described_rules
 
 
 class Instance:
@@ -21,6 +21,7 @@ class Instance:
         self.folder = fmpy.extract(str(path))
         self.description = fmpy.read_model_description(str(path))
         self.variables = {v.name: v for v in self.description.modelVariables}
+        self.rules = described_rules(self.description)
         self.native = self.description.modelExchange is not None
         self.refusal = 3 if self.native else 4  # pythonfmu cannot return fmi2Error, only fmi2Fatal
         self.illegal_step = 3 if self.native else 2  # nor from fmi2DoStep: fmi2Discard
@@ -60,8 +61,7 @@ class Instance:
     def set(self, name: str, value: Any) -> None:
         v = self.variables[name]
         if v.type == "Enumeration":
-            number = next((k for m, k in items_of(v).items() if m == value), value)
-            self.fmu.setInteger([v.valueReference], [number])
+            self.fmu.setInteger([v.valueReference], [self.rules[name].number(value)])
         else:
             self.fmu.setReal([v.valueReference], [value])
 

@@ -11,10 +11,10 @@ from lagfmu.testing import (
     Check,
     Facts,
     Finding,
-    Player,
     Probe,
     RefusalError,
     Run,
+    Session,
     differ,
 )
 from lagfmu.testing import table_of_run as table
@@ -64,10 +64,10 @@ def _initialization(bench: Bench) -> Finding:
     return Finding(tuple(checks))
 
 
-def _passes(player: Player, size: float) -> bool:
+def _passes(session: Session, size: float) -> bool:
     """True if it steps so far; False if it names the stop time.  Raises RefusalError."""
     try:
-        player.step(size)
+        session.step(size)
     except RefusalError as error:
         if "stop time" not in error.message:
             raise
@@ -114,11 +114,11 @@ def _polynomial(bench: Bench, name: str, elapsed: float) -> tuple[float, float, 
     )
 
 
-def _push(player: Player, name: str, values: tuple[float, float, float]) -> None:
+def _push(session: Session, name: str, values: tuple[float, float, float]) -> None:
     value, first, second = values
-    references = player.references([name, name])
-    player.give({name: value})
-    player.call("setRealInputDerivatives", references, [1, 2], [first, second])
+    references = session.references([name, name])
+    session.give({name: value})
+    session.call("setRealInputDerivatives", references, [1, 2], [first, second])
 
 
 def _goes_on(name: str, bench: Bench) -> Finding:
@@ -140,7 +140,7 @@ def _goes_on(name: str, bench: Bench) -> Finding:
                     one, two = two, one
                 one.step(part * facts.stop_time)
                 values = _polynomial(bench, name, one.time - begin)
-                seen = one.inputs()
+                seen = one.read(one.inputs)
                 size = max(abs(x) for x in (values[0], 1.0))
                 checks.append(
                     Check(f"{name} itself", abs(seen[name] - values[0]), 100 * EPS * size)

@@ -74,27 +74,27 @@ def _law(form: JudgedForm, variables: set[str]) -> _Law | None:
 
 
 def _along_each(bench: Bench) -> Finding:
-    facts, player = bench.facts, bench.player
+    facts, session = bench.facts, bench.session
     reals = [v.name for v in facts.outputs if v.type == "Real" and v.variability != "discrete"]
     seeds = [s.name for s in (*facts.starts, *facts.inputs)]
     forms = [_law(form, {*reals, *seeds}) for form in bench.forms if form.law]
     uniques = [names.name(names.UNIQUE, c) for c in facts.constraints]
     known = {p.name: p.start for p in facts.parameters}
     checks: list[Check] = []
-    player.begin({}, None)
+    session.begin({}, None)
     for part in PARTS:
-        player.step(part * facts.stop_time - player.time)
+        session.step(part * facts.stop_time - session.time)
         rows = table(facts, 1)
-        values = player.read() | player.inputs() | {"time": player.time}
+        values = session.read() | session.read(session.inputs) | {"time": session.time}
         for name, value in values.items():
             rows[name][0] = value
         asked = [n for n in reals if _defined(n, values)]
         laws = [x for x in forms if x is not None and {*x.moving} <= {*asked, *seeds}]
         laws = [x for x in laws if applies(x.judged.closed_form, rows, known)[0]]
         for seed in seeds:
-            references = player.references(asked), player.references([seed])
+            references = session.references(asked), session.references([seed])
             try:
-                found = player.call("getDirectionalDerivative", *references, [1.0])
+                found = session.call("getDirectionalDerivative", *references, [1.0])
             except RefusalError:
                 if all(values[n] for n in uniques):
                     raise

@@ -30,7 +30,7 @@ from scipy.optimize import nnls
 from stress_geometry import Collision, Geometry, geometry_of, twin
 
 from lagfmu import names
-from lagfmu.testing import Bench, Check, Facts, Finding, Player, Probe
+from lagfmu.testing import Bench, Check, Facts, Finding, Probe, Session
 
 FAMILY = "impacts"
 ABOVE, JUST_ABOVE = 1e-6, 1e-12  # height of the start, relative to the gaps' own sizes
@@ -140,13 +140,13 @@ def _start(
 
 
 def _impact(
-    player: Player, geometry: Geometry, q: Vector, v: Vector, time: float
+    session: Session, geometry: Geometry, q: Vector, v: Vector, time: float
 ) -> tuple[Vector, Vector]:
     """Velocities (n) just before and just after the impact.  Raises RefusalError."""
-    player.begin(_state(geometry, q, v), None)
-    before = player.read()
-    player.step(2 * time)
-    after = player.read()
+    session.begin(_state(geometry, q, v), None)
+    before = session.read()
+    session.step(2 * time)
+    after = session.read()
 
     def of(seen: Mapping[str, Any], order: int) -> Vector:
         return np.array([seen[names.derivative(n, order)] for n in geometry.coordinates])
@@ -159,7 +159,7 @@ def _strike(geometry: Geometry, chosen: list[int], place: Vector, bench: Bench) 
     with contextlib.ExitStack() as stack:
         other = None
         if twin(bench.facts.path).exists():
-            other = stack.enter_context(Bench(twin(bench.facts.path), bench.quick)).player
+            other = stack.enter_context(Bench(twin(bench.facts.path), bench.quick)).session
         for turn in range(TURNS):
             start = _start(bench, geometry, chosen, place, turn)
             if start is not None:
@@ -173,11 +173,11 @@ def _struck(
     chosen: list[int],
     place: Vector,
     start: tuple[Vector, Vector, float],
-    other: Player | None,
+    other: Session | None,
 ) -> list[Check]:
     q, v, time = start
     known = _known(bench.facts)
-    came, after = _impact(bench.player, geometry, q, v, time)
+    came, after = _impact(bench.session, geometry, q, v, time)
     there = geometry.at(known | _state(geometry, place, after))
     before = geometry.at(known | _state(geometry, place, came))
     checks = _law(geometry, before, there, came, after, chosen)
@@ -186,7 +186,7 @@ def _struck(
         error = _norm(before.M, found - after)
         checks.append(Check("order of declaration", error, ORDER * _norm(before.M, v)))
     for mirror in _mirrors(geometry, known, place):
-        reached, image = _impact(bench.player, geometry, mirror * q, mirror * v, time)
+        reached, image = _impact(bench.session, geometry, mirror * q, mirror * v, time)
         apart = _norm(before.M, reached * mirror - came)  # by forces, which need no symmetry
         error = _norm(before.M, image * mirror - after)
         checks.append(Check("symmetry", error, NEAR * _norm(before.M, v) + apart))

@@ -30,7 +30,6 @@ from lagfmu.testing import (
     verdict,
     write,
 )
-from lagfmu.testing import play_of as play
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
@@ -121,7 +120,7 @@ def test_the_order_of_declaration_is_free(crossed, tmp_path):
     times = bench.times(bench.facts.stop_time)
     run = bench.run({}, times)
     with Bench(built(features, tmp_path, turned=True), quick=True) as turned:
-        other = play(turned.player, {}, times)
+        other = turned.run({}, times)
     assert other.refusal is None
     rows = run.rows.copy()
     for name in rows.dtype.names:

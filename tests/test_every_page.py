@@ -23,7 +23,7 @@ from lagfmu.testing import (
     communication_points,
     load,
     picture_of,
-    plug,
+    run_batch,
 )
 
 pytest.importorskip("wasmtime", reason="pip install -e '.[test]'")
@@ -54,7 +54,7 @@ class Native:
         self.description = fmpy.read_model_description(str(path))
         self.variables = {v.name: v for v in self.description.modelVariables}
         unpacked = fmpy.extract(str(path), str(folder))
-        self.session = Session(plug(path, self.description, unpacked))
+        self.session = Session(unpacked)
 
     def run(self, **given: float) -> Run:
         """What it answers, and 1e-14 of the largest output in a unit plus what changes of 1e-14 of each
@@ -73,7 +73,7 @@ class Native:
             float(experiment.tolerance),
             whole=True,
         )
-        found = self.session.batch(plan, np.vstack([base, moved]))
+        found = run_batch(self.session, plan, np.vstack([base, moved]))
         assert (found.status <= 1).all(), found.reasons
         run, *others = found.trajectory
         spread = sum(np.abs(other - run).max(axis=0) for other in others)

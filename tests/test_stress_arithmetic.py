@@ -17,16 +17,17 @@ from lagfmu.testing import (
     Bench,
     Check,
     Finding,
-    Player,
     Probe,
     RefusalError,
     Run,
+    Session,
     attempt,
     clear,
     departures,
     differ,
     find_compiler,
     lay_beside,
+    session_of,
     started,
     verdict,
 )
@@ -65,7 +66,7 @@ def test_no_parameter_or_start_is_too_small_or_too_large(bench):
                 assert not found.startswith(WRONG), f"{s.name} = {value}: {found}"
 
 
-def refused(ask: Callable[[Player], Any], bench: Bench) -> Finding:
+def refused(ask: Callable[[Session], Any], bench: Bench) -> Finding:
     """It must be refused, and what goes on is as if it had not been asked."""
     h, refusal = bench.facts.step_size, None
     with bench.another("asked") as one, bench.another("not asked") as two:
@@ -157,9 +158,9 @@ def test_a_reset_instance_is_as_new(bench):
     times = bench.times(bench.facts.stop_time, 10)
     other = {p.name: p.start * 1.1 for p in bench.facts.parameters if p.allows(p.start * 1.1)}
     with bench.another("fresh") as one:
-        first = play(one, {}, times)
-        play(one, other, times[:6])
-        assert play(one, {}, times).rows.tobytes() == first.rows.tobytes()
+        first = play(one, bench.facts, {}, times)
+        play(one, bench.facts, other, times[:6])
+        assert play(one, bench.facts, {}, times).rows.tobytes() == first.rows.tobytes()
 
 
 def test_twenty_instances_do_not_meet(bench):
@@ -173,8 +174,8 @@ def test_twenty_instances_do_not_meet(bench):
     alone = [bench.run(v, times) for v in values]
     try:
         for k, v in enumerate(values):
-            some.append(Player(facts, bench.folder, f"instance {k}"))
-            some[k].begin(v, None)
+            some.append(session_of(facts, bench.folder, f"instance {k}"))
+            some[k].begin(v, None, times[-1])
         for j, t in enumerate(times):
             for k, one in enumerate(some):
                 if j:

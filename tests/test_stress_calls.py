@@ -21,8 +21,8 @@ from lagfmu.testing import (
     RIGHT,
     WRONG,
     Bench,
-    Player,
     Probe,
+    Session,
     Verdict,
     attempt,
     exchange,
@@ -63,14 +63,14 @@ def test_what_is_right_passes(bench):
 
 def altered(name: str, change: Callable[..., Any]) -> Callable[[pytest.MonkeyPatch], None]:
     """An importer whose calls of `name` go through `change`."""
-    call = Player.call
+    call = Session.call
 
-    def instead(self: Player, what: str, *arguments: Any, **named: Any) -> Any:
+    def instead(self: Session, what: str, *arguments: Any, **named: Any) -> Any:
         return change(call, self, what, *arguments, **named) if what == name else call(
             self, what, *arguments, **named
         )  # fmt: skip
 
-    return lambda patch: patch.setattr(Player, "call", instead)
+    return lambda patch: patch.setattr(Session, "call", instead)
 
 
 def too_large(call: Any, *arguments: Any) -> list[float]:
@@ -78,25 +78,25 @@ def too_large(call: Any, *arguments: Any) -> list[float]:
     return [first * (1 + 1e-9) + 1e-9, *others]
 
 
-def without_second(call: Any, self: Player, what: str, *arguments: Any) -> None:
+def without_second(call: Any, self: Session, what: str, *arguments: Any) -> None:
     references, orders, (first, _) = arguments
     call(self, what, references, orders, [first, 0.0])
 
 
-def without_end(call: Any, self: Player, what: str, **named: Any) -> None:
+def without_end(call: Any, self: Session, what: str, **named: Any) -> None:
     call(self, what, **named | {"stopTime": None})
 
 
 def stale(patch: pytest.MonkeyPatch) -> None:
     """What has been read once is shown until the next step."""
-    read = Player.read
+    read = Session.read
 
-    def again(self: Player, names: Any = None) -> dict[str, Any]:
+    def again(self: Session, names: Any = None) -> dict[str, Any]:
         if self.time > 0 or not hasattr(self, "shown"):
             self.shown = read(self)
         return self.shown if names is None else read(self, names)
 
-    patch.setattr(Player, "read", again)
+    patch.setattr(Session, "read", again)
 
 
 def another_motion(patch: pytest.MonkeyPatch) -> None:

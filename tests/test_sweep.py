@@ -29,16 +29,16 @@ from lagfmu.testing import (
     MAX,
     MEAN,
     TIME_OF_MAX,
-    Host,
     Plan,
     Session,
+    SessionProcess,
     app,
     axis,
     design,
     distribution,
     engine,
-    plug,
-    read_description,
+    in_session,
+    run_batch,
     sampled,
 )
 from lagfmu.testing import archive_version as version
@@ -53,11 +53,10 @@ def hemisphere(native_fmu) -> Path:
 
 
 @pytest.fixture(scope="module")
-def plugged(hemisphere, tmp_path_factory):
+def unpacked(hemisphere, tmp_path_factory):
     import fmpy
 
-    folder = fmpy.extract(str(hemisphere), str(tmp_path_factory.mktemp("unpacked")))
-    return plug(hemisphere, read_description(hemisphere), folder)
+    return fmpy.extract(str(hemisphere), str(tmp_path_factory.mktemp("unpacked")))
 
 
 def test_the_particle_leaves_where_the_energy_says_in_every_run(hemisphere):
@@ -100,18 +99,18 @@ def test_a_run_in_a_sweep_is_the_run_alone(hemisphere):
         assert (found["lambda.surface"].values[k] == alone["lambda.surface"]).all()
 
 
-def test_the_loop_in_c_and_the_one_in_python_give_the_same_bits(plugged):
+def test_the_loop_in_c_and_the_one_in_python_give_the_same_bits(unpacked):
     """An FMU of another tool, which has no lagfmu_batch, is run by the same steps."""
     keep = (("lambda.surface", MAX), ("lambda.surface", MEAN), ("theta", TIME_OF_MAX), ("r", LAST))
     events = (("departure.surface.count", "departure.surface.time"),)
     plan = Plan(("theta",), keep, np.linspace(0, 1.5, 31), 1e-9, events=events, whole=True)
-    session = Session(plugged)
+    session = Session(unpacked)
     rows = np.array([[0.1], [0.9], [-5e300], [0.3]])
-    fast = session.batch(plan, rows)
+    fast = run_batch(session, plan, rows)
     slow = replace(fast, result=np.full_like(fast.result, np.nan), reasons={})
     slow = replace(slow, trajectory=np.full_like(fast.trajectory, np.nan))
     slow = replace(slow, status=np.zeros(4, np.int32), reached=np.zeros(4))
-    session._looped(plan, rows, slow)
+    in_session(session, plan, rows, slow)
     session.close()
     good = [0, 1, 3]
     assert (fast.result[good] == slow.result[good]).all()
@@ -122,16 +121,16 @@ def test_the_loop_in_c_and_the_one_in_python_give_the_same_bits(plugged):
     assert "theta" in fast.reasons[2]
 
 
-def test_the_largest_value_is_looked_for_at_departures_too(plugged):
+def test_the_largest_value_is_looked_for_at_departures_too(unpacked):
     """theta grows until the particle leaves, and on: at the departure itself it is between two communication
     points, and what is kept there changes nothing of the run that goes on."""
     events = (("departure.surface.count", "departure.surface.time"),)
     wide = Plan(("theta",), (("contact.surface", MAX), ("lambda.surface", LAST), ("der(r)", LAST)),
                 np.array([0.0, 2.0]), 1e-9, events=events)  # fmt: skip
-    session = Session(plugged)
+    session = Session(unpacked)
     rows = np.array([[0.3]])
-    seen = session.batch(wide, rows)
-    blind = session.batch(replace(wide, events=()), rows)
+    seen = run_batch(session, wide, rows)
+    blind = run_batch(session, replace(wide, events=()), rows)
     session.close()
     assert (seen.result == blind.result).all()
 
@@ -155,7 +154,7 @@ def test_a_refused_run_is_a_row_with_its_reason(hemisphere):
     assert found.attrs["refused"] == 1
 
 
-class Deadly(Host):
+class Deadly(SessionProcess):
     """A host whose process dies in one run of a chunk: that with theta = 0.5."""
 
     def _ask(self, plan, values):
@@ -166,10 +165,10 @@ class Deadly(Host):
         return super()._ask(plan, values)
 
 
-def test_a_crash_loses_one_row_and_not_its_chunk(plugged):
+def test_a_crash_loses_one_row_and_not_its_chunk(unpacked):
     """The process of the FMU is killed whenever one run of five is tried: that run is told, the rest done."""
     plan = Plan(("theta",), (("theta", LAST),), np.array([0.0, 0.1]))
-    host = Deadly(plugged)
+    host = Deadly(unpacked)
     found = host.run(plan, np.array([[0.1], [0.2], [0.5], [0.7], [0.9]]))
     host.close()
     assert found.status.tolist() == [0, 0, 6, 0, 0]
@@ -552,7 +551,7 @@ THREE = b"""<fmiModelDescription fmiVersion="3.0" modelName="Three" instantiatio
 @pytest.mark.parametrize(
     ("change", "gone", "message"),
     [
-        (lambda text: THREE, "", "is an FMU of FMI 3.0: a sweep drives FMI 2.0"),
+        (lambda text: THREE, "", "is an FMU of FMI 3.0, expected FMI 2.0"),
         (lambda text: text.replace(b"CoSimulation", b"Other"), "", "has no co-simulation"),
         (lambda text: text, "binaries/", "has no binary for this machine"),
     ],

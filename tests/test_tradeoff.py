@@ -21,7 +21,6 @@ from lagfmu import Scene, simulate, verify
 from lagfmu.errors import BuildError, SimulationError, UsageError
 from lagfmu.testing import (
     Goal,
-    Importer,
     Point,
     Setting,
     Tradeoff,
@@ -29,6 +28,8 @@ from lagfmu.testing import (
     choose,
     load,
     measure,
+    observe,
+    opened,
     other_values,
     prepare,
     print_whole,
@@ -136,9 +137,9 @@ def test_no_error_is_below_the_references_own(wire):
 def test_a_missed_event_is_an_infinite_error(native_fmu):
     """A run without the departure, or with one too many, has no right time of it."""
     path = native_fmu("Hemisphere")
-    with Importer(path) as importer:
-        reference = refer(importer, communication=0.1)
-        run = importer.observe(Setting("dop853", 1e-6, 0.0, 0.1))
+    with opened(path) as session:
+        reference = refer(session, communication=0.1)
+        run = observe(session, Setting("dop853", 1e-6, 0.0, 0.1))
     assert reference.errors(run)["departure.surface.time"] < 1e-6
     run["departure.surface.count"] = 0
     assert reference.errors(run)["departure.surface.time"] == float("inf")
@@ -256,14 +257,14 @@ def test_an_accuracy_may_name_outputs():
 
 def test_other_values_are_near_within_bounds_and_keep_the_contacts(native_fmu):
     """Each parameter and start value within 5 %; the particle still starts on the sphere."""
-    with Importer(native_fmu("Hemisphere")) as importer:
-        scene = importer.observe(Setting("", 0.0, 0.0, 0.01), stop=0.01)
+    with opened(native_fmu("Hemisphere")) as session:
+        scene = observe(session, Setting("", 0.0, 0.0, 0.01), stop=0.01)
         for k in range(4):
-            values = other_values(importer, scene, random.Random(k))
+            values = other_values(session, scene, random.Random(k))
             assert values.keys() == {"m", "g", "a", "r", "theta"}
             starts = {"m": 1.0, "g": 9.81, "a": 1.0, "r": 1.0, "theta": 0.01}
             assert all(0 < abs(v / starts[n] - 1) <= 0.05 for n, v in values.items())
-            run = importer.observe(Setting("", 0.0, 0.0, 0.01), values, 0.01)
+            run = observe(session, Setting("", 0.0, 0.0, 0.01), values, 0.01)
             assert run["contact.surface"][0]
 
 

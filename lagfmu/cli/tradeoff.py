@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
 from ..errors import UsageError
+from ..fmu.described import is_python
 from ..fmu.target import target_of
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
@@ -24,8 +25,8 @@ from ..page.table import print_whole
 from ..prepare.prepare import prepare
 from ..study.tradeoff.choose import Choice, Tick, choose
 from ..study.tradeoff.figure import draw
-from ..study.tradeoff.importer import Importer
 from ..study.tradeoff.measure import DECADES, Plan, Tradeoff, measure
+from ..study.tradeoff.observe import opened
 from ..study.tradeoff.report import data, remarks, report, table
 from ..verification.pipeline import Report, text_of
 from .works import studied
@@ -87,10 +88,10 @@ def compare(
                 return write(prepare(file.model, scene), folder, file.closed_forms, kind)
 
         def study(name: str, fmu: Path) -> Report:
-            with Importer(fmu) as importer:
-                plan = Plan(communication or importer.step_size)
-                if importer.target == "python":  # a run takes long
-                    plan = replace(plan, halvings=2, repeats=1)
+            with opened(fmu) as session:
+                plan = Plan(communication or session.experiment.step_size)
+            if is_python(fmu):  # a run takes long
+                plan = replace(plan, halvings=2, repeats=1)
             if full:
                 plan = replace(plan, tolerances=DECADES, budget=20.0, limit=3.0)
             if tolerances:

@@ -102,3 +102,12 @@ def unpack(fmu: Path) -> str:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     return folder
+
+
+def platforms(fmu: Path) -> list[str]:
+    """For which an FMU, a file or an unpacked folder, has binaries."""
+    if fmu.is_dir():
+        return sorted(p.name for p in fmu.glob("binaries/*"))
+    with opened(fmu) as archive:
+        parts = [name.split("/") for name in archive.namelist()]
+    return sorted({p[1] for p in parts if p[0] == "binaries" and len(p) > 1 and p[1]})

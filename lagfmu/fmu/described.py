@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
-import numpy as np
 from numpy.typing import NDArray
 
 from .. import names
 from ..errors import VerificationError
+from ..interface.rules import Rule
 from .archive import opened
 
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
@@ -49,17 +50,6 @@ def numbers_of(description: Any) -> dict[str, float]:
     }
 
 
-def asked(variable: Any, value: Any) -> Any:
-    """A value, or a column of them, that a user asked for of a variable, as the FMU gets it.
-
-    A start that is an expression of parameters goes before it if it differs from the description; one that
-    is asked for by name is meant, so that its described value is handed over one unit in the last place off.
-    """
-    if not (variable.description or "").endswith(names.FOLLOWS):
-        return value
-    return np.where(value == np.float64(variable.start), np.nextafter(value, np.inf), value)[()]
-
-
 def units_of(variables: Sequence[Any]) -> dict[str, str | None]:
     """The unit of each variable, of a table or of fmpy, by name."""
     return {v.name: getattr(v.unit, "name", v.unit) for v in variables}
@@ -77,19 +67,38 @@ def has_error_bars(variables: Sequence[Any]) -> bool:
     return any(names.barred(n) in known for n in known)
 
 
-def items_of(variable: Any) -> dict[str, int]:
-    """Name -> number of the items of fmpy's ScalarVariable, if it is an Enumeration."""
-    if variable.type != "Enumeration" or variable.declaredType is None:
-        return {}
-    return {item.name: int(item.value) for item in variable.declaredType.items}
+def described_rules(description: Any) -> dict[str, Rule]:
+    """What the variables of an FMU may be set to, by name."""
+    return {v.name: _rule(v) for v in description.modelVariables}
+
+
+def _rule(v: Any) -> Rule:
+    items = getattr(v.declaredType, "items", None) or [] if v.type == "Enumeration" else []
+    return Rule(
+        v.name,
+        v.type,
+        v.causality in ("parameter", "input") or v.initial in ("exact", "approx"),
+        v.causality != "input",
+        -math.inf if v.min is None else float(v.min),
+        math.inf if v.max is None else float(v.max),
+        items={item.name: int(item.value) for item in items},
+        start=float(v.start) if v.type == "Real" and v.start is not None else None,
+        follows=(v.description or "").endswith(names.FOLLOWS),
+    )
 
 
 def read_description(path: Path) -> Any:
-    """fmpy's ModelDescription.  Raises VerificationError if the file is missing, damaged or no FMU."""
-    with opened(path) as archive:
-        if "modelDescription.xml" not in archive.namelist():
-            raise VerificationError(f"{str(path)!r} is no FMU: it holds no modelDescription.xml")
-        archive.read("modelDescription.xml")  # whole, which zipfile tells
+    """fmpy's ModelDescription of an FMU, a file or a folder that one was unpacked into.
+
+    Raises VerificationError if the file is missing, damaged or no FMU.
+    """
+    if not path.is_dir():
+        with opened(path) as archive:
+            if "modelDescription.xml" not in archive.namelist():
+                raise VerificationError(
+                    f"{str(path)!r} is no FMU: it holds no modelDescription.xml"
+                )
+            archive.read("modelDescription.xml")  # whole, which zipfile tells
     try:
         return fmpy.read_model_description(str(path), validate=False)
     except Exception as error:

@@ -1,15 +1,18 @@
-"""One instance of an FMU by names: loaded once, reset and run again and again.  Any FMI 2.0 FMU will do.
+"""THE loop that runs an FMU: a session loads it once, and initializes, sets, steps and reads it by names.
 
-It stands on fmpy's FMU2Slave.  Many runs in one call go through `lagfmu_batch` (runtime/fmi/batch.c) where
-the binary has it, else through the same loop written here: slower, with the same numbers.
+Any FMU of FMI 2.0 with co-simulation will do, and a prepared model, whose slave then runs in this process.
+Many runs in one call: batch.py.  FMUs without co-simulation, and of other versions of FMI, are stepped by
+fmpy: exchange.py.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
+import itertools
 import re
-from collections.abc import Mapping, Sequence
+import shutil
+import time as clock
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,397 +20,370 @@ from typing import Any
 import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
-from fmpy.logging import addLoggerProxy
 from numpy.typing import NDArray
 
-from ..methods import NUMBERS
+from ..errors import LagfmuError, SimulationError
+from ..interface.rules import rules_of
+from ..prepare.prepare import Prepared
+from .archive import platforms, unpack
+from .binary import instantiated, listen
+from .described import Experiment, Trajectory, described_rules, experiment_of, read_description
+from .inprocess import CallError, SlaveInProcess
+from .python import offered
 
 STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
-TYPES = {"Real": 0, "Integer": 1, "Enumeration": 1, "Boolean": 2}  # BatchType in batch.h
-KINDS = ("Real", "Integer", "Boolean")  # the suffix of the getter and setter of each BatchType
-LAST, MAX, MIN, MEAN, TIME_OF_MAX = range(5)  # Keep in batch.h
-MESSAGES: list[str] = []  # of one call: fmpy's proxy of the logger knows one logger a process
-
-
-def _log(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
-    if status < 2:
-        return
-    text = " ".join(message.decode(errors="replace").split())
-    if _heard is not None:
-        _heard.hear(text)
-    else:
-        MESSAGES.append(text)
-
-
-LOGGER = fmi2CallbackLoggerTYPE(_log)  # kept for ever: fmpy's proxy goes on pointing to it
-
-
-def reason() -> str:
-    """What the FMU said of the latest call that failed; pythonfmu's wrapping is taken away."""
-    text = " ".join("; ".join(MESSAGES).split()) or "no message was logged"
-    raised = re.search(r"""Refused\((["'])(.*)\1\)""", text)
-    return raised[2] if raised else text
+WARNING, DISCARD, ERROR = 1, 2, 3
+KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+COLUMNS: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
+MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
+Columns = Mapping[str, Sequence[float]]  # of inputs by name, a value a communication point
+Events = Sequence[
+    tuple[str, str]
+]  # of each the variables with its count, and the latest one's time [s]
 
 
 class RefusalError(Exception):
-    """A call that did not return fmi2OK or a warning: which, its status, the messages in the log."""
+    """A call that did not return OK or a warning: which, its status, what the FMU said of it, and of a step
+    the time [s] from which it did not go on."""
 
-    def __init__(self, call: str, status: int, message: str) -> None:
+    def __init__(self, call: str, status: int, message: str, time: float | None = None) -> None:
         super().__init__(f"{call}: {STATUS[status]}: {message}")
-        self.call, self.status, self.message = call, status, message
+        self.call, self.status, self.message, self.time = call, status, message, time
 
 
 @dataclass(frozen=True)
-class Plug:
-    """What a process must know to load an FMU that was unpacked into `folder`.
+class Run:
+    """Time and values, a row a communication point that was reached, and what ended the run early.
 
-    `variables`: name -> (value reference, FMI type).
+    `between`: rows at events between the points; `seconds`: wall time of stepping and reading.
     """
 
-    folder: str
-    guid: str
-    identifier: str
-    variables: Mapping[str, tuple[int, str]]
-
-    def reference(self, name: str) -> int:
-        """Value reference."""
-        return self.variables[name][0]
-
-    def type(self, name: str) -> int:
-        """BatchType."""
-        return TYPES[self.variables[name][1]]
-
-
-def plug(fmu: Path, description: Any, folder: str) -> Plug:
-    """What to know of an FMU that lies unpacked in `folder`; `description` is fmpy's."""
-    variables = {v.name: (int(v.valueReference), str(v.type)) for v in description.modelVariables}
-    return Plug(folder, description.guid, description.coSimulation.modelIdentifier, variables)
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Many runs of one FMU over the same communication points `times` (points) [s].
-
-    `vary` are set before initialization, to another row of values in each run; `drive` are inputs, set at
-    the communication points to the rows of `drives` (points, inputs).  `keep` are (variable, LAST ...
-    TIME_OF_MAX); `events` are (count, time) of departures.  With `whole`, the values at all points are
-    returned too.
-    """
-
-    vary: tuple[str, ...]
-    keep: tuple[tuple[str, int], ...]
-    times: NDArray[np.float64]
-    tolerance: float = 0.0
-    drive: tuple[str, ...] = ()
-    drives: NDArray[np.float64] | None = None
-    events: tuple[tuple[str, str], ...] = ()
-    whole: bool = False
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of runs: `result` (runs, keep), `trajectory` (runs, points, keep) or None, fmi2Status of
-    each, the time [s] that it reached, and of those that were refused the reason, by number."""
-
-    result: NDArray[np.float64]
-    trajectory: NDArray[np.float64] | None
-    status: NDArray[np.int32]
-    reached: NDArray[np.float64]
-    reasons: dict[int, str]
-
-
-class _Batch(ctypes.Structure):
-    _fields_ = [
-        *((n, ctypes.c_size_t) for n in ("runs", "varied", "driven", "points", "kept", "events")),
-        *((n, ctypes.c_void_p) for n in ("vary", "vary_type", "values", "drive", "drives")),
-        ("times", ctypes.c_void_p),
-        ("tolerance", ctypes.c_double),
-        *((n, ctypes.c_void_p) for n in ("keep", "keep_type", "keep_what", "count", "when")),
-        ("whole", ctypes.c_int),
-        *((n, ctypes.c_void_p) for n in ("result", "trajectory", "status", "reached", "scratch")),
-        ("current", ctypes.c_size_t),
-    ]
+    rows: Trajectory
+    between: Trajectory
+    refusal: RefusalError | None
+    seconds: float
 
 
 class Session:
-    """An instance for co-simulation; free it with close()."""
+    """One instance for co-simulation, of an FMU (a file, or a folder that one was unpacked into) or of a
+    prepared model.  Close it, or use it in a `with` statement.
 
-    def __init__(self, plugged: Plug, name: str = "session") -> None:
-        self.plug, self.name = plugged, name
-        self.used = False
-        self.slave: Any = None
-        self.open()
+    `rules`: what its variables may be set to; `outputs` and `inputs`: their names;
+    `experiment`: the default one; `time`: where it stands
+    [s]; `messages`: with `log` the statuses and texts of all that it has said.  Raises VerificationError for
+    what is no FMU, SimulationError for one that cannot be stepped here, RefusalError with its own reason if
+    it cannot be instantiated.
+    """
+
+    def __init__(
+        self, target: str | Path | Prepared, name: str = "session", log: bool = False
+    ) -> None:
+        self.name, self.log, self.used, self.time = name, log, False, 0.0
+        self.messages: list[tuple[int, str]] = []
+        self.instance: Any = None
+        self._said: list[str] = []  # of calls that fail
+        self._unpacked = ""
+        if isinstance(target, Prepared):
+            table = offered(target)
+            self.rules, variables = rules_of(table), table.variables
+            scene = target.scene
+            self.experiment = Experiment(scene.stop_time, scene.step_size, scene.tolerance)
+            self.reference = dict(table.position)
+            self._make: Callable[[], Any] = lambda: SlaveInProcess(target, self._hear)
+        else:
+            path = Path(target)
+            self.description = read_description(path)
+            if problem := obstacle(path, self.description):
+                raise SimulationError(f"{str(path)!r} {problem}")
+            self.rules, variables = (
+                described_rules(self.description),
+                self.description.modelVariables,
+            )
+            self.reference = {v.name: int(v.valueReference) for v in variables}
+            self.experiment = experiment_of(self.description)
+            self._unpacked = "" if path.is_dir() else unpack(path)
+            self.folder = Path(self._unpacked or path)
+            self._make = lambda: instantiated(self.folder, self.description, name, log)
+        readable = [v for v in variables if self.rules[v.name].kind in KINDS]
+        self.outputs = [v.name for v in readable if v.causality == "output"]
+        self.inputs = [v.name for v in readable if v.causality == "input"]
+        try:
+            self.open()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # ------------------------------------------------------------------ life
 
     def open(self) -> None:
         """Instantiate.  Raises RefusalError with the FMU's reason."""
-        callbacks = fmi2CallbackFunctions()
-        callbacks.logger = LOGGER
-        callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-        callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        addLoggerProxy(ctypes.byref(callbacks))  # formats a message with its arguments
-        MESSAGES.clear()
+        self._said.clear()
+        listen(self._hear)
         try:
-            with contextlib.chdir("."):  # fmpy stays in the folder of a library that it cannot load
-                self.slave = FMU2Slave(
-                    instanceName=self.name,
-                    guid=self.plug.guid,
-                    modelIdentifier=self.plug.identifier,
-                    unzipDirectory=self.plug.folder,
-                )
-            ours = hasattr(self.slave.dll, "lagfmu_batch")  # it gives its reasons unasked
-            self.slave.instantiate(callbacks=callbacks, loggingOn=not ours)
+            self.instance = self._make()
         except Exception as error:
-            told = reason() if MESSAGES else str(error)
-            raise RefusalError("instantiate", 3, told) from None
+            if isinstance(error, LagfmuError):
+                raise
+            raise RefusalError("instantiate", ERROR, self.reason(str(error))) from None
         self.used = False
 
     def close(self) -> None:
-        """Free the instance."""
-        if self.slave is not None and self.slave.component is not None:
-            self.slave.freeInstance()
-        self.slave = None
+        """Free the instance, and remove what was unpacked."""
+        self._free()
+        shutil.rmtree(self._unpacked, ignore_errors=True)
 
     def renew(self) -> None:
         """Another instance in place of one that can no longer be used."""
-        self.close()
+        self._free()
         self.open()
 
-    def call(self, name: str, *arguments: Any, **named: Any) -> Any:
-        """A method of FMU2Slave.  Raises RefusalError unless the status is OK or a warning."""
-        MESSAGES.clear()
-        try:
-            return getattr(self.slave, name)(*arguments, **named)
-        except FMICallException as error:
-            raise RefusalError(name, error.status, reason()) from None
-
-    def references(self, names: Sequence[str]) -> list[int]:
-        """Value references."""
-        return [self.plug.reference(n) for n in names]
-
-    def give(self, values: Mapping[str, float | str]) -> None:
-        """Set variables of any type; a method also by name, one that there is not as an unknown number."""
-        for kind in reversed(KINDS):
-            found: dict[str, Any] = {
-                name: float(value) if kind == "Real" else int(value)
-                for name, value in _numbers(values).items()
-                if KINDS[self.plug.type(name)] == kind
-            }
-            if found:
-                self.call(f"set{kind}", self.references(list(found)), list(found.values()))
+    def _free(self) -> None:
+        if self.instance is not None:
+            self.instance.freeInstance()
+        self.instance = None
 
     def prepare(
         self,
-        values: Mapping[str, float | str],
-        tolerance: float | None,
+        values: Mapping[str, Any] | None = None,
+        tolerance: float | None = None,
         stop: float | None = None,
         start: float = 0.0,
     ) -> None:
-        """Reset if it was used; set up (times in s), set `values`, enter the initialization mode."""
+        """Reset if it was used; set up (times in s), enter the initialization mode, set `values`."""
+        given = dict(values or {})
+        driven = {n: given.pop(n) for n in self.inputs if n in given}
         if self.used:
             self.call("reset")
-        self.used = True
+        self.used, self.time = True, start
         self.call("setupExperiment", tolerance=tolerance, startTime=start, stopTime=stop)
-        self.give(values)
+        self.give(given)
         self.call("enterInitializationMode")
+        self.give(driven)
 
     def begin(
         self,
-        values: Mapping[str, float | str],
-        tolerance: float | None,
+        values: Mapping[str, Any] | None = None,
+        tolerance: float | None = None,
         stop: float | None = None,
+        start: float = 0.0,
     ) -> None:
         """The same, and initialize."""
-        self.prepare(values, tolerance, stop)
+        self.prepare(values, tolerance, stop, start)
         self.call("exitInitializationMode")
 
-    def read(self, names: Sequence[str]) -> dict[str, Any]:
-        """Values of variables, in the types of their kinds."""
-        found: dict[str, Any] = {}
-        for kind in KINDS:
-            those = [n for n in names if KINDS[self.plug.type(n)] == kind]
-            if those:
-                seen = self.call(f"get{kind}", self.references(those))
-                found |= dict(zip(those, seen, strict=True))
-        return found
+    # ------------------------------------------------------------------ calls
+
+    def call(self, name: str, *arguments: Any, **named: Any) -> Any:
+        """A method of fmpy's FMU2Slave.  Raises RefusalError unless the status is OK or a warning."""
+        with self._refusing():
+            return getattr(self.instance, name)(*arguments, **named)
+
+    def reason(self, otherwise: str = "no message was logged") -> str:
+        """What the FMU said of the latest call that failed; pythonfmu's wrapping is taken away."""
+        text = " ".join("; ".join(self._said).split()) or otherwise
+        raised = re.search(r"""Refused\((["'])(.*)\1\)""", text)
+        return raised[2] if raised else text
+
+    @contextlib.contextmanager
+    def _refusing(self) -> Iterator[None]:
+        self._said.clear()
+        listen(self._hear)
+        try:
+            yield
+        except (FMICallException, CallError) as error:
+            raise RefusalError(error.function, error.status, self.reason()) from None
+
+    def _hear(self, status: int, text: str) -> None:
+        if self.log:
+            self.messages.append((status, text))
+        if status > WARNING:
+            self._said.append(text)
+
+    def references(self, names: Sequence[str]) -> list[int]:
+        """Value references."""
+        return [self.reference[n] for n in names]
+
+    def give(self, values: Mapping[str, Any]) -> None:
+        """Set variables of any kind; an item of an Enumeration also by name."""
+        for kind, names in reversed(self._by_kind(values)):
+            numbers = [self.rules[n].number(values[n]) for n in names]
+            self.call(f"set{kind}", self.references(names), numbers)
+
+    def read(self, names: Sequence[str] | None = None) -> dict[str, Any]:
+        """Values of variables, of all outputs without names, in the types of their kinds."""
+        chosen = self.outputs if names is None else names
+        with self._refusing():
+            return dict(zip(chosen, self._reader(chosen)(), strict=True))
 
     def get(self, name: str) -> float:
-        """The value of a Real, Integer, Enumeration or Boolean."""
-        kind = KINDS[self.plug.type(name)]
-        return float(self.call(f"get{kind}", [self.plug.reference(name)])[0])
+        """The value of one, as a number."""
+        return float(self.read([name])[name])
 
-    def batch(self, plan: Plan, values: NDArray[np.float64]) -> Outcome:
-        """Runs with the rows of `values` (runs, varied); one that is refused does not end the others."""
-        runs, points, kept = len(values), len(plan.times), len(plan.keep)
-        found = Outcome(
-            np.full((runs, kept), np.nan),
-            np.full((runs, points, kept), np.nan) if plan.whole else None,
-            np.zeros(runs, dtype=np.int32),
-            np.full(runs, plan.times[0]),
-            {},
+    def _by_kind(self, names: Any) -> list[tuple[str, list[str]]]:
+        found: dict[str, list[str]] = {kind: [] for kind in COLUMNS}
+        for n in names:
+            found[KINDS[self.rules[n].kind]].append(n)
+        return [(kind, those) for kind, those in found.items() if those]
+
+    def _reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
+        """Reads these variables, all of a kind in one call."""
+        parts = [
+            (getattr(self.instance, f"get{kind}"), self.references(those))
+            for kind, those in self._by_kind(names)
+        ]
+        order = [n for _, those in self._by_kind(names) for n in those]
+        places = [order.index(n) for n in names]
+        if places == list(range(len(places))):
+            return lambda: [x for get, those in parts for x in get(those)]
+
+        def read() -> list[Any]:
+            seen = [x for get, those in parts for x in get(those)]
+            return [seen[k] for k in places]
+
+        return read
+
+    # ------------------------------------------------------------------ steps and states
+
+    def step(self, size: float) -> None:
+        """A communication step [s] from where it stands."""
+        self.call("doStep", self.time, size)
+        self.time += size
+
+    def save(self) -> Any:
+        """The whole state, to be restored, or freed by call("freeFMUstate", state)."""
+        return self.call("getFMUstate")
+
+    def restore(self, state: Any, time: float) -> None:
+        """The instance stands in a saved state, at `time` [s], again."""
+        self.call("setFMUstate", state)
+        self.time = time
+
+    def hand(self, other: Session, state: Any = None, time: float | None = None) -> None:
+        """By the bytes of a saved state, else of the present one, the other goes on from there."""
+        kept = self.save() if state is None else state
+        data = self.call("serializeFMUstate", kept)
+        if state is None:
+            self.call("freeFMUstate", kept)
+        taken = other.call("deSerializeFMUstate", data)
+        other.restore(taken, self.time if time is None else time)
+        other.call("freeFMUstate", taken)
+
+    # ------------------------------------------------------------------ the loop
+
+    def run(
+        self,
+        times: Sequence[float],
+        values: Mapping[str, Any] | None = None,
+        tolerance: float | None = None,
+        read: Sequence[str] | None = None,
+        inputs: Columns | None = None,
+        events: Events = (),
+        late: bool = False,
+    ) -> Run:
+        """A run over the communication points `times` [s], as far as the FMU goes.
+
+        `values` are set before it starts; `read` are the columns of its rows (all outputs).  `inputs` are set
+        at each point before it is read, with `late` (as fmpy does) when it has been read.  Of `events` that
+        fall between two points the latest is read too, on a way aside: the run goes on as it would have.
+        """
+        points, names = [float(t) for t in times], self.outputs if read is None else list(read)
+        rows: list[tuple[Any, ...]] = []
+        between: list[tuple[Any, ...]] = []
+        refusal, begun = None, clock.perf_counter()
+        try:
+            first = {n: float(column[0]) for n, column in (inputs or {}).items()}
+            self.begin(dict(values or {}) | first, tolerance, points[-1], points[0])
+            with self._refusing():
+                look, feed = self._reader(names), self._feeder(inputs or {})
+                step, begun = self.instance.doStep, clock.perf_counter()
+                rows.append((points[0], *look()))
+                count = self._counted(events)[0] if events else 0
+                for k, (t, later) in enumerate(itertools.pairwise(points)):
+                    if late:
+                        feed(k)
+                    before = self.instance.getFMUstate() if events else None
+                    step(t, later - t)
+                    self.time = later
+                    if events:
+                        now, latest = self._counted(events)
+                        if now > count and t < latest < later:
+                            between.append((latest, *self._aside(before, t, latest, look)))
+                        self.instance.freeFMUstate(before)
+                        count = now
+                    if not late:
+                        feed(k + 1)
+                    rows.append((later, *look()))
+        except RefusalError as error:
+            error.time = self.time if rows else None
+            refusal = error
+            self.renew()
+        seconds = clock.perf_counter() - begun
+        return Run(self._table(names, rows), self._table(names, between), refusal, seconds)
+
+    def _aside(self, before: Any, t: float, at: float, look: Callable[[], list[Any]]) -> list[Any]:
+        """What is read at an event at the time `at` [s] in the step from t, which has been done."""
+        after = self.instance.getFMUstate()
+        self.instance.setFMUstate(before)
+        self.instance.doStep(t, at - t)
+        seen = look()
+        self.instance.setFMUstate(after)
+        self.instance.freeFMUstate(after)
+        return seen
+
+    def _counted(self, events: Events) -> tuple[int, float]:
+        """Events so far, and the time [s] of the latest."""
+        found = self._reader([n for pair in events for n in pair])()
+        happened = [time for count, time in zip(found[::2], found[1::2], strict=True) if count > 0]
+        return int(sum(found[::2])), max(happened, default=-np.inf)
+
+    def _feeder(self, inputs: Columns) -> Callable[[int], None]:
+        """Sets inputs to their values at point k."""
+        parts = []
+        for kind, names in self._by_kind(inputs):
+            as_kind = float if kind == "Real" else int
+            columns = [[as_kind(x) for x in inputs[n]] for n in names]
+            rows = list(zip(*columns, strict=True))
+            parts.append((getattr(self.instance, f"set{kind}"), self.references(names), rows))
+
+        def feed(k: int) -> None:
+            for put, references, rows in parts:
+                put(references, list(rows[k]))
+
+        return feed
+
+    def _table(self, names: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> Trajectory:
+        columns = [("time", np.float64)]
+        columns += [(n, COLUMNS[KINDS[self.rules[n].kind]]) for n in names]
+        return np.array(rows, dtype=columns)
+
+
+def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
+    """0, h, 2 h, ..., and the stop time [s].  Raises SimulationError for more than fit a memory."""
+    if stop_time / step_size > MOST_POINTS:
+        raise SimulationError(
+            f"step_size = {step_size!r} s asks for {stop_time / step_size:.3g} communication points "
+            f"until {stop_time!r} s, expected at most {MOST_POINTS:.0e}: choose a larger step_size, or "
+            "an earlier stop_time"
         )
-        values = np.ascontiguousarray(values, dtype=np.float64)
-        if hasattr(self.slave.dll, "lagfmu_batch"):
-            self._native(plan, values, found)
-        else:
-            self._looped(plan, values, found)
-        failed = found.status > 1
-        found.result[failed] = np.nan
-        return found
-
-    def _native(self, plan: Plan, values: NDArray[np.float64], found: Outcome) -> None:
-        function = self.slave.dll.lagfmu_batch
-        function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], ctypes.c_int
-        names = [n for n, _ in plan.keep]
-        arrays: dict[str, Any] = {
-            "vary": self._references(plan.vary),
-            "vary_type": self._types(plan.vary),
-            "values": values,
-            "drive": self._references(plan.drive),
-            "drives": None if plan.drives is None else np.ascontiguousarray(plan.drives, float),
-            "times": np.ascontiguousarray(plan.times, dtype=np.float64),
-            "keep": self._references(names),
-            "keep_type": self._types(names),
-            "keep_what": np.array([w for _, w in plan.keep], dtype=np.intc),
-            "count": self._references([c for c, _ in plan.events]),
-            "when": self._references([t for _, t in plan.events]),
-            "result": found.result,
-            "trajectory": found.trajectory,
-            "status": found.status,
-            "reached": found.reached,
-            "scratch": np.zeros(2 * max(len(names), 1)),
-        }
-        batch = _Batch(
-            runs=len(values),
-            varied=len(plan.vary),
-            driven=len(plan.drive),
-            points=len(plan.times),
-            kept=len(names),
-            events=len(plan.events),
-            tolerance=plan.tolerance,
-            whole=int(plan.whole),
-            current=0,
-        )
-        for field, array in arrays.items():
-            setattr(batch, field, None if array is None else array.ctypes.data)
-        self.used = True
-        with _Listener(batch, found.reasons):
-            while batch.current < batch.runs:
-                status = function(self.slave.component, ctypes.byref(batch))
-                if status <= 1:
-                    break
-                found.status[batch.current] = (
-                    status  # it cannot be reset: the rest goes to another one
-                )
-                found.reasons.setdefault(int(batch.current), "the instance could not be reset")
-                batch.current += 1
-                self.renew()
-
-    def _looped(self, plan: Plan, values: NDArray[np.float64], found: Outcome) -> None:
-        for r, row in enumerate(values):
-            try:
-                self._run(plan, row, r, found)
-            except RefusalError as error:
-                found.status[r], found.reasons[r] = error.status, error.message
-                self.renew()
-
-    def _run(self, plan: Plan, row: NDArray[np.float64], r: int, found: Outcome) -> None:
-        """One run, as run() in batch.c."""
-        times = plan.times
-        values = dict(zip(plan.vary, row.tolist(), strict=True)) | self._driven(plan, 0)
-        self.prepare(values, plan.tolerance or None, float(times[-1]), float(times[0]))
-        self.call("exitInitializationMode")
-        kept, whole = found.result[r], found.trajectory
-        points = np.zeros((len(times), len(kept))) if whole is None else whole[r]
-        points[0] = self._seen(plan)
-        seen, when = [points[0]], [float(times[0])]  # with what was seen at departures
-        count, earlier = self._departures(plan)[0], None
-        for k in range(1, len(times)):
-            t, h = float(times[k - 1]), float(times[k] - times[k - 1])
-            if plan.events:
-                earlier = self.call("getFMUstate")
-            self.call("doStep", t, h)
-            found.reached[r] = times[k]
-            if plan.events:
-                now, latest = self._departures(plan)
-                if now > count and t < latest < times[k]:
-                    later = self.call("getFMUstate")
-                    self.call("setFMUstate", earlier)
-                    self.call("doStep", t, latest - t)
-                    seen.append(self._seen(plan))
-                    when.append(latest)
-                    self.call("setFMUstate", later)
-                    self.call("freeFMUstate", later)
-                self.call("freeFMUstate", earlier)
-                count = now
-            self.give(self._driven(plan, k))
-            points[k] = self._seen(plan)
-            seen.append(points[k])
-            when.append(float(times[k]))
-        for k, (column, (_, what)) in enumerate(zip(np.transpose(seen), plan.keep, strict=True)):
-            if what == MEAN:
-                at, width = points[:, k], float(times[-1] - times[0])
-                parts = (at[1:] + at[:-1]) / 2 * np.diff(times) / width
-                kept[k] = sum(parts.tolist())
-            else:
-                place = {MAX: column.argmax(), MIN: column.argmin(), TIME_OF_MAX: column.argmax()}
-                last = int(place.get(what, len(column) - 1))
-                kept[k] = when[last] if what == TIME_OF_MAX else column[last]
-
-    def _seen(self, plan: Plan) -> NDArray[np.float64]:
-        return np.array([self.get(name) for name, _ in plan.keep])
-
-    def _driven(self, plan: Plan, k: int) -> dict[str, float]:
-        """The inputs at a communication point."""
-        if plan.drives is None:
-            return {}
-        return dict(zip(plan.drive, plan.drives[k].tolist(), strict=True))
-
-    def _departures(self, plan: Plan) -> tuple[float, float]:
-        """How many so far, and the time [s] of the latest."""
-        counts = [(self.get(count), when) for count, when in plan.events]
-        happened = [self.get(when) for count, when in counts if count]
-        return sum(c for c, _ in counts), max(happened, default=-np.inf)
-
-    def _references(self, names: Sequence[str]) -> NDArray[np.uintc]:
-        return np.array(self.references(names), dtype=np.uintc)
-
-    def _types(self, names: Sequence[str]) -> NDArray[np.intc]:
-        return np.array([self.plug.type(n) for n in names], dtype=np.intc)
+    count = max(1, int(np.ceil(stop_time / step_size * (1 - 1e-12))))
+    times = np.arange(count + 1, dtype=np.float64) * step_size
+    times[-1] = stop_time
+    return times
 
 
-def _numbers(values: Mapping[str, float | str]) -> dict[str, float]:
-    """Methods by their numbers; a text that is none by a number that is none."""
-    unknown = 1 + max(NUMBERS.values())
-    return {k: NUMBERS.get(v, unknown) if isinstance(v, str) else v for k, v in values.items()}
-
-
-class _Listener:
-    """While many runs go on in one call: the messages of each, by its number."""
-
-    def __init__(self, batch: _Batch, reasons: dict[int, str]) -> None:
-        self.batch, self.reasons = batch, reasons
-
-    def __enter__(self) -> None:
-        MESSAGES.clear()
-        global _heard
-        _heard = self
-
-    def __exit__(self, *_: object) -> None:
-        global _heard
-        _heard = None
-
-    def hear(self, text: str) -> None:
-        """Of several messages of a run, all."""
-        run = int(self.batch.current)
-        known = self.reasons.get(run)
-        self.reasons[run] = f"{known}; {text}" if known else text
-
-
-_heard: _Listener | None = None
+def obstacle(path: Path, description: Any) -> str:
+    """Why a session cannot step an FMU, a file or an unpacked folder, on this machine; empty if it can."""
+    if description.fmiVersion != "2.0":
+        return f"is an FMU of FMI {description.fmiVersion}, expected FMI 2.0"
+    if description.coSimulation is None:
+        return "has no co-simulation"
+    found = platforms(path)
+    if fmpy.platform in found:
+        return ""
+    return f"has no binary for this machine ({fmpy.platform}), but for {', '.join(found) or 'none'}"

@@ -18,10 +18,11 @@ from xml.etree import ElementTree as ET
 from .. import names
 from ..errors import SimulationError
 from ..fmu.described import Trajectory, experiment_of, read_description
+from ..fmu.session import communication_points
 from ..fmu.write import REFERENCES, write_whole
 from .pipeline import as_json
 from .report import report
-from .simulate import communication_points, simulate
+from .simulate import simulate
 from .verify import Verification
 
 TOLERANCE = 1e-12

@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...fmu.archive import unpack
-from ...fmu.session import RefusalError
+from ...fmu.session import RefusalError, Session
 from ...verification.verify import applies
 from .closed_forms import EQUATION, judged, laws
 from .facts import Facts, facts_of
 from .judge import EPS, Check, invariants, lost
-from .player import Drive, Player, Run, Values, play
+from .player import Drive, Run, Values, opened, play
 
 SHIFT = 1e-6
 SAFETY = 30.0
@@ -61,27 +61,27 @@ class Bench:
             *laws(self.facts.laws),
         )
         self.folder = Path(unpack(path))
-        self._player: Player | None = None
+        self._session: Session | None = None
 
     def __enter__(self) -> Bench:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._player is not None:
-            self._player.close()
+        if self._session is not None:
+            self._session.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
     @property
-    def player(self) -> Player:
+    def session(self) -> Session:
         """The instance that runs, reset before each."""
-        if self._player is None:
-            self._player = Player(self.facts, self.folder)
-        return self._player
+        if self._session is None:
+            self._session = opened(self.facts, self.folder)
+        return self._session
 
     @contextlib.contextmanager
-    def another(self, name: str) -> Iterator[Player]:
+    def another(self, name: str) -> Iterator[Session]:
         """A further instance."""
-        one = Player(self.facts, self.folder, name)
+        one = opened(self.facts, self.folder, name)
         try:
             yield one
         finally:
@@ -97,10 +97,10 @@ class Bench:
     def first(self, values: Values) -> Mapping[str, Any]:
         """The outputs after the initialization.  Raises RefusalError."""
         try:
-            self.player.begin(values, None)
-            return self.player.read()
+            self.session.begin(values, None)
+            return self.session.read()
         except RefusalError:
-            self.player.renew()
+            self.session.renew()
             raise
 
     def rate(self, values: Values) -> float:
@@ -142,7 +142,7 @@ class Bench:
         late: bool = False,
     ) -> Run:
         """A run on the bench's instance; `late` as in play()."""
-        return play(self.player, values, times, tolerance, drive, late=late)
+        return play(self.session, self.facts, values, times, tolerance, drive, late=late)
 
     def checks(self, run: Run, span: float | None = None) -> list[Check]:
         """The invariants; `span` [s] is what counts as the default experiment at these values."""

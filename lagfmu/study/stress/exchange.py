@@ -9,10 +9,8 @@ is asked again, at TOLERANCES[1]: its own error, unlike one of the FMU's derivat
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
-import fmpy
-
+from ...fmu.exchange import by_fmpy
 from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .judge import Check
@@ -37,10 +35,16 @@ def compared(bench: Bench) -> Finding:
 
 def _at(bench: Bench, right: Run, tolerance: float) -> Finding:
     facts = bench.facts
-    found = _exchanged(bench, tolerance)
+    names, step = [v.name for v in facts.outputs], facts.stop_time / POINTS
+    kind, stop = "ModelExchange", facts.stop_time
+    run = by_fmpy(bench.folder, facts.description, stop, step, tolerance, read=names, kind=kind)
+    bench.session.renew()  # fmpy's logger is one a process
+    if run.refusal is not None:
+        raise RefusalError(kind, run.refusal.status, run.refusal.message)
+    found = run.rows
     rows = table(facts, len(found))
     for name in rows.dtype.names or ():
-        rows[name] = found[name] if name in found.dtype.names else right.rows[name][: len(found)]
+        rows[name] = found[name] if name in names else right.rows[name][: len(found)]
     count = Check("points that were reached", float(len(right.rows) - len(rows)), 0.5)
     other = replace(right, rows=rows, tolerance=REACHED)
     growth = bench.amplification[-1] + 0 * right.rows["time"]
@@ -49,29 +53,3 @@ def _at(bench: Bench, right: Run, tolerance: float) -> Finding:
     return Finding(
         (count, *checks, *departures(bench, right, other, float(growth[-1]))), None, note
     )
-
-
-def _exchanged(bench: Bench, tolerance: float) -> Any:
-    said: list[str] = []
-
-    def log(_: Any, __: Any, status: int, ___: Any, message: bytes) -> None:
-        if status >= 2:
-            said.append(message.decode(errors="replace"))
-
-    try:
-        return fmpy.simulate_fmu(
-            str(bench.folder),
-            validate=False,
-            fmi_type="ModelExchange",
-            model_description=bench.facts.description,
-            stop_time=bench.facts.stop_time,
-            output_interval=bench.facts.stop_time / POINTS,
-            relative_tolerance=tolerance,
-            record_events=False,
-            output=[v.name for v in bench.facts.outputs],
-            logger=log,
-        )
-    except Exception as error:
-        raise RefusalError("model exchange", 3, "; ".join(said) or str(error)) from None
-    finally:
-        bench.player.renew()  # fmpy's logger is one a process

@@ -93,8 +93,10 @@ def _against(bench: Bench, run: Run) -> Finding:
     Two runs near REFERENCE differ by what rounding makes of the model: no run can be nearer than that.
     """
     checks, times = bench.checks(run), run.rows["time"].tolist()
+    if run.refusal is not None or not times:
+        return Finding(tuple(checks), run.refusal)
     right, other = (bench.run({}, times, tolerance) for tolerance in (REFERENCE, 2 * REFERENCE))
-    if run.refusal is None and right.refusal is None and times:
+    if right.refusal is None:
         growth = bench.amplified({}, right)
         noise = bench.differences(right, other, len(other.rows))
         what = f"as at {REFERENCE:g}"

@@ -18,15 +18,14 @@ import threading
 import zipfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ...errors import SimulationError
 from ...fmu.archive import version
-from ...fmu.session import Outcome, Plan, Plug
+from ...fmu.batch import Outcome, Plan
 from .design import Values
-from .host import Host, HostEndedError
+from .process import EndedError, SessionProcess
 
 PATIENCE = 15  # [s] for a scheduler to answer, and to have a worker
 TRIES = 20  # of a chunk whose workers die, after Dask's own
@@ -58,7 +57,7 @@ def asked_to_stop() -> Iterator[threading.Event]:
 
 
 def local(
-    plug: Plug,
+    folder: str,
     plan: Plan,
     chunks: Chunks,
     workers: int,
@@ -70,18 +69,18 @@ def local(
 
     `limit`: of the time of a run [s]; `beat` hears in between how many runs of unfinished chunks are done.
     """
-    hosts: list[Host] = []
+    processes: list[SessionProcess] = []
     own = threading.local()
     under_way: dict[int, int] = {}
     over = threading.Event()
 
     def run(number: int, values: Values) -> Outcome:
-        if not hasattr(own, "host"):
-            own.host = Host(plug, limit)
-            hosts.append(own.host)
+        if not hasattr(own, "process"):
+            own.process = SessionProcess(folder, limit)
+            processes.append(own.process)
         if over.is_set():
-            raise HostEndedError
-        found: Outcome = own.host.run(plan, values, lambda n: under_way.update({number: n}))
+            raise EndedError
+        found: Outcome = own.process.run(plan, values, lambda n: under_way.update({number: n}))
         return found
 
     waiting = iter(chunks)
@@ -103,9 +102,9 @@ def local(
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
             over.set()
-            for host in hosts:
-                host.end()  # what waits for an answer gets none
-                last.callback(host.close)
+            for process in processes:
+                process.end()  # what waits for an answer gets none
+                last.callback(process.close)
 
 
 def connected(on: Any) -> tuple[Any, bool]:
@@ -146,7 +145,7 @@ def closed(client: Any) -> None:
 
 
 def distributed(
-    client: Any, fmu: Path, plug: Plug, plan: Plan, chunks: Chunks, limit: float | None
+    client: Any, fmu: Path, plan: Plan, chunks: Chunks, limit: float | None
 ) -> Generator[tuple[int, Outcome], None, None]:
     """Chunks as they are done on a cluster.  The FMU is a task of its own: it goes to each worker once, and
     is made again where the workers that had it died."""
@@ -161,7 +160,7 @@ def distributed(
 
     def submit(number: int) -> Any:
         future = client.submit(
-            work, archive, digest, plug, plan, rows[number], limit, retries=TRIES, pure=False
+            work, archive, digest, plan, rows[number], limit, retries=TRIES, pure=False
         )
         known[future] = number
         return future
@@ -200,11 +199,11 @@ def distributed(
 
 _lock = threading.Lock()
 _unpacked: set[str] = set()  # folders
-_hosts = threading.local()
+_own = threading.local()
 
 
 def work(
-    content: bytes, digest: str, plug: Plug, plan: Plan, values: Values, limit: float | None = None
+    content: bytes, digest: str, plan: Plan, values: Values, limit: float | None = None
 ) -> Outcome:
     """One chunk in a Dask worker: its thread keeps a host process with the FMU."""
     from dask.distributed import get_worker
@@ -216,10 +215,10 @@ def work(
             with zipfile.ZipFile(io.BytesIO(content)) as packed:
                 packed.extractall(place)
             _unpacked.add(place)
-    host: Host | None = getattr(_hosts, "host", None)
-    if host is None or host.plug.folder != place or host.limit != limit:
-        if host is not None:
-            host.close()
-        host = _hosts.host = Host(replace(plug, folder=place), limit)
-        atexit.register(host.close)
-    return host.run(plan, values)
+    process: SessionProcess | None = getattr(_own, "process", None)
+    if process is None or process.folder != place or process.limit != limit:
+        if process is not None:
+            process.close()
+        process = _own.process = SessionProcess(place, limit)
+        atexit.register(process.close)
+    return process.run(plan, values)

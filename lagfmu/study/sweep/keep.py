@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from ... import names
 from ...errors import SettingError
-from ...fmu.session import LAST, MAX, MEAN, MIN, TIME_OF_MAX, TYPES
-from ...verification.simulate import missing
+from ...fmu.batch import LAST, MAX, MEAN, MIN, TIME_OF_MAX
+from ...fmu.session import KINDS
+from ...interface.rules import missing
 
 REDUCTIONS = {"last": LAST, "max": MAX, "min": MIN, "mean": MEAN, "time-of-max": TIME_OF_MAX}
 TRAJECTORY = "trajectory"
@@ -75,7 +76,7 @@ def kept(texts: Sequence[str], known: Mapping[str, str], outputs: Sequence[str])
             texts = [
                 f"{n}:last"
                 for n in outputs
-                if known[n] in TYPES and names.read(n).head != names.SOLVER
+                if known[n] in KINDS and names.read(n).head != names.SOLVER
             ]
     numbers, trajectories, problems = [], [], []
     for text in dict.fromkeys(texts):
@@ -85,8 +86,8 @@ def kept(texts: Sequence[str], known: Mapping[str, str], outputs: Sequence[str])
         if how != TRAJECTORY and how not in REDUCTIONS:
             ways = ", ".join((*REDUCTIONS, TRAJECTORY))
             problems.append(f"{text!r}: {how!r} is unknown, expected one of {ways}")
-        elif name not in known or known[name] not in TYPES:
-            problems.append(missing(name, [n for n in known if known[n] in TYPES]))
+        elif name not in known or known[name] not in KINDS:
+            problems.append(missing(name, [n for n in known if known[n] in KINDS]))
         elif how == TRAJECTORY:
             trajectories.append(name)
         else:

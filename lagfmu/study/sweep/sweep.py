@@ -7,7 +7,7 @@ import hashlib
 import os
 import shutil
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,18 +18,16 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...errors import SettingError, SimulationError
-from ...fmu.archive import opened, unpack, version
-from ...fmu.described import Trajectory, asked, experiment_of, read_description
-from ...fmu.session import TYPES, Plan, plug
+from ...fmu.archive import unpack, version
+from ...fmu.batch import Plan
+from ...fmu.described import Trajectory, described_rules, experiment_of, read_description
+from ...fmu.inputs import check_inputs, columns_at
+from ...fmu.session import communication_points, obstacle
 from ...fmu.write import as_fmu
+from ...interface.rules import Rule, unsettable
 from ...model.model import Model
 from ...model.scene import Scene
 from ...numeric.tolerance import tolerance_problem
-from ...verification.simulate import (
-    check_inputs,
-    communication_points,
-    missing,
-)
 from .design import Design, Values, design
 from .engine import asked_to_stop, closed, connected, distributed, local
 from .keep import kept as parsed
@@ -160,12 +158,19 @@ def _study(
 ) -> Study:
     """All that can be said before anything is run.  Raises SettingError."""
     description = read_description(path)
-    _check_fmu(path, description)
+    if problem := obstacle(path, description):
+        raise SimulationError(
+            f"{str(path)!r} {problem}: build it with --platforms, or run the sweep where it has one"
+            if "binary" in problem
+            else f"{str(path)!r} {problem}"
+        )
+    rules = described_rules(description)
     variables = {v.name: v for v in description.modelVariables}
     outputs = [n for n, v in variables.items() if v.causality == "output"]
     kept = parsed(keep, {n: v.type for n, v in variables.items()}, outputs)
-    drives = _drives(inputs, times, variables)
-    _check(varied, variables, drives[0])
+    check_inputs(inputs, rules, [n for n, v in variables.items() if v.causality == "input"])
+    driven = columns_at(inputs, times, rules)
+    _check(varied, rules, driven)
     size = 8 * len(varied) * (len(kept.numbers) + len(kept.trajectories) * len(times))
     if size > memory():
         raise SettingError(
@@ -177,8 +182,8 @@ def _study(
         keep=kept.plan,
         times=times,
         tolerance=tolerance or 0.0,
-        drive=drives[0],
-        drives=drives[1],
+        drive=tuple(driven),
+        drives=np.column_stack(list(driven.values())) if driven else None,
         events=_events(variables) if kept.extremes else (),
         whole=bool(kept.trajectories),
     )
@@ -197,26 +202,6 @@ def _study(
     }
     chunk = min(MOST, max(1, -(-len(varied) // FEWEST)))
     return Study(path, plan, Layout(varied, kept, units, facts), chunk)
-
-
-def _check_fmu(path: Path, description: Any) -> None:
-    """FMI 2.0, co-simulation, with a binary for this machine.  Raises SimulationError."""
-    if description.fmiVersion != "2.0":
-        raise SimulationError(
-            f"{str(path)!r} is an FMU of FMI {description.fmiVersion}: a sweep drives FMI 2.0"
-        )
-    if description.coSimulation is None:
-        raise SimulationError(
-            f"{str(path)!r} has no co-simulation: a sweep steps FMUs by fmi2DoStep"
-        )
-    with opened(path) as archive:
-        folders = [n.split("/")[1] for n in archive.namelist() if n.startswith("binaries/")]
-    if fmpy.platform not in folders:
-        found = ", ".join(dict.fromkeys(f for f in folders if f)) or "none"
-        raise SimulationError(
-            f"{str(path)!r} has no binary for this machine ({fmpy.platform}), but for {found}: build it with "
-            "--platforms, or run the sweep where it has one"
-        )
 
 
 def _assembled(study: Study, parts: Parts, out: Path | None) -> Any:
@@ -243,10 +228,9 @@ def _run(
     """What is not yet there.  Raises KeyboardInterrupt, when all that is finished is kept."""
     layout, chunk = study.layout, study.chunk
     total, done, refused = len(layout.design), parts.done, 0
-    description = read_description(study.path)
-    variables = {v.name: v for v in description.modelVariables}
+    rules = described_rules(read_description(study.path))
     columns = zip(layout.design.names, layout.design.table.T, strict=True)
-    table = np.column_stack([asked(variables[n], column) for n, column in columns])
+    table = np.column_stack([_asked(rules[n], column) for n, column in columns])
     left = [
         (n, table[n * chunk : (n + 1) * chunk]) for n in range(-(-total // chunk)) if n not in done
     ]
@@ -262,15 +246,14 @@ def _run(
             stack.callback(closed, client)
         folder = unpack(study.path)
         stack.callback(shutil.rmtree, folder, ignore_errors=True)
-        plugged = plug(study.path, description, folder)
         tell()
         if client is None:
             stop = stack.enter_context(asked_to_stop())
             cores = workers or os.cpu_count() or 1
-            results = local(plugged, study.plan, left, cores, limit, stop, tell)
+            results = local(folder, study.plan, left, cores, limit, stop, tell)
         else:
             stop = threading.Event()
-            results = distributed(client, study.path, plugged, study.plan, left, limit)
+            results = distributed(client, study.path, study.plan, left, limit)
         with contextlib.closing(results):
             for number, outcome in results:
                 first = number * chunk
@@ -352,37 +335,24 @@ def _check_options(
         raise SettingError("; ".join(problems))
 
 
-def _check(varied: Design, variables: Mapping[str, Any], driven: Sequence[str]) -> None:
-    """Every varied name is something that the FMU lets be set before it starts."""
-    settable = [
-        n
-        for n, v in variables.items()
-        if v.type in TYPES
-        and (v.causality in ("parameter", "input") or v.initial in ("exact", "approx"))
-    ]
-    settable.sort(key=lambda n: names.read(n).head == names.SOLVER)  # what is physics stands first
-    problems = [missing(n, settable, "cannot be set") for n in varied.names if n not in settable]
-    problems += [
-        f"{n} varies and comes from the file of inputs" for n in varied.names if n in driven
-    ]
+def _check(varied: Design, rules: Mapping[str, Rule], driven: Collection[str]) -> None:
+    """Every varied name is something that the FMU lets be set before it starts, to values of its kind; what
+    else it refuses of them is told of the runs that have them."""
+    problems: list[str] = []
     for name, column in zip(varied.names, varied.table.T, strict=True):
-        whole = name in settable and variables[name].type != "Real"
-        if whole and (bad := column[column != np.round(column)]).size:
-            problems.append(f"{name} = {float(bad[0])!r}, expected a whole number")
+        problems += filter(None, [unsettable(rules, name)])
+        odd = column[column != np.round(column)]
+        if name in rules and rules[name].kind != "Real" and odd.size:
+            problems.append(rules[name].problem(float(odd[0])))
+        if name in driven:
+            problems.append(f"{name} varies and comes from the file of inputs")
     if problems:
         raise SettingError("; ".join(problems))
 
 
-def _drives(
-    inputs: Trajectory | None, times: NDArray[np.float64], variables: Mapping[str, Any]
-) -> tuple[tuple[str, ...], NDArray[np.float64] | None]:
-    """Inputs, interpolated linearly at the communication points."""
-    if inputs is None:
-        return (), None
-    check_inputs(inputs, list(variables.values()))
-    names = tuple(n for n in inputs.dtype.names or () if n != "time")
-    table = np.column_stack([np.interp(times, inputs["time"], inputs[n]) for n in names])
-    return names, table
+def _asked(rule: Rule, column: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values that vary as the FMU gets them."""
+    return np.array([rule.asked(x) for x in column]) if rule.follows else column
 
 
 def _events(variables: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:

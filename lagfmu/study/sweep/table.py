@@ -19,11 +19,12 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.session import STATUS, Outcome
+from ...fmu.batch import Outcome
+from ...fmu.session import STATUS
 from .design import Design
-from .host import CRASHED, TIMED_OUT
 from .keep import Kept
 from .parts import Parts, synchronize
+from .process import CRASHED, TIMED_OUT
 
 INFINITE = sys.float_info.max  # stands for infinity where an FMU's Real must be finite: error bars
 METADATA = "-metadata.json"  # of a CSV file, behind its name: W3C's tabular metadata

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ...errors import BuildError, SimulationError
+from ...fmu.session import Session
 from ...fmu.write import write
 from ...methods import METHODS
 from ...model.goal import Goal
@@ -20,7 +21,7 @@ from ...model.scene import Scene
 from ...prepare.prepare import prepare
 from ...verification.simulate import steps_of
 from .held_out import Case, cases
-from .importer import Importer
+from .observe import observe, opened
 from .quantities import selected
 from .reference import Reference, refer, wider
 from .setting import Setting, ladder
@@ -70,25 +71,25 @@ def choose(
     wide = replace(scene, methods=METHODS, reals_only=False, error_bars=False)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         path = write(prepare(model, wide), folder, (), target=target)
-        with Importer(path) as importer:
-            return _chosen(importer, scene, goal, tick or (lambda *_: None))
+        with opened(path) as session:
+            return _chosen(session, scene, goal, tick or (lambda *_: None))
 
 
-def _chosen(importer: Importer, scene: Scene, goal: Goal, say: Tick) -> Choice:
+def _chosen(session: Session, scene: Scene, goal: Goal, say: Tick) -> Choice:
     say("reference", 0, 1)
-    reference = refer(importer)
+    reference = refer(session)
     names = tuple(q.name for q in selected(reference.known, goal.names))
-    dials = ladder(scene.method, importer.step_size, TOLERANCES)
+    dials = ladder(scene.method, session.experiment.step_size, TOLERANCES)
     tried: dict[int, Trial] = {}
 
     def holds(k: int) -> bool:
         if k not in tried:
             say(str(dials[k]), len(tried), len(dials).bit_length())
-            tried[k] = attempt(importer, dials[k], reference, names)
+            tried[k] = attempt(session, dials[k], reference, names)
         return tried[k].error <= goal.on_the_scene
 
     first = bisected(len(dials), holds)
-    others = cases(importer) if first < len(dials) else []
+    others = cases(session) if first < len(dials) else []
     failed: list[tuple[Trial, float]] = []
     for k in range(first, len(dials)):
         if len(failed) == ATTEMPTS:
@@ -98,7 +99,7 @@ def _chosen(importer: Importer, scene: Scene, goal: Goal, say: Tick) -> Choice:
         found: list[tuple[Case, Trial]] = []
         for case in others:
             say(f"{dials[k]} at held-out values", len(found), len(others))
-            found.append((case, attempt(importer, dials[k], case.reference, names, case.values)))
+            found.append((case, attempt(session, dials[k], case.reference, names, case.values)))
         worst = max(trial.error for _, trial in found)
         if worst <= goal.held_out:
             tolerance, trials = dials[k].tolerance, tuple(tried[j] for j in sorted(tried))
@@ -123,7 +124,7 @@ def bisected(count: int, holds: Callable[[int], bool]) -> int:
 
 
 def attempt(
-    importer: Importer,
+    session: Session,
     setting: Setting,
     reference: Reference,
     names: Sequence[str],
@@ -132,9 +133,9 @@ def attempt(
     """The larger error at the FMU's communication step and at the wider one, the reference's own added;
     infinite where it cannot be run."""
     worst, largest, steps = "", 0.0, 0
-    for width in (importer.step_size, wider(importer)):
+    for width in (session.experiment.step_size, wider(session)):
         try:
-            run = importer.observe(replace(setting, communication=width), values)
+            run = observe(session, replace(setting, communication=width), values)
         except SimulationError:
             return Trial(setting, float("inf"), "", 0)
         errors = reference.errors(run)

@@ -11,7 +11,8 @@ import numpy as np
 from ... import names
 from ...errors import SimulationError
 from ...fmu.described import Trajectory
-from .importer import Importer
+from ...fmu.session import Session
+from .observe import observe
 from .reference import Reference, refer
 from .setting import Setting
 
@@ -28,14 +29,14 @@ class Case:
     reference: Reference
 
 
-def cases(importer: Importer) -> list[Case]:
+def cases(session: Session) -> list[Case]:
     """Other points, with their references.  Raises SimulationError if it cannot be run there."""
-    scene = importer.observe(_built(importer))
-    drawn = [other_values(importer, scene, random.Random(k)) for k in range(CASES)]
-    return [Case(values, refer(importer, values)) for values in drawn]
+    scene = observe(session, _built(session))
+    drawn = [other_values(session, scene, random.Random(k)) for k in range(CASES)]
+    return [Case(values, refer(session, values)) for values in drawn]
 
 
-def other_values(importer: Importer, scene: Trajectory, chance: random.Random) -> dict[str, float]:
+def other_values(session: Session, scene: Trajectory, chance: random.Random) -> dict[str, float]:
     """Every parameter and start value, moved by up to SHARE, within its bounds.
 
     Start values of zero stay, unless all are zero.  The FMU puts what misses the constraints back on
@@ -43,9 +44,9 @@ def other_values(importer: Importer, scene: Trajectory, chance: random.Random) -
     """
     reason = "other contacts are closed at the start"
     for _ in range(TRIES):
-        values = _drawn(importer, scene, chance)
+        values = _drawn(session, scene, chance)
         try:
-            begun = importer.observe(_built(importer), values, stop=importer.step_size)
+            begun = observe(session, _built(session), values, stop=session.experiment.step_size)
         except SimulationError as error:
             reason = str(error)
             continue
@@ -53,22 +54,23 @@ def other_values(importer: Importer, scene: Trajectory, chance: random.Random) -
         if all(begun[n][0] == scene[n][0] for n in contacts):
             return values
     raise SimulationError(
-        f"{importer.description.modelName}: no other start values or parameters were found within "
+        f"{session.description.modelName}: no other start values or parameters were found within "
         f"{SHARE:.0%} of the scene's that the FMU starts with ({reason})"
     )
 
 
-def _built(importer: Importer) -> Setting:
-    return Setting("", 0.0, 0.0, importer.step_size)
+def _built(session: Session) -> Setting:
+    return Setting("", 0.0, 0.0, session.experiment.step_size)
 
 
-def _drawn(importer: Importer, scene: Trajectory, chance: random.Random) -> dict[str, float]:
+def _drawn(session: Session, scene: Trajectory, chance: random.Random) -> dict[str, float]:
     given = [
         v
-        for v in importer.description.modelVariables
+        for v in session.description.modelVariables
         if v.type == "Real" and v.start is not None and names.read(v.name).head != names.SOLVER
     ]
-    starts = [v for v in given if v.initial in ("exact", "approx") and v in importer.outputs]
+    outputs = scene.dtype.names or ()
+    starts = [v for v in given if v.initial in ("exact", "approx") and v.name in outputs]
     still = all(float(v.start) == 0 for v in starts)
     values: dict[str, float] = {}
     for v in given:
@@ -78,10 +80,6 @@ def _drawn(importer: Importer, scene: Trajectory, chance: random.Random) -> dict
             moved = share * float(np.abs(scene[v.name]).max())
         elif v not in starts and v.causality != "parameter":
             continue
-        low, high = (
-            float(-np.inf if v.min is None else v.min),
-            float(np.inf if v.max is None else v.max),
-        )
-        if moved != value and low <= moved <= high:
+        if moved != value and not session.rules[v.name].problem(moved):
             values[v.name] = moved
     return values

@@ -16,12 +16,13 @@ from pathlib import Path
 from ... import names
 from ...errors import SimulationError, VerificationError
 from ...fmu.closed_forms import CarriedForm
-from ...fmu.described import file_stem, numbers_of
+from ...fmu.described import file_stem, is_python, numbers_of
+from ...fmu.session import Session
 from ...methods import FIXED_STEP, INTEGRATORS
 from ...verification.simulate import steps_of
 from ...verification.verify import check_closed_form, closed_forms_in
 from .choose import Tick
-from .importer import Importer
+from .observe import observe, opened, seconds
 from .quantities import GROUPS, MULTIPLIER
 from .reference import Reference, refer
 from .setting import HALVINGS, Setting, ladder
@@ -103,23 +104,23 @@ class Tradeoff:
 def measure(fmu: Path, plan: Plan | None = None, tick: Tick | None = None) -> Tradeoff:
     """Errors and times of an FMU.  Raises SimulationError if not even the reference can be run."""
     say = tick or (lambda *_: None)
-    with Importer(fmu) as importer:
-        if names.METHOD not in importer.variables:
+    with opened(fmu) as session:
+        if names.METHOD not in session.rules:
             raise VerificationError(
                 f"{str(fmu)!r} has no parameter 'solver.method': it was built for a scene with one "
                 "method, and there is none to compare with (give the scene more of them in `methods`)"
             )
-        plan = plan or Plan(importer.step_size)
+        plan = plan or Plan(session.experiment.step_size)
         say("reference", 0, 1)
-        reference = refer(importer, communication=plan.communication)
-        points, notes = _errors(importer, reference, closed_forms_in(fmu), plan, say)
+        reference = refer(session, communication=plan.communication)
+        points, notes = _errors(session, reference, closed_forms_in(fmu), plan, say)
         read = [q.name for q in reference.known]
-        work = [partial(importer.seconds, p.setting, read) for p in points]
+        work = [partial(seconds, session, p.setting, read) for p in points]
         timed = take_turns(work, plan, say)
         return Tradeoff(
-            name=file_stem(importer.description),
-            target=importer.target,
-            simulated=importer.stop_time,
+            name=file_stem(session.description),
+            target="python" if is_python(fmu) else "native",
+            simulated=session.experiment.stop_time,
             reference=reference,
             points=tuple(replace(p, seconds=s) for p, s in zip(points, timed, strict=True)),
             notes=tuple(notes),
@@ -127,7 +128,7 @@ def measure(fmu: Path, plan: Plan | None = None, tick: Tick | None = None) -> Tr
 
 
 def _errors(
-    importer: Importer,
+    session: Session,
     reference: Reference,
     closed_forms: Sequence[CarriedForm],
     plan: Plan,
@@ -136,7 +137,7 @@ def _errors(
     """One point a setting, without times; the notes."""
     points: list[Point] = []
     notes: list[str] = []
-    parameters = numbers_of(importer.description)
+    parameters = numbers_of(session.description)
     for k, method in enumerate(plan.methods):
         say(f"errors of {method}", k, len(plan.methods))
         own: list[Point] = []
@@ -144,7 +145,7 @@ def _errors(
         for setting in ladder(method, plan.communication, plan.tolerances, plan.halvings):
             begun = time.perf_counter()
             try:
-                run = importer.observe(setting)
+                run = observe(session, setting)
             except SimulationError as error:
                 failed.append(str(error))
                 continue

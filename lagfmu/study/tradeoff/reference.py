@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...fmu.described import Trajectory
-from .importer import Importer
+from ...fmu.session import Session
+from .observe import observe
 from .quantities import Quantity, magnitudes, quantities
 from .setting import Setting
 
@@ -52,28 +53,28 @@ class Reference:
         return found
 
 
-def wider(importer: Importer, step: float | None = None) -> float:
+def wider(session: Session, step: float | None = None) -> float:
     """Ten times the communication step [s], or less where a quarter of the run is shorter."""
-    h = step or importer.step_size
-    return next((k * h for k in WIDER if k * h <= importer.stop_time / 4), h)
+    h = step or session.experiment.step_size
+    return next((k * h for k in WIDER if k * h <= session.experiment.stop_time / 4), h)
 
 
 def refer(
-    importer: Importer,
+    session: Session,
     values: Mapping[str, Any] | None = None,
     communication: float | None = None,
 ) -> Reference:
     """The reference for an FMU at these start values.  Raises SimulationError if it cannot be run."""
-    known = quantities(importer.description)
-    h, longest = communication or importer.step_size, importer.step_size
+    known = quantities(session.description)
+    h, longest = communication or session.experiment.step_size, session.experiment.step_size
 
     def tight(tolerance: float, width: float, longest: float) -> Trajectory:
         setting = Setting("dop853", tolerance, 0.0, width)
-        return importer.observe(setting, {**(values or {}), names.MAXIMUM_STEP: longest})
+        return observe(session, setting, {**(values or {}), names.MAXIMUM_STEP: longest})
 
     run = tight(REFERENCE, h, longest)
     found = Reference(run, known, magnitudes(known, run), {})
-    missed = found.errors(tight(FINER, wider(importer, h), longest / 2))
+    missed = found.errors(tight(FINER, wider(session, h), longest / 2))
     return Reference(run, known, found.scale, {n: max(ROUNDING, e) for n, e in missed.items()})
 
 

@@ -35,7 +35,7 @@ class Setting:
 
     @property
     def values(self) -> dict[str, Any]:
-        """The FMU's parameters; the tolerance goes through fmi2SetupExperiment instead."""
+        """The FMU's parameters; the tolerance is one of the experiment."""
         values: dict[str, Any] = {METHOD: self.method} if self.method else {}
         return values | {STEP: self.step} if self.step else values
 

@@ -1,7 +1,7 @@
 """The process in which an FMU runs for a study: a crash takes it down, and nothing else.
 
-`python -m lagfmu.study.sweep.host` reads pickled orders from its standard input and answers on what was its
-standard output; what an FMU prints goes to standard error.  `Host` is the other end.
+`python -m lagfmu.study.sweep.process` reads pickled orders from its standard input and answers on what was
+its standard output; what an FMU prints goes to standard error.  `SessionProcess` is the other end.
 """
 
 from __future__ import annotations
@@ -14,40 +14,42 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SimulationError
-from ...fmu.session import Outcome, Plan, Plug, RefusalError, Session
+from ...errors import LagfmuError, SimulationError
+from ...fmu.batch import Outcome, Plan, run_batch
+from ...fmu.session import RefusalError, Session
 
-CRASHED, TIMED_OUT = 6, 7  # status of a run whose process died, was killed; fmi2Status ends at 5
+CRASHED, TIMED_OUT = 6, 7  # status of a run whose process died, was killed; those of FMI end at 5
 SLICE = 0.5  # [s] of work in one order: how far it has come is known in between
 
 
-class HostDiedError(Exception):
+class DiedError(Exception):
     """The process ended while it was at work; how, in words."""
 
     status = CRASHED
 
 
-class HostLateError(HostDiedError):
+class LateError(DiedError):
     """The process was ended, because it worked longer than it may."""
 
     status = TIMED_OUT
 
 
-class HostEndedError(Exception):
+class EndedError(Exception):
     """Nobody waits for the answer any more."""
 
 
-class Host:
-    """A process with one instance of an FMU; started when it is first needed, and again after a crash, or
-    after a run that took longer than `limit` [s]."""
+class SessionProcess:
+    """A process with a session of the FMU that lies unpacked in `folder`; started when it is first needed,
+    and again after a crash, or after a run that took longer than `limit` [s]."""
 
-    def __init__(self, plug: Plug, limit: float | None = None) -> None:
-        self.plug, self.limit = plug, limit
+    def __init__(self, folder: str | Path, limit: float | None = None) -> None:
+        self.folder, self.limit = folder, limit
         self.process: subprocess.Popen[bytes] | None = None
         self.pace = np.inf  # [s] that a run took
         self.ended = False
@@ -58,7 +60,7 @@ class Host:
         """All runs; `tell` hears how many are done.  Where the process dies, each is tried by itself, and
         those that kill it, or take too long, are told.
 
-        Raises SimulationError if the FMU cannot be loaded at all, and HostEndedError after `end`.
+        Raises SimulationError if the FMU cannot be loaded at all, and EndedError after `end`.
         """
         found, first = [], 0
         while first < len(values):
@@ -72,7 +74,7 @@ class Host:
     def _runs(self, plan: Plan, values: NDArray[np.float64]) -> Outcome:
         try:
             return self._ask(plan, values)
-        except HostDiedError as died:
+        except DiedError as died:
             if len(values) == 1:
                 return _failed(plan, died)
         return joined([self._runs(plan, row[None, :]) for row in values])
@@ -94,14 +96,14 @@ class Host:
     def _ask(self, plan: Plan, values: NDArray[np.float64]) -> Outcome:
         if self.process is None:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "lagfmu.study.sweep.host"],
+                [sys.executable, "-m", "lagfmu.study.sweep.process"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
                 start_new_session=True,  # Ctrl-C is for the client, which keeps what is finished
             )
-            self._exchange(self.plug)
+            self._exchange(str(self.folder))
         begun = time.monotonic()
         answer: Outcome = self._exchange((plan, values), self.limit)
         self.pace = (time.monotonic() - begun) / max(len(values), 1)
@@ -130,15 +132,13 @@ class Host:
         except (OSError, EOFError, pickle.UnpicklingError):
             if self.ended:
                 self.close()
-                raise HostEndedError from None
+                raise EndedError from None
             code = process.wait()
             self.close()
             if late.is_set():
-                raise HostLateError(
-                    f"the run took longer than the {limit:g} s of --timeout"
-                ) from None
+                raise LateError(f"the run took longer than the {limit:g} s of --timeout") from None
             how = f"signal {-code}" if code < 0 else f"exit code {code}"
-            raise HostDiedError(f"the FMU took its process down ({how})") from None
+            raise DiedError(f"the FMU took its process down ({how})") from None
         finally:
             if timer is not None:
                 timer.cancel()
@@ -167,7 +167,7 @@ def joined(outcomes: list[Outcome]) -> Outcome:
     )
 
 
-def _failed(plan: Plan, how: HostDiedError) -> Outcome:
+def _failed(plan: Plan, how: DiedError) -> Outcome:
     whole = np.full((1, len(plan.times), len(plan.keep)), np.nan) if plan.whole else None
     status, reached = np.array([how.status], dtype=np.int32), np.array([np.nan])
     return Outcome(np.full((1, len(plan.keep)), np.nan), whole, status, reached, {0: str(how)})
@@ -182,14 +182,16 @@ def main(orders: BinaryIO, answers: BinaryIO) -> None:
         except EOFError:
             break
         answer: Any = None
-        if isinstance(order, Plug):
+        if isinstance(order, str):
             try:
                 session = Session(order, "sweep")
             except RefusalError as error:
                 answer = SimulationError(f"the FMU cannot be instantiated: {error.message}")
+            except LagfmuError as error:
+                answer = SimulationError(str(error))
         else:
             assert session is not None
-            answer = session.batch(*order)
+            answer = run_batch(session, *order)
         pickle.dump(answer, answers)
         answers.flush()
 

@@ -1,0 +1,190 @@
+"""Many runs of one FMU in one call: through `lagfmu_batch` (runtime/fmi/batch.c) where the library has it,
+else by the loop of the session: slower, with the same numbers."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .binary import BATCH, listen
+from .session import KINDS, WARNING, Run, Session
+
+TYPES = ("Real", "Integer", "Boolean")  # BatchType in batch.h
+LAST, MAX, MIN, MEAN, TIME_OF_MAX = range(5)  # Keep in batch.h
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Many runs of one FMU over the same communication points `times` (points) [s].
+
+    `vary` are set before initialization, to another row of values in each run; `drive` are inputs, set at
+    the communication points to the rows of `drives` (points, inputs).  `keep` are (variable, LAST ...
+    TIME_OF_MAX); `events` are (count, time) of departures.  With `whole`, the values at all points are
+    returned too.
+    """
+
+    vary: tuple[str, ...]
+    keep: tuple[tuple[str, int], ...]
+    times: NDArray[np.float64]
+    tolerance: float = 0.0
+    drive: tuple[str, ...] = ()
+    drives: NDArray[np.float64] | None = None
+    events: tuple[tuple[str, str], ...] = ()
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of runs: `result` (runs, keep), `trajectory` (runs, points, keep) or None, the status of
+    each, the time [s] that it reached, and of those that were refused the reason, by number."""
+
+    result: NDArray[np.float64]
+    trajectory: NDArray[np.float64] | None
+    status: NDArray[np.int32]
+    reached: NDArray[np.float64]
+    reasons: dict[int, str]
+
+
+def run_batch(session: Session, plan: Plan, values: NDArray[np.float64]) -> Outcome:
+    """Runs with the rows of `values` (runs, varied); one that is refused does not end the others."""
+    runs, points, kept = len(values), len(plan.times), len(plan.keep)
+    found = Outcome(
+        np.full((runs, kept), np.nan),
+        np.full((runs, points, kept), np.nan) if plan.whole else None,
+        np.zeros(runs, dtype=np.int32),
+        np.full(runs, plan.times[0]),
+        {},
+    )
+    values = np.ascontiguousarray(values, dtype=np.float64)
+    if hasattr(getattr(session.instance, "dll", None), BATCH):
+        _in_library(session, plan, values, found)
+    else:
+        in_session(session, plan, values, found)
+    found.result[found.status > WARNING] = np.nan
+    return found
+
+
+# ------------------------------------------------------------------ in the FMU's own library
+
+
+class _Batch(ctypes.Structure):
+    """Batch of batch.h."""
+
+    _fields_ = [
+        *((n, ctypes.c_size_t) for n in ("runs", "varied", "driven", "points", "kept", "events")),
+        *((n, ctypes.c_void_p) for n in ("vary", "vary_type", "values", "drive", "drives")),
+        ("times", ctypes.c_void_p),
+        ("tolerance", ctypes.c_double),
+        *((n, ctypes.c_void_p) for n in ("keep", "keep_type", "keep_what", "count", "when")),
+        ("whole", ctypes.c_int),
+        *((n, ctypes.c_void_p) for n in ("result", "trajectory", "status", "reached", "scratch")),
+        ("current", ctypes.c_size_t),
+    ]
+
+
+def _in_library(session: Session, plan: Plan, values: NDArray[np.float64], found: Outcome) -> None:
+    names = [n for n, _ in plan.keep]
+    drives = None if plan.drives is None else np.ascontiguousarray(plan.drives, float)
+    arrays: dict[str, Any] = {
+        "vary": _references(session, plan.vary),
+        "vary_type": _types(session, plan.vary),
+        "values": values,
+        "drive": _references(session, plan.drive),
+        "drives": drives,
+        "times": np.ascontiguousarray(plan.times, dtype=np.float64),
+        "keep": _references(session, names),
+        "keep_type": _types(session, names),
+        "keep_what": np.array([w for _, w in plan.keep], dtype=np.intc),
+        "count": _references(session, [c for c, _ in plan.events]),
+        "when": _references(session, [t for _, t in plan.events]),
+        "result": found.result,
+        "trajectory": found.trajectory,
+        "status": found.status,
+        "reached": found.reached,
+        "scratch": np.zeros(2 * max(len(names), 1)),
+    }
+    batch = _Batch(
+        runs=len(values),
+        varied=len(plan.vary),
+        driven=len(plan.drive),
+        points=len(plan.times),
+        kept=len(names),
+        events=len(plan.events),
+        tolerance=plan.tolerance,
+        whole=int(plan.whole),
+        current=0,
+    )
+    for field, array in arrays.items():
+        setattr(batch, field, None if array is None else array.ctypes.data)
+
+    def hear(status: int, text: str) -> None:
+        """Of several messages of a run, all."""
+        run = int(batch.current)
+        if status > WARNING:
+            known = found.reasons.get(run)
+            found.reasons[run] = f"{known}; {text}" if known else text
+
+    session.used = True
+    while batch.current < batch.runs:
+        function = getattr(session.instance.dll, BATCH)
+        function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], ctypes.c_int
+        listen(hear)
+        status = function(session.instance.component, ctypes.byref(batch))
+        if status <= WARNING:
+            break
+        run = int(batch.current)  # it cannot be reset: the rest goes to another one
+        found.status[run] = status
+        found.reasons.setdefault(run, "the instance could not be reset")
+        batch.current += 1
+        session.renew()
+
+
+def _references(session: Session, names: Any) -> NDArray[np.uintc]:
+    return np.array(session.references(names), dtype=np.uintc)
+
+
+def _types(session: Session, names: Any) -> NDArray[np.intc]:
+    kinds = [KINDS[session.rules[n].kind] for n in names]
+    return np.array([TYPES.index(k) for k in kinds], dtype=np.intc)
+
+
+# ------------------------------------------------------------------ in this process
+
+
+def in_session(session: Session, plan: Plan, values: NDArray[np.float64], found: Outcome) -> None:
+    """One run after the other."""
+    names = list(dict.fromkeys(n for n, _ in plan.keep))
+    drives = () if plan.drives is None else plan.drives.T.tolist()
+    inputs = dict(zip(plan.drive, drives, strict=True))
+    tolerance = plan.tolerance or None
+    for r, row in enumerate(values):
+        given = dict(zip(plan.vary, row.tolist(), strict=True))
+        run = session.run(plan.times.tolist(), given, tolerance, names, inputs, plan.events)
+        if len(run.rows):
+            found.reached[r] = run.rows["time"][-1]
+        if found.trajectory is not None:
+            for k, (n, _) in enumerate(plan.keep):
+                found.trajectory[r, : len(run.rows), k] = run.rows[n]
+        if run.refusal is not None:
+            found.status[r], found.reasons[r] = run.refusal.status, run.refusal.message
+        else:
+            found.result[r] = [_kept(run, n, what) for n, what in plan.keep]
+
+
+def _kept(run: Run, name: str, what: int) -> float:
+    """As observe() in batch.c."""
+    times, points = run.rows["time"], run.rows[name].astype(float)
+    if what == MEAN:
+        parts = (points[1:] + points[:-1]) / 2 * np.diff(times) / (times[-1] - times[0])
+        return float(sum(parts.tolist()))
+    every = np.concatenate([points, run.between[name].astype(float)])
+    when = np.concatenate([times, run.between["time"]])
+    order = np.argsort(when, kind="stable")
+    every, when = every[order], when[order]
+    if what in (MAX, MIN):
+        return float(every.max() if what == MAX else every.min())
+    return float(when[every.argmax()] if what == TIME_OF_MAX else every[-1])

@@ -1,0 +1,58 @@
+"""The library of an FMU, loaded into this process by fmpy; what it logs, by the thread that called it."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import fmpy
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+from fmpy.logging import addLoggerProxy
+
+BATCH = "lagfmu_batch"  # many runs in one call (runtime/fmi/batch.h)
+Hear = Callable[[int, str], None]  # the status of a message, and its text
+
+_here = threading.local()  # fmpy's proxy of the logger knows one logger a process
+
+
+def _log(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
+    hear = getattr(_here, "hear", None)
+    if hear is not None:
+        hear(status, " ".join(message.decode(errors="replace").split()))
+
+
+LOGGER = fmi2CallbackLoggerTYPE(_log)  # kept for ever: fmpy's proxy goes on pointing to it
+
+
+def listen(hear: Hear | None) -> None:
+    """Who hears, from now on, what FMUs say in this thread."""
+    _here.hear = hear
+
+
+def instantiated(folder: Path, description: Any, name: str, log: bool) -> FMU2Slave:
+    """An instance for co-simulation of the FMU that lies unpacked in `folder`; one of lagfmu gives its
+    reasons unasked, and logs what it need not say only with `log`.  Raises what fmpy raises."""
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = LOGGER
+    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    addLoggerProxy(ctypes.byref(callbacks))  # formats a message with its arguments
+    with contextlib.chdir("."):  # fmpy stays in the folder of a library that it cannot load
+        slave = FMU2Slave(
+            instanceName=name,
+            guid=description.guid,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            unzipDirectory=str(folder),
+        )
+        slave.instantiate(callbacks=callbacks, loggingOn=log or not hasattr(slave.dll, BATCH))
+    return slave
