@@ -15,7 +15,7 @@ typedef struct {
     const char *moved_name[64];
     int moved_velocity[64];
     double given[64], used[64];
-    Rank rank[64]; /* of the start values */
+    Priority rank[64]; /* of the start values */
 } Bench;
 
 void *bench_open(const System *system);
@@ -71,7 +71,7 @@ void bench_close(Bench *b) {
 const char *bench_why(const Bench *b) { return b->solver.why.text; }
 
 static void moved(void *context, const char *coordinate, int is_velocity, double given,
-                  double used, Rank rank) {
+                  double used, Priority rank) {
     (void)rank;
     Bench *b = context;
     int i = b->moved++;

@@ -269,11 +269,11 @@ def test_one_integrator_and_no_event_code_are_linked(tmp_path: Path, native_fmu:
     file, scene = scene_of("PendulumCartesian")
     prepared = prepare(file.model, replace(scene, outputs=["lambda.rod"], method="dop853"))
     path = write(prepared, tmp_path, target="native")
-    gone = {"rk4.c", "radau5.c", "rattle.c", "events.c", "contacts.c", "switch.c"}
+    gone = {"rk4.c", "radau5.c", "rattle.c", "events.c", "contacts.c", "modes.c"}
     assert not gone & sources(path)
     assert {"dop853.c", "optional.c"} <= sources(path)
     full = native_fmu("PendulumCartesian")
-    assert gone & sources(full) == gone - {"events.c", "contacts.c", "switch.c"}
+    assert gone & sources(full) == gone - {"events.c", "contacts.c", "modes.c"}
     size = {p: zipfile.ZipFile(p).getinfo(_binary(p)).file_size for p in (path, full)}
     assert size[path] < 0.93 * size[full]
 

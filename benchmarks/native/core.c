@@ -16,7 +16,7 @@
 typedef struct {
     Solver solver;
     Observed seen;
-    Rank *rank;
+    Priority *priority;
     double communication;
 } Core;
 
@@ -42,7 +42,7 @@ static int run(void *context, const Task *task, double *lambda, Cost *cost) {
     const int each = (int)lround(task->step / core->communication);
     const int points = task->samples * each;
     s->stop_time = task->stop;
-    if (solver_start(s, 0, PROBLEM_Q, PROBLEM_V, core->rank, NULL, NULL) != OK)
+    if (solver_start(s, 0, PROBLEM_Q, PROBLEM_V, core->priority, NULL, NULL) != OK)
         return 1;
     const double begun = now_ns();
     for (int i = 1; i <= points; i++) {

@@ -14,7 +14,7 @@ import numpy as np
 from ..numeric.failure import OmittedStartError, StartFailureError, StepFailureError
 from ..numeric.priority import GIVEN, OMITTED
 from ..numeric.system import NONHOLONOMIC, Vector
-from ..numeric.thresholds import AFAR_ARRIVED, AFAR_ITERATIONS, AFAR_NEAR, AFAR_SWEEPS
+from ..numeric.thresholds import INITIAL_ARRIVED, INITIAL_ITERATIONS, INITIAL_NEAR, INITIAL_SWEEPS
 from .instant import Instant
 from .magnitudes import extents, motion_speeds
 from .motion import EPS
@@ -72,7 +72,7 @@ def _newton(
     M, _, G, _, _ = at.evaluate(q, v0)
     f = at.residual(q)[fixed]
     allowed = np.zeros(len(fixed))
-    for _ in range(AFAR_ITERATIONS):
+    for _ in range(INITIAL_ITERATIONS):
         allowed = 4 * EPS * (np.abs(G[fixed]) @ np.maximum(np.abs(q), least))
         if (np.abs(f) <= allowed).all():
             return q, np.zeros(len(fixed))
@@ -85,7 +85,7 @@ def _newton(
             off = float(
                 (np.abs(f[own]) / np.where(unit[own] > 0, unit[own], np.inf)).max(initial=0.0)
             )
-            off = off if off < AFAR_NEAR else 0.0
+            off = off if off < INITIAL_NEAR else 0.0
             step = stage.nearest(M, G[fixed][own], -f[own], off)
         except StepFailureError:
             break
@@ -138,10 +138,10 @@ def velocities_from_afar(
     v = v0
     for stage in stages([GIVEN] * system.n if rank is None else rank) if rows else ():
         v, own = v0, stage.rows(system, rows)
-        for _ in range(AFAR_SWEEPS):
+        for _ in range(INITIAL_SWEEPS):
             speeds = motion_speeds(system, M, np.maximum(np.maximum(np.abs(v), np.abs(v0)), least))
             slip = nu - G @ v
-            missed = np.abs(slip) > AFAR_ARRIVED * (np.abs(G) @ speeds + np.abs(nu))
+            missed = np.abs(slip) > INITIAL_ARRIVED * (np.abs(G) @ speeds + np.abs(nu))
             if not missed[rows].any():
                 return v
             if not missed[own].any():

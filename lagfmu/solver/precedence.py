@@ -19,7 +19,7 @@ import numpy as np
 
 from ..numeric.priority import GIVEN, OMITTED, SET
 from ..numeric.system import Matrix, System, Vector
-from ..numeric.thresholds import RANK_EASE
+from ..numeric.thresholds import PRIORITY_EASE
 from .instant import Instant
 from .linear import solve
 from .magnitudes import Mask
@@ -52,7 +52,7 @@ def stages(rank: Sequence[int]) -> Iterator[Stage]:
         if (ranks == highest).any():
             free = ranks <= highest
             below = np.where(ranks == OMITTED, 2 if highest > OMITTED else 0, highest - ranks)
-            yield Stage(highest, free, np.where(free, RANK_EASE**below, 1.0))
+            yield Stage(highest, free, np.where(free, PRIORITY_EASE**below, 1.0))
 
 
 def singular_omissions(

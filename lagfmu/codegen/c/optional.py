@@ -13,9 +13,9 @@ AT_CONTACTS = {
     "contacts_modes": "contacts.c",
     "impact_check": "impact.c",
     "landing_bring_back": "landing.c",
-    "switch_modes": "switch.c",
-    "switch_released": "switch.c",
-    "switch_contradicted": "switch.c",
+    "modes_switch": "modes.c",
+    "modes_departures": "modes.c",
+    "modes_contradicted": "modes.c",
 }
 PEAKS, PASSAGE = "peaks.c", "passage.c"  # behind PEAKS and PASSAGE
 BEHIND_BOTH = "extreme.c"
@@ -70,7 +70,7 @@ def optional_source(
     rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if system.is_watched]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
-    rows += ["    .jumps = &JUMPS,\n"] if system.floors else []
+    rows += ["    .switches = &SWITCHES,\n"] if system.floors else []
     rows += ["    .peaks = &PEAKS,\n"] if peaks else []
     rows += ["    .passage = &PASSAGE,\n"] if _may_pass(system) else []
     rows += ["    .friction = &FRICTION_EVENTS,\n"] if system.frictions else []
@@ -105,7 +105,7 @@ def files_left_out(
     if {PEAKS, PASSAGE} <= gone:
         gone.add(BEHIND_BOTH)
     if not system.floors:
-        gone.add("jumps.c")
+        gone.add("switches.c")
     if not system.prescribed:
         gone |= {*MOTIONS}
     if not system.is_watched:

@@ -70,7 +70,7 @@ class Tables:
             parts.append(self._integers("normal_row", normal_rows))
         folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
         if self.floors:
-            parts.append(self._integers("floors", [int(x) for x in self.floors]))
+            parts.append(self._integers("at_integers", [int(x) for x in self.floors]))
         if any(folded):
             parts.append(self._array("const double", "folded", [repr(x) for x in folded]))
         p = self.prefix
@@ -101,8 +101,8 @@ class Tables:
             "m": eom.m,
             "contacts": len(contacts),
             "inputs": len(eom.u),
-            "jumps": len(self.floors),
-            "floors": f"{p}floors" if self.floors else "NULL",
+            "switches": len(self.floors),
+            "at_integers": f"{p}at_integers" if self.floors else "NULL",
             "parameters": len(eom.p),
             "masses": len(self.mass),
             "entries": len(self.entries),

@@ -37,9 +37,9 @@ typedef struct System System;
 struct System {
     int n, m;                 /* coordinates, constraint rows */
     int contacts;             /* how many rows are contacts */
-    int inputs, parameters;   /* lengths of u, without the levels of jumps behind it, and of p */
-    int jumps;                /* of the forces: how many levels stand behind the inputs in u */
-    const int *floors;        /* (jumps) 1: it jumps wherever h is a whole number; 0: where h = 0 */
+    int inputs, parameters;   /* lengths of u, without the switch states behind it, and of p */
+    int switches;             /* where forces jump: how many switch states stand behind the inputs in u */
+    const int *at_integers;   /* (switches) 1: it switches wherever h is a whole number; 0: where h = 0 */
     int masses, entries;      /* structural non-zeros of M's lower triangle and of G */
     const char *const *coordinates; /* (n) names */
     const Row *rows;          /* (m) */
@@ -72,10 +72,10 @@ struct System {
                      double *M, double *F, double *G, double *nu, double *gamma);
     /* f (m), 0 for a nonholonomic row */
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
-    /* h (jumps): the surfaces at which the forces jump; NULL where there are none */
+    /* h (switches): the surfaces at which forces jump; NULL where there are none */
     void (*surfaces)(double t, const double *q, const double *u, const double *p, double *h);
-    /* bounds on the rates of f of the contacts, then of h of the jumps, in boxes of t, q, v and u (with the
-     * levels behind the inputs); NULL where there are none of both */
+    /* bounds on the rates of f of the contacts, then of h of the switches, in boxes of t, q, v and u (with
+     * the switch states behind the inputs); NULL where there are none of both */
     void (*bounds)(Interval t, const Interval *q, const Interval *v, const Interval *u,
                    const double *p, Interval *rate);
     /* kinetic and potential energy [J]; NULL where they are not read */

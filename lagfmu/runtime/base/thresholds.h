@@ -26,10 +26,10 @@ static const double PROJECTION_SMALL = 1e-12; /* relative residual that rounding
 static const double PROJECTION_ROUNDING = 100 * DBL_EPSILON; /* and where Newton's method that gains slowly
                                                               * is left in peace */
 static const double PROJECTION_LINEAR = 0.1; /* ratio of successive errors: convergence is linear, G loses rank */
-enum { AFAR_ITERATIONS = 60, AFAR_SWEEPS = 3 }; /* of velocities: the second removes the first one's rounding */
-static const double AFAR_NEAR = 1e-5; /* from here the angles between dependent rows tell how far off it is */
-static const double AFAR_ARRIVED = 1e3 * DBL_EPSILON; /* slip, relative to its terms, that rounding may leave */
-static const double RANK_EASE = 0x1p-15; /* weight of a start value's rank below those that a stage frees */
+enum { INITIAL_ITERATIONS = 60, INITIAL_SWEEPS = 3 }; /* of velocities: the second removes the first one's rounding */
+static const double INITIAL_NEAR = 1e-5; /* from here the angles between dependent rows tell how far off it is */
+static const double INITIAL_ARRIVED = 1e3 * DBL_EPSILON; /* slip, relative to its terms, that rounding may leave */
+static const double PRIORITY_EASE = 0x1p-15; /* weight of a start value's rank below those that a stage frees */
 static const double LARGEST_ANGLE = 1e-3 * 0x1p52; /* [rad] neighbouring doubles are 1e-3 apart */
 static const double SMALLEST_TOLERANCE = 1e-14; /* of a step, relative: less is rounding, ... */
 static const double LARGEST_TOLERANCE = 0.1; /* ... and from 0.7 on steps go through contacts unseen */

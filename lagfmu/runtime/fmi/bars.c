@@ -143,7 +143,7 @@ static int have_met_the_same(const Solver *a, const Solver *b) {
         for (int i = 0; i < event_count_of(s, (EventKind)k); i++)
             paired &= x->latest[k].count[i] == y->latest[k].count[i];
     for (int c = 0; c < s->contacts; c++) paired &= x->closed[c] == y->closed[c];
-    for (int k = 0; k < s->jumps; k++) paired &= x->level[k] == y->level[k];
+    for (int k = 0; k < s->switches; k++) paired &= x->switch_state[k] == y->switch_state[k];
     for (int k = 0; k < s->frictions; k++) paired &= modes_paired(&x->stick_slip[k], &y->stick_slip[k]);
     return paired;
 }

@@ -158,12 +158,12 @@ Status exchange_indicators(Instance *x, double *indicators) {
     if (exchange_multipliers(x) != OK) return FAILED;
     const Instant at = segment_instant(s, s->state.now.t);
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
-    if (system->jumps > 0)
+    if (system->switches > 0)
         system->surfaces(at.t, s->state.q, at.u, at.p, indicators + system->contacts);
-    for (int k = 0; k < system->jumps; k++) /* of a floor: how far to the next whole number */
-        if (system->floors[k])
+    for (int k = 0; k < system->switches; k++) /* of a floor: how far to the next whole number */
+        if (system->at_integers[k])
             indicators[system->contacts + k] =
-                range_inside(OPTIONAL.jumps->range(s, k), indicators[system->contacts + k]);
+                range_inside(OPTIONAL.switches->range(s, k), indicators[system->contacts + k]);
     if (system->frictions > 0) {
         const int first = indicators_first_of_frictions(system);
         OPTIONAL.friction->indicators(s, indicators + first);

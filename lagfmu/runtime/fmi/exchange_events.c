@@ -98,8 +98,8 @@ static Status judge_step(Instance *x, int *event) {
     Solver *s = &x->solver;
     double worst;
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
-    *event = s->system->jumps > 0 &&
-             OPTIONAL.jumps->stale(s, segment_instant(s, s->state.now.t), s->state.q);
+    *event = s->system->switches > 0 &&
+             OPTIONAL.switches->stale(s, segment_instant(s, s->state.now.t), s->state.q);
     if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
     if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
@@ -121,17 +121,17 @@ Status exchange_step_done(Instance *x, int *event) {
     return OPTIONAL.peaks->step(&x->solver, event);
 }
 
-/* The levels of forces that jump; `changed`: 1 if one is not what it was. */
+/* The switch states; `changed`: 1 if one is not what it was. */
 static Status settle_jumps(Instance *x, int *changed) {
     Solver *s = &x->solver;
     const Instant at = segment_instant(s, s->state.now.t);
     int again = 0;
     *changed = 0;
-    if (s->system->jumps == 0) return OK;
-    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, NULL, changed);
+    if (s->system->switches == 0) return OK;
+    OPTIONAL.switches->settle(s, at, s->state.q, s->state.v, NULL, changed);
     x->evaluated = 0;
     if (exchange_evaluate(x) != OK) return FAILED; /* what rests on a surface may be about to leave it */
-    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
+    OPTIONAL.switches->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
     *changed |= again;
     x->evaluated = 0;
     return OK;
@@ -142,7 +142,7 @@ static Status release(Instance *x, double drift) {
     Solver *s = &x->solver;
     if (s->system->contacts == 0) return OK;
     x->evaluated = 0;
-    return OPTIONAL.switch_released(s, SHORT / s->state.now.rate, drift);
+    return OPTIONAL.modes_departures(s, SHORT / s->state.now.rate, drift);
 }
 
 /* The state back onto the rows that act. */
@@ -175,7 +175,7 @@ static Status pass_event(Instance *x) {
     const double inside = losses_energy(s, segment_instant(s, s->state.now.t));
     if (OPTIONAL.landing_bring_back(s, x->happened, x->pull) != OK) return FAILED;
     s->state.now.lost += inside - losses_energy(s, segment_instant(s, s->state.now.t));
-    if (OPTIONAL.switch_modes(s, x->happened) != OK) return FAILED;
+    if (OPTIONAL.modes_switch(s, x->happened) != OK) return FAILED;
     return choose_rows(x);
 }
 

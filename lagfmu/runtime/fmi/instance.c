@@ -40,7 +40,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
         x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
-        x->rank = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->rank);
+        x->priority = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->priority);
         x->begin = arena_doubles(&scratch, 2 * system->n);
         x->formula = arena_doubles(&scratch, system->started_count);
         for (int k = 0; k < EVENT_KINDS; k++)
@@ -96,7 +96,7 @@ static void unfollow(Instance *x) {
 /* 1: inputs have other values than they had come to, and more than the forces may change with them. */
 static int turned(const Instance *x) {
     const System *s = x->solver.system;
-    if (s->contacts + s->frictions + s->jumps + s->prescribed_count == 0) return 0;
+    if (s->contacts + s->frictions + s->switches + s->prescribed_count == 0) return 0;
     for (int k = 0; k < s->inputs; k++)
         if (x->solver.drive.value[k] != x->expected[k]) return 1;
     return 0;
@@ -319,11 +319,11 @@ typedef struct {
 
 /* Each value that was given and is moved; those that were left out are collected for one line. */
 static void tell_moved(void *context, const char *coordinate, int is_velocity, double given,
-                       double used, Rank rank) {
+                       double used, Priority priority) {
     Telling *told = context;
     Instance *x = told->x;
     const char *head = is_velocity ? "der(" : "", *tail = is_velocity ? ")" : "";
-    if (rank == OMITTED) {
+    if (priority == OMITTED) {
         const int room = (int)sizeof told->line - told->length;
         const int needed = snprintf(told->line + told->length, (size_t)room, "%s%s%s%s = %s",
                                     told->length > 0 ? ", " : "", head, coordinate, tail, digits(used).text);
@@ -351,12 +351,12 @@ static void tell_left_out(const Telling *told) {
 }
 
 /* A start value that differs from the described one was set, whatever calls set it. */
-static void find_ranks(Instance *x) {
+static void find_priorities(Instance *x) {
     for (int k = 0; k < VARIABLE_COUNT; k++) {
         const Variable *v = &VARIABLES[k];
         if (v->role != ROLE_START) continue;
         const int set = instance_setting(x, v) != v->start;
-        x->rank[v->state] = set ? SET : v->given ? GIVEN : OMITTED;
+        x->priority[v->state] = set ? SET : v->given ? GIVEN : OMITTED;
     }
 }
 
@@ -370,7 +370,7 @@ static Status find_begin(Instance *x) {
     if (system->started_count > 0) system->starts(s->p, x->formula);
     for (int i = 0; i < system->started_count; i++) {
         const int j = system->started[i];
-        if (x->rank[j] == SET) continue;
+        if (x->priority[j] == SET) continue;
         if (!isfinite(x->formula[i]))
             return fail(&s->why,
                         "the start value of %s%s%s is an expression of parameters, which has no finite value "
@@ -418,7 +418,7 @@ static Status find_start(Instance *x) {
     if (find_begin(x) != OK) return FAILED;
     const double *q0 = x->begin, *v0 = q0 + s->system->n;
     Telling told = {.x = x};
-    if (solver_start(s, x->start_time, q0, v0, x->rank, tell_moved, &told) != OK) return FAILED;
+    if (solver_start(s, x->start_time, q0, v0, x->priority, tell_moved, &told) != OK) return FAILED;
     tell_left_out(&told);
     /* model exchange has no communication step: 1 s stands in for it */
     if (x->exchange && nominals_incomplete(s) &&
@@ -433,7 +433,7 @@ Status instance_start(Instance *x) {
     choose_settings(x);
     s->stop_time = x->stop_time;
     s->drive.since = x->start_time;
-    find_ranks(x);
+    find_priorities(x);
     if (find_start(x) != OK) {
         solver_clear(s, x->start_time);
         return FAILED;

@@ -36,7 +36,7 @@ typedef struct Instance {
     int observed, evaluated;
     int followed;           /* 1: the state goes with a motion that was set; as it was in `backup` */
     double *q0, *v0;        /* (n) start values as they were set */
-    Rank *rank;             /* (2 n) who said them; found anew at each start */
+    Priority *priority;     /* (2 n) who said them; found anew at each start */
     double *begin;          /* (2 n) the start values then, with those that follow from parameters */
     double *formula;        /* (started_count of the system) these */
     double *expected;       /* (inputs) values at the end of the latest step */

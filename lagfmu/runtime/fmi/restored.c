@@ -27,7 +27,8 @@ enum { FLAG, COUNT, TALLY, SIZE, LIMIT, FINITE };
 
 /* How many of them there are; more than ONE stand behind a pointer. */
 enum {
-    ONE, N, TWICE_N, ROWS, CONTACTS, CONTACTS_N, FRICTIONS, FRICTIONS_N, INPUTS, LEVELS, PARAMETERS, PEAKS_KEPT, WATCHED, DENSE
+    ONE, N, TWICE_N, ROWS, CONTACTS, CONTACTS_N, FRICTIONS, FRICTIONS_N, INPUTS, SWITCH_STATES, PARAMETERS,
+    PEAKS_KEPT, WATCHED, DENSE
 };
 
 typedef struct {
@@ -84,8 +85,8 @@ static const Saved OF_SOLVER[] = {
     NOW("estimated error", estimated, SIZE),
     SOLVER("coordinates", state.q, FINITE, N),
     SOLVER("velocities", state.v, FINITE, N),
-    SOLVER("levels of jumps", state.level, FINITE, LEVELS),
-    SOLVER("levels", state.offset, FINITE, ROWS),
+    SOLVER("switch states", state.switch_state, FINITE, SWITCH_STATES),
+    SOLVER("offsets", state.offset, FINITE, ROWS),
     SOLVER("scales", state.scale, SIZE, TWICE_N),
     SOLVER("sizes", state.size, SIZE, N),
     SOLVER("gaps", state.gap, SIZE, CONTACTS),
@@ -160,7 +161,7 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
                         [FRICTIONS] = system->frictions,
                         [FRICTIONS_N] = system->frictions * n,
                         [INPUTS] = system->inputs,
-                        [LEVELS] = system->jumps,
+                        [SWITCH_STATES] = system->switches,
                         [PARAMETERS] = system->parameters,
                         [PEAKS_KEPT] = peaks_saved(s->peaks),
                         [WATCHED] = indicators_count(system),
@@ -221,13 +222,13 @@ static Status together_in_solver(Instance *x, const Solver *s) {
     return OK;
 }
 
-/* The levels of jumps, and the ways in which indicators leave their ranges: 1 upwards, -1 downwards. */
+/* The switch states, and the ways in which indicators leave their ranges: 1 upwards, -1 downwards. */
 static Status ways(Instance *x, const Solver *s) {
     const State *a = &s->state;
-    for (int k = 0; x->started && k < s->system->jumps; k++)
-        if (!(s->system->floors[k] ? a->level[k] - 0.5 == floor(a->level[k])
-                                   : fabs(a->level[k]) == 1 || a->level[k] == 0))
-            return restored_none(x, "levels of jumps", a->level[k]);
+    for (int k = 0; x->started && k < s->system->switches; k++)
+        if (!(s->system->at_integers[k] ? a->switch_state[k] - 0.5 == floor(a->switch_state[k])
+                                   : fabs(a->switch_state[k]) == 1 || a->switch_state[k] == 0))
+            return restored_none(x, "switch states", a->switch_state[k]);
     for (int k = 0; k < indicators_count(s->system); k++)
         if (a->left[k] < -1 || a->left[k] > 1) return restored_none(x, "events", a->left[k]);
     return OK;

@@ -93,7 +93,7 @@ SHARED Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, c
 SHARED void mechanism_at_work(const Mechanism *b, double *forces, double *reach);
 
 /* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
- * v are moved in place.  For states that are nearly consistent; initial.c deals with the others.
+ * v are moved in place.  For states that are nearly consistent; initialization.c deals with the others.
  * `size` (n) are the coordinates' magnitudes, which say what rounding is.  On failure q and v are
  * untouched. */
 SHARED Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,

@@ -1,7 +1,7 @@
 /* rattle.c -- RATTLE (Andersen 1983; Hairer, Lubich & Wanner, Geometric Numerical Integration, 2nd
- * ed., sect. VII.1.4, eq. 1.26) for M constant, F(q, t), f(q, t) = level (mostly 0):
+ * ed., sect. VII.1.4, eq. 1.26) for M constant, F(q, t), f(q, t) = offset (mostly 0):
  *
- *   v_h = v + h/2 M^-1 (F(q) + G(q)^T lambda) ,  q1 = q + h v_h ,  f(q1) = level
+ *   v_h = v + h/2 M^-1 (F(q) + G(q)^T lambda) ,  q1 = q + h v_h ,  f(q1) = offset
  *   v1 = v_h + h/2 M^-1 (F(q1) + G(q1)^T mu) ,   G(q1) v1 = nu(q1)
  *
  * symmetric, symplectic, of order 2; raised to order 6 by Kahan and Li's symmetric composition of
@@ -22,30 +22,30 @@ static const double gamma_r[STAGES] = {
     -0.70624617255763935981, 0.33259913678935943860, 0.39216144400731413928};
 static const double SMALL = 1e-9; /* what rounding may leave of a constraint, in its terms */
 
-/* b->f <- level - f(q) on the rows that act; `largest` of it in units of b->lambda. */
-static Status distance(Mechanism *b, Instant at, const int *active, const double *level,
+/* b->f <- offset - f(q) on the rows that act; `largest` of it in units of b->lambda. */
+static Status distance(Mechanism *b, Instant at, const int *active, const double *offset,
                        const double *q, double *largest) {
     *largest = 0;
     if (mechanism_residual(b, at, q, b->f) != OK) return FAILED;
     for (int k = 0; k < b->system->m; k++) {
         if (!active[k]) continue;
-        b->f[k] = (level == NULL ? 0 : level[k]) - b->f[k];
+        b->f[k] = (offset == NULL ? 0 : offset[k]) - b->f[k];
         double ratio = fabs(b->f[k]) / b->lambda[k];
         if (!(ratio <= *largest)) *largest = ratio;
     }
     return OK;
 }
 
-/* q1 <- q1 + M^-1 G^T mu so that f(q1) = level, with M and G as they were factored; the same is
+/* q1 <- q1 + M^-1 G^T mu so that f(q1) = offset, with M and G as they were factored; the same is
  * added to `step` = q1 - q.  b->lambda: sizes of the constraints' terms. */
-static Status onto_constraints(Mechanism *b, Instant at, const int *active, const double *level,
+static Status onto_constraints(Mechanism *b, Instant at, const int *active, const double *offset,
                                double *q1, double *step) {
     double before = HUGE_VAL;
     for (int k = 0; k < b->system->m; k++)
         b->lambda[k] = mechanism_row_size(b, k, q1) + mechanism_row_size(b, k, step) + DBL_MIN;
     for (int count = 0; count < RATTLE_ITERATIONS; count++) {
         double largest;
-        if (distance(b, at, active, level, q1, &largest) != OK) return FAILED;
+        if (distance(b, at, active, offset, q1, &largest) != OK) return FAILED;
         if (largest == 0 || (largest > before / 2 && largest < SMALL)) return OK;
         if (!(largest < before)) break;
         if (linear_nearest(&b->linear, b->f, b->dq) != OK) return FAILED;
@@ -67,7 +67,7 @@ static Status evaluate_forces(Mechanism *b, Instant at, const int *active, const
 
 /* One step of order 2 from `at`; b stands evaluated and factored at (q, v), before and after. */
 static Status basic_step(Mechanism *b, Instant *at, double t_new, double h, const int *active,
-                         const double *level, double *q, double *v, double *step) {
+                         const double *offset, double *q, double *v, double *step) {
     const int n = b->system->n, m = b->system->m;
     at->t = t_new;
     /* predicted with the acceleration at q, which meets the constraints but for h^3 */
@@ -76,7 +76,7 @@ static Status basic_step(Mechanism *b, Instant *at, double t_new, double h, cons
         step[j] = h * (v[j] + 0.5 * h * b->vdot[j]);
         q[j] += step[j];
     }
-    if (onto_constraints(b, *at, active, level, q, step) != OK) return FAILED;
+    if (onto_constraints(b, *at, active, offset, q, step) != OK) return FAILED;
     for (int j = 0; j < n; j++) v[j] = step[j] / h;
     if (evaluate_forces(b, *at, active, q, v) != OK) return FAILED;
     for (int j = 0; j < n; j++) b->trial[j] = 0.5 * h * b->F[j];
@@ -87,7 +87,7 @@ static Status basic_step(Mechanism *b, Instant *at, double t_new, double h, cons
 }
 
 static Status composed_step(Mechanism *b, Instant at, double t_new, double h, const int *active,
-                            const double *level, double *y, double *step) {
+                            const double *offset, double *y, double *step) {
     const int n = b->system->n;
     const double t = at.t;
     double part = 0;
@@ -95,13 +95,13 @@ static Status composed_step(Mechanism *b, Instant at, double t_new, double h, co
     for (int r = 0; r < STAGES; r++) {
         part += gamma_r[r];
         double next = r == STAGES - 1 ? t_new : t + part * h;
-        if (basic_step(b, &at, next, gamma_r[r] * h, active, level, y, y + n, step) != OK)
+        if (basic_step(b, &at, next, gamma_r[r] * h, active, offset, y, y + n, step) != OK)
             return FAILED;
     }
     return OK;
 }
 
-Status rattle_step(Integrator *i, Mechanism *b, const int *active, const double *level,
+Status rattle_step(Integrator *i, Mechanism *b, const int *active, const double *offset,
                    const double *u, const double *p, const Control *control, double t_bound) {
     const int ny = i->ny;
     const Fixed fixed = step_size_fixed(i->t, t_bound, control->fixed_step);
@@ -110,7 +110,7 @@ Status rattle_step(Integrator *i, Mechanism *b, const int *active, const double 
         return step_size_stop(b->why, i->t, "no step leads to the bound", 0);
     memcpy(y, i->y, (size_t)ny * sizeof *y);
     const Instant start = {i->t, u, p};
-    if (composed_step(b, start, fixed.t_new, fixed.h, active, level, y, step) != OK)
+    if (composed_step(b, start, fixed.t_new, fixed.h, active, offset, y, step) != OK)
         return step_size_stop(b->why, i->t, "a stage of rattle fails", 1);
     if (!step_size_finite(ny, y))
         return step_size_stop(b->why, i->t, "the state is not finite", 0);

@@ -12,8 +12,8 @@ SHARED const Method rattle;
 /* One step of the separable system b->system (`separable` in system.h), y = [q; v], from i->t
  * towards t_bound: a fixed step that divides the way there evenly, backwards if t_bound lies
  * before.  u is held during the step; p are the parameters; `active` are the rows that act, on
- * f = level (m; NULL: on f = 0).  Fills i as the other methods do.  FAILED: as before the call. */
-SHARED Status rattle_step(Integrator *i, Mechanism *b, const int *active, const double *level,
+ * f = offset (m; NULL: on f = 0).  Fills i as the other methods do.  FAILED: as before the call. */
+SHARED Status rattle_step(Integrator *i, Mechanism *b, const int *active, const double *offset,
                           const double *u, const double *p, const Control *control, double t_bound);
 
 #endif

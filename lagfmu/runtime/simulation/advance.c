@@ -1,6 +1,6 @@
 /* advance.c -- from one communication point to the next.
  *
- * Steps are taken and projected within a segment (segment.c); events are found (events.c) and met (switch.c).
+ * Steps are taken and projected within a segment (segment.c); events are found (events.c) and met (modes.c).
  * In a scene without inputs the integrator may stand ahead of the communication point: the state there
  * is read from dense output and projected, on demand if the caller has it so: what nobody looks at costs
  * nothing.  It never passes the stop time, an event that lies ahead is
@@ -257,8 +257,8 @@ static Status meet(Solver *s) {
     }
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
-    if (s->system->jumps > 0) OPTIONAL.jumps->pass(s, s->state.left + s->system->contacts);
-    if (s->system->contacts + s->system->frictions > 0 && OPTIONAL.switch_modes(s, s->state.left) != OK)
+    if (s->system->switches > 0) OPTIONAL.switches->pass(s, s->state.left + s->system->contacts);
+    if (s->system->contacts + s->system->frictions > 0 && OPTIONAL.modes_switch(s, s->state.left) != OK)
         return FAILED;
     return s->peaks > 0 ? OPTIONAL.peaks->here(s, 0) : OK;
 }

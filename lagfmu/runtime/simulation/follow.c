@@ -1,8 +1,8 @@
 /* follow.c -- the state with which a step begins after inputs were set, to which everything belongs that is read
  * before that step: the limit from the right.
  *
- * Forces that jump have the levels of now, what a prescribed motion carries goes with it, and modes that the
- * new forces contradict are settled (switch.h). */
+ * Switches have the states of now, what a prescribed motion carries goes with it, and modes that the
+ * new forces contradict are settled (modes.h). */
 #include "optional.h"
 #include "segment.h"
 
@@ -11,7 +11,7 @@ static Status carry(Solver *s) {
     const System *system = s->system;
     if (system->contacts == 0)
         system_active(system, s->state.closed, s->active);
-    else if (OPTIONAL.switch_released(s, s->state.now.span, 0) != OK)
+    else if (OPTIONAL.modes_departures(s, s->state.now.span, 0) != OK)
         return FAILED;
     const Instant at = segment_instant(s, s->state.now.t);
     return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
@@ -19,28 +19,28 @@ static Status carry(Solver *s) {
 }
 
 static Status follow_contacts(Solver *s) {
-    return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.switch_contradicted(s);
+    return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.modes_contradicted(s);
 }
 
 /* What rests on a surface at which forces jump may be about to leave it. */
-static Status follow_jumps(Solver *s, int *changed) {
+static Status follow_switches(Solver *s, int *changed) {
     const Instant at = segment_instant(s, s->state.now.t);
     *changed = 0;
-    if (s->system->jumps == 0) return OK;
+    if (s->system->switches == 0) return OK;
     segment_begin(s);
     if (mechanism_motion(&s->stepped, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
-    OPTIONAL.jumps->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, changed);
+    OPTIONAL.switches->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, changed);
     return OK;
 }
 
 Status solver_follow(Solver *s) {
     int changed;
-    if (!s->state.now.ahead && s->system->jumps > 0)
-        OPTIONAL.jumps->settle(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
+    if (!s->state.now.ahead && s->system->switches > 0)
+        OPTIONAL.switches->settle(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (s->system->prescribed_count > 0 && carry(s) != OK) return FAILED;
     if (s->system->frictions > 0 && OPTIONAL.friction->renew(s) != OK) return FAILED;
     if (!s->drive.turned) return OK;
-    if (follow_contacts(s) != OK || follow_jumps(s, &changed) != OK) return FAILED;
+    if (follow_contacts(s) != OK || follow_switches(s, &changed) != OK) return FAILED;
     return changed ? follow_contacts(s) : OK;
 }
 

@@ -123,7 +123,7 @@ static Status finish_impact(Struck *x, const Impulse *found) {
     return OK;
 }
 
-/* The law.  A row that acts with a contact does so unless the others lift the contact off. */
+/* The law.  A row that acts with a contact does so unless the others make the contact depart. */
 static Status newton_impact(Struck *x, double time, const Impulse *found) {
     const System *system = x->s->system;
     memset(x->holding, 0, (size_t)system->contacts * sizeof *x->holding);

@@ -2,7 +2,7 @@
  *
  *   contact, closed   lambda >= 0
  *   contact, open     f >= 0, and left only at f < -gap, within which contacts touch
- *   jump              h on the side of its level
+ *   switch            h on the side of its state
  *   friction          see slip.c */
 #include "indicators.h"
 
@@ -11,9 +11,9 @@
 #include "optional.h"
 #include "segment.h"
 
-int indicators_count(const System *s) { return s->contacts + s->jumps + 2 * s->frictions; }
+int indicators_count(const System *s) { return s->contacts + s->switches + 2 * s->frictions; }
 
-int indicators_first_of_frictions(const System *s) { return s->contacts + s->jumps; }
+int indicators_first_of_frictions(const System *s) { return s->contacts + s->switches; }
 
 static Status of_contacts(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
@@ -36,7 +36,7 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
 Status indicators_at(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
     if (system->contacts + system->frictions > 0 && of_contacts(s, t, y, values) != OK) return FAILED;
-    if (system->jumps > 0) {
+    if (system->switches > 0) {
         const Instant at = segment_instant(s, t);
         system->surfaces(t, y, at.u, at.p, values + system->contacts);
     }
@@ -51,6 +51,6 @@ Range indicators_range(const Solver *s, int indicator) {
     const System *system = s->system;
     const int of_friction = indicator - indicators_first_of_frictions(system);
     if (of_friction >= 0) return OPTIONAL.friction->range(s, of_friction);
-    if (indicator >= system->contacts) return OPTIONAL.jumps->range(s, indicator - system->contacts);
+    if (indicator >= system->contacts) return OPTIONAL.switches->range(s, indicator - system->contacts);
     return (Range){0, HUGE_VAL, s->state.closed[indicator] ? 0 : s->state.gap[indicator], 0};
 }

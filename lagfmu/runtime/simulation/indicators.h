@@ -2,7 +2,7 @@
  * its range, the equations change.
  *
  *   0 .. contacts - 1   of contact c: lambda while it is closed, f while it is open
- *   then                of jump k of the forces: h, on the side of its level (jumps.h)
+ *   then                of switch k of the forces: h, on the side of its state (switches.h)
  *   then two a friction (friction_events.h): the reserve of its cone while it sticks, the slip velocity along its
  *                       direction while it slips; its normal force while it slips on what is no contact
  *

@@ -13,7 +13,7 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->block = saved->base == NULL ? NULL : saved->base + begin;
     x->q = arena_doubles(saved, n);
     x->v = arena_doubles(saved, n);
-    x->level = arena_doubles(saved, s->jumps);
+    x->switch_state = arena_doubles(saved, s->switches);
     x->offset = arena_doubles(saved, s->m);
     x->scale = arena_doubles(saved, 2 * n);
     x->size = arena_doubles(saved, n);
@@ -64,8 +64,8 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->active = arena_ints(scratch, m);
     s->scale = arena_doubles(scratch, 2 * n);
     s->push = arena_doubles(scratch, contacts);
-    s->u = arena_doubles(scratch, system->inputs + system->jumps);
-    s->work_jumps = arena_doubles(scratch, system->jumps > 0 ? 2 * system->jumps + n : 0);
+    s->u = arena_doubles(scratch, system->inputs + system->switches);
+    s->work_switches = arena_doubles(scratch, system->switches > 0 ? 2 * system->switches + n : 0);
     s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);
     s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
     s->work_contacts = arena_doubles(scratch, 2 * n + 3 * m);
@@ -86,7 +86,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_friction = arena_doubles(scratch, some * (2 * frictions + 4 * n));
     s->iwork_friction = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
     s->iwork_events = arena_ints(scratch, 6 * contacts);
-    s->work_switch = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + n);
+    s->work_modes = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + n);
     s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(n, m, contacts));
     s->iwork_impact = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));
 }

@@ -25,7 +25,7 @@ static Interval box(double a, double middle, double b) {
 static const Interval *bound_rates(Solver *s, double a, double b, double *y) {
     const System *system = s->system;
     const Integrator *i = &s->integrator;
-    const int n = system->n, inputs = system->inputs, driven = inputs + system->jumps;
+    const int n = system->n, inputs = system->inputs, driven = inputs + system->switches;
     const double t[3] = {a, a + (b - a) / 2, b};
     double *u = s->work_gap;
     Interval *q = (Interval *)(void *)(u + 3 * driven), *w = q + 2 * n, *rate = w + driven;
@@ -35,7 +35,7 @@ static const Interval *bound_rates(Solver *s, double a, double b, double *y) {
     }
     for (int j = 0; j < 2 * n; j++) q[j] = box(y[j], y[2 * n + j], y[4 * n + j]);
     for (int j = 0; j < inputs; j++) w[j] = box(u[j], u[driven + j], u[2 * driven + j]);
-    for (int j = inputs; j < driven; j++) w[j] = interval_of(s->state.level[j - inputs]);
+    for (int j = inputs; j < driven; j++) w[j] = interval_of(s->state.switch_state[j - inputs]);
     system->bounds((Interval){a, b}, q, q + n, w, s->p, rate);
     return rate;
 }
@@ -58,7 +58,7 @@ static int inputs_move(const Solver *s) {
 
 static int is_bounded(const Solver *s, int i) {
     return i < s->system->contacts ? !s->state.closed[i]
-                                   : i < s->system->contacts + s->system->jumps;
+                                   : i < s->system->contacts + s->system->switches;
 }
 
 static int is_inside(const Solver *s, int i, double value) {

@@ -17,7 +17,7 @@ SHARED MinimumGap minimum_gap(Solver *s, const Samples *samples, int k, double *
 
 /* Doubles of its boxes. */
 static inline int minimum_gap_doubles(const System *s) {
-    return s->bounds == NULL ? 0 : 4 * s->n + 5 * (s->inputs + s->jumps) + 2 * (s->contacts + s->jumps);
+    return s->bounds == NULL ? 0 : 4 * s->n + 5 * (s->inputs + s->switches) + 2 * (s->contacts + s->switches);
 }
 
 #endif

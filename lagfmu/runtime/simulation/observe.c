@@ -30,8 +30,8 @@ static void full_active(Solver *s) {
     }
 }
 
-/* The level that a row of the full system keeps. */
-static double level(const Solver *s, int k) {
+/* The offset that a row of the full system keeps. */
+static double offset_of(const Solver *s, int k) {
     const System *own = s->system;
     if (own->embed == NULL) return s->state.offset[k];
     for (int i = 0; i < own->m; i++)
@@ -83,7 +83,7 @@ static Status observe_residuals(const Solver *s, Instant at, Mechanism *b, Obser
         if (system->rows[k].kind == NONHOLONOMIC || system->rows[k].friction != 0)
             o->residual[k] = mechanism_slip(b, k, o->v);
         else
-            o->residual[k] -= level(s, k);
+            o->residual[k] -= offset_of(s, k);
     }
     return OK;
 }

@@ -8,20 +8,20 @@
 #include "contacts.h"
 #include "events.h"
 #include "impact.h"
-#include "jumps.h"
+#include "switches.h"
 #include "landing.h"
 #include "linkage.h"
 #include "passage.h"
 #include "peaks.h"
 #include "rattle.h"
 #include "friction_events.h"
-#include "switch.h"
+#include "modes.h"
 
 typedef struct {
     /* Integrators by MethodName, that of AUTO being the explicit one; NULL where it is left out. */
     const Method *methods[METHOD_COUNT];
     double (*rk4_error)(const Integrator *i, int component);
-    Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *level,
+    Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *offset,
                           const double *u, const double *p, const Control *control,
                           double t_bound);
     /* Finds events; NULL where there is nothing to watch. */
@@ -31,11 +31,11 @@ typedef struct {
                              const int *touching, const int *departing);
     Status (*impact_check)(Solver *s);
     Status (*landing_bring_back)(Solver *s, const int *happened, const double *pull);
-    Status (*switch_modes)(Solver *s, const int *happened);
-    Status (*switch_released)(Solver *s, double span, double drift);
-    Status (*switch_contradicted)(Solver *s);
+    Status (*modes_switch)(Solver *s, const int *happened);
+    Status (*modes_departures)(Solver *s, double span, double drift);
+    Status (*modes_contradicted)(Solver *s);
     /* Of forces that jump; NULL where none do. */
-    const Jumps *jumps;
+    const Switches *switches;
     /* Of quantities whose extremes are kept; NULL where there are none. */
     const Peaks *peaks;
     /* Of singular configurations; NULL with less than two constraints, or with frictions. */

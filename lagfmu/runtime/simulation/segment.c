@@ -28,7 +28,7 @@ void segment_choose_rows(Solver *s) {
 Instant segment_instant(Solver *s, double t) {
     const System *system = s->system;
     if (system->inputs > 0) drive_at(system, &s->drive, t, s->u);
-    for (int k = 0; k < system->jumps; k++) s->u[system->inputs + k] = s->state.level[k];
+    for (int k = 0; k < system->switches; k++) s->u[system->inputs + k] = s->state.switch_state[k];
     return (Instant){t, s->u, s->p};
 }
 
@@ -82,7 +82,7 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
 /* The equations at the times of a step from t on. */
 static Ode equations_at(Solver *s, double t) {
     const int plain = is_plain(s) && !s->state.now.approach.near;
-    if (plain) (void)segment_instant(s, t); /* levels of jumps, which stay */
+    if (plain) (void)segment_instant(s, t); /* switch states, which stay */
     return (Ode){s, plain ? plain_rate : rate_of_state, jacobian, &s->why};
 }
 

@@ -21,7 +21,7 @@ SHARED double segment_fewest_steps(const Solver *s);
  * remembered; factors are lost. */
 SHARED void segment_choose_rows(Solver *s);
 
-/* Time t with the inputs then, and the levels of jumps behind them (kept in s->u). */
+/* Time t with the inputs then, and the switch states behind them (kept in s->u). */
 SHARED Instant segment_instant(Solver *s, double t);
 
 /* The motion at a state that may lie off the constraints: by those rows, but by all that act where there are

@@ -4,7 +4,7 @@
 
 #include "linkage.h"
 #include "mechanism.h"
-#include "precedence.h"
+#include "start_priority.h"
 #include "sensitivity.h"
 #include "state.h"
 
@@ -37,7 +37,7 @@ typedef struct Solver {
     Integrator integrator, probe; /* probe: integrates again from the last accepted point */
     int *active;               /* (m) rows that act in the present modes */
     double *scale;             /* (2 n) of errors, in the present step */
-    double *u;                 /* (inputs, then jumps) at the time of the latest evaluation */
+    double *u;                 /* (inputs, then switches) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
     int peaks;                 /* how many quantities' extremes are kept (peaks.h); set before the layout */
     Status (*measure)(struct Solver *s, const Observed *o, double *values); /* (peaks) of them at a state */
@@ -45,11 +45,11 @@ typedef struct Solver {
     double *push;              /* (contacts) impulse of the impacts of the present instant [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
-    double *work_initial;      /* (6 n + 3 m) of initial.c, afar.c and nominals.c */
+    double *work_initial;      /* (6 n + 3 m) of initialization.c, initial_projection.c and nominals.c */
     int *iwork_initial;        /* (2 m + contacts) */
     double *work_contacts;     /* (2 n + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */
-    double *work_jumps;        /* (2 jumps + n) of jumps.c */
+    double *work_switches;     /* (2 switches + n) of switches.c */
     double apart, narrowest;   /* linear_apart() at the latest stage, and the least of a step */
     double *work_passage;      /* (2 n) of passage.c */
     double *work_advance;      /* (4 n) of advance.c */
@@ -62,8 +62,8 @@ typedef struct Solver {
     StickSlip *trial_modes;    /* (frictions) of stick_slip.c, with */
     double *work_friction;     /* (2 frictions + 4 n) */
     int *iwork_friction;       /* (4 frictions + 2 contacts) */
-    int *iwork_events;         /* (6 contacts) of events.c and switch.c */
-    double *work_switch;       /* (m + n) of switch.c */
+    int *iwork_events;         /* (6 contacts) of events.c and modes.c */
+    double *work_modes;        /* (m + n) of modes.c */
     double *work_impact;       /* of impact.c, see there */
     int *iwork_impact;
     Why passed;                /* singular configurations passed since the caller emptied it, as a sentence */
@@ -82,13 +82,13 @@ SHARED void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System 
 
 /* One start value that had to be moved onto the constraints. */
 typedef void (*Moved)(void *context, const char *coordinate, int is_velocity, double given,
-                      double used, Rank rank);
+                      double used, Priority priority);
 
-/* initial.c -- the consistent state at t nearest to the start values q0, v0 (n, not in s->state) of
- * rank (2 n, of the coordinates and then of the velocities: which of them move first), for the drive and
+/* initialization.c -- the consistent state at t nearest to the start values q0, v0 (n, not in s->state) of
+ * priority (2 n, of the coordinates and then of the velocities: which of them move first), for the drive and
  * p that the caller has set; `moved` (may be NULL) is called for each value that
  * was moved.  FAILED: the start is refused, the cause is in s->why; the state is in disorder. */
-SHARED Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
+SHARED Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Priority *priority,
                            Moved moved, void *context);
 
 /* No state yet: at t [s], with nothing in it.  For a start that was refused. */
@@ -98,7 +98,7 @@ SHARED void solver_clear(Solver *s, double t);
  * puts the saved one back (it keeps a copy). */
 SHARED Status solver_advance(Solver *s, double t_end);
 
-/* follow.c -- the inputs may have been set: levels of jumps are those of now, contacts whose surface went away
+/* follow.c -- the inputs may have been set: switch states are those of now, contacts whose surface went away
  * open, the others go with it; a prescribed motion may have another place and other rates than it went by, and
  * forces others than the modes of contacts and frictions belong to (drive.turned).  What each step begins
  * with.  FAILED leaves the state in disorder. */

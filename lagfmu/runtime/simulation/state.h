@@ -82,8 +82,8 @@ typedef struct {
     Numbers now;
     int looking;              /* 1: events are not counted: solver_look(), after which a saved state is put back */
     double *q, *v;            /* (n) at t, on the constraints */
-    double *level;            /* (jumps) on which side of its surface each jump of the forces is */
-    double *offset;           /* (m) the level f = offset that a row keeps which came back with its contact */
+    double *switch_state;     /* (switches) on which side of its surface each force that jumps is evaluated */
+    double *offset;           /* (m) f = offset of a row which came back with its contact */
     double *scale;            /* (2 n) magnitudes below which errors in q and v are measured absolutely */
     double *size;             /* (n) the coordinates' magnitudes, for rounding */
     double *gap;              /* (contacts) |f| below which a contact touches */

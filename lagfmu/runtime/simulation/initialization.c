@@ -1,14 +1,14 @@
-/* initial.c -- a consistent start: projection of start values onto the constraints, contact modes,
+/* initialization.c -- a consistent start: projection of start values onto the constraints, contact modes,
  * nominals.
  *
- * Positions are projected (afar.c, precedence.c) onto the constraints that always act and onto contacts
+ * Positions are projected (initial_projection.c, start_priority.c) onto the constraints that always act and onto contacts
  * that are penetrated (f < gap); then velocities onto G v = nu; then the contacts that touch are
  * closed if their multiplier is positive. */
 #include <float.h>
 #include <string.h>
 
-#include "afar.h"
 #include "digits.h"
+#include "initial_projection.h"
 #include "nominals.h"
 #include "optional.h"
 #include "segment.h"
@@ -54,10 +54,10 @@ static Status find_positions(const Start *x) {
     memcpy(state->q, x->q0, (size_t)s->n * sizeof *state->q);
     memset(state->closed, 0, (size_t)s->contacts * sizeof *state->closed);
     system_active(s, state->closed, rows);
-    if (afar_positions(x, state->q, rows) == FAILED) return FAILED;
+    if (initial_positions(x, state->q, rows) == FAILED) return FAILED;
     for (int count = 0; count <= s->contacts; count++) {
-        if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return afar_refused(x->s);
-        if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return afar_refused(x->s);
+        if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return initial_refused(x->s);
+        if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return initial_refused(x->s);
         for (int j = 0; j < s->n; j++) unit[j] = fmax(fabs(state->q[j]), state->size[j]);
         for (int c = 0; c < s->contacts; c++) {
             int k = s->contact[c];
@@ -66,7 +66,7 @@ static Status find_positions(const Start *x) {
         }
         system_active(s, state->closed, rows);
         memcpy(moved, state->q, (size_t)s->n * sizeof *moved);
-        if (afar_positions(x, moved, rows) == FAILED) return FAILED;
+        if (initial_positions(x, moved, rows) == FAILED) return FAILED;
         int still = 1;
         for (int j = 0; j < s->n; j++)
             still &= fabs(moved[j] - state->q[j]) <= 4 * DBL_EPSILON * state->size[j];
@@ -143,7 +143,7 @@ static Status move_velocities(const Start *x, int *active, const double *natural
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
     system_active(x->s->system, state->closed, active);
-    if (afar_velocities(x, state->q, natural, active, state->v) == FAILED) return FAILED;
+    if (initial_velocities(x, state->q, natural, active, state->v) == FAILED) return FAILED;
     return mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->size);
 }
 
@@ -155,7 +155,7 @@ static Status find_velocities(const Start *x) {
     Mechanism *b = &x->s->stepped;
     double *natural = x->s->work_initial, *fastest = natural + s->n, *shared = fastest + s->n;
     int *active = x->s->iwork_initial, low = 1;
-    if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return afar_refused(x->s);
+    if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return initial_refused(x->s);
     if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
     for (int j = 0; j < s->n; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
@@ -166,10 +166,10 @@ static Status find_velocities(const Start *x) {
         if (speed > TOUCH * mechanism_row_size(b, k, shared)) state->closed[c] = 0;
     }
     while (low) {
-        if (move_velocities(x, active, natural) == FAILED) return afar_refused(x->s);
-        if (close_low(x, active, &low) == FAILED) return afar_refused(x->s);
+        if (move_velocities(x, active, natural) == FAILED) return initial_refused(x->s);
+        if (close_low(x, active, &low) == FAILED) return initial_refused(x->s);
     }
-    if (mechanism_evaluate(b, x->at, state->q, state->v) == FAILED) return afar_refused(x->s);
+    if (mechanism_evaluate(b, x->at, state->q, state->v) == FAILED) return initial_refused(x->s);
     return check_velocities(x, active, natural, shared);
 }
 
@@ -182,16 +182,16 @@ static Status find_modes(const Start *x) {
     memcpy(touching, state->closed, (size_t)s->contacts * sizeof *touching);
     if (s->contacts > 0 && OPTIONAL.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
                                                 touching, NULL) == FAILED)
-        return afar_refused(x->s);
+        return initial_refused(x->s);
     if (s->frictions > 0 &&
         OPTIONAL.friction->begin(x->s, x->at, state->closed, touching) == FAILED)
-        return afar_refused(x->s);
+        return initial_refused(x->s);
     system_active(s, state->closed, x->s->active);
     if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,
                           state->size) == FAILED)
-        return afar_refused(x->s);
+        return initial_refused(x->s);
     if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
-        return afar_refused(x->s);
+        return initial_refused(x->s);
     segment_choose_rows(x->s);
     return OK;
 }
@@ -219,7 +219,7 @@ static void tell_each_moved(const Start *x, Moved moved, void *context) {
         double rounding = 4 * DBL_EPSILON * state->size[j] * (is_velocity ? state->now.rate : 1);
         if (fabs(given - used) > fmax(1e-12 * unit, rounding))
             moved(context, x->s->system->coordinates[j], is_velocity, given, used,
-                  is_velocity ? x->rank_v[j] : x->rank_q[j]);
+                  is_velocity ? x->priority_v[j] : x->priority_q[j]);
     }
 }
 
@@ -235,7 +235,7 @@ static Status check_start_finite(Solver *s, const double *q0, const double *v0) 
     return OK;
 }
 
-/* Nothing has happened yet: no steps, no departures, every row on its own level. */
+/* Nothing has happened yet: no steps, no departures, every row without an offset. */
 SHARED void solver_clear(Solver *s, double t) {
     State *state = &s->state;
     memset(state->block, 0, state->block_size);
@@ -245,17 +245,17 @@ SHARED void solver_clear(Solver *s, double t) {
     state->now.fresh = 1;
 }
 
-Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Rank *rank,
+Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Priority *priority,
                     Moved moved, void *context) {
     if (check_start_finite(s, q0, v0) == FAILED) return FAILED;
     solver_clear(s, t);
-    const Start x = {s, segment_instant(s, t), q0, v0, rank, rank + s->system->n};
-    if (s->system->jumps > 0) OPTIONAL.jumps->settle(s, x.at, q0, v0, NULL, NULL);
+    const Start x = {s, segment_instant(s, t), q0, v0, priority, priority + s->system->n};
+    if (s->system->switches > 0) OPTIONAL.switches->settle(s, x.at, q0, v0, NULL, NULL);
     if (s->system->contacts > 0 && OPTIONAL.impact_check(s) != OK) return FAILED;
     s->stepped.dependent = 1; /* it is not known yet */
     nominals_sizes(s, q0);
     if (find_positions(&x) == FAILED) return FAILED;
-    if (s->system->jumps > 0) OPTIONAL.jumps->settle(s, x.at, s->state.q, v0, NULL, NULL);
+    if (s->system->switches > 0) OPTIONAL.switches->settle(s, x.at, s->state.q, v0, NULL, NULL);
     if (find_velocities(&x) == FAILED) return FAILED;
     if (find_modes(&x) == FAILED) return FAILED;
     for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];

@@ -1,7 +1,7 @@
-/* switch.c -- what happens at contacts: impacts (impact.c), rest, and the modes of all contacts together
+/* modes.c -- what happens at contacts: impacts (impact.c), rest, and the modes of all contacts together
  * (contacts.c; Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chs. 4 and 6).  Nothing
  * depends on the order in which contacts are declared. */
-#include "switch.h"
+#include "modes.h"
 
 #include <math.h>
 #include <string.h>
@@ -55,7 +55,7 @@ static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
 static Status strike_contacts(Solver *s, Instant at, const int *happened, Flags *x) {
     int landed = 0;
     const int contacts = s->system->contacts;
-    double *slow = s->work_switch;
+    double *slow = s->work_modes;
     for (int c = 0; c < contacts; c++) landed |= happened[c] && !x->departing[c];
     if (!landed) return OK;
     if (mechanism_evaluate(&s->stepped, at, s->state.q, s->state.v) != OK) return FAILED;
@@ -90,7 +90,7 @@ static int find_low(Solver *s, const double *slow, const int *shut, Flags *x) {
 static Status settle_modes(Solver *s, Instant at, Flags *x) {
     const System *system = s->system;
     const double *q = s->state.q, *v = s->state.v;
-    double *slow = s->work_switch;
+    double *slow = s->work_modes;
     int *shut = s->iwork_events + 5 * system->contacts;
     memcpy(shut, x->closed, (size_t)system->contacts * sizeof *shut);
     if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
@@ -107,8 +107,8 @@ static Status settle_modes(Solver *s, Instant at, Flags *x) {
     return contacts_modes(s, at, q, v, x->closed, x->touching, x->departing);
 }
 
-/* Rows that come back with a contact keep the level f = offset at which they do. */
-static Status set_levels(Solver *s, Instant at, const int *closed) {
+/* Rows that come back with a contact keep the offset f at which they do. */
+static Status set_offsets(Solver *s, Instant at, const int *closed) {
     const System *system = s->system;
     if (mechanism_residual(&s->stepped, at, s->state.q, s->stepped.f) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++) {
@@ -137,19 +137,19 @@ static void note_closings(Solver *s, const int *happened, const int *closed, con
     }
 }
 
-Status switch_modes(Solver *s, const int *happened) {
+Status modes_switch(Solver *s, const int *happened) {
     const System *system = s->system;
     const int contacts = system->contacts;
     const Instant at = segment_instant(s, s->state.now.t);
     const int rubs = system->frictions > 0;
-    double *arriving = s->work_switch + system->m;
+    double *arriving = s->work_modes + system->m;
     memcpy(arriving, s->state.v, (size_t)system->n * sizeof *arriving);
     memset(s->push, 0, (size_t)contacts * sizeof *s->push);
     int *flags = s->iwork_events;
     Flags x = {flags, flags + contacts, flags + 2 * contacts, flags + 3 * contacts,
                flags + 4 * contacts};
     if (find_near(s, at, happened, &x) != OK || strike_contacts(s, at, happened, &x) != OK) return FAILED;
-    if (settle_modes(s, at, &x) != OK || set_levels(s, at, x.closed) != OK) return FAILED;
+    if (settle_modes(s, at, &x) != OK || set_offsets(s, at, x.closed) != OK) return FAILED;
     if (rubs && OPTIONAL.friction->change(s, at, happened + indicators_first_of_frictions(system),
                                         x.closed, x.touching, x.departing) != OK)
         return FAILED;
@@ -165,14 +165,14 @@ Status switch_modes(Solver *s, const int *happened) {
 }
 
 /* Contact c is closed, but the motion of its surface has just been set anew and leaves a gap, or a speed at
- * which it opens; `parted`: more of it than the contact, had it not been there for the last `span` seconds,
+ * which it opens; `departed`: more of it than the contact, had it not been there for the last `span` seconds,
  * would have closed by itself: then it did not only lose what the surface did otherwise than foreseen.  A
  * part `drift` of the constraint's own size and speed is what an integrator has left. */
-static Status has_parted(Solver *s, Instant at, int c, double span, double drift, int *parted) {
+static Status has_departed(Solver *s, Instant at, int c, double span, double drift, int *departed) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
     const int k = system->contact[c];
-    *parted = 0;
+    *departed = 0;
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     const double gap = b->f[k], speed = mechanism_slip(b, k, s->state.v);
@@ -186,20 +186,20 @@ static Status has_parted(Solver *s, Instant at, int c, double span, double drift
     s->state.closed[c] = 1;
     if (mechanism_motion(b, at, s->state.q, s->state.v, s->active) != OK) return FAILED;
     const double approach = fmax(b->gamma[k] - mechanism_row(b, k, b->vdot), 0);
-    *parted = gap > fmax(close, approach * span * span / 2) ||
+    *departed = gap > fmax(close, approach * span * span / 2) ||
               speed > fmax(slow, approach * span);
     return OK;
 }
 
-Status switch_released(Solver *s, double span, double drift) {
+Status modes_departures(Solver *s, double span, double drift) {
     const System *system = s->system;
     if (system->prescribed_count == 0) return OK;
     const Instant at = segment_instant(s, s->state.now.t);
     for (int c = 0; c < system->contacts; c++) {
-        int parted;
+        int departed;
         if (!s->state.closed[c]) continue;
-        if (has_parted(s, at, c, span, drift, &parted) != OK) return FAILED;
-        if (!parted) continue;
+        if (has_departed(s, at, c, span, drift, &departed) != OK) return FAILED;
+        if (!departed) continue;
         s->state.closed[c] = 0;
         s->state.armed[c] = 1;
         note_departure(s, c);
@@ -216,7 +216,7 @@ static Status find_contradicted(Solver *s, Instant at, int *left, int *any) {
     const double *q = s->state.q, *v = s->state.v;
     Mechanism *b = &s->stepped;
     int *modes = s->iwork_events, *touching = modes + contacts;
-    double *slow = s->work_switch;
+    double *slow = s->work_modes;
     memset(left, 0, (size_t)indicators_count(system) * sizeof *left);
     if (mechanism_residual(b, at, q, b->f) != OK || mechanism_evaluate(b, at, q, v) != OK) return FAILED;
     find_slow(s, slow);
@@ -233,9 +233,9 @@ static Status find_contradicted(Solver *s, Instant at, int *left, int *any) {
     return OPTIONAL.friction->contradicted(s, at, left + indicators_first_of_frictions(system), any);
 }
 
-Status switch_contradicted(Solver *s) {
+Status modes_contradicted(Solver *s) {
     int any;
     segment_begin(s);
     if (find_contradicted(s, segment_instant(s, s->state.now.t), s->state.left, &any) != OK) return FAILED;
-    return any ? switch_modes(s, s->state.left) : OK;
+    return any ? modes_switch(s, s->state.left) : OK;
 }

@@ -1,11 +1,11 @@
-/* afar.c -- start values onto the constraints, from anywhere, by precedence.
+/* initial_projection.c -- start values onto the constraints, from anywhere, by precedence.
  *
  *   M dq = G^T mu ,  G dq = -f     damped Newton's method from afar (Deuflhard, Newton Methods for
  *                                  Nonlinear Problems, sect. 3.1), the step halved until |f| falls
  *   M dv = G^T mu ,  G dv = nu - G v
  *
  * of the coordinates that are free in a stage; each stage begins at the start values as they were given. */
-#include "afar.h"
+#include "initial_projection.h"
 
 #include <float.h>
 #include <string.h>
@@ -16,7 +16,7 @@
 
 enum { STEP_HALVINGS = 25 };
 
-Status afar_refused(Solver *s) {
+Status initial_refused(Solver *s) {
     Why cause = s->why;
     return fail(&s->why, "the start is refused: %s", cause.text);
 }
@@ -52,7 +52,7 @@ static double find_far_off(const System *s, const int *rows, const double *f, co
     double off = 0;
     for (int k = 0; k < s->m; k++)
         if (rows[k] && allowed[k] > 0) off = fmax(off, 1e3 * DBL_EPSILON * fabs(f[k]) / allowed[k]);
-    return off < AFAR_NEAR ? off : 0;
+    return off < INITIAL_NEAR ? off : 0;
 }
 
 static Status cannot_be_projected(const Start *x, const int *rows, const double *f,
@@ -81,25 +81,25 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
  * It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
  * since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
  * of at the start (`size`).  While it falls on and on, there is nothing to arrive at. */
-static Status newton_from_afar(const Start *x, int stage, double *q, const int *rows) {
+static Status newton_at_start(const Start *x, int stage, double *q, const int *rows) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
     double *trial = x->s->work_initial, *least = trial + s->n, *f = least + s->n;
     double *f_trial = f + s->m, *allowed = f_trial + s->m;
     int *own = x->s->iwork_initial + s->m;
-    const int all = precedence_rows(s, x->rank_q, stage, rows, own);
+    const int all = priority_rows(s, x->priority_q, stage, rows, own);
     nominals_extents(s, x->at.p, least);
-    if (mechanism_residual(b, x->at, q, f) == FAILED) return afar_refused(x->s);
+    if (mechanism_residual(b, x->at, q, f) == FAILED) return initial_refused(x->s);
     for (int count = 0;; count++) {
-        if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return afar_refused(x->s);
+        if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return initial_refused(x->s);
         find_allowed(x, q, least, 4, trial, allowed);
         if (arrived(s, rows, f, allowed)) return OK;
-        if (count == AFAR_ITERATIONS) return cannot_be_projected(x, rows, f, allowed);
+        if (count == INITIAL_ITERATIONS) return cannot_be_projected(x, rows, f, allowed);
         find_allowed(x, q, x->s->state.size, 1e3, trial, allowed);
         if (!all && arrived(s, own, f, allowed)) break; /* what is left is not for these coordinates */
         for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
         b->linear.off = find_far_off(s, own, f, allowed);
-        const Status status = precedence_nearest(b, x->rank_q, stage, own, f_trial);
+        const Status status = priority_nearest(b, x->priority_q, stage, own, f_trial);
         b->linear.off = 0;
         if (status == FAILED) break;
         double damping = 1;
@@ -134,13 +134,13 @@ static Status check_omissions(const Start *x, const double *q, int k, double f) 
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
     double aside = 0;
-    if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return afar_refused(x->s);
+    if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return initial_refused(x->s);
     for (int j = 0; j < s->n; j++) aside = fmax(aside, fabs(q[j]));
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
-        if (x->rank_q[s->entry_column[e]] == OMITTED && b->G[e] != 0) return OK;
+        if (x->priority_q[s->entry_column[e]] == OMITTED && b->G[e] != 0) return OK;
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
         const char *name = s->coordinates[s->entry_column[e]];
-        if (x->rank_q[s->entry_column[e]] != OMITTED) continue;
+        if (x->priority_q[s->entry_column[e]] != OMITTED) continue;
         if (!depends_elsewhere(x, q, e, aside > 0 ? aside : 1)) continue;
         return fail(&x->s->why,
                     "the start is refused: %s has no start value, and at 0 constraint '%s', missed by "
@@ -153,13 +153,13 @@ static Status check_omissions(const Start *x, const double *q, int k, double f) 
 static Status check_all_omissions(const Start *x, const double *q, const int *rows) {
     const System *s = x->s->system;
     double *f = x->s->work_initial + 2 * s->n;
-    if (mechanism_residual(&x->s->stepped, x->at, q, f) == FAILED) return afar_refused(x->s);
+    if (mechanism_residual(&x->s->stepped, x->at, q, f) == FAILED) return initial_refused(x->s);
     for (int k = 0; k < s->m; k++)
         if (rows[k] && f[k] != 0 && check_omissions(x, q, k, f[k]) == FAILED) return FAILED;
     return OK;
 }
 
-Status afar_positions(const Start *x, double *q, int *rows) {
+Status initial_positions(const Start *x, double *q, int *rows) {
     const System *s = x->s->system;
     const size_t bytes = (size_t)s->n * sizeof *q;
     double *given = x->s->work_initial + 5 * s->n + 3 * s->m;
@@ -170,9 +170,9 @@ Status afar_positions(const Start *x, double *q, int *rows) {
     }
     if (!any) return OK;
     memcpy(given, q, bytes);
-    for (int stage = 0; (stage = precedence_stage(s, x->rank_q, stage)) < RANKS; stage++) {
+    for (int stage = 0; (stage = priority_stage(s, x->priority_q, stage)) < PRIORITIES; stage++) {
         memcpy(q, given, bytes);
-        if (newton_from_afar(x, stage, q, rows) == OK) return OK;
+        if (newton_at_start(x, stage, q, rows) == OK) return OK;
         if (stage == OMITTED && check_all_omissions(x, given, rows) == FAILED) return FAILED;
     }
     return FAILED;
@@ -190,25 +190,25 @@ static int on_velocities(const Start *x, const double *least, const double *v, c
     for (int k = 0; k < s->m; k++) {
         slip[k] = -mechanism_slip(b, k, v);
         const double terms = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);
-        on &= !own[k] || fabs(slip[k]) <= AFAR_ARRIVED * terms;
+        on &= !own[k] || fabs(slip[k]) <= INITIAL_ARRIVED * terms;
     }
     return on;
 }
 
-Status afar_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v) {
+Status initial_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
     double *slip = x->s->work_initial + 3 * s->n, *speed = slip + s->m;
     int *own = x->s->iwork_initial + s->m;
     memcpy(v, x->v0, (size_t)s->n * sizeof *v);
-    for (int stage = 0; (stage = precedence_stage(s, x->rank_v, stage)) < RANKS; stage++) {
+    for (int stage = 0; (stage = priority_stage(s, x->priority_v, stage)) < PRIORITIES; stage++) {
         memcpy(v, x->v0, (size_t)s->n * sizeof *v);
-        precedence_rows(s, x->rank_v, stage, rows, own);
-        for (int sweep = 0; sweep < AFAR_SWEEPS; sweep++) {
+        priority_rows(s, x->priority_v, stage, rows, own);
+        for (int sweep = 0; sweep < INITIAL_SWEEPS; sweep++) {
             if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return FAILED;
             if (on_velocities(x, least, v, rows, speed, slip)) return OK;
             if (on_velocities(x, least, v, own, speed, slip)) break;
-            if (precedence_nearest(b, x->rank_v, stage, own, slip) == FAILED) break;
+            if (priority_nearest(b, x->priority_v, stage, own, slip) == FAILED) break;
             for (int j = 0; j < s->n; j++) v[j] += b->dq[j];
         }
     }

@@ -1,24 +1,24 @@
-/* switch.h -- what happens at an event: contacts open or are struck, modes are settled together. */
-#ifndef LAGFMU_SWITCH_H
-#define LAGFMU_SWITCH_H
+/* modes.h -- what happens at an event: contacts open or are struck, modes are settled together. */
+#ifndef LAGFMU_MODES_H
+#define LAGFMU_MODES_H
 
 #include "linkage.h"
 #include "solver.h"
 
 /* The state (s->state at s->state.now.t) right after the event of the contacts flagged in `happened`:
  * a closed one opens, an open one is struck. */
-SHARED Status switch_modes(Solver *s, const int *happened);
+SHARED Status modes_switch(Solver *s, const int *happened);
 
 /* Opens contacts that a jump of a prescribed motion has left a gap in, or a speed at which they part: a
  * departure.  A gap that the contact, pressed as it is, would have closed within `span` [s] is none: the
  * motion went on a little otherwise than its derivatives had foreseen over a step of that length.  `drift`: that
  * part of the constraint's own size and speed is what an integrator that knows no constraints may have left. */
-SHARED Status switch_released(Solver *s, double span, double drift);
+SHARED Status modes_departures(Solver *s, double span, double drift);
 
 /* Settles contacts and frictions together where a mode contradicts the forces of now: a closed contact would
  * pull, an open one is pressed at f = df/dt = 0, a friction sticks beyond its cone, slips at s = 0 in a
  * direction in which it does not begin to move, or one way where it moves the other, or has a bilateral normal
  * force that has turned round. */
-SHARED Status switch_contradicted(Solver *s);
+SHARED Status modes_contradicted(Solver *s);
 
 #endif

@@ -1,6 +1,6 @@
-/* afar.h -- start values onto the constraints, from anywhere, by precedence (precedence.h). */
-#ifndef LAGFMU_AFAR_H
-#define LAGFMU_AFAR_H
+/* initial_projection.h -- start values onto the constraints, from anywhere, by precedence (start_priority.h). */
+#ifndef LAGFMU_INITIAL_PROJECTION_H
+#define LAGFMU_INITIAL_PROJECTION_H
 
 #include "linkage.h"
 #include "solver.h"
@@ -10,17 +10,17 @@ typedef struct {
     Solver *s;
     Instant at;
     const double *q0, *v0;
-    const Rank *rank_q, *rank_v; /* (n) */
+    const Priority *priority_q, *priority_v; /* (n) */
 } Start;
 
 /* "the start is refused: " before the cause. */
-SHARED Status afar_refused(Solver *s);
+SHARED Status initial_refused(Solver *s);
 
 /* f = 0 on the rows: q (n) is moved.  `rows` (m) loses those that are nonholonomic. */
-SHARED Status afar_positions(const Start *x, double *q, int *rows);
+SHARED Status initial_positions(const Start *x, double *q, int *rows);
 
 /* G v = nu at q on the rows: v (n), from x->v0, as near as can be.  least (n) >= 0: speeds below which
  * nothing counts. */
-SHARED Status afar_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v);
+SHARED Status initial_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v);
 
 #endif

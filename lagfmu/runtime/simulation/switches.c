@@ -1,0 +1,67 @@
+/* switches.c -- the switch states of forces that jump (switches.h). */
+#include "switches.h"
+
+#include <math.h>
+#include <string.h>
+
+static double switch_state_of(double h, int at_integers) {
+    return at_integers ? floor(h) + 0.5 : (double)((h > 0) - (h < 0));
+}
+
+static const double SOON = 1e-6; /* natural times in which a motion on a surface shows where it goes */
+
+/* h of all surfaces a little later, in ahead (switches); the inputs are held. */
+static void look_ahead(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
+                       double *ahead) {
+    const System *system = s->system;
+    const double soon = fmax(SOON / (s->state.now.rate > 0 ? s->state.now.rate : 1), SOON * SOON * fabs(at.t));
+    double *later = ahead + system->switches;
+    for (int j = 0; j < system->n; j++)
+        later[j] = q[j] + soon * (v[j] + (vdot == NULL ? 0 : soon * vdot[j] / 2));
+    system->surfaces(at.t + soon, later, at.u, at.p, ahead);
+}
+
+static int is_on(double h, int at_integers) { return at_integers ? h == floor(h) : h == 0; }
+
+static void settle_switches(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
+                          int *changed) {
+    const System *system = s->system;
+    double *h = s->work_switches, *ahead = h + system->switches;
+    int any = 0;
+    if (changed != NULL) *changed = 0;
+    system->surfaces(at.t, q, at.u, at.p, h);
+    for (int k = 0; k < system->switches; k++) any |= is_on(h[k], system->at_integers[k]);
+    if (any) look_ahead(s, at, q, v, vdot, ahead);
+    for (int k = 0; k < system->switches; k++) {
+        const int on = is_on(h[k], system->at_integers[k]);
+        const double state = switch_state_of(on ? ahead[k] : h[k], system->at_integers[k]);
+        if (changed != NULL && state != s->state.switch_state[k]) *changed = 1;
+        s->state.switch_state[k] = state;
+    }
+    memcpy(s->u + system->inputs, s->state.switch_state, (size_t)system->switches * sizeof *s->u);
+}
+
+static int stale(Solver *s, Instant at, const double *q) {
+    const System *system = s->system;
+    system->surfaces(at.t, q, at.u, at.p, s->work_switches);
+    for (int k = 0; k < system->switches; k++)
+        if (!is_on(s->work_switches[k], system->at_integers[k]) &&
+            switch_state_of(s->work_switches[k], system->at_integers[k]) != s->state.switch_state[k])
+            return 1;
+    return 0;
+}
+
+static void pass_surface(Solver *s, const int *way) {
+    for (int k = 0; k < s->system->switches; k++) {
+        double *state = &s->state.switch_state[k];
+        if (way[k] != 0) *state = s->system->at_integers[k] ? *state + way[k] : way[k];
+    }
+}
+
+static Range range(const Solver *s, int k) {
+    const double state = s->state.switch_state[k];
+    if (s->system->at_integers[k]) return (Range){state - 0.5, state + 0.5, 0, 0};
+    return (Range){state >= 0 ? 0 : -HUGE_VAL, state <= 0 ? 0 : HUGE_VAL, 0, 0};
+}
+
+SHARED_VALUE const Switches SWITCHES = {settle_switches, stale, pass_surface, range};
