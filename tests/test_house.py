@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import runpy
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -34,6 +35,7 @@ ROOMS = (  # each imports from those before it, and from no other
     "testing",
 )
 FLOORS = ("base", "linear", "ode", "mechanics", "simulation", "fmi")  # of the C runtime
+HOUSE = runpy.run_path(str(ROOT.parent / "benchmarks" / "house.py"))
 MODULES = sorted(p for p in ROOT.rglob("*.py") if p.parent != ROOT or p.stem in ROOMS)
 
 
@@ -73,6 +75,15 @@ def test_no_module_is_imported_in_secret() -> None:
     secret = re.compile(r"\b(import_module|__import__)\(\s*f?[\"'](lagfmu|\.)")
     for path in sorted(ROOT.rglob("*.py")):
         assert not secret.search(path.read_text(encoding="utf-8")), path.name
+
+
+def test_no_files_of_python_import_each_other() -> None:
+    """Whoever reads a file has read what it stands on before: there is no circle, wherever in a file it
+    imports."""
+    assert HOUSE["circles"]({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [{"b", "c"}]
+    files = HOUSE["imports"](ROOT)
+    assert len(files) > len(MODULES)
+    assert HOUSE["circles"](files) == []
 
 
 def test_a_test_imports_no_room() -> None:

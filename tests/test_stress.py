@@ -92,7 +92,9 @@ def judged(bench, change):
 def test_the_hemisphere_is_never_wrong(native_fmu, tmp_path):
     """Every quick probe is right or refused; the summary is a table, a JSON file and a Markdown file."""
     text = io.StringIO()
-    (tried,) = stress([native_fmu("Hemisphere")], tmp_path, Console(file=text), quick=True)
+    (tried,) = stress(
+        [native_fmu("Hemisphere")], tmp_path, Console(file=text), quick=True, limit=60.0
+    )
     found = tried.found
     assert [r for r in found.rows if r.verdict in (WRONG, UNFINISHED)] == []
     assert sum(r.verdict == RIGHT for r in found.rows) > 25

@@ -4,7 +4,7 @@ import signal
 import sys
 from typing import Any, NoReturn
 
-from ..fmu.archive import version
+from ..fmu.archive import tool
 from ..verification.pipeline import INTERRUPTED, TERMINATED
 
 
@@ -12,7 +12,7 @@ def main() -> None:
     """The `lagfmu` command, also as `python -m lagfmu`."""
     signal.signal(signal.SIGTERM, _end)  # by the way on which temporary folders go
     if sys.argv[1:] == ["--version"]:
-        say_version()
+        print(tool())
         return
     try:
         from .app import app
@@ -24,8 +24,3 @@ def main() -> None:
 
 def _end(*_: Any) -> NoReturn:
     sys.exit(TERMINATED)
-
-
-def say_version() -> None:
-    """The version that FMUs state as their tool's."""
-    print(f"lagfmu {version()}")

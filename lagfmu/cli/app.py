@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
+from ..fmu.archive import tool
 from ..verification.pipeline import EXIT_CODES
-from . import say_version
 from .commands.build import build
 from .commands.new import new
 from .commands.page import page
@@ -30,7 +30,7 @@ for _command in COMMANDS:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        say_version()
+        print(tool())
         raise typer.Exit
 
 

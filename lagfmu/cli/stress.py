@@ -30,7 +30,6 @@ from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import NO_ROOM, UNFINISHED, WRONG, Verdict
 from ..study.stress.report import MEANING, Stressed, as_markdown, data, report, summary, table
 from ..verification.pipeline import Report, text_of
-from .commands.stress import LIMIT
 from .tradeoff import progress
 from .works import studied
 
@@ -45,7 +44,8 @@ def stress(
     target: str | None = None,
     scenes: Sequence[str] = (),
     quick: bool = False,
-    limit: float = LIMIT,
+    *,
+    limit: float,
 ) -> list[Report]:
     """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json, .md, and OUT/TARGET.md.
 

@@ -25,6 +25,11 @@ DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, struct
 OUTSIDE = re.compile(r"[/\\]|.*[:\\]|(.*/)?\.\.(/|\Z)", re.S)  # absolute, of a drive, or above
 
 
+def tool() -> str:
+    """What FMUs name as the tool that made them."""
+    return f"lagfmu {version()}"
+
+
 def version() -> str:
     """The version of lagfmu that is installed."""
     return importlib.metadata.version("lagfmu")

@@ -12,7 +12,7 @@ from ..codegen.c.tables import entanglements
 from ..codegen.c.variables import variables_source
 from ..errors import BuildError
 from ..prepare.prepare import Prepared
-from .archive import pack, version
+from .archive import pack, tool
 from .compiler import HOST, Platform, chosen, compile_libraries, is_first
 from .description import guid_of, model_description
 
@@ -128,7 +128,7 @@ def sources_of(prepared: Prepared, listed: bool = True) -> Sources:
         table,
         scene,
         prepared.model,
-        f"lagfmu {version()}",
+        tool(),
         {
             **({"ModelExchange": {**common, **MODEL_EXCHANGE}} if exchanged else {}),
             "CoSimulation": {**common, **CO_SIMULATION, **order},

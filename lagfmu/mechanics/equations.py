@@ -28,6 +28,7 @@ from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
 from ..names import derivative, read
+from .formulations.multipliers import multipliers
 
 TIME = dynamicsymbols._t
 
@@ -106,10 +107,13 @@ class EquationsOfMotion(Displayed):
     levels: tuple[Expr, ...] = ()
 
     def multipliers(self) -> dict[str, Expr]:
-        """Constraint -> lambda as a formula, where the system is small; see formulations/multipliers.py."""
-        from .formulations.multipliers import multipliers
+        """Constraint -> lambda in q, v, t and parameters [J/[f]; W/[expression] if nonholonomic].
 
-        return multipliers(self)
+        Raises DerivationError where the system is too large, or M or G M^-1 G^T has no inverse.
+        """
+        found = multipliers(self.model.name, self.M, self.G, self.F, self.gamma)
+        back = {plain: model for model, plain in self.symbols.items()} | {TIME: sp.Symbol("t")}
+        return {c.name: e.xreplace(back) for c, e in zip(self.constraints, found, strict=True)}
 
     @property
     def driven(self) -> tuple[Expr, ...]:

@@ -10,8 +10,6 @@ import typer
 from ..options import JsonFile, JunitFile, Target
 from ..terminal import console, plainly
 
-LIMIT = 60.0  # [s] for one probe
-
 
 def stress(
     targets: Annotated[
@@ -23,7 +21,7 @@ def stress(
         list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Half of the probes.")] = False,
-    limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = LIMIT,
+    limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = 60.0,
     json: JsonFile = None,
     junit: JunitFile = None,
 ) -> None:
@@ -32,5 +30,5 @@ def stress(
     from ..stress import stress as probed
 
     with plainly():
-        done = probed(targets, out, console, target, scene or (), quick, limit)
+        done = probed(targets, out, console, target, scene or (), quick, limit=limit)
         finish("stress", done, json, junit)
