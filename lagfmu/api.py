@@ -14,6 +14,7 @@ from rich.console import Console
 
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
+from .fmu.native import try_start
 from .fmu.target import NATIVE, PYTHON, target_of
 from .fmu.write import as_fmu, put, write
 from .live.playable import playable
@@ -89,14 +90,14 @@ def build_fmu(
 class Shown:
     """What `lagfmu show` prints, as text and, in a notebook, as a page."""
 
-    def __init__(self, prepared: Prepared) -> None:
-        self.prepared = prepared
+    def __init__(self, prepared: Prepared, untried: str = "") -> None:
+        self.prepared, self.untried = prepared, untried
 
     def __repr__(self) -> str:
         console = Console(
             file=io.StringIO(), width=100, color_system=None, force_jupyter=False, emoji=False
         )
-        show_prepared(self.prepared, console)
+        show_prepared(self.prepared, console, self.untried)
         text: str = console.file.getvalue()  # type: ignore[attr-defined]
         return text.rstrip()
 
@@ -111,7 +112,8 @@ def show(model: Model | str | os.PathLike[str], scene: Scene | None = None) -> S
     """
     if not isinstance(model, Model):
         model = load(Path(model)).model
-    return Shown(prepare(model, scene))
+    prepared = prepare(model, scene)
+    return Shown(prepared, try_start(prepared))
 
 
 def verify(

@@ -70,7 +70,8 @@ from .model.units import (
 )
 from .numeric import thresholds
 from .numeric.failure import StartFailureError, StepFailureError
-from .numeric.priority import GIVEN, OMITTED, SET
+from .numeric.initialization import Stage
+from .numeric.start_priority import GIVEN, OMITTED, SET
 from .numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Row, System
 from .numeric.thresholds import STIFF_STEPS
 from .page.documentation import page as documentation_page

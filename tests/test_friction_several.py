@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,13 @@ from lagfmu import (
     Nonholonomic,
     Parameter,
     Scene,
+    build_fmu,
     multiplier,
+    show,
     simulate,
 )
-from lagfmu.errors import SimulationError
-from lagfmu.testing import find_compiler, load, prepare, write
+from lagfmu.errors import CannotStartError, SimulationError
+from lagfmu.testing import find_compiler, load, prepare, targets, write
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"
@@ -324,6 +327,21 @@ def test_painleve_is_refused_by_name_and_only_there(
     else:
         inner = 1 + 3 / 5 + way * 3 * friction * 2 / 5
         assert start() == pytest.approx(g / inner, rel=1e-10)
+
+
+def test_a_start_that_its_frictions_forbid_is_not_built(tmp_path, monkeypatch) -> None:
+    """The same rod as the model says it, mu = 1.5: the FMU itself refuses its start, so that there is none,
+    and `show` says so; where nothing can compile one it says that nobody asked."""
+    start = {theta: float(np.arctan(2)), y: 2 / 5**0.5, x.diff(): -2.0}
+    parameters = [replace(p, value=1.5) if p.symbol == mu else p for p in rod().parameters]
+    model = replace(rod(), start=start, parameters=parameters)
+    for asked in (lambda: build_fmu(model, tmp_path, check=False), lambda: show(model)):
+        with pytest.raises(CannotStartError, match="'grip': sliding has no acceleration"):
+            asked()
+    assert not list(tmp_path.iterdir())
+    monkeypatch.setattr(targets, "find_compiler", lambda: None)
+    assert "not examined" in (said := " ".join(repr(show(model)).split()))
+    assert "pip install ziglang" in said
 
 
 @pytest.mark.parametrize("way", [1, -1])

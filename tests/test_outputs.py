@@ -196,10 +196,11 @@ def test_a_value_that_is_none_is_refused_by_name(target, tmp_path):
         assert part in str(refused.value)
 
 
-def test_a_model_whose_output_has_no_value_at_its_start_is_refused():
-    """Told when the FMU is built, by the same words."""
+def test_a_model_whose_output_has_no_value_at_its_start_is_refused(tmp_path):
+    """Told when the FMU is built, by the same words, and no file is left."""
     with pytest.raises(ModelError, match="'heading' has no value"):
-        prepare(pendulum(outputs=[HEADING]))
+        build_fmu(pendulum(outputs=[HEADING]), tmp_path, target="native", check=False)
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_an_output_depends_on_is_told(prepared):

@@ -15,9 +15,9 @@ from redundant import SYSTEMS
 from runs import simulate_fmu
 
 from lagfmu import Scene, simulate
-from lagfmu.solver.precedence import Stage
 from lagfmu.testing import (
     RedundantConstraintWarning,
+    Stage,
     StartMovedWarning,
     find_compiler,
     prepare,

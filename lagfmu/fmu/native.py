@@ -13,8 +13,10 @@ from ..codegen.c.variables import variables_source
 from ..errors import BuildError
 from ..prepare.prepare import Prepared
 from .archive import pack, tool
-from .compiler import HOST, Platform, chosen, compile_libraries, is_first
+from .compiler import HOST, Platform, chosen, compile_libraries, host, is_first
 from .description import guid_of, model_description
+from .target import missing_for_native
+from .trial import check_start
 
 CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -74,10 +76,11 @@ def build(
     sources: bool = True,
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content; `sources`: it
-    carries its C files."""
+    carries its C files.  Raises CannotStartError for one that refuses its own start."""
     wanted, scene = chosen(platforms), prepared.scene
     made = sources_of(prepared, sources)
     libraries = made.compiled(scene.name, wanted)
+    _check_start(prepared, made, libraries)
     contents = {"modelDescription.xml": made.description, **extra}
     for platform in wanted:
         path = f"binaries/{platform.folder}/{scene.name}{platform.suffix}"
@@ -85,6 +88,24 @@ def build(
     for name, text in made.shipped.items() if sources else ():
         contents[f"sources/{name}"] = text
     return pack(contents)
+
+
+def _check_start(prepared: Prepared, made: Sources, libraries: Mapping[str, bytes]) -> None:
+    """Raises CannotStartError; of an FMU for other machines alone it is asked where there are frictions."""
+    here = host()
+    if here.folder not in libraries and prepared.system.frictions:
+        libraries = made.compiled(prepared.scene.name, [here])
+    if here.folder in libraries:
+        check_start(prepared, made.description, libraries[here.folder])
+
+
+def try_start(prepared: Prepared) -> str:
+    """Ask whether the frictions of a scene, if any, allow its start.  Raises CannotStartError where they
+    do not; what is returned is why it could not be asked."""
+    missing = missing_for_native() if prepared.system.frictions else ""
+    if prepared.system.frictions and not missing:
+        _check_start(prepared, sources_of(prepared, False), {})
+    return missing
 
 
 def offers_exchange(prepared: Prepared) -> bool:

@@ -23,7 +23,7 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from .. import names
 from ..numeric.failure import StepFailureError
-from ..numeric.priority import GIVEN, OMITTED, SET, left_out
+from ..numeric.start_priority import GIVEN, OMITTED, SET, left_out
 from ..numeric.system import System
 from ..numeric.thresholds import SMALLEST_TOLERANCE
 from ..numeric.tolerance import tolerance_problem
@@ -438,7 +438,7 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             y[j] = x
         found = start(self.system, self.settings, self.start_time, y[:n], y[n:], u, self.p, rank)
         for moved in found.moved:
-            if moved.rank != OMITTED:
+            if moved.priority != OMITTED:
                 self._warn(str(moved))
         if line := left_out(found.moved):
             self.log(line, Fmi2Status.ok, "logEvents")

@@ -17,7 +17,7 @@ from .. import names
 from ..interface.variables import Variable
 from ..model.model import Contact, Holonomic, Nonholonomic
 from ..model.units import Unit, for_reading
-from ..numeric.priority import OMITTED
+from ..numeric.start_priority import OMITTED
 from ..prepare.prepare import Prepared
 from .savings import savings
 from .template import template
@@ -117,7 +117,7 @@ def page(
         moved=[
             (
                 m.name,
-                "left out" if m.rank == OMITTED else f"{m.given:.10g}",
+                "left out" if m.priority == OMITTED else f"{m.given:.10g}",
                 f"{m.used:.10g}",
                 shown(whole[m.name].unit),
             )

@@ -14,7 +14,7 @@ from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.integrability.classify import Classification, classify
 from ..model.model import Contact, Nonholonomic, name_of
 from ..names import FORCE, MULTIPLIER, OWN
-from ..numeric.priority import OMITTED
+from ..numeric.start_priority import OMITTED
 from ..prepare.consistency import of_undecided
 from ..prepare.prepare import Derived, Prepared
 from .documentation import as_given, shown
@@ -25,8 +25,8 @@ from .wrapped import wrapped
 INDENT = 6
 
 
-def show(prepared: Prepared, console: Console) -> None:
-    """Print what is known about a model in a scene.
+def show(prepared: Prepared, console: Console, untried: str = "") -> None:
+    """Print what is known about a model in a scene; `untried`: why nobody asked if frictions allow its start.
 
     Raises DerivationError if the nonholonomic constraints contradict each other.
     """
@@ -62,6 +62,11 @@ def show(prepared: Prepared, console: Console) -> None:
     console.print(_units(prepared))
     _heading(console, "Start values")
     _starts(prepared, console)
+    if untried:
+        text = (
+            "whether the frictions allow this start was not examined, as the FMU itself is asked: "
+        )
+        _print(console, "  ", text + untried)
     console.print()
 
 
@@ -211,5 +216,7 @@ def _starts(prepared: Prepared, console: Console) -> None:
         console.print(Text("  as given: they satisfy the constraints"))
     for m in moved:
         unit = shown(prepared.whole[m.name].unit)
-        said = "is left out: it becomes" if m.rank == OMITTED else f"= {m.given!r} is projected to"
+        said = (
+            "is left out: it becomes" if m.priority == OMITTED else f"= {m.given!r} is projected to"
+        )
         _print(console, "  ", f"{m.name} {said} {m.used!r} {unit}")

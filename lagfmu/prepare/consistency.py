@@ -22,23 +22,19 @@ from ..mechanics.form import Form
 from ..model.units import ONE, for_reading
 from ..names import RESIDUAL, derivative, motion, name
 from ..numeric.failure import OmittedStartError, StepFailureError
-from ..numeric.priority import GIVEN
+from ..numeric.initialization import initial_positions
+from ..numeric.instant import at_start, expanded
+from ..numeric.motion import friction_law
+from ..numeric.nominals import Mask
+from ..numeric.rank import MISSED, rank_of
+from ..numeric.start import Start, start
+from ..numeric.start_priority import GIVEN
 from ..numeric.system import NONHOLONOMIC, Matrix, System, Vector
 from ..numeric.thresholds import RANK
-from ..solver.afar import project_from_afar
-from ..solver.friction import law
-from ..solver.initial import Start, start
-from ..solver.instant import Instant
-from ..solver.jumps import levels_at
-from ..solver.magnitudes import Mask
-from ..solver.observe import expand, observe
-from ..solver.state import Settings
 from .diagnosis import cause_of_failure, negative_energy
-from .starts import ranks
+from .starts import priorities
 
 TRIALS = 5
-ALONE = 1e-6  # part of a unit vector of multipliers that push nothing, up to which one has no part in it
-MISSED = 1e-9  # part of a constraint's terms by which it is missed
 
 
 class RedundantConstraintWarning(UserWarning):
@@ -84,29 +80,29 @@ def examine(
     generator = random.Random(1)
     ranks, masses = [], []
     for trial in range(TRIALS):
-        q, v = np.array(begun.state.q), np.array(begun.state.v)
+        q, v = begun.q, begun.v
         if trial:  # a nearby configuration that satisfies the constraints as well
             shift = [0.1 * s * generator.uniform(-1, 1) for s in _spans(system, begun, p)]
             try:
                 q = _nearby(system, begun, q + np.array(shift), v, u, p)
             except StepFailureError:
                 continue
-        inputs = levelled(system, u, q, p)
-        full, q, v = expand(system, 0.0, q, v, inputs, p)
-        at = Instant(full, 0.0, inputs, p)
-        M, _, G, _, _ = at.evaluate(q, v)
+        at, q, v = expanded(at_start(system, q, u, p), q, v)
+        full = at.system
+        M, _, G, _, _ = at.equations(q, v)
         f = at.residual(q) if full.contacts else np.zeros(full.m)
         try:
-            C = law(at, q, v).C if full.frictions else np.zeros((0, full.m))
+            C = friction_law(at, q, v).C if full.frictions else np.zeros((0, full.m))
         except StepFailureError:
             continue
-        ranks.append(_rank(full, G, f, np.abs(G) @ np.abs(q), C))
+        ranks.append(rank_of(full, G, f, np.abs(G) @ np.abs(q), C))
         masses.append(M)
     size = np.abs([M.diagonal() for M in masses]).max(axis=0)
     negative = negative_energy(full, masses[0], size)
     if negative:
         raise ModelError(eom.model.name, [negative])
-    rank, redundant, shared, undecided = max(ranks, key=lambda r: r[0])
+    found = max(ranks, key=lambda r: r.rank)
+    redundant, shared, undecided = found.redundant, found.shared, found.undecided
     if redundant:
         warnings.warn(
             f"model {eom.model.name!r}: constraint{'s' if len(redundant) > 1 else ''} "
@@ -123,7 +119,7 @@ def examine(
             stacklevel=3,
         )
     missed = _missed(table, system, begun, u, p)
-    return Structure(eom.n, eom.m, rank, redundant, shared, undecided, begun, missed)
+    return Structure(eom.n, eom.m, found.rank, redundant, shared, undecided, begun, missed)
 
 
 def of_undecided(frictions: Sequence[str], redundant: Sequence[str]) -> str:
@@ -144,7 +140,7 @@ def _spans(system: System, begun: Start, p: Sequence[float]) -> list[float]:
     numbers = system.folded or (0.0,) * system.n
     spans = []
     for part, number, size in zip(
-        system.extent or ((),) * system.n, numbers, begun.state.size, strict=True
+        system.extent or ((),) * system.n, numbers, begun.size, strict=True
     ):
         lengths = [x for x in (*(abs(p[i]) for i in part), number) if x > 0] or [size or 1e-3]
         spans.append(max(min(lengths), 1e-3 * max(lengths)))
@@ -155,18 +151,17 @@ def _missed(
     table: VariableTable, system: System, begun: Start, u: Sequence[float], p: Sequence[float]
 ) -> tuple[str, ...]:
     """The constraints that act at the start and that the values of the model miss: by how much."""
-    n, rows = system.n, system.active(begun.state.closed)
-    q, v = np.array(begun.state.q), np.array(begun.state.v)
+    n, rows = system.n, system.active(begun.closed)
+    q, v = begun.q.copy(), begun.v.copy()
     free = np.ones(2 * n, dtype=bool)  # nobody said what these are: they follow
     for j, state in enumerate(motion(system.coordinates)):
         free[j] = not table[state].given
     place = {state: j for j, state in enumerate(motion(system.coordinates))}
     for m in begun.moved:
-        if m.rank == GIVEN:
+        if m.priority == GIVEN:
             (q if place[m.name] < n else v)[place[m.name] % n] = m.given
-    levels = levels_at(system, 0.0, q, u, p)
-    at = Instant(system, 0.0, [*system.inputs_at(u, 0.0), *levels], p)
-    _, _, G, nu, _ = at.evaluate(q, v)
+    at = at_start(system, q, u, p)
+    _, _, G, nu, _ = at.equations(q, v)
     places = _uncured(at.residual(q)[rows], G[rows], np.abs(q), free[:n])
     rates = _uncured((G @ v - nu)[rows], G[rows], np.abs(v), free[n:])
     units = {r.name: r.unit or ONE for r in table.those(RESIDUAL)}
@@ -187,11 +182,6 @@ def _uncured(miss: Vector, G: Matrix, size: Vector, free: Mask) -> Vector:
     return np.where(np.abs(left) > MISSED * (np.abs(G) @ size), left, 0.0)
 
 
-def levelled(system: System, u: Sequence[float], q: Vector, p: Sequence[float]) -> list[float]:
-    """The inputs, and the levels of what jumps, at the start."""
-    return [*u, *levels_at(system, 0.0, q, u, p)]
-
-
 def values_at_start(
     eom: EquationsOfMotion, table: VariableTable, numbers: Mapping[Any, Any]
 ) -> tuple[list[float], list[float]]:
@@ -209,13 +199,11 @@ def begin(
     q0 = [given.get(c, 0.0) for c in system.coordinates]
     v0 = [given.get(derivative(c), 0.0) for c in system.coordinates]
     try:
-        begun = start(system, Settings(), 0.0, q0, v0, u, p, ranks(system, table, {}))
-        observe(system, begun.state, u, p)
+        begun = start(system, q0, v0, u, p, priorities(system, table))
     except OmittedStartError as error:
         raise ModelError(eom.model.name, [str(error)]) from error
     except StepFailureError as error:
-        levels = levels_at(system, 0.0, np.array(q0), u, p)
-        at = Instant(system, 0.0, [*system.inputs_at(u, 0.0), *levels], p)
+        at = at_start(system, np.array(q0), u, p)
         cause = cause_of_failure(at, np.array(q0), np.array(v0)) or str(error)
         raise ModelError(eom.model.name, [cause]) from error
     return begun, u, p
@@ -232,7 +220,7 @@ def check_held(
 
     The equations, `table` and `system` are the model's, with all contacts; `kept` may open.
     """
-    closed = begin(eom, table, system, numbers)[0].state.closed
+    closed = begin(eom, table, system, numbers)[0].closed
     names = [system.rows[k].name for k in system.contacts]
     away = [n for n, shut in zip(names, closed, strict=True) if n not in kept and not shut]
     if away:
@@ -275,58 +263,6 @@ def _nearby(
     system: System, begun: Start, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
 ) -> Vector:
     """The configuration near q that satisfies the constraints that act at the start."""
-    levelled = [*u, *levels_at(system, 0.0, q, u, p)]
-    at = Instant(system, 0.0, levelled, p)
     with np.errstate(all="ignore"):
-        rows = system.active(begun.state.closed)
-        return project_from_afar(at, q, v, rows, np.array(begun.state.size))
-
-
-def _rank(
-    full: System, G: Matrix, f: Vector, size: Vector, C: Matrix
-) -> tuple[int, tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Rank of G with rows scaled to unit norm; the rows that add nothing to those before them: what is left
-    of each beside the span of those (Gram and Schmidt, twice); and all whose multiplier is not unique: those
-    with a part in the null space of G^T (Wojtyra 2005).  Contacts come last: one that cannot be closed
-    while those on which it depends are (a wall on either side) is no redundancy.  C (frictions, rows) takes
-    multipliers to normal forces: the frictions of which one is not unique come last."""
-    norm = np.linalg.norm(G, axis=1)
-    norm = np.where(norm > 0, norm, 1.0)
-    G, f, size, C = G / norm[:, None], f / norm, size / norm, C / norm
-    span = np.zeros((0, full.n))
-    redundant: list[str] = []
-    rows: list[int] = []
-    for k in sorted(range(full.m), key=lambda k: k in full.contacts):
-        if full.rows[k].friction is not None:
-            continue  # it holds as long as it sticks
-        rest = G[k].copy()
-        for _ in range(2):
-            rest -= span.T @ (span @ rest)
-        length = float(np.linalg.norm(rest))
-        if len(span) < full.n and length > np.sqrt(RANK):
-            span = np.vstack([span, rest / length])
-        elif k in full.contacts and _apart(k, rows, G, f, size):
-            continue
-        else:
-            redundant.append(full.rows[k].name)
-        rows.append(k)
-    rows.sort()
-    left = _left_null_space(G[rows], len(redundant))
-    shared = np.linalg.norm(left, axis=1) > ALONE
-    grows = np.linalg.norm(C[:, rows] @ left, axis=1) > ALONE * np.linalg.norm(C[:, rows], axis=1)
-    names = tuple(full.rows[k].name for k, part in zip(rows, shared, strict=True) if part)
-    frictions = tuple(x.name for x, part in zip(full.frictions, grows, strict=True) if part)
-    return len(span), tuple(redundant), names, frictions
-
-
-def _apart(k: int, rows: Sequence[int], G: Matrix, f: Vector, size: Vector) -> bool:
-    """Whether row k, as it follows from `rows`, still has a gap when all of those have none."""
-    share = np.linalg.lstsq(G[rows].T, G[k], rcond=RANK)[0]
-    return bool(abs(f[k] - share @ f[rows]) > MISSED * (size[k] + np.abs(share) @ size[rows]))
-
-
-def _left_null_space(G: Matrix, count: int) -> Matrix:
-    """(rows, count), orthonormal: the multipliers that push nothing."""
-    if not count or not len(G):
-        return np.zeros((len(G), 0))
-    return np.linalg.svd(G)[0][:, len(G) - count :]
+        rows = system.active(begun.closed)
+        return initial_positions(at_start(system, q, u, p), q, v, rows, begun.size)

@@ -10,10 +10,10 @@ import random
 import numpy as np
 
 from ..numeric.failure import StepFailureError
+from ..numeric.initialization import initial_positions
+from ..numeric.instant import Instant
 from ..numeric.system import Matrix, System, Vector
 from ..numeric.thresholds import RANK
-from ..solver.afar import project_from_afar
-from ..solver.instant import Instant
 
 NEGATIVE = 1e-12  # a mass below this fraction of its neighbours' is rounding
 INDEFINITE = 1e-8  # an eigenvalue of the scaled mass matrix above -this is rounding
@@ -27,7 +27,7 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
     values = ", ".join(f"{n} = {x!r}" for n, x in named)
     with np.errstate(all="ignore"):
         try:
-            M, F, G, nu, gamma = at.evaluate(q, v)
+            M, F, G, nu, gamma = at.equations(q, v)
             bad = not all(np.isfinite(a).all() for a in (M, F, G, nu, gamma))
             reason = "a value is not finite" if bad else ""
             f = at.residual(q)
@@ -46,7 +46,7 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
         if loose:
             remedy = "give it a mass, or a constraint"
             aside = q + 0.1 * np.maximum(np.abs(q).max(initial=0.0), 1.0)
-            M, _, G, _, _ = at.evaluate(aside, v)
+            M, _, G, _, _ = at.equations(aside, v)
             if not _massless(system, M, G[rows]):
                 remedy = f"elsewhere it has: start at another place than {values}, or take other coordinates"
             return (
@@ -108,7 +108,7 @@ def _massless(system: System, M: Matrix, G: Matrix) -> str:
 def _projected(at: Instant, q: Vector, v: Vector, rows: list[int]) -> Vector | None:
     size = np.maximum(np.abs(q), np.abs(q).max(initial=0.0) or 1.0)
     try:
-        return project_from_afar(at, q, v, rows, size)
+        return initial_positions(at, q, v, rows, size)
     except StepFailureError:
         return None
 

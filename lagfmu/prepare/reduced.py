@@ -18,10 +18,10 @@ from ..interface.variables import VariableTable
 from ..mechanics.form import Form
 from ..model.model import Model
 from ..names import motion
+from ..numeric.instant import at_start, expanded
+from ..numeric.start import Start
 from ..numeric.system import System
-from ..solver.initial import Start
-from ..solver.observe import expand
-from .consistency import Structure, levelled, values_at_start
+from .consistency import Structure, values_at_start
 from .starts import ALLOWED, StartMovedWarning, check_given
 
 
@@ -39,8 +39,8 @@ def misses(
     if form.reduction is None or not wanted:
         return {}
     u, p = values_at_start(eom, table, numbers)
-    q, v = np.array(begun.state.q), np.array(begun.state.v)
-    full, q, v = expand(system, 0.0, q, v, levelled(system, u, q, p), p)
+    at, q, v = expanded(at_start(system, begun.q, u, p), begun.q, begun.v)
+    full = at.system
     has = dict(zip(motion(full.coordinates), [*q.tolist(), *v.tolist()], strict=True))
     n = full.n
     size = dict.fromkeys(motion(full.coordinates)[:n], np.abs(q).max(initial=0.0))
@@ -91,7 +91,7 @@ def restarted(model: Model, form: Form, structure: Structure, missed: Mapping[st
     begun = structure.start
     check_given(model.name, begun.moved, structure.missed)
     names = motion([str(eom.symbols[q]) for q in model.coordinates])
-    values = dict(zip(names, [*begun.state.q, *begun.state.v], strict=True))
+    values = dict(zip(names, [*begun.q.tolist(), *begun.v.tolist()], strict=True))
     start = {own[n]: float(values[n]) for n in stepped}
     follow = ", ".join(f"{n} = {values[n]!r}" for n in stepped if values[n])
     warnings.warn(

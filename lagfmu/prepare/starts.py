@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 from ..errors import ModelError
 from ..interface.variables import VariableTable
 from ..names import motion
-from ..numeric.priority import GIVEN, LEFT_OUT, OMITTED, SET, Moved, left_out
+from ..numeric.start_priority import GIVEN, LEFT_OUT, OMITTED, Moved, left_out
 from ..numeric.system import System
 
 LOG = logging.getLogger("lagfmu")
@@ -21,17 +20,9 @@ class StartMovedWarning(UserWarning):
     """A start value is not the one that the simulation begins with."""
 
 
-def ranks(system: System, table: VariableTable, values: Mapping[str, Any]) -> list[int]:
-    """Of each coordinate and then each velocity (2 n): who said its start value, as in precedence.py.
-
-    `values`: what is set, by name; a value that is the described one is not.
-    """
-    names = motion(system.coordinates)
-    said = [GIVEN if table[name].given else OMITTED for name in names]
-    return [
-        SET if name in values and float(values[name]) != table[name].start else rank
-        for name, rank in zip(names, said, strict=True)
-    ]
+def priorities(system: System, table: VariableTable) -> list[int]:
+    """Of each coordinate and then each velocity (2 n): who said its start value, as in start_priority.py."""
+    return [GIVEN if table[name].given else OMITTED for name in motion(system.coordinates)]
 
 
 def tell(moved: Iterable[Moved | str]) -> None:
@@ -42,7 +33,7 @@ def tell(moved: Iterable[Moved | str]) -> None:
     for m in known:
         if isinstance(m, str) and m.startswith(LEFT_OUT):
             lines.append(m)
-        elif isinstance(m, str) or m.rank != OMITTED:
+        elif isinstance(m, str) or m.priority != OMITTED:
             warnings.warn(str(m), StartMovedWarning, stacklevel=3)
     for line in filter(None, lines):
         LOG.info(line)
@@ -53,7 +44,7 @@ def check_given(model: str, moved: Iterable[Moved], missed: Sequence[str]) -> No
 
     `missed`: the constraints that they miss, and by how much.
     """
-    wrong = [m for m in moved if m.rank == GIVEN and abs(m.used - m.given) > ALLOWED * m.size]
+    wrong = [m for m in moved if m.priority == GIVEN and abs(m.used - m.given) > ALLOWED * m.size]
     if wrong:
         raise ModelError(
             model,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..numeric.failure import OmittedStartError, StartFailureError, StepFailureError
-from ..numeric.priority import GIVEN, OMITTED
+from ..numeric.start_priority import GIVEN, OMITTED
 from ..numeric.system import NONHOLONOMIC, Vector
 from ..numeric.thresholds import INITIAL_ARRIVED, INITIAL_ITERATIONS, INITIAL_NEAR, INITIAL_SWEEPS
 from .instant import Instant

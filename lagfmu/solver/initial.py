@@ -14,7 +14,7 @@ import numpy as np
 
 from ..names import motion
 from ..numeric.failure import StartFailureError, StepFailureError
-from ..numeric.priority import GIVEN, Moved
+from ..numeric.start_priority import GIVEN, Moved
 from ..numeric.system import Matrix, System, Vector
 from ..numeric.thresholds import LARGEST_ANGLE, TOUCH
 from . import optional_contacts, optional_slides

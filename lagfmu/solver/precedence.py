@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..numeric.priority import GIVEN, OMITTED, SET
+from ..numeric.start_priority import GIVEN, OMITTED, SET
 from ..numeric.system import Matrix, System, Vector
 from ..numeric.thresholds import PRIORITY_EASE
 from .instant import Instant

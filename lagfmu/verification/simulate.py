@@ -40,7 +40,7 @@ from ..fmu.write import as_built
 from ..interface.rules import Rule, problems_of
 from ..model.model import Model
 from ..model.scene import Scene
-from ..numeric.priority import LEFT_OUT
+from ..numeric.start_priority import LEFT_OUT
 from ..numeric.tolerance import tolerance_problem
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import tell

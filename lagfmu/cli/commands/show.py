@@ -24,6 +24,7 @@ def show(
     For a scene that needs less than everything, print also what is removed and what that saves.
     """
     from ...errors import CannotStartError
+    from ...fmu.native import try_start
     from ...page.text import show as show_prepared
     from ...page.text import show_what_is_known
     from ...prepare.prepare import prepare
@@ -35,9 +36,10 @@ def show(
         for s in narrowed(chosen(file, None if scene is None else [scene]), needs):
             try:
                 prepared = prepare(file.model, s)
+                untried = try_start(prepared)
             except CannotStartError as error:
                 show_what_is_known(error.known, console)
                 raise
-            show_prepared(prepared, console)
+            show_prepared(prepared, console, untried)
             structure = prepared.structure
             check_given(file.model.name, structure.start.moved, structure.missed)

@@ -10,7 +10,7 @@ LEFT_OUT = "start values that were left out"
 
 
 class Moved(NamedTuple):
-    """A start value that missed the constraints, what it was moved to, and of which rank it is.
+    """A start value that missed the constraints, what it was moved to, and of which priority it is.
 
     `size`: the magnitude of the coordinate; of a velocity, that magnitude times the motion's natural rate,
     or the velocity itself if it is larger.
@@ -19,7 +19,7 @@ class Moved(NamedTuple):
     name: str
     given: float
     used: float
-    rank: int
+    priority: int
     size: float
 
     def __str__(self) -> str:
@@ -31,5 +31,5 @@ class Moved(NamedTuple):
 
 def left_out(moved: Iterable[Moved]) -> str:
     """Of the values that nobody gave, one line with what they are; empty where there are none."""
-    values = ", ".join(f"{m.name} = {m.used!r}" for m in moved if m.rank == OMITTED)
+    values = ", ".join(f"{m.name} = {m.used!r}" for m in moved if m.priority == OMITTED)
     return f"{LEFT_OUT} follow from the constraints: {values}" if values else ""

@@ -1,0 +1,30 @@
+"""Can it start?  Asked of the native library itself, by initializing it as it is described.
+
+Whether frictions and contacts have one solution at the start (Painleve's paradox, no consistent mode) nothing
+but the simulation's own code decides.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from ..errors import CannotStartError
+from ..prepare.prepare import Prepared
+from .compiler import host
+from .session import RefusalError, Session
+
+
+def check_start(prepared: Prepared, description: bytes, library: bytes) -> None:
+    """Initialize an instance of `library`, that of this machine.  Raises CannotStartError with its reason."""
+    here = host()
+    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+        Path(folder, "modelDescription.xml").write_bytes(description)
+        place = Path(folder, "binaries", here.folder, prepared.scene.name + here.suffix)
+        place.parent.mkdir(parents=True)
+        place.write_bytes(library)
+        try:
+            with Session(folder) as session:
+                session.begin()
+        except RefusalError as error:
+            raise CannotStartError(prepared.model.name, [error.message], prepared) from error

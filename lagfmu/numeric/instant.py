@@ -1,0 +1,77 @@
+"""A system at one time, with its inputs and parameters: the equations as functions of the motion alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .failure import StepFailureError, plain
+from .system import Matrix, System, Vector
+
+
+@dataclass(frozen=True)
+class Instant:
+    """`system` at time t [s] under u, the inputs with the switch states behind them, and the parameters p."""
+
+    system: System
+    t: float
+    u: Sequence[float]
+    p: Sequence[float]
+
+    def equations(self, q: Vector, v: Vector) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
+        """M (n, n), F (n), G (m, n), nu (m), gamma (m).  Raises StepFailureError where they have no value."""
+        try:
+            return self.system.assemble(self.t, q, v, self.u, self.p)
+        except (ArithmeticError, ValueError) as error:
+            raise self._failed("equations", error) from error
+
+    def residual(self, q: Vector) -> Vector:
+        """f (m): how far each position constraint is missed; 0 for nonholonomic rows.  Raises likewise."""
+        assert self.system.residual is not None
+        try:
+            f = self.system.residual(self.t, q.tolist(), self.u, self.p)
+        except (ArithmeticError, ValueError) as error:
+            raise self._failed("constraints", error) from error
+        return np.array(f, dtype=float)
+
+    def _failed(self, what: str, error: Exception) -> StepFailureError:
+        return StepFailureError(
+            f"the {what} cannot be evaluated at t = {float(self.t)!r} s ({plain(error)})"
+        )
+
+
+def at_start(system: System, q: Vector, u: Sequence[float], p: Sequence[float]) -> Instant:
+    """The instant t = 0 under the inputs u, with the switch states that belong to q."""
+    inputs = system.inputs_at(u, 0.0)
+    return Instant(system, 0.0, [*inputs, *switch_states(system, 0.0, q, inputs, p)], p)
+
+
+def switch_states(
+    system: System, t: float, q: Vector, u: Sequence[float], p: Sequence[float]
+) -> tuple[float, ...]:
+    """On which side of its surface h(t, q, u, p) each force that jumps there is evaluated, by h alone: its
+    sign, or, where it jumps wherever h is a whole number, n + 1/2 for n <= h < n + 1."""
+    if system.surfaces is None:
+        return ()
+    padded = [*u, *(0.0,) * (system.driven - len(u))]
+    values = system.surfaces(t, q.tolist(), padded, p)
+    return tuple(_side(h, floor) for h, floor in zip(values, system.floors, strict=True))
+
+
+def _side(h: float, floor: bool) -> float:
+    if floor:
+        return math.floor(h) + 0.5 if math.isfinite(h) else h
+    return float(np.sign(h))
+
+
+def expanded(at: Instant, s: Vector, sdot: Vector) -> tuple[Instant, Vector, Vector]:
+    """The instant of the full system, with its q (n) and v (n), from the coordinates that are stepped."""
+    embedding = at.system.embedding
+    if embedding is None:
+        return at, s, sdot
+    q, v = embedding.embed(at.t, s.tolist(), sdot.tolist(), at.u, at.p)
+    full = Instant(embedding.full, at.t, at.u, at.p)
+    return full, np.array(q, dtype=float), np.array(v, dtype=float)

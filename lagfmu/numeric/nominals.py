@@ -1,0 +1,134 @@
+"""Nominals: the size of each coordinate, and the natural rate of the motion, at the start.  No unit counts.
+
+    size   of a coordinate: |q|, or the largest parameter of its dimension; of angles at most 1 rad
+    rate   [1/s] of the motion: the largest |v| / size and sqrt(|vdot| / size)
+
+A coordinate at 0 of whose dimension there is no parameter has no size: its 0 is a mark on a ruler.  There the
+motion itself tells what is large, V tau and A tau^2 with V and A the largest speed and acceleration of its
+dimension: tau is the shortest time in which anything changes, 1/rate of the coordinates that have a size, or
+V/A.  Parameters and angles alone give that rate (a place may be far away, and says nothing), and V/A the
+forces before they cancel.
+
+A displacement of each coordinate in turn tells what holds it: dvdot, were it displaced by its size.  At rest
+on springs that balance, what is left of the acceleration is rounding, and sqrt(|dvdot| / size) is the rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .failure import StepFailureError
+from .instant import Instant
+from .motion import Motion
+from .system import Matrix, System, Vector
+from .thresholds import DISPLACED, LOST
+
+Mask = NDArray[np.bool_]
+
+
+def extents(system: System, p: Sequence[float]) -> Vector:
+    """For each coordinate the largest magnitude among the parameters of its dimension, those that are
+    numbers in the code with them; angles: 0."""
+    parts = system.extent or ((),) * system.n
+    folded = system.folded or (0.0,) * system.n
+    return np.array([max((abs(p[i]) for i in part), default=0.0) for part in parts]).clip(
+        min=folded
+    )
+
+
+def sizes(system: System, q: Vector, p: Sequence[float], before: Vector) -> Vector:
+    """The coordinates' sizes (n); 0 where there is none.  `before` (n): sizes before a projection."""
+    place = np.where(np.abs(q) > LOST * before, np.abs(q), 0.0)
+    size = np.maximum(place, extents(system, p))
+    angles = list(system.angles)
+    if angles:
+        size[angles] = min(place[angles].max(), 1.0) or 1.0
+    return size
+
+
+def motion_speeds(system: System, M: Matrix, speed: Vector) -> Vector:
+    """What speeds (n) a whole motion has that moves each coordinate at `speed` (n) >= 0: the largest of its
+    dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its own.
+
+    A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed is
+    rounding of theirs.
+    """
+    mass = M.diagonal()
+    momentum = (np.sqrt(np.maximum(mass, 0.0)) * speed).max(initial=0.0)
+    shared = np.empty(system.n)
+    for j in range(system.n):
+        like = list(system.like[j]) if system.like else [j]
+        heaviest = mass[like].max()
+        shared[j] = speed[like].max()
+        if heaviest > 0:
+            shared[j] = max(shared[j], momentum / np.sqrt(heaviest))
+    return shared
+
+
+def natural(
+    at: Instant,
+    q: Vector,
+    v: Vector,
+    size: Vector,
+    now: Motion,
+    moving: Callable[[Vector], Motion],
+) -> tuple[Vector, float]:
+    """Sizes (n) as far as they can be known, from those of places, and the natural rate [1/s]; 0: not known.
+
+    `now` is the motion; moving(q): the one at other positions, with its velocities and modes.
+    """
+    system, speed, felt, known = at.system, np.abs(v), now.felt, size > 0
+    size = size.copy()
+    measured = extents(system, at.p) > 0
+    measured[list(system.angles)] = True
+    steady = _rate(system, size, speed, felt, known & measured)
+    slowest = min(_rates(system, size, speed, np.zeros(system.n), known), default=0.0)
+    fastest = 0.0  # of the rates by which sizes are taken from the motion
+    for j in np.flatnonzero(~known):
+        like = list(system.like[j]) if system.like else [j]
+        V, A, pull = speed[like].max(), np.abs(now.vdot[like]).max(), felt[like].max()
+        if LOST * pull >= A:
+            A = pull  # at rest: what is left is rounding of forces that cancel
+        rate = max(steady, pull / V if V > 0 else 0.0)
+        if rate > 0:
+            rate = max(
+                rate, slowest
+            )  # one that is hardly pushed moves no farther than the others do
+            size[j] = max(V / rate, A / rate / rate)
+        fastest = max(fastest, rate)
+    back = _held(q, np.where(known, size, 0.0), now, moving)
+    pull = np.abs(now.vdot)
+    if not v.any() and bool((pull <= LOST * np.maximum(felt, back)).all()):  # it rests
+        pull = np.where(back > LOST / DISPLACED * felt, back, 0.0)
+    rate = max(_rate(system, size, speed, pull, known), fastest)
+    return size, rate or _rate(system, size, speed, felt, known)
+
+
+def _held(q: Vector, size: Vector, now: Motion, moving: Callable[[Vector], Motion]) -> Vector:
+    """Accelerations (n) with which a state comes back if each coordinate in turn is displaced by its size,
+    linearly; 0 at the edge of what the equations describe."""
+    back = np.zeros(len(q))
+    for j in np.flatnonzero(size):
+        moved = q.copy()
+        moved[j] += DISPLACED * size[j]
+        try:
+            back += np.abs(moving(moved).vdot - now.vdot) / DISPLACED
+        except StepFailureError:
+            return np.zeros(len(q))
+    return back
+
+
+def _rates(system: System, size: Vector, speed: Vector, pull: Vector, counted: Mask) -> list[float]:
+    """speed / size or sqrt(pull / size) of those that count, where it is not 0; an angle's speed by 1 rad."""
+    unit = size.copy()
+    unit[list(system.angles)] = 1.0
+    rates = np.maximum(speed[counted] / unit[counted], np.sqrt(pull[counted] / size[counted]))
+    return [rate for rate in rates.tolist() if rate > 0]
+
+
+def _rate(system: System, size: Vector, speed: Vector, pull: Vector, counted: Mask) -> float:
+    """The largest of them."""
+    return max(_rates(system, size, speed, pull, counted), default=0.0)

@@ -1,0 +1,199 @@
+"""A consistent start: start values on the constraints, contacts that are closed, nominals.
+
+Positions are projected onto the constraints that always act and onto contacts that are penetrated (f < -gap);
+then velocities onto G v = nu; then the contacts that touch are closed if their multiplier is positive.  Every
+value that was moved is reported.  Whether frictions allow the start, and outputs have values there, is asked
+of the native FMU.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..names import motion as names_of_motion
+from .contacts import check_restitution, closed_contacts, stays_low
+from .failure import StartFailureError, StepFailureError
+from .initialization import EPS, initial_positions, initial_velocities
+from .instant import Instant, at_start
+from .linear import independent
+from .motion import NONE, motion, stick_slip
+from .nominals import motion_speeds, natural, sizes
+from .start_priority import GIVEN, Moved
+from .system import Matrix, System, Vector
+from .thresholds import LARGEST_ANGLE, TOUCH
+
+SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
+MOVED = 1e-12  # part of a value by which it has moved
+
+
+@dataclass(frozen=True)
+class Start:
+    """q, v (n) on the constraints; one entry a contact: is it closed; the switch states of forces that jump;
+    the coordinates' sizes (n) and the natural rate [1/s] of the motion; each value that had to be moved."""
+
+    q: Vector
+    v: Vector
+    closed: tuple[bool, ...]
+    switch_states: tuple[float, ...]
+    size: Vector
+    rate: float
+    moved: tuple[Moved, ...]
+
+
+def start(
+    system: System,
+    q0: Sequence[float],
+    v0: Sequence[float],
+    u: Sequence[float],
+    p: Sequence[float],
+    priority: Sequence[int] | None = None,
+) -> Start:
+    """The consistent start at t = 0 nearest to the start values.  Raises StartFailureError with the cause.
+
+    `priority` (2 n), of the coordinates and then of the velocities: which of them move first; without it they
+    are all alike.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            check_restitution(system, p)
+            q, v = np.array(q0, float), np.array(v0, float)
+            order = [GIVEN] * (2 * system.n) if priority is None else list(priority)
+            return _start(at_start(system, q, u, p), q, v, order)
+    except StartFailureError:
+        raise
+    except StepFailureError as error:
+        raise StartFailureError(f"the start is refused: {error}") from error
+
+
+def _start(at: Instant, q0: Vector, v0: Vector, priority: list[int]) -> Start:
+    system, n = at.system, at.system.n
+    q, size, gap, near = _positions(at, q0, v0, priority[:n])
+    if system.floors:
+        at = at_start(system, q, at.u[: len(at.u) - len(system.floors)], at.p)
+    v, touching = _velocities(at, q, v0, near, size, gap, priority[n:])
+    closed = closed_contacts(at, q, v, touching) if system.contacts else ()
+    rows, slips = system.active(closed), NONE
+    if system.frictions:
+        rows, slips = stick_slip(at, q, v, rows, size)
+    now = motion(at, q, v, rows, slips)
+    held = [rows[i] for i in independent(now.M, now.G[rows])]
+    size, rate = natural(at, q, v, size, now, lambda there: motion(at, there, v, held, slips))
+    states = tuple(at.u[len(at.u) - len(system.floors) :])
+    moved = _moved(system, [*q0, *v0], [*q, *v], size, rate, priority)
+    return Start(q, v, closed, states, size, rate, moved)
+
+
+def _positions(
+    at: Instant, q0: Vector, v0: Vector, priority: Sequence[int]
+) -> tuple[Vector, Vector, Vector, list[bool]]:
+    """q (n) on the constraints, sizes (n), and of each contact |f| below which it touches and if it does."""
+    system = at.system
+    contacts = list(system.contacts)
+    size = sizes(system, q0, at.p, np.zeros(system.n))
+    q = initial_positions(at, q0, v0, system.permanent, size, priority)
+    gap, near = np.zeros(0), [False] * len(contacts)
+    for _ in range(len(contacts) + 1):
+        G = at.equations(q, v0)[2]
+        gap = TOUCH * (np.abs(G) @ np.maximum(np.abs(q), size))[contacts]
+        near = (at.residual(q)[contacts] <= gap).tolist()
+        before, q = q, initial_positions(at, q, v0, system.active(near), size, priority)
+        if (np.abs(q - before) <= 4 * EPS * size).all():
+            break
+    for j in system.angles:
+        if not abs(q[j]) <= LARGEST_ANGLE:
+            raise StartFailureError(
+                f"the start is refused: the angle {system.coordinates[j]} = {float(q[j])!r} rad has "
+                f"no digits left for a direction, expected at most {LARGEST_ANGLE:.1e} rad either "
+                "way: take off whole turns"
+            )
+    return q, sizes(system, q, at.p, size), gap, near
+
+
+def _velocities(
+    at: Instant,
+    q: Vector,
+    v0: Vector,
+    near: Sequence[bool],
+    size: Vector,
+    gap: Vector,
+    priority: Sequence[int],
+) -> tuple[Vector, list[bool]]:
+    """v (n) on G v = nu, and which contacts touch: one that is already parting (df/dt > 0) is open, unless it
+    parts so slowly that it would not rise above the gap within which contacts touch, as after an impact."""
+    system = at.system
+    M, F, G, nu, _ = at.equations(q, v0)
+    _check_masses(at, q, v0, M)
+    mass = np.where(M.diagonal() > 0, M.diagonal(), np.inf)
+    free = np.sqrt(size * np.abs(F) / mass)  # speeds that the forces alone would give
+    unit = np.abs(G) @ motion_speeds(system, M, np.maximum(np.abs(v0), free))
+    rising = (G @ v0 - nu > TOUCH * unit)[list(system.contacts)]
+    shut = [touches and not rises for touches, rises in zip(near, rising, strict=True)]
+    while True:
+        rows = system.active(shut)
+        v = initial_velocities(at, q, v0, rows, free, priority)
+        parting = [c for c, touches in enumerate(near) if touches and not shut[c]]
+        low = stays_low(at, q, v, shut, parting, gap)
+        if not low:
+            break
+        shut = [s or c in low for c, s in enumerate(shut)]
+    M, _, G, nu, _ = at.equations(q, v)
+    fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), free)
+    unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)
+    missed = [k for k in rows if abs(G[k] @ v - nu[k]) > TOUCH * unit[k]]
+    if missed:
+        names = ", ".join(repr(system.rows[k].name) for k in missed)
+        raise StartFailureError(
+            f"no velocities satisfy the constraints {names} at the start: they contradict each "
+            "other, or the configuration is singular"
+        )
+    return v, shut
+
+
+def _check_masses(at: Instant, q: Vector, v0: Vector, M: Matrix) -> None:
+    """Raises StartFailureError for a mass that a double holds to a few digits only, or that is 0 only because
+    its factors are too small to multiply.
+
+    Then a parameter of the order of 1 in place of a small one makes it positive, and a double does not
+    hold it; one that vanishes with a parameter that is 0, or at this place, is what the model says.
+    """
+    names, masses = at.system.coordinates, M.diagonal().tolist()
+    for name, mass in zip(names, masses, strict=True):
+        if 0 < mass < SMALLEST_MASS:
+            raise StartFailureError(
+                f"the start is refused: the mass of {name} is {mass!r}, expected 0 or at least "
+                f"{SMALLEST_MASS:.3g} (in SI units), below which numbers lose their digits: choose "
+                "larger units of mass"
+            )
+    absent = [j for j, k in zip(*at.system.mass, strict=True) if j == k and masses[j] == 0]
+    for i, value in enumerate(at.p if absent else ()):
+        if not 0 < abs(value) < 1:
+            continue
+        larger = replace(at, p=[*at.p[:i], float(np.copysign(1.0, value)), *at.p[i + 1 :]])
+        there = larger.equations(q, v0)[0].diagonal()
+        for j in absent:
+            if there[j] > 0:
+                raise StartFailureError(
+                    f"the start is refused: the mass of {names[j]} is too small for a double, with a "
+                    f"parameter of {value!r} (in SI units): choose smaller units"
+                )
+
+
+def _moved(
+    system: System,
+    given: Sequence[float],
+    used: Sequence[float],
+    size: Vector,
+    rate: float,
+    priority: Sequence[int],
+) -> tuple[Moved, ...]:
+    """The values (2 n) that are not the given ones, but for rounding."""
+    whole = [*size, *(size * rate)]
+    states = names_of_motion(system.coordinates)
+    return tuple(
+        Moved(name, float(a), float(b), rank, float(max(unit, abs(a))))
+        for name, a, b, rank, unit in zip(states, given, used, priority, whole, strict=True)
+        if abs(a - b) > max(MOVED * max(abs(a), abs(b)), 4 * EPS * max(unit, abs(a)))
+    )
