@@ -15,7 +15,7 @@ typedef struct {
     const char *moved_name[64];
     int moved_velocity[64];
     double given[64], used[64];
-    Priority rank[64]; /* of the start values */
+    Priority priority[64]; /* of the start values */
 } Bench;
 
 void *bench_open(const System *system);
@@ -56,7 +56,7 @@ void *bench_open(const System *system) {
             *all[i] = (Arena){b->memory[i], 0};
         }
     }
-    for (int i = 0; i < 64; i++) b->rank[i] = GIVEN;
+    for (int i = 0; i < 64; i++) b->priority[i] = GIVEN;
     memset(b->solver.drive.value, 0, (size_t)system->inputs * sizeof(double));
     memset(b->solver.drive.first, 0, (size_t)system->inputs * sizeof(double));
     memset(b->solver.drive.second, 0, (size_t)system->inputs * sizeof(double));
@@ -71,8 +71,8 @@ void bench_close(Bench *b) {
 const char *bench_why(const Bench *b) { return b->solver.why.text; }
 
 static void moved(void *context, const char *coordinate, int is_velocity, double given,
-                  double used, Priority rank) {
-    (void)rank;
+                  double used, Priority priority) {
+    (void)priority;
     Bench *b = context;
     int i = b->moved++;
     if (i >= 64) return;
@@ -94,7 +94,7 @@ int bench_start(Bench *b, double t, const double *q, const double *v, double tol
     b->moved = 0;
     b->solver.settings = (Settings){DOP853, tolerance, 0, 0, 1e6};
     b->solver.drive.since = t;
-    return solver_start(&b->solver, t, q, v, b->rank, moved, b);
+    return solver_start(&b->solver, t, q, v, b->priority, moved, b);
 }
 
 int bench_advance(Bench *b, double t_end) { return solver_advance(&b->solver, t_end); }
@@ -199,7 +199,7 @@ void *bench_array(Bench *b, const char *name) {
         {"state.closed", s->state.closed}, {"state.armed", s->state.armed},
         {"state.count", left->count}, {"state.departure_time", left->time},
         {"state.departure_q", left->q}, {"state.departure_v", left->v},
-        {"rank", b->rank}, {"active", s->active}, {"p", s->p}, {"value", s->drive.value}, {"first", s->drive.first},
+        {"priority", b->priority}, {"active", s->active}, {"p", s->p}, {"value", s->drive.value}, {"first", s->drive.first},
         {"second", s->drive.second}, {"M", s->stepped.M}, {"G", s->stepped.G},
         {"vdot", s->stepped.vdot}, {"lambda", s->stepped.lambda},
         {"seen.q", b->seen.q}, {"seen.v", b->seen.v}, {"seen.vdot", b->seen.vdot},

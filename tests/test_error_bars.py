@@ -1,4 +1,4 @@
-"""Error bars: how far a run's values may be off, estimated by a companion run at a coarser tolerance."""
+"""Error bars: how far a run's values may be off, estimated by a finer run beside the delivered one."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_the_time_of_departure_lies_within_its_bar(barred):
 
 def test_an_event_in_the_middle_of_a_long_step_lies_within_its_bar(barred):
     """A particle that slides down with friction leaves; both runs take the same step to where it does, whose
-    error the companion must not share: the time, and the flight that follows from it."""
+    error the finer run must not share: the time, and the flight that follows from it."""
     names = ("departure.surface.time", "r", "theta")
     tolerances = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
     for step in (0.25, 0.5):
@@ -148,7 +148,7 @@ def test_the_time_at_which_slipping_starts_lies_within_its_bar(barred):
 
 
 def test_rattle_has_bars_by_the_step_halved(barred):
-    """Of order 6: the companion of half the step is off by a 64th of the delivered run's error."""
+    """Of order 6: the finer run of half the step is off by a 64th of the delivered run's error."""
     with instance(barred("PendulumCartesian")) as one:
         one.start({"solver.method": "rattle", "solver.step": 0.05}, tolerance=1e-6)
         for _ in range(20):
@@ -159,7 +159,7 @@ def test_rattle_has_bars_by_the_step_halved(barred):
 
 
 def test_a_run_is_the_same_with_error_bars_and_without(barred, native_fmu):
-    """The companion runs beside it and touches nothing: every value of every output, bit for bit."""
+    """The finer run goes beside it and touches nothing: every value of every output, bit for bit."""
     with_bars = run(barred("Hemisphere"), 2.0, 0.05)
     without = run(native_fmu("Hemisphere"), 2.0, 0.05)
     for name in without.dtype.names:
@@ -168,7 +168,7 @@ def test_a_run_is_the_same_with_error_bars_and_without(barred, native_fmu):
 
 
 def test_going_back_and_on_again_gives_the_same_bars(barred):
-    """The companion is part of a saved state, as a pointer and as bytes, across the departure."""
+    """The finer run is part of a saved state, as a pointer and as bytes, across the departure."""
     with instance(barred("Hemisphere")) as one, instance(barred("Hemisphere"), "b") as other:
         for x in (one, other):
             x.start(tolerance=1e-6)
@@ -210,7 +210,7 @@ def test_reading_bars_does_not_change_them(barred):
 
 def test_a_fixed_step_has_bars_by_the_step_halved(barred):
     """rk4 of order 4: the run of half the step is off by a fifteenth of the difference.
-    The companion takes it."""
+    The finer run takes it."""
     with instance(barred("PendulumCartesian")) as one:
         one.start({"solver.method": "rk4", "solver.step": 0.02}, tolerance=1e-6)
         for _ in range(20):
@@ -258,7 +258,7 @@ def test_between_the_two_departures_the_bars_are_infinite(barred):
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A mass on a spring by rk4, and an output that is not defined beyond x = d: two steps from x = 1 to the
-    middle end 5 mm short of it, the four of the companion 0.3 mm."""
+    middle end 5 mm short of it, the four of the finer run 0.3 mm."""
     if find_compiler() is None:
         pytest.skip("no C compiler on this machine")
     x, (m, k, d) = dynamicsymbols("x"), symbols("m k d", positive=True)
@@ -277,8 +277,8 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(prepare(model, scene), tmp_path_factory.mktemp("root"), target="native")
 
 
-def test_a_companion_that_cannot_follow_is_told_and_the_run_goes_on(root):
-    """Where the companion cannot be read and the delivered run can all bars are infinite, and the log says so
+def test_a_finer_run_that_cannot_follow_is_told_and_the_run_goes_on(root):
+    """Where the finer run cannot be read and the delivered run can all bars are infinite, and the log says so
     once."""
     with instance(root) as one:
         one.start(tolerance=1e-6)
@@ -317,8 +317,8 @@ def test_a_bar_has_no_derivative(barred):
         assert "'error.x' is not defined" in one.log[-1][2]
 
 
-def test_a_forged_companion_is_refused_or_harmless(barred, tmp_path):
-    """Modes, times and differences that no companion has, with the right checksum: refused in words, or
+def test_a_forged_finer_run_is_refused_or_harmless(barred, tmp_path):
+    """Modes, times and differences that no finer run has, with the right checksum: refused in words, or
     finite to read."""
     attack = str(Path(__file__).with_name("test_forged_states.py"))
     done = subprocess.run(
@@ -361,7 +361,7 @@ def test_bars_of_many_runs_are_kept_as_any_output(barred):
 
 
 def test_an_infinite_bar_is_printed_so(root, tmp_path):
-    """In the table of a sweep, where the companion is lost."""
+    """In the table of a sweep, where the finer run is lost."""
     said = CliRunner().invoke(
         app,
         ["sweep", str(root), "--vary", "d=0.002,0.0001", "--keep", "error.x:max", "--plot",
@@ -385,7 +385,7 @@ def test_an_fmu_without_bars_is_refused_by_name(native_fmu):
 
 
 def test_nothing_of_it_is_in_an_fmu_without(native_fmu, python_fmu):
-    """Neither its sources nor its python files hold a companion."""
+    """Neither its sources nor its python files hold a finer run."""
     with zipfile.ZipFile(native_fmu("Hemisphere")) as archive:
         carried = archive.namelist()
     assert "sources/observe.c" in carried

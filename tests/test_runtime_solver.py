@@ -218,13 +218,13 @@ def check_start(
     q: Sequence[float],
     v: Sequence[float],
     u: Sequence[float],
-    rank: Sequence[int] | None = None,
+    priority: Sequence[int] | None = None,
 ) -> Any:
     """It starts, and what is observed then obeys M vdot = F + G^T lambda, Q = G^T lambda, and f = 0 and
     G v = nu in the rows that act, to the rounding of their terms; M, F, G in NumPy."""
     one.drive(u)
-    one.array("rank", 2 * one.system.n, c_int)[:] = (
-        [GIVEN] * (2 * one.system.n) if rank is None else rank
+    one.array("priority", 2 * one.system.n, c_int)[:] = (
+        [GIVEN] * (2 * one.system.n) if priority is None else priority
     )
     assert one.start(q, v), one.why()
     seen, full = one.observe(), one.full
@@ -352,11 +352,11 @@ def test_an_omitted_value_whose_zero_is_singular_is_asked_for(bench):
     """x = 0.6 on a circle of 1 m and nothing said of y: at y = 0 the circle does not depend on y to first
     order, and which of +-0.8 is meant nobody can know."""
     one = bench("PendulumCartesian")
-    rank = [GIVEN, OMITTED, OMITTED, OMITTED]
-    one.array("rank", 4, c_int)[:] = rank
+    priority = [GIVEN, OMITTED, OMITTED, OMITTED]
+    one.array("priority", 4, c_int)[:] = priority
     assert not one.start([0.6, 0.0], [0.0, 0.0])
     assert "give y a start value" in one.why()
-    check_start(one, [0.6, -0.1], [0.0, 0.0], [], rank)
+    check_start(one, [0.6, -0.1], [0.0, 0.0], [], priority)
     np.testing.assert_allclose(one.state()["q"], [0.6, -0.8], rtol=1e-15)
 
 

@@ -84,11 +84,11 @@ int main(int argc, char *argv[]) {
         if (strcmp(argv[1], METHOD_NAMES[k]) == 0)
             core.solver.settings.method = (MethodName)k;
     }
-    core.rank = calloc(2 * (size_t)MODEL_SYSTEM->n, sizeof *core.rank);
-    if (core.rank == NULL)
+    core.priority = calloc(2 * (size_t)MODEL_SYSTEM->n, sizeof *core.priority);
+    if (core.priority == NULL)
         return 1;
     for (int j = 0; j < 2 * MODEL_SYSTEM->n; j++)
-        core.rank[j] = GIVEN;
+        core.priority[j] = GIVEN;
     core.solver.settings.tolerance = task.tolerance;
     memcpy(core.solver.p, PROBLEM_P, (size_t)MODEL_SYSTEM->parameters * sizeof(double));
     System counting = *MODEL_SYSTEM;
@@ -107,6 +107,6 @@ int main(int argc, char *argv[]) {
         fprintf(stderr, "%s\n", core.solver.why.text);
     free(saved);
     free(scratch);
-    free(core.rank);
+    free(core.priority);
     return status;
 }

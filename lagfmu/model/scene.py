@@ -45,7 +45,7 @@ class Scene:
     true), and `solver.method` is left out.
     `error_bars`: besides each lambda, Q, coordinate, velocity, output of the model's own and time of an
     event that is an output, `error.NAME`: an estimate of how far this run's
-    value may be off, by a companion run (docs/error_bars.md); co-simulation only.
+    value may be off, by a finer run (docs/error_bars.md); co-simulation only.
     `derivatives`: whether a native FMU offers directional derivatives; None: unless `outputs` are
     named.
 

@@ -1,8 +1,8 @@
-/* bars.c -- error bars by a companion run at a finer tolerance; see bars.h.
+/* bars.c -- error bars by a finer run; see bars.h.
  *
  * Events pair by their count: while one of the runs has met an event that the other has not, a difference
  * says nothing and the bar is infinite, for which the largest double stands.  Beside a method of fixed
- * steps the companion takes twice as many. */
+ * steps the finer run takes twice as many. */
 #include "bars.h"
 
 #include <float.h>
@@ -19,7 +19,7 @@
 
 static const double INFINITE = DBL_MAX;
 /* Of bars.h; MARGIN, SPREAD, ESTIMATE and ROUNDING are calibrated: benchmarks/error_bars.py --drawn. */
-static const double FINER = 0.1;    /* the companion's tolerance, in that of the delivered run */
+static const double FINER = 0.1;    /* the finer run's tolerance, in that of the delivered run */
 static const double SHORTER = 0.7;  /* its first and its longest step, in the delivered run's */
 static const double MARGIN = 6, SPREAD = 0.03, ESTIMATE = 2, BAR_ROUNDING = 16;
 
@@ -57,7 +57,7 @@ static int has_fixed_step(const Instance *x) {
     return OPTIONAL.methods[x->solver.settings.method]->fixed;
 }
 
-/* What the companion shares with the delivered run, but for the tolerance. */
+/* What the finer run shares with the delivered run, but for the tolerance. */
 static void share_settings(Instance *x) {
     Solver *c = &x->bars->solver;
     const double step = c->settings.step;
@@ -96,7 +96,7 @@ static void lose_bars(Instance *x, const char *why) {
     Bars *b = x->bars;
     *b->lost = 1;
     (void)snprintf(x->note, sizeof x->note,
-                   "error bars: the companion run at the tolerance %s cannot follow to t = %s s, all bars "
+                   "error bars: the finer run at the tolerance %s cannot follow to t = %s s, all bars "
                    "are infinite (%s) from here: %.250s",
                    digits(b->solver.settings.tolerance).text, digits(x->solver.state.now.t).text,
                    digits(INFINITE).text, why);
@@ -250,7 +250,7 @@ static void widen(Instance *x) {
     }
 }
 
-/* Of fixed steps, n to t_end for the delivered run and 2 n for the companion. */
+/* Of fixed steps, n to t_end for the delivered run and 2 n for the finer run. */
 static void begin_bars(Instance *x, double t_end) {
     const double span = t_end - x->solver.state.now.t;
     if (!has_fixed_step(x) || !(span > 0) || !isfinite(span)) return;
@@ -285,16 +285,16 @@ static Status restored_bars(Instance *x) {
     const Bars *b = x->bars;
     if (!x->started) return OK;
     share_settings(x);
-    if (*b->lost != 0 && *b->lost != 1) return restored_none(x, "companion", *b->lost);
+    if (*b->lost != 0 && *b->lost != 1) return restored_none(x, "finer run", *b->lost);
     for (int k = 0; k < b->end - b->first; k++) {
         if (!(b->worst[k] >= 0 && b->worst[k] <= DBL_MAX))
             return restored_none(x, "error bar", b->worst[k]);
         if (!(b->size[k] >= 0 && b->size[k] <= DBL_MAX))
             return restored_none(x, "error bar", b->size[k]);
     }
-    if (*b->lost) return OK; /* of the companion nothing is used any more */
+    if (*b->lost) return OK; /* of the finer run nothing is used any more */
     if (b->solver.state.now.t != x->solver.state.now.t)
-        return restored_none(x, "companion's time", b->solver.state.now.t);
+        return restored_none(x, "finer run's time", b->solver.state.now.t);
     return restored_solver(x, &b->solver);
 }
 

@@ -100,7 +100,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                     "points, which Model Exchange has not: take co-simulation");
     if (fmuType == fmi2ModelExchange && ERROR_BARS != NULL)
         return none(functions, instanceName,
-                    "fmi2Instantiate: error bars come from a companion run beside the FMU's own, and in "
+                    "fmi2Instantiate: error bars come from a finer run beside the FMU's own, and in "
                     "Model Exchange the importer integrates: take co-simulation, or an FMU without");
 
     const size_t name_size = strlen(instanceName) + 1;

@@ -62,7 +62,7 @@ SHARED void instance_reset(Instance *x);
 /* The value of a variable.  FAILED, the cause in x->solver.why, if it cannot be calculated. */
 SHARED Status instance_get(Instance *x, const Variable *v, double *value);
 
-/* The same of what lies in a state that `o` was observed at: of this instance, or of a companion. */
+/* The same of what lies in a state that `o` was observed at: of this instance, or of a finer run. */
 SHARED Status instance_value(Solver *s, const Observed *o, const Variable *v, double *value);
 
 /* The value of a variable that is not an output, as it was set. */

@@ -113,7 +113,7 @@ static Status check_velocities(const Start *x, const int *active, double *fastes
     return FAILED;
 }
 
-/* Of the contacts that touch and part, those that would not rise above the gap within which contacts touch,
+/* Of the contacts that touch and depart, those that would not rise above the gap within which contacts touch,
  * v^2 <= 2 a gap, are closed; whether there are any. */
 static Status close_low(const Start *x, int *active, int *any) {
     const System *s = x->s->system;
@@ -147,7 +147,7 @@ static Status move_velocities(const Start *x, int *active, const double *natural
     return mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->size);
 }
 
-/* Velocities on G v = nu; a contact that is already parting (df/dt > 0) is open, unless it parts so slowly
+/* Velocities on G v = nu; a contact that is already departing (df/dt > 0) is open, unless so slowly
  * that it comes to rest, as after an impact. */
 static Status find_velocities(const Start *x) {
     const System *s = x->s->system;

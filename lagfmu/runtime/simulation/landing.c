@@ -4,7 +4,7 @@
  * A solver stops where it sees that f has changed its sign, a little inside, f = -d; a slow rebound from
  * there would never come out.  So q goes back onto f = 0, and what the way inside has added to the speed
  * is taken off, s^2 <- s^2 - 2 a d with the acceleration a towards the contact: without it bounces with e
- * near 1 would not die out, e^2 (h + d) = h.  A contact that is inside and already parts, though it is
+ * near 1 would not die out, e^2 (h + d) = h.  A contact that is inside and already departs, though it is
  * pulled back, has been in a flight too short for the solver's steps: it is at rest, s = 0. */
 #include "landing.h"
 

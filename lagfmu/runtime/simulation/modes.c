@@ -68,7 +68,7 @@ static Status strike_contacts(Solver *s, Instant at, const int *happened, Flags 
     return OK;
 }
 
-/* Contacts that were struck, or were closed, and part so slowly that they would not rise above the gap within
+/* Contacts that were struck, or were closed, and depart so slowly that they would not rise above the gap within
  * which contacts touch, v^2 / (2 a) <= gap, are added to those that touch: without it a ball would bounce
  * infinitely often in a finite time.  `shut`: closed before.  Returns whether there are any. */
 static int find_low(Solver *s, const double *slow, const int *shut, Flags *x) {
@@ -86,7 +86,7 @@ static int find_low(Solver *s, const double *slow, const int *shut, Flags *x) {
     return any;
 }
 
-/* The modes after the impacts: accelerations decide where df/dt is zero; what parts is open. */
+/* The modes after the impacts: accelerations decide where df/dt is zero; what departs is open. */
 static Status settle_modes(Solver *s, Instant at, Flags *x) {
     const System *system = s->system;
     const double *q = s->state.q, *v = s->state.v;

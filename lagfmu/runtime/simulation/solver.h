@@ -28,7 +28,7 @@ typedef struct Solver {
     Settings settings;
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
-    double limit;              /* [s] of a step, of the companion of error bars (bars.h); 0: none */
+    double limit;              /* [s] of a step, of the finer run of error bars (bars.h); 0: none */
     double first, taken;       /* [s] the first and the longest step that led to the communication point */
     State state;
     Drive drive;
