@@ -45,19 +45,9 @@ def hang(path, angles, stop, points=1, tolerance=1e-12):
     )
 
 
-def test_at_rest_every_link_carries_what_hangs_below_it(native_fmu):
-    """Hanging straight down the tension of link k is (n - k + 1) m g: lambda = -T/(2 l)."""
-    result = hang(native_fmu("Chain"), np.zeros(4), 1.0, 5)
-    for k in range(1, 5):
-        tension = (4 - k + 1) * MASS * G
-        np.testing.assert_allclose(
-            result[f"lambda.link{k}"], -tension / (2 * LENGTH), rtol=1e-13, err_msg=f"link {k}"
-        )
-
-
 @pytest.mark.parametrize("n", [1, 2, 3, 7, 20])
 def test_every_link_of_any_chain_at_rest(chain, n):
-    """The same for n links, whatever n."""
+    """Hanging straight down the tension of link k is (n - k + 1) m g: lambda = -T/(2 l), whatever n."""
     result = simulate(chain.chain(n), 0.1, 0.1, start_values=places(np.zeros(n)))
     for k in range(1, n + 1):
         tension = (n - k + 1) * MASS * G

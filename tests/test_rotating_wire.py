@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from runs import simulate_fmu
 
 CASES = {
@@ -24,40 +23,6 @@ def spin(path, m, omega, r0, v0, tolerance=1e-12, **start):
         relative_tolerance=tolerance,
         start_values={"m": m, "omega": omega, **start},
     )
-
-
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
-@pytest.mark.parametrize(("tolerance", "allowed"), [(None, 1e-7), (1e-12, 1e-11)])
-def test_the_bead_runs_away_and_lambda_is_the_motors_torque(native_fmu, case, tolerance, allowed):
-    """r = r0 cosh wt + (v0/w) sinh wt, and lambda = 2 m w r r' is the torque [N m] that keeps the wire
-    turning: from rest m r0^2 w^2 sinh 2wt."""
-    result = spin(native_fmu("RotatingWire"), **case, tolerance=tolerance)
-    m, w, r0, v0 = case.values()
-    t = result["time"]
-    r = r0 * np.cosh(w * t) + v0 / w * np.sinh(w * t)
-    rate = r0 * w * np.sinh(w * t) + v0 * np.cosh(w * t)
-    size = np.abs(r).max()
-    assert np.abs(result["r"] - r).max() < allowed * size
-    assert np.abs(result["der(r)"] - rate).max() < allowed * size * abs(w)
-    torque = 2 * m * w * r * rate
-    top = np.abs(torque).max()
-    assert np.abs(result["lambda.drive"] - torque).max() < 2 * allowed * top
-    if v0 == 0:
-        np.testing.assert_allclose(torque, m * r0**2 * w**2 * np.sinh(2 * w * t), rtol=1e-12)
-    np.testing.assert_array_equal(result["Q.phi"], result["lambda.drive"])
-    assert (result["Q.r"] == 0).all()
-
-
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
-def test_the_wire_turns_evenly(native_fmu, case):
-    """phi = w t and phi' = w to rounding: the motor does not give way, and what is left of phi'' is
-    rounding in the Coriolis acceleration 2 r' w / r that it balances."""
-    result = spin(native_fmu("RotatingWire"), **case)
-    w = case["omega"]
-    np.testing.assert_allclose(result["phi"], w * result["time"], rtol=1e-14, atol=0)
-    np.testing.assert_allclose(result["der(phi)"], w, rtol=1e-14)
-    coriolis = 2 * np.abs(result["der(r)"] * w / result["r"])
-    assert (np.abs(result["der(phi,2)"]) <= 2 * np.finfo(float).eps * coriolis).all()
 
 
 def test_the_motor_feeds_the_bead(native_fmu):
