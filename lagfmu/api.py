@@ -59,17 +59,16 @@ def build_fmu(
     `target` is 'native' or 'python'; without one it is native where a C compiler is at hand, else python,
     with a warning that names what to install.  A native FMU has binaries for `platforms`, see
     compiler.PLATFORMS.
-    A scene with an `accuracy` takes some runs more: its tolerance is found by bisection.
+    For a scene with an `accuracy` the tolerance is found by bisection, which takes some runs.
 
-    `closed_forms` travel in the FMU, so that `lagfmu verify` can hold it against them.  With `check` the
-    FMU is simulated through fmpy and held against them here, and its page shows the figures; a native FMU
-    is simulated only if it has a binary for this machine.  With `reference` it carries the results of its
-    default experiment at a tolerance of 1e-12 (FMI-LS-REF).
+    The FMU carries the `closed_forms` for `lagfmu verify`.  With `check` it is simulated through fmpy and
+    compared with them here, and its page shows the figures; a native FMU is simulated only if it has a
+    binary for this machine.  With `reference` it carries the results of its default experiment at a
+    tolerance of 1e-12 (FMI-LS-REF).
 
-    Without `sources` a native FMU carries no C files: it is smaller, and cannot be compiled anew.
+    Without `sources` a native FMU carries no C files: it is smaller, and no tool can compile it again.
 
-    With `page` its documentation holds the page in which it runs (documentation/play.html), which needs
-    ziglang.
+    With `page` its documentation holds its live page (documentation/play.html), which needs ziglang.
 
     Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
     VerificationError with the statements that do not hold.  After the last two the file is kept.

@@ -22,8 +22,8 @@ TIME = dynamicsymbols._t
 class Statement:
     """Where something holds of an FMU's outputs, and how well.
 
-    `while_closed`, `while_open`: only while that contact is so.  `until_departure`: only as long as that
-    contact, closed at the start, has not opened.  `when`: only where this expression of outputs, parameters,
+    `while_closed`, `while_open`: only while that contact is so.  `until_departure`: only until that contact,
+    closed at the start, departs.  `when`: only where this expression of outputs, parameters,
     initial values and time is not 0 (contacts and counts are numbers in it).  Errors are measured relative to
     `scale` (default: the largest magnitude of `expected` along the run) and allowed up to `within` times the
     solver's tolerance, but at least `rounding`.  `only`: the FMUs that it applies to.
@@ -44,7 +44,7 @@ class ClosedForm(Statement):
     """`actual` equals `expected` at every communication point at which it applies.
 
     `name` is an output's name (then `actual` may be left out) or a label.  `at_departure`: only once, when
-    that contact, closed at the start, has first opened, to be used with the `departure` symbols.
+    that contact, closed at the start, has first departed; for use with the `departure` symbols.
     """
 
     name: str
@@ -74,7 +74,7 @@ def initial(state: Expr) -> Expr:
 def departure(contact: str, state: Expr = None) -> Expr:
     """A coordinate or velocity at the contact's latest departure; its time [s] without `state`.
 
-    A closed form that uses it applies only once the contact has opened.
+    A closed form that uses it applies only once the contact has departed.
     """
     if state is None:
         return output(names.name(names.DEPARTURE_TIME, contact))

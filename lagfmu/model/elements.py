@@ -116,7 +116,7 @@ class Output:
     `expression` may hold coordinates, their first and second derivatives, inputs, parameters, time,
     `multiplier(constraint)` and `force_of_constraint(coordinate)`; each of its terms has the dimension
     of `unit`.  The name may be structured, as bob.height.  `otherwise` (a number, or an expression) is
-    its value where the expression has none, as a quotient by a lambda that is 0 in the open.
+    its value where the expression has none, as a quotient by the lambda of an open contact.
     """
 
     name: str
@@ -131,7 +131,7 @@ class Peak:
     """The extremes of a quantity over the continuous motion so far, between communication points too.
 
     `of` is the name of a Real output of the FMU, or a pattern: `lambda.rod`, `Q.*`, `der(x)`, one of the
-    model's own.  A native FMU then tells `peak.NAME.max`, `.min`, and when: `.max_time`, `.min_time` [s].
+    model's own.  A native FMU then reports `peak.NAME.max`, `.min`, `.max_time` and `.min_time` [s].
     """
 
     of: str
@@ -152,7 +152,7 @@ class Embedding:
 
 @dataclass(frozen=True)
 class ModelFields:
-    """What is said of a mechanical system, right or wrong; `model.py` checks it."""
+    """The fields of a model, right or wrong; `model.py` checks them."""
 
     name: str
     coordinates: Mapping[Expr, str]

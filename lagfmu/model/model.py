@@ -65,9 +65,9 @@ class Model(ModelFields, Displayed):
     numbers in that unit or to expressions of parameters.  A unit may be a multiple of an SI unit (g, mm,
     deg): the model keeps every number in SI, and in `display_units` the unit in which importers show it.
     `descriptions` may explain coordinates.  `outputs` are quantities besides those that every FMU reports,
-    `picture` how it looks.  A `Friction` is written among `constraints` and kept in `frictions`, a `Peak`
-    among `outputs` and kept in `peaks`.  `author`, `version`, `license` and `copyright` are told to
-    importers.
+    `picture` how it looks.  Write a `Friction` among `constraints` (it is kept in `frictions`), a `Peak`
+    among `outputs` (it is kept in `peaks`).  `author`, `version`, `license` and `copyright` stand in the
+    FMU's description.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """

@@ -54,7 +54,7 @@ class Spring:
 @dataclass(frozen=True)
 class Disk:
     """A disk or sphere; without `radius` [m] a particle.  `angle` [rad], counterclockwise from the right,
-    draws a spoke, `trace` the way that the centre has gone."""
+    draws a spoke, `trace` the path of the centre."""
 
     center: Point
     radius: Expr | None = None

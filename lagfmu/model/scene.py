@@ -1,7 +1,7 @@
-"""What one FMU must show, and so what it must hold: the full FMU is the scene that asks for everything.
+"""What one FMU reports: the full FMU is the scene that asks for everything.
 
-`outputs`, `fixed`, `inputs`, `contacts` and `frictions` say what an importer will read, change, drive, see
-open and see slip; prune.py and fold.py take everything else away before code is printed.
+`outputs`, `fixed`, `inputs`, `contacts` and `frictions` name what an importer reads, changes and drives, and
+what may open and slip; prune.py and fold.py remove everything else before code is printed.
 """
 
 from __future__ import annotations

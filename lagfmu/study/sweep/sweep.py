@@ -69,21 +69,21 @@ def sweep(
 ) -> Any:
     """Run an FMU (or a model, or a model file, built natively where a compiler is at hand) many times.
 
-    What varies are parameters, start values and `solver.*`: `vary` maps names to values, all of which are
-    crossed; `sample` maps names to frozen distributions of SciPy, of which `runs` points are drawn by
-    `sampling` ('latin-hypercube' or 'sobol') with `seed`; `rows` is a table with a column a quantity (a
-    pandas DataFrame, a structured array, or a dict of sequences).
+    Parameters, start values and `solver.*` may vary.  `vary` maps names to values, which are crossed;
+    `sample` maps names to frozen distributions of SciPy, from which `sampling` ('latin-hypercube' or 'sobol')
+    draws `runs` points with `seed`; `rows` is a table with a column for each name (a pandas DataFrame, a
+    structured array, or a dict of sequences).
 
-    `keep` are 'NAME:last', ':max', ':min', ':time-of-max' (of the continuous motion where the FMU has peaks,
-    as one that is built here, else of communication points and events), ':mean' or ':trajectory'; if empty,
-    the largest multipliers, counts and times of departures and slips.  `out`:
-    .parquet or .csv for a row a run, .nc or .zarr for all, trajectories included; finished chunks stand in
-    OUT.parts at once, and `resume` goes on from them.  `on` is a Dask scheduler's address or a
-    `dask.distributed.Client`; without it `workers` processes of this machine do the runs (all cores).
-    A run that takes longer than `timeout` [s] is given up: its status is 'timeout', its process is replaced.
+    `keep` lists 'NAME:last', ':max', ':min', ':time-of-max' (of the continuous motion where the FMU has
+    peaks, as one that is built here; else of communication points and events), ':mean' or
+    ':trajectory'.  If empty: the largest multipliers, counts and times of departures and of slipping.
+    `out` is .parquet or .csv (a row for each run), or .nc or .zarr (with trajectories).  Finished parts
+    are in OUT.parts; `resume` continues from them.  `on` is a Dask scheduler's address or a
+    `dask.distributed.Client`; without it `workers` processes of this machine do the runs (default: all
+    cores).  `timeout` [s] limits a run: its status is then 'timeout', and its process is replaced.
 
-    Returns an xarray.Dataset over the crossed quantities, or over `run`; a run that is refused has NaN, its
-    `status` and `reason`.  Raises SimulationError with what was expected.
+    Returns an xarray.Dataset over the crossed quantities, or over `run`; a refused run has NaN, its `status`
+    and its `reason`.  Raises SimulationError with what was expected.
     """
     _require()
     path_out = None if out is None else Path(out)
