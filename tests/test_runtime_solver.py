@@ -1016,7 +1016,7 @@ def test_contacts_of_unlike_restitution_keep_newtons_law(bench):
     smooth ones alone, each with its own e: 0 <= Lambda, 0 <= s+ + e s-, one of them zero."""
     one, rng, smooth = bench(jointed()), np.random.default_rng(5), np.array([3, 4])
     contacts, gripped, lifted, kept = np.array([1, 3, 4]), 0, 0, 0
-    for draw in range(120):
+    for draw in range(200):
         B, A = rng.standard_normal((4, 4)), rng.standard_normal((5, 4))
         M, before, values = B @ B.T + 0.1 * np.eye(4), rng.standard_normal(4), rng.uniform(0, 1, 3)
         A[contacts] *= -np.sign(A[contacts] @ before)[:, None]
@@ -1037,7 +1037,7 @@ def test_contacts_of_unlike_restitution_keep_newtons_law(bench):
         kept += after @ M @ after > before @ M @ before * (1 - 1e-12)
         gripped += pushes[2] != 0
         lifted += bool(entering[0]) and pushes[1] == 0
-        assert pushes[1] != 0 or pushes[2] == 0
+        assert pushes[2] == 0 or pushes[1] != 0 or A[1] @ after == pytest.approx(0, abs=1e-9)
         if not entering[0]:
             left = A[smooth] @ after + values[1:] * (A[smooth] @ before)
             left, pushes = left[2 - len(struck) :], pushes[struck]

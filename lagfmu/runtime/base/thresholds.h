@@ -17,7 +17,7 @@ static const double VANISHES = 1e-8;      /* component of a unit null vector tha
 static const double HIDDEN = 1e-7;        /* part that a heavy coordinate keeps in a row of unit norm, ... */
 static const double HIDES = 1e-3;         /* ... of which it has at least this part without the masses: then rows
                                            * may seem to be dependent and are not */
-static const double LCP_ZERO = 1e-12;     /* of the largest |b| in scaled rows: a w that counts as none */
+static const double LCP_ZERO = 1e-12;     /* of the terms of A z + b in scaled rows: a w that counts as none */
 static const double LCP_DEPENDENT = 1e-10; /* of a row of unit norm that must stand out to join the set */
 
 /* ---- projection, and consistent initial values ---- */

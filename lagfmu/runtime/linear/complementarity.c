@@ -78,10 +78,17 @@ static int join(Problem *p, int j) {
     }
 }
 
-/* w, 0 on the set; the row that violates w >= 0 most. */
-static int most_violated(const Problem *p, double *w) {
+/* w, 0 on the set; the row that violates w >= 0 most.  `floor`: what rounding leaves of the terms of A z + b,
+ * which nearly parallel rows make much larger than b. */
+static int most_violated(const Problem *p, double *w, double *floor) {
     int least = 0;
-    for (int i = 0; i < p->n; i++) w[i] = gap(p, i);
+    *floor = 0;
+    for (int i = 0; i < p->n; i++) {
+        double terms = fabs(p->b[i]);
+        for (int j = 0; j < p->n; j++) terms += fabs(p->A[i * p->n + j]) * p->z[j];
+        *floor = fmax(*floor, LCP_ZERO * terms);
+        w[i] = gap(p, i);
+    }
     for (int a = 0; a < p->count; a++) w[p->held[a]] = 0;
     for (int i = 1; i < p->n; i++)
         if (w[i] < w[least]) least = i;
@@ -91,14 +98,11 @@ static int most_violated(const Problem *p, double *w) {
 int complementarity_solve(int n, double *A, double *b, double *z, double *w, double *work,
                           int *iwork) {
     Problem p = {n, 0, iwork, iwork + n, A, b, z, work, work + n * n};
-    double *d = p.r + n, floor = 0;
+    double *d = p.r + n, floor;
     scale(&p, d);
-    for (int i = 0; i < n; i++) {
-        z[i] = 0;
-        floor = fmax(floor, LCP_ZERO * fabs(b[i]));
-    }
+    for (int i = 0; i < n; i++) z[i] = 0;
     for (int round = 0; round < 50 * (n + 1); round++) {
-        const int j = most_violated(&p, w);
+        const int j = most_violated(&p, w, &floor);
         if (n == 0 || w[j] >= -floor) {
             for (int i = 0; i < n; i++) {
                 z[i] /= d[i];
