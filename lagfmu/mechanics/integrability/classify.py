@@ -10,28 +10,25 @@ part; its rank is the number of independent first integrals (Bryant et al., *Ext
 Systems*, ch. II).  All ranks are generic: they hold away from singular points.
 
 That a coefficient vanishes is proven by exact arithmetic; that one does not is decided by its
-values with 60 digits at random points (samples.py).
+values at random points (zero.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 
-from sympy import Eq, factor_terms, sympify
-from sympy import Integral as Integral_
+from sympy import Eq, eye, factor_terms, sympify
 from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
 from ...model.display import Displayed
 from ...model.elements import Expr
 from .forms import Chart, on_surfaces, pfaffian
-from .frobenius import closed, curvature, derived_flag, obstruction, rref
-from .functions import Functions
-from .generators import Undecided
+from .frobenius import Reduced, closed, curvature, derived_flag, obstruction, rref
 from .integrals import first_integrals
+from .zero import DIGITS, Undecided, short, slope
 
 __all__ = ["Classification", "Integral", "Kind", "classify", "pfaffian"]
 
@@ -81,7 +78,6 @@ def classify(
     coordinates: Sequence[Expr],
     *,
     holonomic: Sequence[Expr] = (),
-    integrate: bool = True,
 ) -> Classification:
     """Classify a Pfaffian constraint, or a set of them.
 
@@ -92,28 +88,27 @@ def classify(
 
     `forms` are linear in the velocities q_j' of the `coordinates` q_j (`dynamicsymbols`), and set
     to zero; every other symbol is a generic parameter, every other function an unknown one.
-    Numbers with a decimal point are read as the decimal number with 14 digits.  With
-    `integrate=False`, the integrals are not looked for; else, where an integrating factor is
-    simple.  What would take too long is told by the sizes of expressions, not by a clock: the answer is the
-    same on every machine and under any load.
+    Numbers with a decimal point are read as the decimal number with 14 digits.  Integrals are found where
+    an integrating factor is simple and they are elementary; else the certificate says that there is no
+    closed form found.  What would take too long is told by the sizes of expressions, not by a clock: the
+    answer is the same on every machine and under any load.
     """
     given = tuple(forms) if isinstance(forms, list | tuple) else (forms,)
     plain = tuple(f.lhs - f.rhs if isinstance(f, Eq) else sympify(f) for f in given)
     for form in plain:
         pfaffian(form, coordinates)  # it is one, as it was given
     left, surfaces, free = on_surfaces(plain, tuple(coordinates), holonomic)
-    return _classify(left, free, surfaces, integrate)
+    return _classify(left, free, surfaces)
 
 
 def _classify(
     forms: tuple[Expr, ...],
     coordinates: tuple[Expr, ...],
     surfaces: tuple[Expr, ...],
-    integrate: bool,
 ) -> Classification:
     each: tuple[Classification, ...] = ()
     if len(forms) > 1:
-        each = tuple(_classify((form,), coordinates, surfaces, integrate) for form in forms)
+        each = tuple(_classify((form,), coordinates, surfaces) for form in forms)
     system = _System(forms, coordinates, surfaces)
     back = system.chart.back
     try:
@@ -122,13 +117,10 @@ def _classify(
         expr = back(undecided.expr)
         text = f"undecided: whether {expr} is zero decides the answer, and it is {undecided.reason}"
         return Classification(Kind.UNDECIDED, forms, system.rank, None, (), text, expr, each)
-    found: tuple[Integral, ...] = ()
     depth = flag[-1]
-    if integrate and depth:
-        found = system.integrals(bottom, [i.f for c in each for i in c.integrals])
-        if len(found) < depth:
-            were = "was" if len(found) == 1 else "were"
-            text += f"; of {depth} integrals, {len(found)} {were} found in closed form"
+    found = system.integrals(bottom, [i.f for c in each for i in c.integrals]) if depth else ()
+    if len(found) < depth:
+        text += f"; no closed form found for {depth - len(found)} of {depth} integrals"
     return Classification(kind, forms, system.rank, depth, found, text, witness, each, flag)
 
 
@@ -146,70 +138,54 @@ class _System:
         self.levels = [self.chart.there(f) for f in surfaces]
         self.rank = 0
 
-    def proof(self) -> tuple[Kind, tuple[int, ...], list[list[Expr]], str, Expr]:
+    def proof(self) -> tuple[Kind, tuple[int, ...], Reduced, str, Expr]:
         """Frobenius' theorem: the kind, the derived flag and the rows at its bottom, certificate, witness."""
-        entries = [entry for row in self.rows for entry in row]
-        for entry in (entry for entry in entries if entry.has(Integral_)):
-            raise Undecided(entry, "an integral, which is not looked into")
-        variables = self.chart.variables
-        width, count = len(variables), len(self.all)
-        field = self.field = Functions(variables, entries)
-        matrix = [[field.element(entry) for entry in row] for row in self.rows]
-        unit = [[field.one if i == j else field.zero for j in range(count)] for i in range(count)]
-        whole = [
-            a + b for a, b in zip(matrix, unit, strict=True)
-        ]  # each with what it is combined of
-        self.reduced, self.pivots = rref(field, whole, width)
-        held = len(rref(field, matrix[len(self.forms) :], width)[1])
-        self.rank = len(self.pivots) - held
+        x = self.chart.variables
+        unit = eye(len(self.all)).tolist()
+        whole = [a + b for a, b in zip(self.rows, unit, strict=True)]  # each with what it is of
+        self.reduced = rref(whole, len(x))
+        pivots = self.reduced.pivots
+        held = len(rref(self.rows[len(self.forms) :], len(x)).pivots)
+        self.rank = len(pivots) - held
         self._consistent()
-        basis = [row[:width] for row in self.reduced[: len(self.pivots)]]
-        bend = curvature(field, basis, self.pivots)
-        first, value, where = obstruction(field, matrix, bend, self.pivots)
-        ranks, bottom = derived_flag(field, basis, bend)
+        basis = Reduced([row[: len(x)] for row in self.reduced.rows[: len(pivots)]], pivots)
+        bend = curvature(basis, x)
+        first, value, where = obstruction(self.rows, bend, pivots)
+        ranks, bottom = derived_flag(basis, bend, x)
         flag = tuple(rank - held for rank in ranks)
-        if all(closed(field, row) for row in matrix[: len(self.forms)]):
+        if all(closed(row, x) for row in self.rows[: len(self.forms)]):
             kind = Kind.HOLONOMIC
         elif flag[-1] == self.rank:
             kind = Kind.INTEGRABLE
         else:
             kind = Kind.PARTLY if flag[-1] else Kind.NONHOLONOMIC
-        witness = self.chart.back(factor_terms(field.expr(value)))
-        text = self._certificate(kind, flag, first, witness, where)
-        return kind, flag, [[field.expr(a) for a in row] for row in bottom], text, witness
+        witness = self.chart.back(factor_terms(value))
+        return kind, flag, bottom, self._certificate(kind, flag, first, witness, where), witness
 
-    def integrals(self, bottom: list[list[Expr]], known: list[Expr]) -> tuple[Integral, ...]:
+    def integrals(self, bottom: Reduced, known: list[Expr]) -> tuple[Integral, ...]:
         """Integrals of the rows, besides the surfaces themselves."""
         known = [*self.levels, *map(self.chart.there, known)]
-        found = []
-        for f in first_integrals(self.rows, bottom, self.chart.variables, known):
-            if f not in self.levels:
-                with suppress(Undecided):  # it has passed, but its factors may be too long
-                    found.append(self._integral(f))
-        return tuple(found)
+        found = first_integrals(self.rows, bottom, self.chart.variables, known)
+        return tuple(self._integral(f) for f in found if f not in self.levels)
 
     def _integral(self, f: Expr) -> Integral:
         """f with its integrating factors: df = sum_i (df/dx_(p_i)) (reduced row i)."""
-        variables = self.chart.variables
-        field = Functions(variables, [f, *(entry for row in self.rows for entry in row)])
-        f = min(f, field.expr(field.element(f)), key=lambda e: e.count_ops())
-        slopes = [field.element(f.diff(variables[pivot])) for pivot in self.pivots]
+        x = self.chart.variables
+        slopes = [slope(f, x[pivot]) for pivot in self.reduced.pivots]
         factors = []
         for k in range(len(self.forms)):
-            parts = [
-                field.times(slope, field.element(self.field.expr(row[len(variables) + k])))
-                for slope, row in zip(slopes, self.reduced, strict=False)
-            ]
-            factors.append(self.chart.back(factor_terms(field.expr(field.plus(*parts)))))
+            pairs = zip(slopes, self.reduced.rows, strict=False)
+            mu = short(sum(df * row[len(x) + k] for df, row in pairs))
+            factors.append(self.chart.back(factor_terms(mu)))
         return Integral(self.chart.back(f), tuple(factors))
 
     def _consistent(self) -> None:
         """dt is no combination of the forms: else, they ask that a function of (q, t) be zero."""
         width = len(self.chart.variables)
-        if width - 1 not in self.pivots:
+        if width - 1 not in self.reduced.pivots:
             return
-        row = self.reduced[self.pivots.index(width - 1)]
-        used = [k for k in range(len(self.all)) if row[width + k]]
+        row = self.reduced.rows[-1 + len(self.reduced.pivots)]
+        used = [k for k in range(len(self.all)) if row[width + k] != 0]
         if len(used) == 1 and not any(self.rows[used[0]][:-1]):
             raise DerivationError(
                 f"constraint {self.all[used[0]]} has no velocity in it: it is no Pfaffian "
@@ -251,7 +227,7 @@ class _System:
         name = "omega" if first is None or alone else f"omega_{first + 1}"
         basis = " ^ ".join(f"d{names[j]}" for j in where)
         plain = self.chart.there(witness).is_rational_function()
-        how = "" if plain else " (by its values with 60 digits at random points)"
+        how = "" if plain else f" (by {DIGITS} digits of it at random points)"
         text = (
             f"{kind.value}: the coefficient of {basis} in d({name}) ^ {wedge} is {witness}, "
             f"not 0{how}"

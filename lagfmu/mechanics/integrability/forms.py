@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from sympy import Dummy, Eq, S, Symbol, expand, simplify, sympify
+from sympy import Dummy, Eq, S, expand, simplify, sympify
 from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
 from ...model.elements import Expr
+from .zero import plain
 
 _SHORT = 60  # operations of a coordinate's value that is put in
 
@@ -63,7 +64,7 @@ class Chart:
         self._back = {value: key for key, value in self._there.items()}
 
     def there(self, expr: Expr) -> Expr:
-        return expr.xreplace(self._there)
+        return plain(expr.xreplace(self._there))
 
     def back(self, expr: Expr) -> Expr:
         return sympify(expr).xreplace(self._back)
@@ -78,39 +79,26 @@ def on_surfaces(
     coordinate and its velocity are put into the forms and into the other f: exact, and f is gone.  An f
     that is not stays, and its differential has to join the forms.
     """
-    forms, left = list(forms), [sympify(f) for f in holonomic]
-    free, kept = list(coordinates), []
-    while left:
-        left.sort(key=lambda f: f.count_ops())
-        f = left.pop(0)
-        solved = _solved(f, free)
-        if solved is None:
+    left, kept, free = list(forms), [], list(coordinates)
+    surfaces = sorted(map(sympify, holonomic), key=lambda f: f.count_ops())
+    while surfaces:
+        f = surfaces.pop(0)
+        solved = ((q, expand(q - f / f.diff(q))) for q in free if _is_constant(f.diff(q)))
+        q, value = next(solved, (None, S.NaN))
+        if q is None or value.count_ops() > _SHORT:
             kept.append(f)
             continue
-        q, value = solved
         free.remove(q)
-        forms = [_put(form, q, value) for form in forms]
-        left = [g for g in (_put(g, q, value) for g in (*left, *kept)) if g != 0]
-        kept = []
-    return tuple(forms), tuple(kept), tuple(free)
+        put = {q.diff(dynamicsymbols._t): value.diff(dynamicsymbols._t)}
+        left, surfaces, kept = (
+            [e.xreplace(put).xreplace({q: value}) for e in group]
+            for group in (left, surfaces, kept)
+        )
+    return tuple(left), tuple(f for f in kept if f != 0), tuple(free)
 
 
-def _solved(f: Expr, coordinates: Sequence[Expr]) -> tuple[Expr, Expr] | None:
-    """A coordinate that f = 0 gives, and its value."""
-    for q in coordinates:
-        factor = f.diff(q)
-        if factor == 0 or not all(isinstance(s, Symbol) for s in factor.free_symbols):
-            continue
-        moving = factor.has(dynamicsymbols._t, *coordinates)
-        if not moving and (factor.is_number or factor.is_Symbol or factor.is_nonzero):
-            value = expand(q - f / factor)
-            if not value.has(q) and value.count_ops() <= _SHORT:
-                return q, value
-    return None
-
-
-def _put(expr: Expr, q: Expr, value: Expr) -> Expr:
-    time = dynamicsymbols._t
-    if not expr.has(q):
-        return expr
-    return expr.xreplace({q.diff(time): value.diff(time)}).xreplace({q: value})
+def _is_constant(factor: Expr) -> bool:
+    """It depends on parameters alone, and is not zero whatever they are."""
+    if factor.has(dynamicsymbols._t):
+        return False
+    return bool(factor.is_Symbol or factor.is_nonzero)

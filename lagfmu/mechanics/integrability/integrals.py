@@ -1,264 +1,167 @@
 """First integrals in closed form, where an integrating factor is simple.
 
-One form omega: a factor mu with d(mu omega) = 0 is looked for as a product of powers of the variables, of
-the factors of omega's coefficients and of omega's value on the field of all scalings, and of exponentials
-exp(c x) (Darboux; for separable, homogeneous, Bernoulli and autonomous equations it is of that kind), or
-as that of a linear equation (Ince, *Ordinary Differential Equations*, ch. II).  Several forms: those that
-are integrable alone, one after the other, and sums of monomials with constant coefficients.
-A candidate counts only where df = 0 along the system is proven.
+A factor mu with d(mu omega) = 0 is looked for as a product of powers of the variables, of the factors of
+omega's coefficients and of omega's value on the field of all scalings, and of exponentials exp(c x)
+(Darboux; for separable, homogeneous, Bernoulli and autonomous equations it is of that kind: Ince,
+*Ordinary Differential Equations*, ch. II).  Of a set, each row by itself.  What is found counts only where
+df = 0 along the system is proven.
 """
 
 from __future__ import annotations
 
 import itertools
-import random
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from typing import Any
 
-from sympy import (
-    Add,
-    Mul,
-    PolynomialError,
-    Rational,
-    S,
-    exp,
-    expand,
-    ilcm,
-    log,
-)
-from sympy.polys.domains import QQ
-from sympy.polys.matrices import DomainMatrix
+import sympy as sp
+from sympy.integrals.heurisch import heurisch
+from sympy.integrals.rationaltools import ratint
 
 from ...model.elements import Expr
-from .frobenius import Row, along, closed, curvature, rref
-from .functions import Functions
-from .generators import Undecided
-from .quadratures import potential
+from .frobenius import Reduced, Row, along, closed, curvature, rref
+from .zero import Undecided, is_zero, plain, short, slope
 
-FAILURES = (Undecided, ArithmeticError, NotImplementedError, PolynomialError, TypeError, ValueError)
-_UNKNOWNS = 90  # constants of a sum
-_FACTORABLE = 40  # terms of a polynomial that is factored
+FAILURES = (
+    Undecided,
+    ArithmeticError,
+    NotImplementedError,
+    sp.PolynomialError,
+    TypeError,
+    ValueError,
+)
+_FACTORABLE = 200  # operations of a coefficient that is factored
+_SEARCHED = 20  # operations of a term whose integral is searched for
 
 
 def first_integrals(
-    forms: Sequence[Sequence[Expr]],
-    rows: Sequence[Sequence[Expr]],
-    variables: Sequence[Expr],
-    known: Sequence[Expr],
+    forms: Sequence[Row], bottom: Reduced, variables: Row, known: Sequence[Expr]
 ) -> list[Expr]:
-    """Independent first integrals of the integrable system that the reduced `rows` span.
+    """Independent first integrals of the integrable system of the reduced rows at the `bottom`.
 
     `forms` are the one-forms as they were given, and `known` candidates for integrals.
     """
     found: list[Expr] = []
-    for f in _candidates(forms, rows, variables, known):
+    rows = forms if len(forms) == 1 else bottom.rows
+    searched = itertools.chain.from_iterable(_integrals_of(row, variables) for row in rows)
+    for f in itertools.chain(known, searched):
         with suppress(*FAILURES):
-            if _independent_integral(f, found, rows, variables):
+            if _independent(f, found, bottom, variables):
                 found.append(f)
-        if len(found) == len(rows):
+        if len(found) == len(bottom.rows):
             break
     return found
 
 
-def _candidates(
-    forms: Sequence[Sequence[Expr]],
-    rows: Sequence[Sequence[Expr]],
-    variables: Sequence[Expr],
-    known: Sequence[Expr],
-) -> Iterator[Expr]:
-    yield from known
-    for row in forms if len(forms) == 1 else rows:
-        yield from _integrals_of(row, variables)
-    if len(rows) > 1:
-        for degree in (1, 2):
-            yield from _sums(rows, variables, degree)
-
-
-def _independent_integral(
-    f: Expr, found: Sequence[Expr], rows: Sequence[Sequence[Expr]], variables: Sequence[Expr]
-) -> bool:
+def _independent(f: Expr, found: Sequence[Expr], bottom: Reduced, variables: Row) -> bool:
     """df = 0 along the system, and the derivatives by the pivots are independent of those found."""
-    field = Functions(variables, [f, *found, *itertools.chain(*rows)])
-    basis = [[field.element(entry) for entry in row] for row in rows]
-    pivots = pivots_of(rows)
-    value = field.element(f)
-    if not all(
-        field.is_zero(along(field, basis, pivots, j, value))
-        for j in range(len(variables))
-        if j not in pivots
-    ):
+    free = (j for j in range(len(variables)) if j not in bottom.pivots)
+    if not all(is_zero(along(j, f, bottom, variables)) for j in free):
         return False
-    matrix = [[field.diff(field.element(g), variables[p]) for p in pivots] for g in (*found, f)]
-    return len(rref(field, matrix, len(pivots))[1]) > len(found)
+    matrix = [[slope(g, variables[p]) for p in bottom.pivots] for g in (*found, f)]
+    return len(rref(matrix, len(bottom.pivots)).pivots) > len(found)
 
 
-def pivots_of(rows: Sequence[Sequence[Expr]]) -> list[int]:
-    """Where the reduced rows have their first entry."""
-    return [next(j for j, entry in enumerate(row) if entry != 0) for row in rows]
-
-
-# --- one form ------------------------------------------------------------------------------
-
-
-def _integrals_of(row: Sequence[Expr], variables: Sequence[Expr]) -> Iterator[Expr]:
-    """Candidates f with df = mu omega."""
+def _integrals_of(row: Row, variables: Row) -> Iterator[Expr]:
+    """Candidates f with df = mu omega, for a form that is integrable by itself."""
     with suppress(*FAILURES):
-        field = Functions(variables, row)
-        given = [field.element(entry) for entry in row]
-        if sum(map(bool, given)) > 1 and closed(field, given):  # then no factor makes it easier
-            f = potential(row, variables)
-            if f is not None:
-                yield f
-            return
-        form = _primitive(field, given)
-        place = next(i for i, a in enumerate(form) if a)
-        alone = [field.over(a, form[place]) for a in form]
-        if any(any(column) for column in curvature(field, [alone], [place]).values()):
-            return
-        for mu in _integrating_factors(field, form):
-            f = potential([mu * field.expr(a) for a in form], variables)
-            if f is not None:
-                yield _without_logarithms(f)
+        alone = rref([row], len(variables))
+        if closed(row, variables):
+            yield from _potential(row, variables)
+        elif not any(any(column) for column in curvature(alone, variables).values()):
+            form = _primitive(row)
+            factors = (
+                [sp.S.One] if closed(form, variables) else _integrating_factors(form, variables)
+            )
+            for mu in factors:
+                for f in _potential([short(mu * a) for a in form], variables):
+                    yield sp.exp(sp.expand(f)) if f.has(sp.log) else f  # x exp(-w t)
 
 
-def _primitive(field: Functions, row: Row) -> Row:
+def _primitive(row: Row) -> Row:
     """The row times its common denominator, divided by the common factor of the rest."""
-    row = [field.lift(entry) for entry in row]
-    below, above = field.K.ring.one, field.K.ring.zero
-    for entry in row:
-        field.admit(entry, field.K.raw_new(above, below))
-        below, above = below.lcm(entry.denom), above.gcd(entry.numer)
-    factor = field.K.new(below, above)
-    return [field.times(entry, factor) for entry in row]
+    quotients = [short(a) for a in row]
+    below = sp.lcm_list([sp.fraction(a)[1] for a in quotients])
+    above = [short(a * below) for a in quotients]
+    factor = sp.gcd_list(above)
+    return [short(a / factor) for a in above]
 
 
-def _integrating_factors(field: Functions, form: Row) -> Iterator[Expr]:
-    """mu with d(mu omega) = 0, for an integrable form."""
-    if closed(field, form):
-        yield S.One
-        return
-    yield from _darboux(field, form)
-    places = [i for i, a in enumerate(form) if a]
-    for p in places:  # linear in y: d(log mu) = sum_i (db_i/dy) dx_i for dy + sum_i b_i dx_i
-        y = field.variables[p]
-        slopes = [field.diff(field.over(a, form[p]), y) for a in form]
-        if all(field.is_zero(field.diff(slope, y)) for slope in slopes):
-            inner = potential([field.expr(slope) for slope in slopes], field.variables)
-            if inner is not None:
-                yield exp(expand(inner)) / field.expr(form[p])
-
-
-def _darboux(field: Functions, form: Row) -> Iterator[Expr]:
+def _integrating_factors(form: Row, variables: Row) -> Iterator[Expr]:
     """mu = prod_m h_m**c_m with d(mu omega) = 0: linear in the constants c_m."""
-    x = field.variables
-    places = [i for i, a in enumerate(form) if a]
-    scaled = field.plus(*[field.times(field.element(x[i]), form[i]) for i in places])
-    bases: dict[Expr, None] = {x[i]: None for i in places}
-    for a in (*(form[i] for i in places), scaled):
-        if len(a.numer) <= _FACTORABLE:
-            for factor, _ in a.numer.factor_list()[1]:
-                h = factor.as_expr().xreplace(field.generators.meaning)
-                if h.has(*x):
-                    bases[h] = None
-    bases |= {exp(x[i]): None for i in places}
-    logarithms = [
-        [field.over(field.diff(field.element(h), v), field.element(h)) for v in x] for h in bases
-    ]
-    pairs = list(itertools.combinations(range(len(x)), 2))
-    columns = [
-        [field.minus(field.diff(form[j], x[i]), field.diff(form[i], x[j])) for i, j in pairs]
-    ]
-    for slope in logarithms:
-        columns.append(
-            [
-                field.minus(field.times(slope[i], form[j]), field.times(slope[j], form[i]))
-                for i, j in pairs
-            ]
-        )
-    for vector in relations(field, columns):
-        if vector[0] != 0:
-            yield Mul(*[h ** (c / vector[0]) for h, c in zip(bases, vector[1:], strict=True)])
+    pairs = [(a, x) for a, x in zip(form, variables, strict=True) if a != 0]
+    bases = {x: None for _, x in pairs} | {sp.exp(x): None for _, x in pairs}
+    for a in (*(a for a, _ in pairs), short(sp.Add(*(a * x for a, x in pairs)))):
+        if a.count_ops() <= _FACTORABLE:
+            factors = (h for h, _ in sp.factor_list(a)[1])
+            bases |= {h: None for h in factors if h.has(*variables)}
+    powers = sp.symbols(f"c:{len(bases)}", cls=sp.Dummy)
+    logarithm = sum(c * sp.log(h) for c, h in zip(powers, bases, strict=True))
+    equations = []
+    for (a, x), (b, y) in itertools.combinations(zip(form, variables, strict=True), 2):
+        bend = slope(b, x) - slope(a, y)
+        turned = slope(logarithm, x) * b - slope(logarithm, y) * a
+        equations += _coefficients(bend + turned, variables)
+    for solution in sp.linsolve(equations, *powers):
+        chosen = (c.xreplace(dict.fromkeys(powers, sp.S.Zero)) for c in solution)
+        yield sp.Mul(*[h**c for h, c in zip(bases, chosen, strict=True)])
 
 
-def relations(field: Functions, columns: Sequence[Row]) -> list[list[Expr]]:
-    """Vectors c of constants with sum_m c_m columns_m = 0 identically: every coefficient of it as a
-    polynomial in the generators that are not constant has to vanish."""
-    constants = field.constants()
-    moving = [k for k, symbol in enumerate(field.K.symbols) if symbol not in constants]
-    table: dict[Any, dict[int, Any]] = {}
-    ring = field.K.ring
-    for equation, entries in enumerate(zip(*columns, strict=True)):
-        lifted = [field.lift(entry) for entry in entries]
-        below = ring.one
-        for entry in lifted:
-            field.admit(entry, field.K.raw_new(ring.one, below))
-            below = below.lcm(entry.denom)
-        for m, entry in enumerate(lifted):
-            entry = field.times(entry, field.K.raw_new(below))
-            for monomial, coefficient in entry.numer.terms():
-                outer = tuple(monomial[k] for k in moving)
-                inner = tuple(0 if k in moving else e for k, e in enumerate(monomial))
-                cells = table.setdefault((equation, outer), {})
-                cells[m] = cells.get(m, ring.zero) + ring.term_new(
-                    inner, coefficient / entry.denom.LC
-                )
-    width = len(columns)
-    chance = random.Random(3)
-    point = [(g, QQ(chance.randint(2, 99), chance.randint(2, 99))) for g in ring.gens]
-    tried = [
-        [QQ.convert(cells[m].evaluate(point)) if m in cells else QQ.zero for m in range(width)]
-        for cells in table.values()
-    ]
-    if DomainMatrix(tried, (len(tried), width), QQ).rank() == width:
-        return []
-    domain = QQ.frac_field(*constants) if constants else QQ
-    lines = [
-        [domain.from_sympy(cells.get(m, ring.zero).as_expr()) for m in range(width)]
-        for cells in table.values()
-    ]
-    kernel = DomainMatrix(lines, (len(lines), width), domain).nullspace().to_dense().to_list()
-    meaning = field.generators.meaning
-    return [[domain.to_sympy(c).xreplace(meaning) for c in vector] for vector in kernel]
+def _coefficients(quotient: Expr, variables: Row) -> list[Expr]:
+    """What has to vanish for the quotient to be zero for all values of the variables."""
+    numerator = sp.fraction(short(quotient))[0]
+    if not numerator.has(*variables):
+        return [numerator]
+    polynomial = sp.Poly(numerator)
+    moving = [g for g in polynomial.gens if g.has(*variables)]
+    return list(polynomial.as_poly(*moving).coeffs())
 
 
-def _sums(rows: Sequence[Sequence[Expr]], variables: Sequence[Expr], degree: int) -> Iterator[Expr]:
-    """f = sum of monomials in variables and functions, with constant coefficients."""
-    with suppress(*FAILURES):
-        field = Functions(variables, itertools.chain(*rows))
-        basis = [[field.element(entry) for entry in row] for row in rows]
-        pivots = pivots_of(rows)
-        fixed = field.constants()
-        atoms = [s for s in field.K.symbols if s not in fixed]
-        atoms = [field.generators.meaning[s] for s in atoms]
-        monomials = [
-            Mul(*factors)
-            for count in range(1, degree + 1)
-            for factors in itertools.combinations_with_replacement(atoms, count)
-        ]
-        if len(monomials) > _UNKNOWNS:
+def _potential(row: Row, variables: Row) -> Iterator[Expr]:
+    """f with df/dx_i = row_i, for an exact row, by one quadrature for each variable."""
+    for order in (1, -1):
+        f = sp.S.Zero
+        for a, x in list(zip(row, variables, strict=True))[::order]:
+            rest = a if f == 0 else short(a - plain(slope(f, x)))
+            if not is_zero(rest):
+                term = _quadrature(rest, x)
+                if term is None:
+                    break
+                f += term
+        else:
+            yield f.as_independent(*variables, as_Add=True)[1]
             return
-        free = [j for j in range(len(variables)) if j not in pivots]
-        columns = [
-            [along(field, basis, pivots, j, field.element(monomial)) for j in free]
-            for monomial in monomials
+
+
+def _quadrature(expr: Expr, x: Expr) -> Expr | None:
+    """The integral of `expr` by x where SymPy finds it soon; symbols count as positive, and what comes of
+    it is verified afterwards."""
+    names = {v: sp.Dummy(v.name, positive=True) for v in sorted(expr.free_symbols | {x}, key=str)}
+    attempts = [sp.expand(expr), sp.factor_terms(expr)]
+    if expr.is_rational_function(x):
+        attempts = [sp.apart(expr, x)]
+    for attempt in attempts:
+        terms = [
+            _primitive_of(term.xreplace(names), names[x]) for term in sp.Add.make_args(attempt)
         ]
-        for vector in relations(field, columns):
-            first = next(c for c in vector if c != 0)
-            yield Add(*[(c / first).cancel() * g for c, g in zip(vector, monomials, strict=True)])
+        if None not in terms:
+            return sp.Add(*terms).xreplace({new: old for old, new in names.items()})
+    return None
 
 
-def _without_logarithms(f: Expr) -> Expr:
-    """A sum of logarithms with rational ratios is exponentiated: log(x) - w*t to x*exp(-w*t)."""
-    logs = [
-        term.as_independent(log, as_Add=False) for term in Add.make_args(expand(f)) if term.has(log)
-    ]
-    if not logs:
-        return f
-    ratios = [(factor / logs[0][0]).cancel() for factor, node in logs]
-    if not all(isinstance(node, log) for _, node in logs) or not all(
-        isinstance(ratio, Rational) for ratio in ratios
-    ):
-        return f
-    scale = ilcm(1, *[ratio.q for ratio in ratios])
-    return exp(expand(scale * f / logs[0][0]))
+def _primitive_of(term: Expr, x: Expr) -> Expr | None:
+    constant, term = term.as_independent(x, as_Add=False)
+    if term.is_rational_function(x):
+        found = ratint(term, x)
+    elif term.count_ops() > _SEARCHED or len(_curved(term, x)) > 1:
+        return None
+    else:
+        found = heurisch(term, x)
+    if found is None or found.has(sp.Integral, sp.nan, sp.zoo):
+        return None
+    return constant * found
+
+
+def _curved(term: Expr, x: Expr) -> set[Expr]:
+    """Arguments that are not linear in x: of several, SymPy may search for minutes."""
+    nodes = [p for p in term.atoms(sp.Pow) if not p.exp.is_Integer] + [*term.atoms(sp.Function)]
+    return {a for node in nodes for a in node.args if a.diff(x).has(x)}
