@@ -18,7 +18,7 @@ from .codegen.c.printer import identifiers, number, string
 from .codegen.c.solve import solve_source
 from .codegen.c.variables import variables_source
 from .codegen.py.equations import lower
-from .fmu import compiler, native
+from .fmu import compiler
 from .fmu import target as targets
 from .fmu.archive import version as archive_version
 from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch
@@ -44,14 +44,12 @@ from .mechanics.formulations.nullspace import lambda_free, null_space
 from .mechanics.integrability.classify import Kind, pfaffian
 from .mechanics.jumps import jumps_of, with_jumps
 from .model.closed_form import TIME
-from .model.elements import Expr
 from .model.file import ModelFile, load
 from .model.formula import with_outputs
 from .model.goal import Goal
 from .model.goal import parse as parse_goal
 from .model.library import known
 from .model.model import name_of
-from .model.reactions import reactions_in
 from .model.spline import SplineBase
 from .model.units import (
     ENERGY,
@@ -69,11 +67,9 @@ from .model.units import (
     plain,
 )
 from .numeric import thresholds
-from .numeric.failure import StartFailureError, StepFailureError
 from .numeric.initialization import Stage
 from .numeric.start_priority import GIVEN, OMITTED, SET
-from .numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Row, System
-from .numeric.thresholds import STIFF_STEPS
+from .numeric.system import System
 from .page.documentation import page as documentation_page
 from .page.documentation import with_figures
 from .page.picture import as_bytes, direction, picture_of, read_picture
@@ -90,14 +86,13 @@ from .prepare.prepare import Prepared, prepare
 from .prepare.starts import StartMovedWarning
 from .study.stress import exchange, runs, worker
 from .study.stress.bench import Bench, Finding
-from .study.stress.closed_forms import JudgedForm, judged, magnitude
-from .study.stress.facts import Facts, facts_of
-from .study.stress.judge import EPS, Check, acts, differ, first_landing
+from .study.stress.closed_forms import judged, magnitude
+from .study.stress.facts import facts_of
+from .study.stress.judge import Check, differ, first_landing
 from .study.stress.lagrange import lagrange, lay_beside
 from .study.stress.player import Run, clear
 from .study.stress.player import opened as session_of
 from .study.stress.player import play as play_of
-from .study.stress.player import table as table_of_run
 from .study.stress.probe import (
     CONSISTENT,
     REFUSED,
@@ -126,7 +121,7 @@ from .study.tradeoff.quantities import OWN, quantities
 from .study.tradeoff.reference import refer
 from .study.tradeoff.report import table as tradeoff_table
 from .study.tradeoff.setting import Setting
-from .verification.evaluate import Compiled, function
+from .verification.evaluate import Compiled
 from .verification.pipeline import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
