@@ -36,7 +36,9 @@ ROOT = Path(__file__).parent.parent
 Graph = Mapping[str, set[str]]
 Figures = dict[str, float]
 SECRET = re.compile(r"""import_module\(\s*f?["']([\w.]+)["'](?:, *__package__)?""")
-DEFINED = re.compile(r"^(?!typedef|return|else)[A-Za-z][\w \*]*?\b(\w+)\([^;{]*\{", re.MULTILINE)
+DEFINED = re.compile(
+    r"^(?!typedef|return|else|static)[A-Za-z][\w \*]*?\b(\w+)\([^;{]*\{", re.MULTILINE
+)
 CALLED = re.compile(r"(?<![\w.>])(\w+)\(")
 HANDED = re.compile(r"\(\*(\w+)\)\(")  # an argument that is a function
 UNSEEN = re.compile(r'"(?:\\.|[^"\\])*"|/\*.*?\*/', re.DOTALL)
@@ -148,7 +150,7 @@ def condensed(files: Graph) -> dict[str, set[str]]:
 
 
 def calls(runtime: Path) -> dict[str, set[str]]:
-    """C file -> C files whose functions it calls by name."""
+    """C file -> C files whose functions, but for static ones, it calls by name."""
     bare = {p.stem: UNSEEN.sub("", p.read_text("utf-8")) for p in sorted(runtime.rglob("*.c"))}
     owner = {f: stem for stem, text in bare.items() for f in DEFINED.findall(text)}
     found = {}

@@ -1,28 +1,24 @@
-"""Equations of motion -> model.c: their numeric form as `const System`, see runtime/base/system.h.
-
-The C twin of codegen/py/equations.py, with the same layout: M as the non-zeros of its lower triangle, G
-as its non-zeros, both sorted by row, then column.  Equations and patterns only; no solver text.
+"""Equations of motion -> model.c: their numeric form (parts.py) as `const System`, see
+runtime/base/system.h.  Equations and patterns only; no solver text.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from textwrap import wrap
 from typing import Any
 
 import sympy as sp
 
-from ...mechanics.differential import Differential
-from ...mechanics.equations import TIME, EquationsOfMotion, FrictionLaw, formulas_of
+from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.form import Form
-from ...mechanics.formulations.minimal import Reduction
-from ...mechanics.jumps import NONE, Jumps, levelled
+from ...mechanics.jumps import levelled
 from ...model.elements import Expr
-from ...model.model import Contact
 from .. import bounds
-from .function import FILL, Result, function
+from ..parts import Function, Parts, parts_of
+from .function import FILL, function
 from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
 
@@ -41,6 +37,7 @@ HEAD = """/* model.c -- {name}{description}
 #include "system.h"
 #include "variables.h"
 """
+POINTER = "\nSHARED_VALUE const System *const MODEL_SYSTEM = &{}equations;\n"
 
 
 def model_source(form: Form, tangents: bool = True) -> str:
@@ -52,23 +49,15 @@ def model_source(form: Form, tangents: bool = True) -> str:
     """
     form, jumps = levelled(form)
     given = form.equations
-    jumps = jumps.mapped(_real([*given.q, *given.v, *given.u, *given.p, TIME]))
-    eom, reduction = _in_reals(given), form.reduction
+    symbols = _real([*given.q, *given.v, *given.u, *given.p, TIME])
+    time = symbols.get(TIME, TIME)
+    whole = parts_of(_in_reals(form), jumps.mapped(symbols), tangents, time)
+    eom = whole[0].eom
     index = _index("coordinates", eom.q) + _index("constraints", [c.name for c in eom.constraints])
-    if reduction is None:
-        text = _System(eom, "", form.formulation, tangents, jumps=jumps).text() + _pointer(
-            "equations"
-        )
-    else:
-        reduced = _in_reals(reduction.reduced)
-        index += _index("coordinates that are stepped", reduced.q)
-        text = "\n".join(
-            [
-                _System(eom, "", "multipliers", tangents).text(),
-                *_embedding(eom, reduction, reduced, tangents),
-                _System(reduced, "reduced_", "minimal", tangents, reduction.rows, jumps).text(),
-            ]
-        ) + _pointer("reduced_equations")
+    if len(whole) > 1:
+        index += _index("coordinates that are stepped", whole[-1].eom.q)
+    text = "\n".join(piece for parts in whole for piece in (*_embedding(parts), _system(parts)))
+    text += POINTER.format(whole[-1].prefix)
     helpers = [code for name, code in {**HELPERS, "fill": FILL}.items() if f"{name}(" in text]
     helpers += [table_text(s) for s in eom.model.splines if f"&{table_name(s)}," in text]
     model = eom.model
@@ -97,16 +86,25 @@ def _index(what: str, names: Sequence[Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _pointer(name: str) -> str:
-    return f"\nSHARED_VALUE const System *const MODEL_SYSTEM = &{name};\n"
-
-
 def _real(symbols: Sequence[Expr]) -> dict[Expr, Expr]:
     return {s: sp.Symbol(str(s), real=True) for s in symbols if s.is_real is None}
 
 
-def _in_reals(eom: EquationsOfMotion) -> EquationsOfMotion:
-    """The same equations with every symbol real, so that |x| and its like have real derivatives."""
+def _in_reals(form: Form) -> Form:
+    """The same with every symbol real, so that |x| and its like have real derivatives."""
+    reduction = form.reduction
+    if reduction is not None:
+        reduced = _equations_in_reals(reduction.reduced)
+        table = reduced.symbols
+        phi, vel = (
+            tuple(sp.sympify(e).xreplace(table) for e in group)
+            for group in (reduction.phi, reduction.vel)
+        )
+        reduction = replace(reduction, phi=phi, vel=vel, reduced=reduced)
+    return replace(form, equations=_equations_in_reals(form.equations), reduction=reduction)
+
+
+def _equations_in_reals(eom: EquationsOfMotion) -> EquationsOfMotion:
     table = _real([*eom.q, *eom.v, *eom.u, *eom.p, TIME])
 
     def real(e: Expr) -> Expr:
@@ -122,282 +120,58 @@ def _in_reals(eom: EquationsOfMotion) -> EquationsOfMotion:
     )
 
 
-class _Vocabulary:
-    """The arguments of a system's functions: which symbols stand in them, and their C names."""
-
-    def __init__(self, eom: EquationsOfMotion, q: str = "q", v: str = "v") -> None:
-        t = _real([TIME]).get(TIME, TIME)
-        self.t, self.q, self.v, self.u, self.p = (t,), eom.q, eom.v, eom.driven, eom.p
-        moving = [*eom.q, *eom.v, *eom.u]
-        self.change = {s: sp.Symbol(f"d({s})", real=True) for s in moving}
-        self.change[t] = sp.Symbol("d(t)", real=True)
-        fixed = [*eom.p, *eom.levels]
-        self.names = identifiers([*moving, *fixed, *(self.change[s] for s in moving)])
-        self.names |= {t: "t", self.change[t]: "dt"}
-        self.state = {"t": self.t, q: self.q, v: self.v, "u": self.u, "p": self.p}
-        self.still = {"t": self.t, q: self.q, "u": self.u, "p": self.p}
-        self.along = {
-            **self.state,
-            **{
-                f"d{a}": tuple(self.change[s] for s in self.state[a] if s in self.change)
-                for a in ("t", q, v, "u")
-            },
-        }
+def _names(parts: Parts) -> dict[Expr, str]:
+    """The C names of the symbols of a state, and of their changes."""
+    eom, change = parts.eom, parts.change
+    moving = [*eom.q, *eom.v, *eom.u]
+    names = identifiers([*moving, *eom.p, *eom.levels, *(change[s] for s in moving)])
+    return names | {parts.time: "t", change[parts.time]: "dt"}
 
 
-def _embedding(
-    eom: EquationsOfMotion, reduction: Reduction, reduced: EquationsOfMotion, tangents: bool
-) -> list[str]:
-    words = _Vocabulary(reduced, "s", "sdot")
-    table = _real([*(s := reduction.reduced).q, *s.v, *s.u, *s.p, TIME])
-    q = [sp.sympify(e).xreplace(table) for e in reduction.phi]
-    v = [sp.sympify(e).xreplace(table) for e in reduction.vel]
-    d = Differential(words.change)
-    embed = function(
-        "embed",
-        "q = phi(s, t) and v = J sdot + dphi/dt.",
-        words.state,
-        {"q": _results(q, eom.q), "v": _results(v, eom.v)},
-        words.names,
+def _reported(parts: Parts, names: Mapping[Expr, str]) -> dict[Expr, str]:
+    """Besides, those of what is solved for."""
+    flat = [s for group in parts.solved.values() for s in group]
+    more = identifiers([*flat, *(parts.change[s] for s in flat)], list(names.values()))
+    return {**names, **more}
+
+
+def _embedding(parts: Parts) -> list[str]:
+    return [_define(f, _names(parts)) for f in parts.embedding]
+
+
+def _define(f: Function, names: Mapping[Expr, str], prefix: str = "") -> str:
+    return function(prefix + f.name, f.doc, f.arguments, f.results, names)
+
+
+def _system(parts: Parts) -> str:
+    """Functions, then tables."""
+    names = _names(parts)
+    own = [f for f in parts.functions if f.name.startswith("outputs")]
+    texts = {f.name: _define(f, names, parts.prefix) for f in parts.functions if f not in own}
+    changing = [] if parts.eom.bare else bounds.rates(parts.eom, parts.constraints, parts.jumps)
+    if changing:
+        texts["bounds"] = _bounds(parts, changing)
+    texts |= {f.name: _define(f, _reported(parts, names)) for f in own}
+    tables = Tables(parts)
+    text = tables.of_what_is_read if parts.eom.bare else tables.text
+    return "\n".join([*texts.values(), text(set(texts))])
+
+
+def _bounds(parts: Parts, changing: Sequence[Expr]) -> str:
+    """Bounds on the rates of the indicators, in interval arithmetic."""
+    eom = parts.eom
+    groups = {"q": eom.q, "v": eom.v, "u": eom.u}
+    places = {s: f"{a}[{j}]" for a, group in groups.items() for j, s in enumerate(group)}
+    places |= {p: f"interval_of(p[{k}])" for k, p in enumerate(eom.p)}
+    places[parts.time] = "t"
+    lines, found = bounds.body(changing, places, bounds.C)
+    text = [f"    const Interval {line};\n" for line in lines]
+    text += [f"    rate[{k}] = {value};\n" for k, value in enumerate(found)]
+    whole = "".join(text)
+    silence = [a for a in "tqvup" if not re.search(rf"\b{a}\b", whole)]
+    head = (
+        "/* Bounds on how fast the indicators of events change: f of contacts, h of jumps. */\n"
+        f"static void {parts.prefix}bounds(Interval t, const Interval *q, const Interval *v, "
+        "const Interval *u,\n                   const double *p, Interval *rate) {\n"
     )
-    if not tangents:
-        return [embed]
-    change = function(
-        "embed_tangent",
-        "The change of q and v along the direction (dt, ds, dsdot, du).",
-        words.along,
-        {
-            "dq": _results([d(e) for e in q], eom.q),
-            "dv": _results([d(e) for e in v], eom.v),
-        },
-        words.names,
-    )
-    return [embed, change]
-
-
-def _results(values: Sequence[Expr], places: Sequence[Any]) -> list[Result]:
-    return [Result(sp.sympify(e), str(x)) for e, x in zip(values, places, strict=True)]
-
-
-class _Reported:
-    """The words of the outputs of the model's own: those of a state, and what is solved for there."""
-
-    def __init__(self, eom: EquationsOfMotion, words: _Vocabulary) -> None:
-        solved = {"vdot": eom.vdot, "lambda": eom.lam, "Q": eom.Q}
-        flat = [s for group in solved.values() for s in group]
-        self.change = {s: sp.Symbol(f"d({s})", real=True) for s in flat}
-        more = identifiers([*flat, *self.change.values()], list(words.names.values()))
-        self.names = words.names | more
-        self.change |= words.change
-        self.state = {**words.state, **solved}
-        self.along = {**self.state}
-        for a, group in {"t": words.t, "q": eom.q, "v": eom.v, "u": eom.u, **solved}.items():
-            self.along[f"d{a}"] = tuple(self.change[s] for s in group)
-
-
-def _coefficients(law: FrictionLaw) -> tuple[tuple[Expr, str], ...]:
-    return ((law.static, "static"), (law.kinetic, "kinetic"))
-
-
-class _System:
-    """One System: its functions, patterns and the table that holds them together."""
-
-    def __init__(
-        self,
-        eom: EquationsOfMotion,
-        prefix: str,
-        formulation: str,
-        tangents: bool,
-        rows: Sequence[int] | None = None,
-        jumps: Jumps = NONE,
-    ) -> None:
-        self.eom, self.prefix, self.formulation = eom, prefix, formulation
-        self.tangents, self.jumps = tangents, jumps
-        chosen = range(len(eom.constraints)) if rows is None else rows
-        self.constraints = [eom.constraints[k] for k in chosen]
-        mass, jacobian = eom.M.todok(), eom.G.todok()
-        self.mass = sorted((i, j) for i, j in mass if i >= j)
-        self.entries = sorted(jacobian)
-        self.M = [mass[ij] for ij in self.mass]
-        self.G = [jacobian[kj] for kj in self.entries]
-        self.words = _Vocabulary(eom)
-
-    def text(self) -> str:
-        """Functions, then tables."""
-        functions = self._functions()
-        tables = Tables(
-            self.eom,
-            self.prefix,
-            self.formulation,
-            self.constraints,
-            self.mass,
-            self.entries,
-            [s.floor for s in self.jumps.surfaces],
-        )
-        text = tables.of_what_is_read if self.eom.bare else tables.text
-        return "\n".join([*functions.values(), text(set(functions))])
-
-    def _coulomb(self) -> dict[str, list[Result]]:
-        laws = self.eom.frictions
-        mu = [(e, f"{what} of {a.name}") for a in laws for e, what in _coefficients(a)]
-        normal = [(c, f"{a.name}, {name}") for a in laws for name, c in a.normal.items()]
-        return {
-            "coefficients": [Result(sp.sympify(e), text) for e, text in mu],
-            "load": [Result(sp.sympify(a.load), a.name) for a in laws],
-            "normal": [Result(sp.sympify(c), text) for c, text in normal],
-        }
-
-    def _functions(self) -> dict[str, str]:
-        """The text of each function of the System that is needed."""
-        eom, words = self.eom, self.words
-        q, rows = [str(s) for s in eom.q], [c.name for c in self.constraints]
-        at_mass = [f"{q[i]}, {q[j]}" for i, j in self.mass]
-        at_entry = [f"{rows[k]}, {q[j]}" for k, j in self.entries]
-        f = [sp.S.Zero if e is None else e for e in eom.f]
-        energy = [sp.S.Zero if e is None else e for e in (eom.kinetic, eom.potential)]
-        if eom.kinetic is None and eom.potential is None:
-            energy = []
-        groups = {
-            "M": (self.M, at_mass),
-            "F": (eom.F, q),
-            "G": (self.G, at_entry),
-            "nu": (eom.nu, rows),
-            "gamma": (eom.gamma, rows),
-            "f": (f, rows),
-            "energy": (energy, ("kinetic", "potential")[: len(energy)]),
-        }
-        values = {a: _results(list(e), places) for a, (e, places) in groups.items()}
-        d = Differential(words.change)
-        changes = {
-            f"d{a}": _results([d(e) for e in group], places)
-            for a, (group, places) in groups.items()
-        }
-        restitution = [
-            eom.plain(c.restitution) if isinstance(c, Contact) else sp.S.Zero
-            for c in self.constraints
-        ]
-
-        def define(name: str, doc: str, arguments: Any, results: Any) -> str:
-            return function(self.prefix + name, doc, arguments, results, words.names)
-
-        found: dict[str, str] = {}
-        if not eom.bare:
-            found["dynamics"] = define(
-                "dynamics",
-                "M (lower triangle), F, G, nu, gamma of  M vdot = F + G^T lambda,  G vdot = gamma.",
-                words.state,
-                {a: values[a] for a in ("M", "F", "G", "nu", "gamma")},
-            )
-            found["residual"] = define(
-                "residual",
-                "f of each constraint f(q, t) = 0; 0 for a nonholonomic one.",
-                words.still,
-                {"f": values["f"]},
-            )
-        if energy:
-            found["energies"] = define(
-                "energies",
-                "Kinetic and potential energy [J].",
-                words.state,
-                {"energy": values["energy"]},
-            )
-        if any(isinstance(c, Contact) for c in self.constraints):
-            found["restitution"] = define(
-                "restitution",
-                "Newton's coefficient of restitution of each row; 0 for one that is no contact.",
-                {"p": words.p},
-                {"e": _results(restitution, rows)},
-            )
-        if eom.frictions:
-            found["coulomb"] = define(
-                "coulomb",
-                "Coefficients, static and kinetic, and normal force load + sum of c * lambda [N].",
-                words.state,
-                self._coulomb(),
-            )
-        if self.tangents and (energy or not eom.bare):
-            found["tangent"] = define(
-                "tangent",
-                "The change of all of these along the direction (dt, dq, dv, du).",
-                words.along,
-                changes,
-            )
-        if eom.lookups:
-            found["lookups"] = define(
-                "lookups",
-                "Where tables are looked up.",
-                words.state,
-                {"places": _results([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])},
-            )
-        formulas = formulas_of(eom) if not eom.bare else {}
-        if formulas:
-            states = [str(s) for s in (*eom.q, *eom.v)]
-            found["starts"] = define(
-                "starts",
-                "Start values that are expressions of parameters.",
-                {"p": words.p},
-                {"w": [Result(e, states[j]) for j, e in formulas.items()]},
-            )
-        jumps = self.jumps
-        if jumps.surfaces:
-            h = [s.h for s in jumps.surfaces]
-            found["surfaces"] = define(
-                "surfaces",
-                "h of each jump of the forces: where it passes 0, or a whole number.",
-                words.still,
-                {"h": _results(h, [str(s) for s in eom.levels])},
-            )
-        changing = bounds.rates(eom, self.constraints, jumps) if not eom.bare else []
-        if changing:
-            found["bounds"] = self._bounds(changing)
-        if eom.outputs and not self.prefix:
-            found |= self._outputs()
-        return found
-
-    def _bounds(self, changing: Sequence[Expr]) -> str:
-        """Bounds on the rates of the indicators, in interval arithmetic."""
-        eom = self.eom
-        groups = {"q": eom.q, "v": eom.v, "u": eom.u}
-        places = {s: f"{a}[{j}]" for a, group in groups.items() for j, s in enumerate(group)}
-        places |= {p: f"interval_of(p[{k}])" for k, p in enumerate(eom.p)}
-        places[self.words.t[0]] = "t"
-        lines, values = bounds.body(changing, places, bounds.C)
-        text = [f"    const Interval {line};\n" for line in lines]
-        text += [f"    rate[{k}] = {value};\n" for k, value in enumerate(values)]
-        whole = "".join(text)
-        silence = [a for a in "tqvup" if not re.search(rf"\b{a}\b", whole)]
-        head = (
-            "/* Bounds on how fast the indicators of events change: f of contacts, h of jumps. */\n"
-            f"static void {self.prefix}bounds(Interval t, const Interval *q, const Interval *v, "
-            "const Interval *u,\n                   const double *p, Interval *rate) {\n"
-        )
-        return head + "".join(f"    (void){a};\n" for a in silence) + whole + "}\n"
-
-    def _outputs(self) -> dict[str, str]:
-        """The model's own outputs, and their changes."""
-        outputs, words = self.eom.outputs, _Reported(self.eom, self.words)
-        d = Differential(words.change)
-        value = [o.expression for o in outputs]
-        other = [sp.S.Zero if o.otherwise is None else o.otherwise for o in outputs]
-        places = [f"{o.name} [{o.unit}]" for o in outputs]
-        found = {
-            "outputs": function(
-                "outputs",
-                "Outputs of the model's own, and their values where these are not finite.",
-                words.state,
-                {"w": _results(value, places), "other": _results(other, places)},
-                words.names,
-            )
-        }
-        if self.tangents:
-            found["outputs_tangent"] = function(
-                "outputs_tangent",
-                "Their changes along a direction, with those of what is solved for.",
-                words.along,
-                {
-                    "dw": _results([d(e) for e in value], places),
-                    "dother": _results([d(sp.sympify(e)) for e in other], places),
-                },
-                words.names,
-            )
-        return found
+    return head + "".join(f"    (void){a};\n" for a in silence) + whole + "}\n"

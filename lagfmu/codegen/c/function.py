@@ -16,6 +16,7 @@ import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from ...model.elements import Expr
+from ..parts import Value
 from .printer import POWER, Printer
 from .subexpressions import Names, common_subexpressions
 
@@ -26,14 +27,6 @@ FILL = (
     "static void fill(double *values, int count, double value) {\n"
     "    for (int i = 0; i < count; i++) {\n        values[i] = value;\n    }\n}\n"
 )
-
-
-@dataclass(frozen=True)
-class Result:
-    """One value to compute: expression, and what stands in the comment behind it."""
-
-    value: Expr
-    place: str
 
 
 @dataclass(frozen=True)
@@ -52,7 +45,7 @@ def function(
     name: str,
     doc: str,
     arguments: Mapping[str, Sequence[Expr]],
-    results: Mapping[str, Sequence[Result]],
+    results: Mapping[str, Sequence[Value]],
     names: Mapping[Expr, str],
 ) -> str:
     """C text of `name(arguments, results)`.
@@ -145,13 +138,13 @@ def _silence(unused: Sequence[str]) -> str:
 # ------------------------------------------------------------------------------- statements
 
 
-def _statements(array: str, group: Sequence[Result]) -> Iterator[_Statement]:
+def _statements(array: str, group: Sequence[Value]) -> Iterator[_Statement]:
     """Assignments; equal neighbours become one loop, long sums are added up in pieces."""
     k = 0
     while k < len(group):
-        value = sp.sympify(group[k].value)
+        value = group[k].expression
         end = k + 1
-        while end < len(group) and group[end].value == value:
+        while end < len(group) and group[end].expression == value:
             end += 1
         if end - k >= RUN:
             place = f"{group[k].place} ... {group[end - 1].place}"

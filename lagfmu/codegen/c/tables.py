@@ -7,30 +7,20 @@ from collections.abc import Collection, Sequence
 from textwrap import wrap
 from typing import Any
 
-from ...mechanics.equations import EquationsOfMotion, formulas_of
-from ...model.model import Constraint, Contact, Nonholonomic
+from ...mechanics.equations import EquationsOfMotion
+from ...model.model import Nonholonomic
+from ...numeric.system import CONTACT
+from ..parts import Parts
 from . import elimination
 from . import solve as csolve
 
-Pair = tuple[int, int]
-
 
 class Tables:
-    """Of one system; `mass` and `entries` are the positions of the values in M and G."""
+    """Of one system."""
 
-    def __init__(
-        self,
-        eom: EquationsOfMotion,
-        prefix: str,
-        formulation: str,
-        constraints: Sequence[Constraint],
-        mass: Sequence[Pair],
-        entries: Sequence[Pair],
-        floors: Sequence[bool] = (),
-    ) -> None:
-        self.floors = floors
-        self.eom, self.prefix, self.formulation = eom, prefix, formulation
-        self.constraints, self.mass, self.entries = constraints, mass, entries
+    def __init__(self, parts: Parts) -> None:
+        self.parts, self.eom, self.prefix = parts, parts.eom, parts.prefix
+        self.mass, self.entries = parts.mass, parts.jacobian
 
     def of_what_is_read(self, functions: Collection[str]) -> str:
         """A System of coordinates that are only read: names, and the energies if they are read."""
@@ -43,14 +33,13 @@ class Tables:
 
     def text(self, functions: Collection[str]) -> str:
         """The tables, the elimination's plan, and the System with these functions."""
-        eom = self.eom
+        parts, eom = self.parts, self.eom
         start = [bisect_left(self.entries, (k,)) for k in range(eom.m + 1)]
-        contacts = [k for k, c in enumerate(self.constraints) if isinstance(c, Contact)]
-        prescribed = [k for k, s in enumerate(eom.u) if eom.rates.get(s) in eom.rates]
-        estimated = [k for k, s in enumerate(eom.u) if s in eom.estimated]
+        contacts = [k for k, row in enumerate(parts.rows) if row.kind == CONTACT]
+        prescribed, estimated, folded = parts.prescribed, parts.estimated, parts.folded
         dimension, extent, angles = self._dimensions()
         names = [f'"{s}"' for s in eom.q]
-        parts = [
+        tables = [
             self._array("const char *const", "coordinates", names),
             self._array("const Row", "rows", self._rows()),
             self._integers("contact", contacts),
@@ -66,31 +55,30 @@ class Tables:
         ]
         frictions, normal_rows = self._frictions()
         if frictions:
-            parts.append(self._array("const Friction", "frictions", frictions))
-            parts.append(self._integers("normal_row", normal_rows))
-        folded = [eom.folded(eom.units[str(q)]) for q in eom.q]
-        if self.floors:
-            parts.append(self._integers("at_integers", [int(x) for x in self.floors]))
+            tables.append(self._array("const Friction", "frictions", frictions))
+            tables.append(self._integers("normal_row", normal_rows))
+        if parts.at_integers:
+            tables.append(self._integers("at_integers", [int(x) for x in parts.at_integers]))
         if any(folded):
-            parts.append(self._array("const double", "folded", [repr(x) for x in folded]))
+            tables.append(self._array("const double", "folded", [repr(x) for x in folded]))
         p = self.prefix
         plan = elimination.plan(eom.n, eom.m, self.mass, self.entries)
-        parts.append("\n" + plan.c_text(f"{p}plan") + "\n")
+        tables.append("\n" + plan.c_text(f"{p}plan") + "\n")
         solve = None
-        if self.formulation != "nullspace":
+        if parts.formulation != "nullspace":
             solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
-            parts.append(f"{solve}\n" if solve else "")
+            tables.append(f"{solve}\n" if solve else "")
         quick = solve is not None and not eom.u
         if quick:
             sizes = (len(self.mass), eom.n, len(self.entries), eom.m, eom.m)
-            parts.append(csolve.accelerate_source(p, sizes) + "\n")
+            tables.append(csolve.accelerate_source(p, sizes) + "\n")
         own, more = self._outputs(functions)
         reach, ends = self._lookups(functions)
-        parts += [own, reach]
+        tables += [own, reach]
         more |= ends
         if "starts" in functions:
-            started = list(formulas_of(eom))
-            parts.append(self._integers("started", started))
+            started = list(parts.formulas)
+            tables.append(self._integers("started", started))
             more |= {
                 "started_count": len(started),
                 "started": f"{p}started",
@@ -101,8 +89,8 @@ class Tables:
             "m": eom.m,
             "contacts": len(contacts),
             "inputs": len(eom.u),
-            "switches": len(self.floors),
-            "at_integers": f"{p}at_integers" if self.floors else "NULL",
+            "switches": len(parts.at_integers),
+            "at_integers": f"{p}at_integers" if parts.at_integers else "NULL",
             "parameters": len(eom.p),
             "masses": len(self.mass),
             "entries": len(self.entries),
@@ -122,9 +110,9 @@ class Tables:
             ),
             "angles": angles,
             "folded": f"{p}folded" if any(folded) else "NULL",
-            "formulation": self.formulation.upper(),
-            "constant_mass": int(self._constant_mass()),
-            "separable": int(self._separable()),
+            "formulation": parts.formulation.upper(),
+            "constant_mass": int(_constant_mass(eom)),
+            "separable": int(not entanglements(eom, parts.formulation)),
             "plan": f"&{p}plan",
             "solve": f"{p}solve" if solve else "NULL",
             "accelerate": f"{p}accelerate" if quick else "NULL",
@@ -150,7 +138,7 @@ class Tables:
                 "coulomb": f"{p}coulomb",
             }
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
-        return "".join(parts) + f"static const System {p}equations = {{\n{lines}}};\n"
+        return "".join(tables) + f"static const System {p}equations = {{\n{lines}}};\n"
 
     def _outputs(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
         """Tables of the model's own outputs, and the System's fields that hold them."""
@@ -185,34 +173,24 @@ class Tables:
         return self._array("const int", name, [str(k) for k in values] or ["0"])
 
     def _rows(self) -> list[str]:
-        position = {c.name: k for k, c in enumerate(self.constraints)}
-        owner = {name: i + 1 for i, law in enumerate(self.eom.frictions) for name in law.of}
         items = []
-        for c in self.constraints:
-            kind = "HOLONOMIC"
-            if isinstance(c, Contact):
-                kind = "CONTACT"
-            elif isinstance(c, Nonholonomic):
-                kind = "NONHOLONOMIC"
-            closed = getattr(c, "while_closed", None)
-            gate = -1 if closed is None else position[closed]
-            items.append(f'{{"{c.name}", {kind}, {gate}, {owner.get(c.name, 0)}}}')
+        for row in self.parts.rows:
+            gate = -1 if row.while_closed is None else row.while_closed
+            owner = 0 if row.friction is None else row.friction + 1
+            items.append(f'{{"{row.name}", {row.kind.upper()}, {gate}, {owner}}}')
         return items or ['{"", HOLONOMIC, -1, 0}']
 
     def _frictions(self) -> tuple[list[str], list[int]]:
         """The frictions as Friction in system.h, and the rows whose multipliers make up N."""
-        position = {c.name: k for k, c in enumerate(self.constraints)}
         items: list[str] = []
         normal_rows: list[int] = []
-        for law in self.eom.frictions:
-            rows = [position[name] for name in law.of]
-            normal = [position[name] for name in law.normal]
-            gated = law.load == 0 and all(isinstance(self.constraints[k], Contact) for k in normal)
+        for law in self.parts.frictions:
+            rows = ", ".join(map(str, law.rows))
             items.append(
-                f'{{"{law.name}", {len(rows)}, {{{", ".join(map(str, rows))}}}, {len(normal_rows)}, '
-                f"{len(normal)}, {int(gated and bool(normal))}}}"
+                f'{{"{law.name}", {len(law.rows)}, {{{rows}}}, {len(normal_rows)}, '
+                f"{len(law.normal)}, {int(law.gated)}}}"
             )
-            normal_rows += normal
+            normal_rows += law.normal
         return items, normal_rows
 
     def _dimensions(self) -> tuple[list[int], list[int], int]:
@@ -227,12 +205,6 @@ class Tables:
         ]
         angles = [k for u, k in zip(units, of_coordinates, strict=True) if u.dimensionless]
         return of_coordinates, of_parameters or [-1], angles[0] if angles else -1
-
-    def _constant_mass(self) -> bool:
-        return _constant_mass(self.eom)
-
-    def _separable(self) -> bool:
-        return not entanglements(self.eom, self.formulation)
 
 
 def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:

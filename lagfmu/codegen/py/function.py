@@ -20,7 +20,7 @@ from ..identifier import identifier
 
 ARGUMENTS = (
     *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "h", "e", "energy"),
-    *("vdot", "lam", "Q", "w", "static", "kinetic", "load", "normal"),
+    *("vdot", "lam", "Q", "w", "static", "kinetic", "load", "normal", "places"),
 )
 
 TABLE = "table_of_"
@@ -88,7 +88,8 @@ def function(
 ) -> str:
     """Source of `name(*arguments)` that returns a tuple of the lists in `results`.
 
-    `arguments` maps an argument to the symbols it is unpacked into (none: it is passed as it is).
+    `arguments` maps an argument to the symbols it is unpacked into, one that is passed as it is to the one
+    symbol that has its name.
     """
     printer = _Printer(names)
     flat = [sp.sympify(e) for group in results.values() for e in group]
@@ -97,6 +98,8 @@ def function(
     common, reduced = sp.cse(flat, symbols=free, order="none", list=True)
     lines = [f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
     for argument, symbols in arguments.items():
+        if [names[s] for s in symbols] == [argument]:
+            continue
         wanted = [names[s] if s in used else "_" for s in symbols]
         if any(w != "_" for w in wanted):
             lines.append(f"    {', '.join(wanted)}{',' if len(wanted) == 1 else ''} = {argument}")

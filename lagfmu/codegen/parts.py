@@ -1,0 +1,317 @@
+"""What the numeric form of a model consists of, in no language: c/ and py/ print this list.
+
+    M(q,t) vdot = F(q,v,t,u) + G^T lambda ,  G v = nu(q,t,u) ,  G vdot = gamma(q,v,t,u) ,  f(q,t) = 0
+
+M is listed by the non-zeros of its lower triangle, G by its non-zeros, both sorted by row, then column.  A
+tangent is the change of a function's results along a direction in t, q, v and u; d(x) is the change of x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+
+from ..mechanics.differential import Differential
+from ..mechanics.equations import TIME, EquationsOfMotion, formulas_of
+from ..mechanics.form import Form
+from ..mechanics.formulations.minimal import Reduction
+from ..mechanics.jumps import NONE, Jumps
+from ..model.elements import Expr
+from ..model.model import Constraint, Contact, Nonholonomic
+from ..numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Friction, Row
+
+Arguments = Mapping[str, Sequence[Expr]]
+EMBED = "q = phi(s, t) and v = J sdot + dphi/dt."
+
+
+@dataclass(frozen=True)
+class Value:
+    """One number to compute, and what it is of."""
+
+    expression: Expr
+    place: str
+
+
+@dataclass(frozen=True)
+class Function:
+    """name(arguments) -> results: each argument with the symbols in it, each result with its values."""
+
+    name: str
+    doc: str
+    arguments: Arguments
+    results: Mapping[str, Sequence[Value]]
+
+
+def values(expressions: Sequence[Expr], places: Sequence[Any]) -> list[Value]:
+    """Each expression with its place."""
+    return [Value(sp.sympify(e), str(x)) for e, x in zip(expressions, places, strict=True)]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Of one system: its coordinates, the `constraints` that are its rows, its functions and patterns.
+
+    `prefix` begins the names of all that is defined for it; `jumps`: those of its forces.  `reduction`: what
+    leads from it to `full`, the equations of all coordinates.  `tangents`: its functions have them.
+    """
+
+    eom: EquationsOfMotion
+    prefix: str
+    formulation: str
+    constraints: tuple[Constraint, ...]
+    jumps: Jumps = NONE
+    full: EquationsOfMotion | None = None
+    reduction: Reduction | None = None
+    tangents: bool = False
+    time: Expr = TIME
+
+    # ------------------------------------------------------------------------ patterns
+
+    @cached_property
+    def mass(self) -> list[tuple[int, int]]:
+        """(row, column) of each value of M."""
+        return sorted((i, j) for i, j in self.eom.M.todok() if i >= j)
+
+    @cached_property
+    def jacobian(self) -> list[tuple[int, int]]:
+        """(row, column) of each value of G."""
+        return sorted(self.eom.G.todok())
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """The constraints, as they act."""
+        position = {c.name: k for k, c in enumerate(self.constraints)}
+        owner = {name: i for i, law in enumerate(self.eom.frictions) for name in law.of}
+        found = []
+        for c in self.constraints:
+            kind = HOLONOMIC
+            if isinstance(c, Contact):
+                kind = CONTACT
+            elif isinstance(c, Nonholonomic):
+                kind = NONHOLONOMIC
+            closed = getattr(c, "while_closed", None)
+            gate = None if closed is None else position[closed]
+            found.append(Row(c.name, kind, gate, owner.get(c.name)))
+        return found
+
+    @cached_property
+    def frictions(self) -> list[Friction]:
+        """The rows that each friction limits, and those that make up its normal force."""
+        position = {c.name: k for k, c in enumerate(self.constraints)}
+        found = []
+        for law in self.eom.frictions:
+            rows = tuple(position[name] for name in law.of)
+            normal = tuple(position[name] for name in law.normal)
+            gated = law.load == 0 and all(isinstance(self.constraints[k], Contact) for k in normal)
+            found.append(Friction(law.name, rows, normal, gated and bool(normal)))
+        return found
+
+    @cached_property
+    def at_integers(self) -> tuple[bool, ...]:
+        """Which of the jumps are wherever h is a whole number."""
+        return tuple(s.floor for s in self.jumps.surfaces)
+
+    @cached_property
+    def prescribed(self) -> tuple[int, ...]:
+        """Where in u a prescribed motion begins: what has a rate that has a rate."""
+        rates = self.eom.rates
+        return tuple(k for k, s in enumerate(self.eom.u) if rates.get(s) in rates)
+
+    @cached_property
+    def estimated(self) -> tuple[int, ...]:
+        """Those of them whose rates are estimated."""
+        return tuple(k for k, s in enumerate(self.eom.u) if s in self.eom.estimated)
+
+    @cached_property
+    def folded(self) -> tuple[float, ...]:
+        """Of each coordinate's dimension the largest parameter that is a number in the code."""
+        return tuple(self.eom.folded(self.eom.units[str(q)]) for q in self.eom.q)
+
+    @cached_property
+    def formulas(self) -> dict[int, Expr]:
+        """Start values that are expressions of parameters, by their position among (q, v)."""
+        return {} if self.eom.bare else formulas_of(self.eom)
+
+    # ------------------------------------------------------------------------ functions
+
+    @cached_property
+    def state(self) -> Arguments:
+        """What most functions are of."""
+        eom = self.eom
+        return {"t": (self.time,), "q": eom.q, "v": eom.v, "u": eom.driven, "p": eom.p}
+
+    @cached_property
+    def solved(self) -> Arguments:
+        """What is solved for at a state."""
+        return {"vdot": self.eom.vdot, "lambda": self.eom.lam, "Q": self.eom.Q}
+
+    @cached_property
+    def change(self) -> dict[Expr, Expr]:
+        """d(x) of each symbol that changes."""
+        moving = (*self.eom.q, *self.eom.v, *self.eom.u, self.time)
+        reported = (s for group in self.solved.values() for s in group)
+        return {s: sp.Symbol(f"d({s})", real=True) for s in (*moving, *reported)}
+
+    @cached_property
+    def groups(self) -> dict[str, list[Value]]:
+        """The numbers of the equations: M, F, G, nu, gamma, f, energy."""
+        eom = self.eom
+        M, G = eom.M.todok(), eom.G.todok()
+        q, rows = [str(s) for s in eom.q], [c.name for c in self.constraints]
+        energy = {"kinetic": eom.kinetic, "potential": eom.potential}
+        if eom.kinetic is None and eom.potential is None:
+            energy = {}
+        listed = {
+            "M": ([M[ij] for ij in self.mass], [f"{q[i]}, {q[j]}" for i, j in self.mass]),
+            "F": (eom.F, q),
+            "G": (
+                [G[kj] for kj in self.jacobian],
+                [f"{rows[k]}, {q[j]}" for k, j in self.jacobian],
+            ),
+            "nu": (eom.nu, rows),
+            "gamma": (eom.gamma, rows),
+            "f": (_or_zero(eom.f), rows),
+            "energy": (_or_zero(energy.values()), list(energy)),
+        }
+        return {label: values(*pair) for label, pair in listed.items()}
+
+    @cached_property
+    def functions(self) -> list[Function]:
+        """All that it needs; of coordinates that are only read, the energies and the model's outputs."""
+        eom, state, groups = self.eom, self.state, self.groups
+        still = {a: s for a, s in state.items() if a != "v"}
+        found = []
+        if not eom.bare:
+            found += [
+                Function(
+                    "dynamics",
+                    "M (lower triangle), F, G, nu, gamma of  M vdot = F + G^T lambda,  G vdot = gamma.",
+                    state,
+                    {a: groups[a] for a in ("M", "F", "G", "nu", "gamma")},
+                ),
+                Function(
+                    "residual",
+                    "f of each constraint f(q, t) = 0; 0 for a nonholonomic one.",
+                    still,
+                    {"f": groups["f"]},
+                ),
+            ]
+        if groups["energy"]:
+            text = "Kinetic and potential energy [J]."
+            found.append(Function("energies", text, state, {"energy": groups["energy"]}))
+        found += self._of_contacts()
+        if self.tangents and (groups["energy"] or not eom.bare):
+            text = "The change of all of these along the direction (dt, dq, dv, du)."
+            found.append(self._tangent("tangent", text, state, groups))
+        if eom.lookups:
+            places = values([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])
+            found.append(
+                Function("lookups", "Where tables are looked up.", state, {"places": places})
+            )
+        if self.formulas:
+            text = "Start values that are expressions of parameters."
+            names = [str(s) for s in (*eom.q, *eom.v)]
+            w = values([*self.formulas.values()], [names[j] for j in self.formulas])
+            found.append(Function("starts", text, {"p": eom.p}, {"w": w}))
+        if self.jumps.surfaces:
+            text = "h of each jump of the forces: where it passes 0, or a whole number."
+            h = values([s.h for s in self.jumps.surfaces], eom.levels)
+            found.append(Function("surfaces", text, still, {"h": h}))
+        if eom.outputs and not self.prefix:
+            found += self._of_outputs()
+        return found
+
+    def _of_contacts(self) -> Iterator[Function]:
+        """Restitution and Coulomb's law."""
+        eom, laws = self.eom, self.eom.frictions
+        if any(isinstance(c, Contact) for c in self.constraints):
+            e = [
+                eom.plain(c.restitution) if isinstance(c, Contact) else sp.S.Zero
+                for c in self.constraints
+            ]
+            text = "Newton's coefficient of restitution of each row; 0 for one that is no contact."
+            results = {"e": values(e, [c.name for c in self.constraints])}
+            yield Function("restitution", text, {"p": eom.p}, results)
+        if laws:
+            mu = {f"{w} of {a.name}": getattr(a, w) for a in laws for w in ("static", "kinetic")}
+            normal = {f"{a.name}, {row}": c for a in laws for row, c in a.normal.items()}
+            listed = {
+                "coefficients": mu,
+                "load": {a.name: a.load for a in laws},
+                "normal": normal,
+            }
+            text = (
+                "Coefficients, static and kinetic, and normal force load + sum of c * lambda [N]."
+            )
+            results = {a: values([*of.values()], [*of]) for a, of in listed.items()}
+            yield Function("coulomb", text, self.state, results)
+
+    def _of_outputs(self) -> Iterator[Function]:
+        """The model's own outputs."""
+        outputs = self.eom.outputs
+        places = [f"{o.name} [{o.unit}]" for o in outputs]
+        results = {
+            "w": values([o.expression for o in outputs], places),
+            "other": values(_or_zero(o.otherwise for o in outputs), places),
+        }
+        text = "Outputs of the model's own, and their values where these are not finite."
+        arguments = {**self.state, **self.solved}
+        yield Function("outputs", text, arguments, results)
+        if self.tangents:
+            text = "Their changes along a direction, with those of what is solved for."
+            yield self._tangent("outputs_tangent", text, arguments, results)
+
+    @cached_property
+    def embedding(self) -> list[Function]:
+        """What leads from its coordinates to all of them."""
+        if self.reduction is None or self.full is None:
+            return []
+        state = dict(zip(("t", "s", "sdot", "u", "p"), self.state.values(), strict=True))
+        phi, vel = self.reduction.phi, self.reduction.vel
+        results = {"q": values(phi, self.full.q), "v": values(vel, self.full.v)}
+        found = [Function("embed", EMBED, state, results)]
+        if self.tangents:
+            text = "The change of q and v along the direction (dt, ds, dsdot, du)."
+            found.append(self._tangent("embed_tangent", text, state, results))
+        return found
+
+    def _tangent(
+        self, name: str, doc: str, arguments: Arguments, results: Mapping[str, Sequence[Value]]
+    ) -> Function:
+        d = Differential(self.change)
+        along = {
+            f"d{a}": tuple(self.change[s] for s in symbols if s in self.change)
+            for a, symbols in arguments.items()
+            if a != "p"
+        }
+        changes = {
+            f"d{a}": [Value(d(x.expression), x.place) for x in group]
+            for a, group in results.items()
+        }
+        return Function(name, doc, {**arguments, **along}, changes)
+
+
+def _or_zero(expressions: Any) -> list[Expr]:
+    return [sp.S.Zero if e is None else e for e in expressions]
+
+
+def parts_of(
+    form: Form, jumps: Jumps, tangents: bool = False, time: Expr = TIME
+) -> tuple[Parts, ...]:
+    """The system of all coordinates and, where it is reduced, the one of those that are stepped.
+
+    `form` and `jumps` as jumps.levelled gives them; `time`: the symbol in them.
+    """
+    eom, reduction = form.equations, form.reduction
+    more: dict[str, Any] = {"tangents": tangents, "time": time}
+    if reduction is None:
+        return (Parts(eom, "", form.formulation, eom.constraints, jumps, **more),)
+    reduced = reduction.reduced
+    return (
+        Parts(eom, "", "multipliers", eom.constraints, **more),
+        Parts(reduced, "reduced_", "minimal", reduction.constraints, jumps, eom, reduction, **more),
+    )
