@@ -83,6 +83,7 @@ def test_figures_change_nothing_but_the_page(tmp_path):
     assert with_figures == without
 
 
+@pytest.mark.thorough
 def test_an_fmu_for_other_machines_builds(tmp_path):
     """One without a binary for this machine cannot be simulated here, and is built all the same."""
     foreign = "darwin64"

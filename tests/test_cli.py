@@ -433,6 +433,7 @@ def test_python_m_lagfmu_is_the_same_command():
     assert "simulate" in run.stdout
 
 
+@pytest.mark.thorough
 def test_build_fmus_prints_a_line_an_fmu(tmp_path):
     """python build_fmus.py incline_disk belt --out DIR, from another folder: disks of each target and a block
     that slips, which is native alone, each with its verdict, its worst error and whose that is, within 80

@@ -611,6 +611,7 @@ def test_a_foot_too_far_out_for_a_double_is_refused_by_name(tmp_path):
     assert "choose larger units" in told
 
 
+@pytest.mark.thorough
 def test_walls_that_meet_are_named(tmp_path):
     """A ball that loses nothing between walls x = +-(w - c t) gains 2 c at each impact: it is struck without
     end before they meet at t = w/c = 1 s."""

@@ -209,6 +209,7 @@ def test_the_plan_of_a_chain_grows_linearly():
     assert sizes[2] - sizes[1] == 2 * (sizes[1] - sizes[0])
 
 
+@pytest.mark.thorough
 def test_the_same_patterns_give_the_same_text():
     """Nothing depends on the order of a set or a dictionary."""
     mass = [(i, j) for i in range(8) for j in range(i + 1) if (i + j) % 3 == 0 or i == j]

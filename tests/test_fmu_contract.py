@@ -575,6 +575,7 @@ write(prepare(file.model, file.scenes[0]), sys.argv[2])
 """
 
 
+@pytest.mark.thorough
 def test_source_date_epoch_gives_a_date_in_utc(tmp_path):
     """1,700,000,000 s after 1970 is 2023-11-14T22:13:20Z; without the variable there is no date."""
     bare = {k: v for k, v in os.environ.items() if k != "SOURCE_DATE_EPOCH"}
@@ -699,6 +700,7 @@ print("60")
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["Hemisphere"])
 def test_sixty_instances_one_after_another(name, fmu):
     """Instantiate, run, free, sixty times in one process: no crash and the same numbers."""

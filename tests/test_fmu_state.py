@@ -152,6 +152,7 @@ for scene in file.scenes:
 """
 
 
+@pytest.mark.thorough
 def test_two_builds_are_the_same_bytes(tmp_path):
     """An FMU depends on its model alone: not on the process, the hash seed, the folder or the time."""
     source = Path(__file__).parent.parent / "models" / "pendulum.py"

@@ -147,6 +147,7 @@ def test_the_archive_holds_what_it_needs_and_no_more(native_fmu):
     }
 
 
+@pytest.mark.thorough
 def test_the_fmu_is_small(native_fmu, everywhere):
     """Bounds that a library linked in by mistake would break, and code that only some models need."""
     for name, most in (("PendulumCartesian", 270e3), ("Hemisphere", 300e3)):
@@ -237,6 +238,7 @@ for s in file.scenes:
 """
 
 
+@pytest.mark.thorough
 def test_two_processes_build_the_same_bytes(native_fmu, tmp_path):
     """Another hash seed, folder, and a cache that is empty: the same FMU, and the parent's."""
     made = []
@@ -320,6 +322,7 @@ def test_the_aarch64_binary_gives_the_same_numbers_under_qemu(everywhere, tmp_pa
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.thorough
 def test_the_sources_link_into_an_importer(everywhere, native_fmu, tmp_path):
     """With a prefix for the functions, as the standard has it for several FMUs in one program: two of them
     share no name, and the numbers are those of the binary, bit for bit."""
@@ -379,6 +382,7 @@ def test_the_drift_of_model_exchange_is_bounded(native_fmu):
     assert abs(found["residual.rod"]).max() > 0
 
 
+@pytest.mark.thorough
 def test_a_recompilation_from_the_sources_agrees(native_fmu, tmp_path):
     """fmpy, CMake and the system's compiler make the same FMU from what is inside."""
     if shutil.which("cmake") is None or shutil.which("cc") is None:
@@ -437,6 +441,7 @@ def test_without_a_compiler_the_remedy_is_named(prepared, tmp_path, monkeypatch)
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 def test_the_systems_compiler_makes_the_same_motion(native_fmu, prepared, tmp_path, monkeypatch):
     """Without ziglang cc compiles for this machine, and the numbers agree."""
     path = shutil.which("cc")

@@ -15,6 +15,8 @@ from PIL import Image
 
 REPOSITORY = Path(__file__).parent.parent
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module")
 def site(shared_folder: Path) -> Path:

@@ -272,6 +272,7 @@ CHANGED = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("mutant", MUTANTS)
 def test_a_solver_that_is_slightly_wrong_is_found(mutant, tmp_path):
     """lambda too large by 1e-6 as it is shown, states that are not projected, a departure 1e-4 N early,

@@ -207,6 +207,7 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped(hemisphere, tmp_path):
     assert len(facts["fmu_sha256"]) == 64
 
 
+@pytest.mark.thorough
 def test_ctrl_c_says_where_the_rest_is_and_how_to_go_on(hemisphere, tmp_path):
     """What a user does: an interrupt in the middle of a long sweep, then the same command with --resume."""
     import pyarrow.parquet as pq
@@ -488,6 +489,7 @@ def test_an_optimizer_finds_the_damping_at_which_the_spring_just_holds(dist):
     assert names["study"].best_params["c"] == pytest.approx(allowed, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_the_client_never_loads_the_binary(hemisphere):
     """Host processes do: a crash of the FMU is none of the client's."""
     code = (
@@ -639,6 +641,7 @@ def cluster(folder: Path, workers: int):
             process.wait()
 
 
+@pytest.mark.thorough
 def test_a_cluster_gives_the_same_numbers_even_if_its_workers_die(hemisphere, tmp_path):
     """Two Dask workers, one of which is killed again and again while it works: every run is there exactly
     once, with the bytes of the run on this machine."""

@@ -98,6 +98,7 @@ def test_a_run_without_an_end_is_given_up(hemisphere):
         lagfmu.sweep(hemisphere, steps, timeout=0.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_the_client_alone_is_interrupted(hemisphere, tmp_path):
     """SIGINT to the client and not to its workers, in the middle of long runs: nothing is tried again, no
