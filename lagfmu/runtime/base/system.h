@@ -138,7 +138,7 @@ struct System {
 };
 
 /* 1 where a row acts while the contacts stand as in `closed` (one entry a contact); 0 for rows that hold by
- * friction alone, which friction.c adds where they stick. */
+ * friction alone, which sliding.c adds where they stick. */
 SHARED void system_active(const System *s, const int *closed, int *active);
 
 #endif

@@ -44,18 +44,43 @@ struct FrictionForces {
 SHARED const Sliding SLIDING;
 
 /* G_t v - nu_t of friction i at the state that was evaluated last. */
-SHARED void friction_slip(const Mechanism *b, int i, const double *v, double s[2]);
+static inline void friction_slip(const Mechanism *b, int i, const double *v, double s[2]) {
+    const Friction *law = &b->system->friction[i];
+    s[1] = 0;
+    for (int r = 0; r < law->rows; r++) s[r] = mechanism_slip(b, law->row[r], v);
+}
 
-/* mu, load and c at a state.  FAILED if they are no coefficients of friction. */
-SHARED Status friction_coefficients(Mechanism *b, Instant at, const double *q, const double *v);
+/* load + c lambda of friction i. */
+static inline double friction_normal(const Mechanism *b, int i, const double *lambda) {
+    const Friction *law = &b->system->friction[i];
+    double sum = b->friction->load[i];
+    for (int k = law->first; k < law->first + law->normals; k++)
+        sum += b->friction->c[k] * lambda[b->system->normal_row[k]];
+    return sum;
+}
 
-/* load + c lambda of friction i; its tangential multipliers, and their length. */
-SHARED double friction_normal(const Mechanism *b, int i, const double *lambda);
-SHARED double friction_tangential(const Mechanism *b, int i, const double *lambda, double force[2]);
+/* The length of a vector in two rows, or, mostly, in one. */
+static inline double friction_length(const double x[2]) { return x[1] == 0 ? fabs(x[0]) : hypot(x[0], x[1]); }
+
+/* The tangential multipliers of friction i, and their length. */
+static inline double friction_tangential(const Mechanism *b, int i, const double *lambda, double force[2]) {
+    const Friction *law = &b->system->friction[i];
+    force[1] = 0;
+    for (int r = 0; r < law->rows; r++) force[r] = lambda[law->row[r]];
+    return friction_length(force);
+}
 
 /* The unit vector of the slip velocity s; beyond a stop it goes on as before, so that the equations of a
  * segment stay smooth there. */
-SHARED void friction_heading(const StickSlip *mode, const double s[2], double e[2]);
+static inline void friction_heading(const StickSlip *mode, const double s[2], double e[2]) {
+    const double length = friction_length(s);
+    e[0] = mode->direction[0];
+    e[1] = mode->direction[1];
+    if (!(length > mode->noise) || (s[1] == 0 && e[1] == 0)) return;
+    if (s[0] * e[0] + s[1] * e[1] < 0) return;
+    e[0] = s[0] / length;
+    e[1] = s[1] / length;
+}
 
 /* painleve.c -- the refusal of a sliding problem that has no acceleration, or several. */
 SHARED Status painleve_paradox(const Mechanism *b, double t, const int *which, int count, double value);

@@ -13,6 +13,7 @@
 
 #include <string.h>
 
+#include "digits.h"
 #include "thresholds.h"
 
 static void layout_sliding(Mechanism *b, Arena *arena) {
@@ -65,6 +66,23 @@ static const int *acting(Mechanism *b, const int *active) {
         for (int r = 0; r < s->friction[i].rows; r++)
             f->acting[s->friction[i].row[r]] = f->loaded[i] && f->stick_slip[i].sticks;
     return f->acting;
+}
+
+/* Coefficients at the state. */
+static Status find_coefficients(Mechanism *b, Instant at, const double *q, const double *v) {
+    const System *s = b->system;
+    struct FrictionForces *f = b->friction;
+    s->coulomb(at.t, q, v, at.u, at.p, f->mu, f->load, f->c);
+    for (int i = 0; i < s->frictions; i++) {
+        if (0 <= f->mu[2 * i + 1] && f->mu[2 * i + 1] <= f->mu[2 * i] && f->mu[2 * i] < HUGE_VAL)
+            continue;
+        return fail(b->why,
+                    "friction '%s' has the coefficients static = %s and kinetic = %s at t = %s s, "
+                    "expected 0 <= kinetic <= static",
+                    s->friction[i].name, digits(f->mu[2 * i]).text, digits(f->mu[2 * i + 1]).text,
+                    digits(at.t).text);
+    }
+    return OK;
 }
 
 /* d = G_t^T e of friction i. */
@@ -156,7 +174,7 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
     int sliding = 0, sticking = 0;
-    if (friction_coefficients(b, at, q, v) != OK) return FAILED;
+    if (find_coefficients(b, at, q, v) != OK) return FAILED;
     if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
     if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) != OK) return FAILED;
     for (int i = 0; i < s->frictions; i++) {
