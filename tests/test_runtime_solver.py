@@ -861,15 +861,15 @@ def test_what_the_legs_of_a_table_carry_depends_on_no_order(case, bench):
     np.testing.assert_allclose(found, [found[0]] * len(found), atol=1e-12)
 
 
-def test_a_contact_that_is_leaving_is_not_closed_again(bench):
+def test_a_contact_that_departs_is_not_closed_again(bench):
     """Where the force presses, only the flag keeps it open."""
     one = bench(walls(1)[0])
     force = -walls(1)[1][0]
     one.drive(force)
     still = doubles([0, 0])
-    for leaving, expected in ((integers([0]), 1), (integers([1]), 0), (None, 1)):
+    for departing, expected in ((integers([0]), 1), (integers([1]), 0), (None, 1)):
         closed = integers([0])
-        assert not one.c.bench_modes(one.handle, still, still, closed, integers([1]), leaving)
+        assert not one.c.bench_modes(one.handle, still, still, closed, integers([1]), departing)
         assert closed[0] == expected
 
 

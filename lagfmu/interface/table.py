@@ -516,12 +516,12 @@ class _Builder:
     def losses(self) -> list[Variable]:
         """What frictions and impacts dissipate; with frictions a continuous state of model exchange."""
         constraints = self.stepped.constraints
-        rubs, of = bool(self.eom.frictions), Subject(names.DISSIPATED)
-        if not rubs and not any(isinstance(c, Contact) for c in constraints):
+        slips, of = bool(self.eom.frictions), Subject(names.DISSIPATED)
+        if not slips and not any(isinstance(c, Contact) for c in constraints):
             return []
-        both = "frictions and impacts" if rubs else "impacts"
+        both = "frictions and impacts" if slips else "impacts"
         text = f"energy that {both} dissipated so far"
-        lost = self.output(of, text, ENERGY, (), discrete=not rubs)
+        lost = self.output(of, text, ENERGY, (), discrete=not slips)
         if not self.lost:
             return [lost]
         behind = self.known.union(*(self.symbols(*law.expressions) for law in self.eom.frictions))

@@ -18,8 +18,8 @@ Fields = TypeVar("Fields", bound=ModelFields)
 def stuck(model: Fields, slipping: Sequence[str], problems: list[str]) -> Fields:
     """The model in which only the frictions `slipping` (names or patterns) may slip.
 
-    What the others limit holds always, or while the one contact is closed that presses it; parameters that
-    stand in those frictions alone go with them.
+    What the others limit holds always, or while the one contact of its normal force is closed; parameters
+    that stand in those frictions alone go with them.
     """
     may = select(slipping, [f.name for f in model.frictions], "friction", problems)
     gone = [f for f in model.frictions if f.name not in may]
@@ -29,13 +29,13 @@ def stuck(model: Fields, slipping: Sequence[str], problems: list[str]) -> Fields
     contacts = {multiplier(c.name): c.name for c in model.constraints if isinstance(c, Contact)}
     for f in gone:
         normal = sp.sympify(f.normal)
-        pressing = [name for symbol, name in contacts.items() if normal.has(symbol)]
-        gates |= {name: pressing[0] for name in f.of if pressing}
+        normals = [name for symbol, name in contacts.items() if normal.has(symbol)]
+        gates |= {name: normals[0] for name in f.of if normals}
         rough = [name for name in f.of if not isinstance(_row(model, name), Nonholonomic)]
-        if len(pressing) > 1 or (pressing and rough):
+        if len(normals) > 1 or (normals and rough):
             problems.append(
                 f"the friction {f.name!r} shall not slip, but {', '.join(map(repr, f.of))} acts with "
-                f"{' and '.join(map(repr, pressing))}: that can be said of a Nonholonomic constraint and "
+                f"{' and '.join(map(repr, normals))}: that can be said of a Nonholonomic constraint and "
                 f"one contact alone (while_closed); name it in `frictions`"
             )
     if problems:

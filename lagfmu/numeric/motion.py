@@ -104,29 +104,29 @@ def stick_slip(
     at: Instant, q: Vector, v: Vector, rows: Sequence[int], size: Vector
 ) -> tuple[list[int], Slips]:
     """The rows that act, those that stick by friction with them, and the frictions that slip; `size` (n): of
-    the coordinates.  Of frictions that rest, the one farthest out of its cone slips first."""
+    the coordinates.  Of frictions at s = 0, the one farthest out of its cone slips first."""
     system, law = at.system, friction_law(at, q, v)
     M, F, G, nu, _ = at.equations(q, v)
     mass = np.where(M.diagonal() > 0, M.diagonal(), np.inf)
     speed = np.maximum(np.abs(v), np.sqrt(size * np.abs(F) / mass))
     s, noise = G @ v - nu, FRICTION_SLACK * (np.abs(G) @ speed + np.abs(nu))
-    pressed = [i for i, f in enumerate(system.frictions) if not f.gated or {*f.normal} & {*rows}]
-    tangential = {i: list(system.frictions[i].rows) for i in pressed}
+    loaded = [i for i, f in enumerate(system.frictions) if not f.gated or {*f.normal} & {*rows}]
+    tangential = {i: list(system.frictions[i].rows) for i in loaded}
     slips = {
         i: s[k] / np.linalg.norm(s[k])
         for i, k in tangential.items()
         if np.linalg.norm(s[k]) > noise[k].sum()
     }
     while True:
-        resting = {i: k for i, k in tangential.items() if i not in slips}
-        acting = sorted({*rows, *(k for those in resting.values() for k in those)})
+        sticking = {i: k for i, k in tangential.items() if i not in slips}
+        acting = sorted({*rows, *(k for those in sticking.values() for k in those)})
         try:
             lam = motion(at, q, v, acting, slips).lam
         except StepFailureError:  # they are driven apart, and the simulation will say which slip
             return list(rows), NONE
         excess = {
             i: float(np.linalg.norm(lam[k]) / held - 1)
-            for i, k in resting.items()
+            for i, k in sticking.items()
             if (held := law.static[i] * abs(law.load[i] + law.C[i] @ lam)) > 0 or lam[k].any()
         }
         worst = max(excess, key=lambda i: excess[i], default=None)

@@ -36,7 +36,7 @@ class Row:
 @dataclass(frozen=True)
 class Friction:
     """Coulomb friction: its name, the rows that it limits (one or two), those whose multipliers make up
-    the normal force, and whether these are contacts alone: without them nothing presses."""
+    the normal force, and whether these are contacts alone: without them there is none."""
 
     name: str
     rows: tuple[int, ...]
