@@ -100,7 +100,7 @@ def test_a_run_in_a_sweep_is_the_run_alone(hemisphere):
 
 
 def test_the_loop_in_c_and_the_one_in_python_give_the_same_bits(unpacked):
-    """An FMU of another tool, which has no lagfmu_batch, is run by the same steps."""
+    """An FMU of another tool, which has no lagfmu_runs, is run by the same steps."""
     keep = (("lambda.surface", MAX), ("lambda.surface", MEAN), ("theta", TIME_OF_MAX), ("r", LAST))
     events = (("departure.surface.count", "departure.surface.time"),)
     plan = Plan(("theta",), keep, np.linspace(0, 1.5, 31), 1e-9, events=events, whole=True)

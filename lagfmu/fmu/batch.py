@@ -1,4 +1,4 @@
-"""Many runs of one FMU in one call: through `lagfmu_batch` (runtime/fmi/batch.c) where the library has it,
+"""Many runs of one FMU in one call: through `lagfmu_runs` (runtime/fmi/batch.c) where the library has it,
 else by the loop of the session: slower, with the same numbers."""
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .binary import BATCH, listen
-from .session import KINDS, WARNING, Run, Session
+from .session import WARNING, RefusalError, Run, Session
 
-TYPES = ("Real", "Integer", "Boolean")  # BatchType in batch.h
 LAST, MAX, MIN, MEAN, TIME_OF_MAX = range(5)  # Keep in batch.h
 
 
@@ -76,10 +75,10 @@ class _Batch(ctypes.Structure):
 
     _fields_ = [
         *((n, ctypes.c_size_t) for n in ("runs", "varied", "driven", "points", "kept", "events")),
-        *((n, ctypes.c_void_p) for n in ("vary", "vary_type", "values", "drive", "drives")),
+        *((n, ctypes.c_void_p) for n in ("vary", "values", "drive", "drives")),
         ("times", ctypes.c_void_p),
         ("tolerance", ctypes.c_double),
-        *((n, ctypes.c_void_p) for n in ("keep", "keep_type", "keep_what", "count", "when")),
+        *((n, ctypes.c_void_p) for n in ("keep", "what", "count", "when")),
         ("whole", ctypes.c_int),
         *((n, ctypes.c_void_p) for n in ("result", "trajectory", "status", "reached", "scratch")),
         ("current", ctypes.c_size_t),
@@ -91,14 +90,12 @@ def _in_library(session: Session, plan: Plan, values: NDArray[np.float64], found
     drives = None if plan.drives is None else np.ascontiguousarray(plan.drives, float)
     arrays: dict[str, Any] = {
         "vary": _references(session, plan.vary),
-        "vary_type": _types(session, plan.vary),
         "values": values,
         "drive": _references(session, plan.drive),
         "drives": drives,
         "times": np.ascontiguousarray(plan.times, dtype=np.float64),
         "keep": _references(session, names),
-        "keep_type": _types(session, names),
-        "keep_what": np.array([w for _, w in plan.keep], dtype=np.intc),
+        "what": np.array([w for _, w in plan.keep], dtype=np.intc),
         "count": _references(session, [c for c, _ in plan.events]),
         "when": _references(session, [t for _, t in plan.events]),
         "result": found.result,
@@ -128,28 +125,16 @@ def _in_library(session: Session, plan: Plan, values: NDArray[np.float64], found
             known = found.reasons.get(run)
             found.reasons[run] = f"{known}; {text}" if known else text
 
-    session.used = True
-    while batch.current < batch.runs:
-        function = getattr(session.instance.dll, BATCH)
-        function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], ctypes.c_int
-        listen(hear)
-        status = function(session.instance.component, ctypes.byref(batch))
-        if status <= WARNING:
-            break
-        run = int(batch.current)  # it cannot be reset: the rest goes to another one
-        found.status[run] = status
-        found.reasons.setdefault(run, "the instance could not be reset")
-        batch.current += 1
-        session.renew()
+    function = getattr(session.instance.dll, BATCH)
+    function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], ctypes.c_int
+    listen(hear)
+    status = function(session.instance.component, ctypes.byref(batch))
+    if status > WARNING:
+        raise RefusalError(BATCH, status, found.reasons.get(0, "no message was logged"))
 
 
 def _references(session: Session, names: Any) -> NDArray[np.uintc]:
     return np.array(session.references(names), dtype=np.uintc)
-
-
-def _types(session: Session, names: Any) -> NDArray[np.intc]:
-    kinds = [KINDS[session.rules[n].kind] for n in names]
-    return np.array([TYPES.index(k) for k in kinds], dtype=np.intc)
 
 
 # ------------------------------------------------------------------ in this process

@@ -1,39 +1,45 @@
-/* batch.c -- many runs of one instance in one call.  It calls the functions of the interface alone, as any
- * importer would: reset, set up, set, initialize, step and read. */
+/* batch.c -- many runs of one instance in one call: reset, set up, set, initialize, step and read, as an
+ * importer would. */
 #include "batch.h"
 
 #include <math.h>
-#include <stddef.h>
 
-static fmi2Status set(fmi2Component c, fmi2ValueReference reference, int type, double value) {
-    const fmi2Integer whole = (fmi2Integer)value;
-    switch (type) {
-        case BATCH_INTEGER: return fmi2SetInteger(c, &reference, 1, &whole);
-        case BATCH_BOOLEAN: return fmi2SetBoolean(c, &reference, 1, &whole);
-        default: return fmi2SetReal(c, &reference, 1, &value);
-    }
+/* NULL, and the cause, if there is no such number. */
+static const Variable *variable_of(Instance *x, unsigned reference) {
+    if (reference < (unsigned)VARIABLE_COUNT && VARIABLES[reference].type != TYPE_STRING)
+        return &VARIABLES[reference];
+    (void)fail(&x->solver.why, "value reference %u is no number of this FMU", reference);
+    return NULL;
 }
 
-static fmi2Status get_value(fmi2Component c, fmi2ValueReference reference, int type, double *value) {
-    fmi2Integer whole = 0;
-    fmi2Status status = fmi2OK;
-    switch (type) {
-        case BATCH_INTEGER: status = fmi2GetInteger(c, &reference, 1, &whole); break;
-        case BATCH_BOOLEAN: status = fmi2GetBoolean(c, &reference, 1, &whole); break;
-        default: return fmi2GetReal(c, &reference, 1, value);
-    }
-    *value = whole;
+static Status put_number(Instance *x, unsigned reference, double value) {
+    const Variable *v = variable_of(x, reference);
+    if (v == NULL || instance_settable(x, v, value) != OK) return FAILED;
+    instance_put(x, v, value);
+    return OK;
+}
+
+static Status read_number(Instance *x, unsigned reference, double *value) {
+    const Variable *v = variable_of(x, reference);
+    return v == NULL ? FAILED : instance_get(x, v, value);
+}
+
+/* The inputs of a communication point. */
+static Status drive_inputs(Instance *x, const Batch *b, size_t point) {
+    Status status = OK;
+    for (size_t k = 0; k < b->driven && status == OK; k++)
+        status = put_number(x, b->drive[k], b->drives[point * b->driven + k]);
     return status;
 }
 
 /* Departures so far, and the latest one's time [s]. */
-static double departures(fmi2Component c, const Batch *b, double *latest) {
+static double departures(Instance *x, const Batch *b, double *latest) {
     double sum = 0;
     *latest = -HUGE_VAL;
     for (size_t k = 0; k < b->events; k++) {
         double count = 0, time = 0;
-        if (get_value(c, b->count[k], BATCH_INTEGER, &count) > fmi2Warning || count == 0) continue;
-        if (fmi2GetReal(c, &b->when[k], 1, &time) > fmi2Warning) continue;
+        if (read_number(x, b->count[k], &count) != OK || count == 0) continue;
+        if (read_number(x, b->when[k], &time) != OK) continue;
         sum += count;
         if (time > *latest) *latest = time;
     }
@@ -41,101 +47,85 @@ static double departures(fmi2Component c, const Batch *b, double *latest) {
 }
 
 /* What is kept, with the values at time t [s]; `point` is a communication point's number, or -1. */
-static fmi2Status observe(fmi2Component c, const Batch *b, double *result, double *largest,
-                          double *before, long point, double t) {
+static Status keep_values(Instance *x, const Batch *b, long point, double t) {
+    double *result = b->result + b->current * b->kept, *largest = b->scratch, *before = largest + b->kept;
     for (size_t k = 0; k < b->kept; k++) {
-        double x = 0, *kept = &result[k];
-        const fmi2Status status = get_value(c, b->keep[k], b->keep_type[k], &x);
-        if (status > fmi2Warning) return status;
+        double value = 0, *kept = &result[k];
+        if (read_number(x, b->keep[k], &value) != OK) return FAILED;
         const int first = point == 0;
-        switch (b->keep_what[k]) {
-            case KEEP_MAX: *kept = first || x > *kept ? x : *kept; break;
-            case KEEP_MIN: *kept = first || x < *kept ? x : *kept; break;
+        switch (b->what[k]) {
+            case KEEP_MAX: *kept = first || value > *kept ? value : *kept; break;
+            case KEEP_MIN: *kept = first || value < *kept ? value : *kept; break;
             case KEEP_MEAN:
                 if (first) *kept = 0;
                 if (point > 0)
-                    *kept += (x + before[k]) / 2 * (t - b->times[point - 1]) /
+                    *kept += (value + before[k]) / 2 * (t - b->times[point - 1]) /
                              (b->times[b->points - 1] - b->times[0]);
                 break;
             case KEEP_TIME_OF_MAX:
-                if (first || x > largest[k]) *kept = t;
+                if (first || value > largest[k]) *kept = t;
                 break;
-            default: *kept = x; break;
+            default: *kept = value; break;
         }
-        if (first || x > largest[k]) largest[k] = x;
-        if (point >= 0) before[k] = x;
+        if (first || value > largest[k]) largest[k] = value;
+        if (point >= 0) before[k] = value;
         if (point >= 0 && b->whole)
-            b->trajectory[(b->current * b->points + (size_t)point) * b->kept + k] = x;
+            b->trajectory[(b->current * b->points + (size_t)point) * b->kept + k] = value;
     }
-    return fmi2OK;
+    return OK;
 }
 
-static fmi2Status start_run(fmi2Component c, const Batch *b) {
+static Status start_run(Instance *x, const Batch *b) {
     const double *values = b->values + b->current * b->varied;
-    fmi2Status status = fmi2SetupExperiment(c, b->tolerance > 0, b->tolerance, b->times[0], fmi2True,
-                                            b->times[b->points - 1]);
-    for (size_t k = 0; k < b->varied && status <= fmi2Warning; k++)
-        status = set(c, b->vary[k], b->vary_type[k], values[k]);
-    if (status <= fmi2Warning && b->driven > 0)
-        status = fmi2SetReal(c, b->drive, b->driven, b->drives);
-    if (status <= fmi2Warning) status = fmi2EnterInitializationMode(c);
-    if (status <= fmi2Warning) status = fmi2ExitInitializationMode(c);
-    return status;
+    const double *tolerance = b->tolerance > 0 ? &b->tolerance : NULL;
+    instance_reset(x);
+    Status status = instance_set_up(x, tolerance, b->times[0], &b->times[b->points - 1]);
+    for (size_t k = 0; k < b->varied && status == OK; k++) status = put_number(x, b->vary[k], values[k]);
+    if (status == OK) status = drive_inputs(x, b, 0);
+    return status == OK ? instance_initialize(x) : FAILED;
 }
 
 /* A departure at time `at` [s] lay within the step from `earlier`: what is kept is looked at there too, on a
  * way aside, so that the run itself goes on as it would have. */
-static fmi2Status aside(fmi2Component c, const Batch *b, fmi2FMUstate earlier, double t, double at,
-                        double *result, double *largest, double *before) {
-    fmi2FMUstate later = NULL;
-    fmi2Status status = fmi2GetFMUstate(c, &later);
-    if (status <= fmi2Warning) {
-        status = fmi2SetFMUstate(c, earlier);
-        if (status <= fmi2Warning) status = fmi2DoStep(c, t, at - t, fmi2False);
-        if (status <= fmi2Warning) status = observe(c, b, result, largest, before, -1, at);
-        const fmi2Status back = fmi2SetFMUstate(c, later);
-        if (back > fmi2Warning) status = back;
-    }
-    (void)fmi2FreeFMUstate(c, &later);
+static Status aside(Instance *x, const Batch *b, const char *earlier, char *later, double at) {
+    instance_save(x, later);
+    instance_restore(x, earlier);
+    Status status = instance_step(x, at);
+    if (status == OK) status = keep_values(x, b, -1, at);
+    instance_restore(x, later);
     return status;
 }
 
-static fmi2Status run(fmi2Component c, const Batch *b, fmi2FMUstate *earlier, double *largest,
-                      double *before) {
-    double *result = b->result + b->current * b->kept, *reached = &b->reached[b->current];
-    double latest = 0;
-    fmi2Status status = start_run(c, b);
+static RunStatus one_run(Instance *x, const Batch *b, char *earlier, char *later) {
+    double *reached = &b->reached[b->current], latest = 0;
     *reached = b->times[0];
-    if (status <= fmi2Warning) status = observe(c, b, result, largest, before, 0, *reached);
-    double count = b->events > 0 && status <= fmi2Warning ? departures(c, b, &latest) : 0;
-    for (size_t k = 1; k < b->points && status <= fmi2Warning; k++) {
+    if (start_run(x, b) != OK || keep_values(x, b, 0, *reached) != OK) return RUN_REFUSED;
+    double count = departures(x, b, &latest);
+    for (size_t k = 1; k < b->points; k++) {
         const double t = b->times[k - 1], h = b->times[k] - t;
-        if (b->events > 0) status = fmi2GetFMUstate(c, earlier);
-        if (status <= fmi2Warning) status = fmi2DoStep(c, t, h, fmi2False);
-        if (status > fmi2Warning) break;
+        if (b->events > 0) instance_save(x, earlier);
+        if (instance_steppable(x, t, h) != OK) return RUN_REFUSED;
+        if (instance_step(x, t + h) != OK) return RUN_STOPPED;
         *reached = b->times[k];
         if (b->events > 0) {
-            const double now = departures(c, b, &latest);
-            if (now > count && latest > t && latest < *reached)
-                status = aside(c, b, *earlier, t, latest, result, largest, before);
+            const double now = departures(x, b, &latest);
+            const int between = now > count && latest > t && latest < *reached;
+            if (between && aside(x, b, earlier, later, latest) != OK) return RUN_STOPPED;
             count = now;
         }
-        if (b->driven > 0 && status <= fmi2Warning)
-            status = fmi2SetReal(c, b->drive, b->driven, b->drives + k * b->driven);
-        if (status <= fmi2Warning)
-            status = observe(c, b, result, largest, before, (long)k, *reached);
+        if (drive_inputs(x, b, k) != OK || keep_values(x, b, (long)k, *reached) != OK) return RUN_REFUSED;
     }
-    return status > fmi2Warning ? status : fmi2OK;
+    return RUN_DONE;
 }
 
-fmi2Status lagfmu_batch(fmi2Component c, Batch *b) {
-    fmi2FMUstate earlier = NULL;
-    if (c == NULL || b == NULL || b->points < 2) return fmi2Error;
+void batch_run(Instance *x, Batch *b, char *states) {
+    char *later = states + instance_record_size(x);
     for (size_t r = b->current; r < b->runs; r++) {
         b->current = r;
-        if (fmi2Reset(c) > fmi2Warning) return fmi2Fatal;
-        b->status[r] = (int)run(c, b, &earlier, b->scratch, b->scratch + b->kept);
+        const RunStatus status = one_run(x, b, states, later);
+        b->status[r] = (int)status;
+        if (status != RUN_DONE)
+            x->tell(x->context, status == RUN_STOPPED ? NOTE_DISCARD : NOTE_ERROR, x->solver.why.text);
     }
-    (void)fmi2FreeFMUstate(c, &earlier);
-    return fmi2OK;
+    instance_reset(x);
 }

@@ -9,15 +9,11 @@
  * initialization mode, and after a discarded step another one may be tried without going back to a
  * saved state (the instance stands where it stood before).
  *
- * Memory: one block in fmi2Instantiate and one in fmi2GetFMUstate or fmi2DeSerializeFMUstate, all by
- * the importer's callbacks. */
-#include <float.h>
-#include <math.h>
+ * Memory: one block in fmi2Instantiate, one in fmi2GetFMUstate or fmi2DeSerializeFMUstate, and
+ * one for the time of lagfmu_runs (fmi2_steps.c), all by the importer's callbacks. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "digits.h"
-#include "exchange.h"
 #include "fmi2_component.h"
 
 /* ------------------------------------------------------------------ inquiry, logging */
@@ -142,26 +138,10 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDef
                                fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
     Component *c = component;
-    Why text;
+    const double *dial = toleranceDefined ? &tolerance : NULL, *stop = stopTimeDefined ? &stopTime : NULL;
     if (!component_allowed(c, INSTANTIATED)) return component_forbidden(c, "fmi2SetupExperiment");
-    if (toleranceDefined && !(tolerance > 0 && tolerance <= LARGEST_TOLERANCE)) {
-        (void)fail(&text,
-                   "fmi2SetupExperiment: tolerance = %s, expected a positive number of at most %g (an "
-                   "error relative to each value), e.g. 1e-8",
-                   digits(tolerance).text, LARGEST_TOLERANCE);
-        return component_refuse(c, text.text);
-    }
-    if (!isfinite(startTime) || (stopTimeDefined && !(stopTime > startTime))) {
-        (void)fail(&text,
-                   "fmi2SetupExperiment: start time %s s and stop time %s s, expected a finite "
-                   "start before the stop",
-                   digits(startTime).text, stopTimeDefined ? digits(stopTime).text : "not defined");
-        return component_refuse(c, text.text);
-    }
-    c->instance.tolerance = toleranceDefined ? tolerance : 0;
-    c->instance.start_time = startTime;
-    c->instance.stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
-    c->instance.started = 0;
+    if (instance_set_up(&c->instance, dial, startTime, stop) != OK)
+        return component_refused(c, "fmi2SetupExperiment");
     return fmi2OK;
 }
 
@@ -175,9 +155,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component component) {
 fmi2Status fmi2ExitInitializationMode(fmi2Component component) {
     Component *c = component;
     if (!component_allowed(c, INITIALIZATION)) return component_forbidden(c, "fmi2ExitInitializationMode");
-    if (instance_observe(&c->instance) != OK) return component_failed(c, fmi2Error);
-    if (c->instance.exchange) exchange_begin(&c->instance);
-    c->instance.running = 1;
+    if (instance_initialize(&c->instance) != OK) return component_failed(c, fmi2Error);
     c->instance.phase = c->instance.exchange ? EVENT : STEP_COMPLETE;
     return fmi2OK;
 }

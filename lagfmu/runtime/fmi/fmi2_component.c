@@ -27,15 +27,23 @@ void component_message(Component *c, fmi2Status status, int category, const char
 }
 
 void component_told(void *context, Note note, const char *text) {
-    if (note == NOTE_WARNING)
-        component_message(context, fmi2Warning, LOG_WARNINGS, text);
-    else
-        component_message(context, fmi2OK, LOG_EVENTS, text);
+    switch (note) {
+        case NOTE_WARNING: component_message(context, fmi2Warning, LOG_WARNINGS, text); break;
+        case NOTE_EVENT: component_message(context, fmi2OK, LOG_EVENTS, text); break;
+        case NOTE_DISCARD: component_message(context, fmi2Discard, LOG_DISCARDS, text); break;
+        case NOTE_ERROR: component_message(context, fmi2Error, LOG_ERRORS, text); break;
+    }
 }
 
 fmi2Status component_refuse(Component *c, const char *text) {
     component_message(c, fmi2Error, LOG_ERRORS, text);
     return fmi2Error;
+}
+
+fmi2Status component_refused(Component *c, const char *function) {
+    Why text;
+    (void)fail(&text, "%s: %s", function, c->instance.solver.why.text);
+    return component_refuse(c, text.text);
 }
 
 /* The cause that a numerical function left. */

@@ -54,10 +54,11 @@ SHARED void component_send(const fmi2CallbackFunctions *callbacks, const char *n
 SHARED void component_message(Component *c, fmi2Status status, int category, const char *text);
 SHARED void component_told(void *context, Note note, const char *text);
 
-/* The call returns fmi2Error, and why: the text; the cause that a numerical function left; a function that
- * may not be called now; a pointer that is missing; a value reference of no such variable; a value or a
- * derivative that there is not. */
+/* The call returns fmi2Error, and why: the text; the cause that a function of the instance left, after this
+ * function's name or as it stands; a function that may not be called now; a pointer that is missing; a value
+ * reference of no such variable; a value or a derivative that there is not. */
 SHARED fmi2Status component_refuse(Component *c, const char *text);
+SHARED fmi2Status component_refused(Component *c, const char *function);
 SHARED fmi2Status component_failed(Component *c, fmi2Status status);
 SHARED fmi2Status component_forbidden(Component *c, const char *function);
 SHARED fmi2Status component_missing(Component *c, const char *function);

@@ -1,32 +1,6 @@
-/* fmi2_steps.c -- co-simulation: communication steps and their status (section 4.2). */
+/* fmi2_steps.c -- co-simulation: communication steps and their status (section 4.2); many runs in one call. */
+#include "batch.h"
 #include "fmi2_component.h"
-
-#include <float.h>
-#include <math.h>
-
-#include "digits.h"
-
-static const double ROUNDING = 1e-6; /* part of a step by which sums of times may differ from ours */
-
-/* A step that cannot be: its size, its beginning or its end. */
-static fmi2Status refuse_step(Component *c, double t, double h) {
-    const double now = c->instance.solver.state.now.t;
-    Why text;
-    if (!(h > 0 && h <= DBL_MAX))
-        (void)fail(&text, "fmi2DoStep: the communication step is %s s, expected a positive number",
-                   digits(h).text);
-    else if (!(fabs(t - now) <= ROUNDING * h + 1e-12 * fabs(now)))
-        (void)fail(&text,
-                   "fmi2DoStep: the communication point is %s s, but this FMU stands at %s s: "
-                   "continue there, or restore a state saved at that time",
-                   digits(t).text, digits(now).text);
-    else
-        (void)fail(&text,
-                   "fmi2DoStep: the step ends at %s s, after the stop time %s s that "
-                   "fmi2SetupExperiment defined",
-                   digits(t + h).text, digits(c->instance.stop_time).text);
-    return component_refuse(c, text.text);
-}
 
 fmi2Status fmi2DoStep(fmi2Component component, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
@@ -35,11 +9,7 @@ fmi2Status fmi2DoStep(fmi2Component component, fmi2Real currentCommunicationPoin
     const double t = currentCommunicationPoint, h = communicationStepSize;
     (void)noSetFMUStatePriorToCurrentPoint; /* nothing is kept for it */
     if (!component_allowed(c, STEPPING)) return component_forbidden(c, "fmi2DoStep");
-    const double now = c->instance.solver.state.now.t;
-    const double slack = ROUNDING * h + 1e-12 * fabs(now);
-    if (!(h > 0 && h <= DBL_MAX && fabs(t - now) <= slack &&
-          t + h <= c->instance.stop_time + slack))
-        return refuse_step(c, t, h);
+    if (instance_steppable(&c->instance, t, h) != OK) return component_refused(c, "fmi2DoStep");
     if (instance_step(&c->instance, t + h) != OK) {
         c->instance.phase = STEP_FAILED;
         return component_failed(c, fmi2Discard);
@@ -101,4 +71,24 @@ fmi2Status fmi2GetStringStatus(fmi2Component component, const fmi2StatusKind s,
                                fmi2String *value) {
     (void)value;
     return nothing_to_say(component, "fmi2GetStringStatus", s);
+}
+
+/* ------------------------------------------------------------------ beside the standard */
+
+#define lagfmu_runs FMI2_NAME(lagfmu_runs)
+
+/* What became of the runs stands in the batch; the instance is as new. */
+FMI2_EXPORT fmi2Status lagfmu_runs(fmi2Component component, Batch *batch);
+
+fmi2Status lagfmu_runs(fmi2Component component, Batch *batch) {
+    Component *c = component;
+    if (!component_allowed(c, ANY_MODE) || c->instance.exchange)
+        return component_forbidden(c, "lagfmu_runs");
+    if (batch == NULL || batch->points < 2) return component_missing(c, "lagfmu_runs");
+    char *states = c->callbacks.allocateMemory(2, instance_record_size(&c->instance));
+    if (states == NULL) return component_refuse(c, "lagfmu_runs: no memory");
+    batch_run(&c->instance, batch, states);
+    c->callbacks.freeMemory(states);
+    c->instance.phase = INSTANTIATED;
+    return fmi2OK;
 }

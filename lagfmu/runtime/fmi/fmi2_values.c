@@ -3,10 +3,6 @@
 
 #include <limits.h>
 #include <math.h>
-#include <string.h>
-
-#include "digits.h"
-#include "optional.h"
 
 /* The value of a variable: before the initialization as it was set, later as it is. */
 static fmi2Status read_value(Component *c, const char *function, const Variable *v, double *value) {
@@ -65,41 +61,6 @@ fmi2Status fmi2GetString(fmi2Component component, const fmi2ValueReference vr[],
     return nvr == 0 ? fmi2OK : component_unknown(c, "fmi2GetString", vr[0], TYPE_STRING);
 }
 
-/* A fixed parameter that is set once more to the bits that it has: some importers do. */
-static int is_same(Component *c, const Variable *v, double value) {
-    const double now = instance_setting(&c->instance, v);
-    return (v->role == ROLE_PARAMETER || v->role == ROLE_SOLVER) &&
-           memcmp(&now, &value, sizeof now) == 0;
-}
-
-/* fmi2OK if the variable may be set to the value now. */
-static fmi2Status settable(Component *c, const Variable *v, double value) {
-    Why text;
-    if (v->role == ROLE_OUTPUT) {
-        (void)fail(&text, "'%s' is calculated and cannot be set", v->name);
-        return component_refuse(c, text.text);
-    }
-    if (c->instance.running && v->role != ROLE_INPUT && !is_same(c, v, value)) {
-        (void)fail(&text, "'%s' can only be set before the end of the initialization", v->name);
-        return component_refuse(c, text.text);
-    }
-    return fmi2OK;
-}
-
-static fmi2Status valid(Component *c, const Variable *v, double value) {
-    Why text;
-    if (!isfinite(value))
-        (void)fail(&text, "'%s' = %s, expected a finite number", v->name, digits(value).text);
-    else if (value < v->min || value > v->max)
-        (void)fail(&text, "'%s' = %s is outside its bounds [%s, %s]", v->name, digits(value).text,
-                   digits(v->min).text, digits(v->max).text);
-    else if (v->positive && !(value > 0))
-        (void)fail(&text, "'%s' = %s, expected a positive number", v->name, digits(value).text);
-    else
-        return fmi2OK;
-    return component_refuse(c, text.text);
-}
-
 enum { SETTABLE = INSTANTIATED | INITIALIZATION | STEPPING | EXCHANGE };
 
 fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
@@ -110,40 +71,9 @@ fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], s
     for (size_t k = 0; k < nvr; k++) { /* all are checked before one is set */
         const Variable *v = component_variable(vr[k], TYPE_REAL);
         if (v == NULL) return component_unknown(c, "fmi2SetReal", vr[k], TYPE_REAL);
-        if (settable(c, v, value[k]) != fmi2OK || valid(c, v, value[k]) != fmi2OK)
-            return fmi2Error;
+        if (instance_settable(&c->instance, v, value[k]) != OK) return component_failed(c, fmi2Error);
     }
-    for (size_t k = 0; k < nvr; k++)
-        if (!is_same(c, &VARIABLES[vr[k]], value[k]))
-            instance_set(&c->instance, &VARIABLES[vr[k]], value[k]);
-    return fmi2OK;
-}
-
-static int is_offered(int method) {
-    return method > 0 && method < METHOD_COUNT && OPTIONAL.methods[method] != NULL;
-}
-
-static fmi2Status valid_method(Component *c, const Variable *v, int method) {
-    Why text;
-    if (method == RATTLE &&
-        !(MODEL_SYSTEM->separable && MODEL_SYSTEM->formulation == MULTIPLIERS)) {
-        (void)fail(&text,
-                   "'%s' = 'rattle': this method needs a constant mass matrix, forces without "
-                   "velocities, position constraints only and the formulation 'multipliers'; "
-                   "choose another",
-                   v->name);
-        return component_refuse(c, text.text);
-    }
-    if (!is_offered(method)) {
-        const char *comma = "";
-        (void)fail(&text, "'%s' = %d, expected one of ", v->name, method);
-        for (int k = 0; k < METHOD_COUNT; k++) {
-            if (!is_offered(k)) continue;
-            why_append(&text, "%s%d (%s)", comma, k, METHOD_NAMES[k]);
-            comma = ", ";
-        }
-        return component_refuse(c, text.text);
-    }
+    for (size_t k = 0; k < nvr; k++) instance_put(&c->instance, &VARIABLES[vr[k]], value[k]);
     return fmi2OK;
 }
 
@@ -155,12 +85,9 @@ static fmi2Status set_whole(Component *c, const char *function, Type type,
     for (size_t k = 0; k < nvr; k++) {
         const Variable *v = component_variable(vr[k], type);
         if (v == NULL) return component_unknown(c, function, vr[k], type);
-        if (settable(c, v, value[k]) != fmi2OK) return fmi2Error;
-        if (v->place == AT_METHOD && valid_method(c, v, value[k]) != fmi2OK) return fmi2Error;
+        if (instance_settable(&c->instance, v, value[k]) != OK) return component_failed(c, fmi2Error);
     }
-    for (size_t k = 0; k < nvr; k++)
-        if (!is_same(c, &VARIABLES[vr[k]], value[k]))
-            instance_set(&c->instance, &VARIABLES[vr[k]], value[k]);
+    for (size_t k = 0; k < nvr; k++) instance_put(&c->instance, &VARIABLES[vr[k]], value[k]);
     return fmi2OK;
 }
 

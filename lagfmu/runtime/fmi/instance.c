@@ -236,7 +236,6 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
     return instance_value(&x->solver, &x->seen, v, value);
 }
 
-/* The inputs are others than those under which the runs have stepped ahead. */
 void instance_inputs_changed(Instance *x) {
     solver_inputs_changed(&x->solver);
     if (ERROR_BARS != NULL) ERROR_BARS->inputs_changed(x);

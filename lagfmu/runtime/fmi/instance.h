@@ -12,8 +12,8 @@
 #include "solver.h"
 #include "variables.h"
 
-/* What there is to tell while a call succeeds. */
-typedef enum { NOTE_WARNING, NOTE_EVENT } Note;
+/* What there is to tell: while a call succeeds; of a step that could not be done, of what is refused. */
+typedef enum { NOTE_WARNING, NOTE_EVENT, NOTE_DISCARD, NOTE_ERROR } Note;
 typedef void (*Tell)(void *context, Note note, const char *text);
 
 typedef struct Instance {
@@ -76,6 +76,24 @@ SHARED void instance_inputs_changed(Instance *x);
 
 /* Sets the derivative of an input with respect to time; order 1 or 2. */
 SHARED void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value);
+
+/* As an importer drives it, whatever the version of FMI (experiment.c).  FAILED: nothing has changed, and the
+ * cause is in x->solver.why. */
+
+/* Times in s; a tolerance or a stop time that is not defined is NULL. */
+SHARED Status instance_set_up(Instance *x, const double *tolerance, double start, const double *stop);
+
+/* May the variable be set to the value now?  The rules of interface/rules.py, by the same table. */
+SHARED Status instance_settable(Instance *x, const Variable *v, double value);
+
+/* Sets a variable to a value that it may be set to: nothing happens where a parameter has these bits. */
+SHARED void instance_put(Instance *x, const Variable *v, double value);
+
+/* The end of the initialization: from here on only inputs can be set. */
+SHARED Status instance_initialize(Instance *x);
+
+/* Is there a communication step from t to t + h [s] now? */
+SHARED Status instance_steppable(Instance *x, double t, double h);
 
 /* The consistent start, unless it is known already. */
 SHARED Status instance_start(Instance *x);
