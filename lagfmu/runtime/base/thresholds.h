@@ -26,7 +26,7 @@ static const double PROJECTION_SMALL = 1e-12; /* relative residual that rounding
 static const double PROJECTION_ROUNDING = 100 * DBL_EPSILON; /* and where Newton's method that gains slowly
                                                               * is left in peace */
 static const double PROJECTION_LINEAR = 0.1; /* ratio of successive errors: convergence is linear, G loses rank */
-enum { INITIAL_ITERATIONS = 60, INITIAL_SWEEPS = 3 }; /* of velocities: the second removes the first one's rounding */
+enum { INITIAL_ITERATIONS = 60, INITIAL_SWEEPS = 3 }; /* of velocities: the second removes rounding of the first */
 static const double INITIAL_NEAR = 1e-5; /* from here the angles between dependent rows tell how far off it is */
 static const double INITIAL_ARRIVED = 1e3 * DBL_EPSILON; /* slip, relative to its terms, that rounding may leave */
 static const double PRIORITY_EASE = 0x1p-15; /* weight of a start value's rank below those that a stage frees */

@@ -40,8 +40,8 @@ typedef struct {
     Status (*work)(Solver *s, double t0, double t1, double *work);
     /* d(y')/dy and dy'/dt by differences. */
     Status (*jacobian)(Solver *s, double t, const double *y, double *J, double *dfdt);
-    /* An impact with friction, and one without rebound; done: 0 where no contact that is struck is of a normal force,
-     * or none was found (frictional_impact.c). */
+    /* An impact with friction, and one without rebound; done: 0 where no contact that is struck is of a
+     * normal force, or none was found (frictional_impact.c). */
     Status (*impact)(Solver *s, Instant at, const double *q, const double *v, const int *entering,
                   const double *slip, double *e, Impulse plastic, Impulse found, int *done);
 } FrictionEvents;

@@ -1,6 +1,6 @@
-/* initial_projection.c -- start values onto the constraints, from anywhere, by precedence.
+/* initial_projection.c -- start values onto the constraints, from however far, by start priority.
  *
- *   M dq = G^T mu ,  G dq = -f     damped Newton's method from afar (Deuflhard, Newton Methods for
+ *   M dq = G^T mu ,  G dq = -f     damped Newton's method (Deuflhard, Newton Methods for
  *                                  Nonlinear Problems, sect. 3.1), the step halved until |f| falls
  *   M dv = G^T mu ,  G dv = nu - G v
  *

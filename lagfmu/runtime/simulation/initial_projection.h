@@ -1,4 +1,4 @@
-/* initial_projection.h -- start values onto the constraints, from anywhere, by precedence (start_priority.h). */
+/* initial_projection.h -- start values onto the constraints, by start priority (start_priority.h). */
 #ifndef LAGFMU_INITIAL_PROJECTION_H
 #define LAGFMU_INITIAL_PROJECTION_H
 

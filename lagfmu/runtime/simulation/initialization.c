@@ -1,9 +1,9 @@
 /* initialization.c -- a consistent start: projection of start values onto the constraints, contact modes,
  * nominals.
  *
- * Positions are projected (initial_projection.c, start_priority.c) onto the constraints that always act and onto contacts
- * that are penetrated (f < gap); then velocities onto G v = nu; then the contacts that touch are
- * closed if their multiplier is positive. */
+ * Positions are projected (initial_projection.c) onto the constraints that always act and onto contacts that
+ * are penetrated (f < gap); then velocities onto G v = nu; then the contacts that touch are closed if their
+ * multiplier is positive. */
 #include <float.h>
 #include <string.h>
 

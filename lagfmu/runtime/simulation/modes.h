@@ -9,8 +9,8 @@
  * a closed one opens, an open one is struck. */
 SHARED Status modes_switch(Solver *s, const int *happened);
 
-/* Opens contacts that a jump of a prescribed motion has left a gap in, or a speed at which they depart: a
- * departure.  A gap that the contact, pressed as it is, would have closed within `span` [s] is none: the
+/* Departures of contacts that a jump of a prescribed motion has left a gap in, or a speed at which they open.
+ * A gap that the contact, under its normal force, would have closed within `span` [s] is none: the
  * motion went on a little otherwise than its derivatives had foreseen over a step of that length.  `drift`: that
  * part of the constraint's own size and speed is what an integrator that knows no constraints may have left. */
 SHARED Status modes_departures(Solver *s, double span, double drift);

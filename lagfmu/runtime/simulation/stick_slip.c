@@ -328,7 +328,7 @@ static int fits(Settling *x, int *trial, const int *touching, const int *departi
            memcmp(settled, trial, bytes) == 0;
 }
 
-/* The contacts of the normal force of friction i that touch become as `shut`; 0: there are none, or one departs. */
+/* The touching contacts of the normal force of friction i become as `shut`; 0: there are none, or one departs. */
 static int turn_contacts(const System *s, int i, int shut, int *closed, const int *touching,
                          const int *departing) {
     const Friction *law = &s->friction[i];
