@@ -107,6 +107,12 @@ def test_the_solver_stands_alone() -> None:
         assert imported(path) <= {"solver", "numeric", "names"}, path.name
 
 
+def test_what_changed_is_one_page() -> None:
+    """Of the version to come, by topic; a merge that unites two of its texts brings old lines back."""
+    text = (ROOT.parent / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert len(text.split()) < 1_200
+
+
 def test_the_rooms_can_be_counted() -> None:
     """What lies directly in lagfmu/ is these rooms, besides the runtime's C and the two
     files that Python asks for."""
