@@ -18,6 +18,7 @@ class Module:
         self.compiled = wasmtime.Module(engine, module)
         instance = wasmtime.Instance(self.store, self.compiled, [])
         self.exports = instance.exports(self.store)
+        self.memory = self.exports["memory"]
         self.call("_initialize")
         self.facts = facts
 
@@ -31,28 +32,30 @@ class Module:
 
     def log(self) -> list[str]:
         start, size = self.call("page_log"), self.call("page_log_size")
-        text = bytes(self.exports["memory"].read(self.store, start, start + size))
+        text = bytes(self.memory.read(self.store, start, start + size))
         return [m[1:].decode() for m in text.split(b"\0") if m]
 
     def simulate(self, points: Any, tolerance: float = 0.0) -> Any:
         """A row at each of the communication points [s], as fmpy has it."""
         columns = [v for v in self.facts["variables"] if v["column"]]
-        memory = self.exports["memory"]
-        references = self.call("page_memory", 4 * len(columns))
-        numbers = [v["reference"] for v in columns]
-        memory.write(self.store, struct.pack(f"<{len(columns)}i", *numbers), references)
-        row = self.call("page_memory", 8 * len(columns))
+        width, numbers = len(columns), [v["reference"] for v in columns]
+        times = self._put(struct.pack(f"<{len(points)}d", *points))
+        keep = self._put(struct.pack(f"<{width}I", *numbers))
+        rows = self._put(bytes(8 * width * len(points)))
+        arguments = (0, 0, 0, tolerance, len(points), times, width, keep, rows)
+        assert self.call("page_run", *arguments) == 0, self.log()
+        data = bytes(self.memory.read(self.store, rows, rows + 8 * width * len(points)))
+        values = np.frombuffer(data).reshape(len(points), width)
         kinds = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
         fields = [("time", np.float64), *((v["name"], kinds[v["type"]]) for v in columns)]
         result = np.zeros(len(points), dtype=fields)
-        assert self.call("page_instantiate") <= 1, self.log()
-        assert self.call("page_setup", tolerance, float(points[-1])) <= 1, self.log()
-        assert self.call("page_initialize") <= 1, self.log()
-        for k, t in enumerate(points):
-            if k:
-                before = float(points[k - 1])
-                assert self.call("page_step", before, float(t) - before) <= 1, self.log()
-            assert self.call("page_read", references, len(columns), row) <= 1, self.log()
-            values = bytes(memory.read(self.store, row, row + 8 * len(columns)))
-            result[k] = (t, *struct.unpack(f"<{len(columns)}d", values))
+        result["time"] = points
+        for v, column in zip(columns, values.T, strict=True):
+            result[v["name"]] = column
         return result
+
+    def _put(self, data: bytes) -> int:
+        """Its place in the module's memory."""
+        place = self.call("page_memory", len(data))
+        self.memory.write(self.store, data, place)
+        return place

@@ -314,7 +314,7 @@ class _Builder:
                 names.TOLERANCE,
                 0.0,
                 ONE,
-                "relative tolerance of each step; 0: the one of fmi2SetupExperiment, else "
+                "relative tolerance of each step; 0: the one of the experiment, else "
                 f"{self.scene.tolerance!r}",
                 float(LARGEST_TOLERANCE),
             ),

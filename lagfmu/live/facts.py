@@ -14,6 +14,7 @@ import fmpy
 from .. import names
 from ..fmu.archive import pack
 from ..fmu.described import experiment_of
+from ..interface.rules import MESSAGES
 from ..model.units import for_reading
 from ..page.preset import SETTABLE
 
@@ -59,6 +60,7 @@ def facts(
             "tolerance": experiment.tolerance,
         },
         "variables": variables,
+        "rules": MESSAGES,
         "picture": picture,
         "preset": {
             "sliders": [n for n in given["sliders"] if n in settable],

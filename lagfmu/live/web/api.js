@@ -35,7 +35,7 @@ class Computation {
       for (const { reject } of this.waiting.values()) reject(new Error(event.message));
       this.waiting.clear();
     };
-    return this.ask({ kind: "load", module, variables: FACTS.variables }, [module]);
+    return this.ask({ kind: "load", module, variables: FACTS.variables, rules: FACTS.rules }, [module]);
   }
 
   ask(job, transfer = []) {

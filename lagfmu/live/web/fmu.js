@@ -1,10 +1,10 @@
 /* fmu.js -- runs of an FMU whose sources were compiled with importer.c to WebAssembly.
  *
- * A run is what fmpy.simulate_fmu does: the same calls, the same communication points, a row at each.
- * Runs in the worker; knows nothing of the page. */
+ * A run is what an importer's is: the same settings, the same communication points, a row at each; the loop
+ * is the FMU's own (batch.c).  Runs in the worker; knows nothing of the page. */
 
-const OK = 1; // fmi2OK and fmi2Warning; then come discard, error, fatal, pending
-const STATUS = ["ok", "warning", "discard", "error", "fatal", "pending"];
+const [DONE, REFUSED, NO_MEMORY] = [0, 3, -1]; // statuses of a run
+const NOTES = ["warning", "ok", "discard", "error"]; // what a message is
 const NUMBERS = ["Real", "Integer", "Boolean"];
 const LONGEST = 1e6; // communication points of a run, all of which are kept
 
@@ -22,18 +22,45 @@ function isClose(a, b) {
   return a === b || Math.abs(a - b) <= 1e-9 * Math.max(Math.abs(a), Math.abs(b));
 }
 
+/* Does a value hold a rule of interface/rules.py?  Their messages come with the facts. */
+const HOLDS = {
+  settable: (v) => v.role !== "output",
+  finite: (v, value) => typeof value === "number" && Number.isFinite(value),
+  whole: (v, value) => v.type === "Real" || Number.isInteger(value),
+  range: (v, value) => (v.min === null || value >= v.min) && (v.max === null || value <= v.max),
+  positive: () => true, // an FMU does not describe it, and says it itself
+};
+
+/* What is wrong with a value of a variable; empty if nothing is. */
+function problemOf(rules, variable, value) {
+  const broken = Object.keys(rules).find((rule) => !HOLDS[rule](variable, value));
+  if (!broken) return "";
+  const numbers = { value, minimum: variable.min ?? -Infinity, maximum: variable.max ?? Infinity };
+  const told = { name: variable.name };
+  for (const [key, number] of Object.entries(numbers)) told[key] = asInPython(number);
+  return rules[broken].replace(/\{(\w+)\}/g, (_, key) => told[key]);
+}
+
+/* As Python writes it. */
+function asInPython(value) {
+  const text = String(value);
+  return text.replace("Infinity", "inf").replace("NaN", "nan").replace(/^-?\d+$/, "$&.0");
+}
+
 /* Problems of the settings in words; an FMU would not know these names. */
-function problemsOf(variables, settings) {
+function problemsOf(variables, rules, settings) {
   const problems = [];
   const kinds = { parameters: ["parameter", "solver"], start: ["start"], inputs: ["input"] };
   for (const [key, roles] of Object.entries(kinds)) {
-    const known = variables.filter((v) => roles.includes(v.role) && NUMBERS.includes(v.type)).map((v) => v.name);
+    const known = variables.filter((v) => roles.includes(v.role) && NUMBERS.includes(v.type));
     for (const [name, value] of Object.entries(settings[key] || {})) {
-      if (!known.includes(name)) {
-        const listed = known.join(", ") || "none: this FMU has no such variable";
+      const variable = known.find((v) => v.name === name);
+      if (variable) {
+        const problem = problemOf(rules, variable, value);
+        if (problem) problems.push(`${key}: ${problem}`);
+      } else {
+        const listed = known.map((v) => v.name).join(", ") || "none: this FMU has no such variable";
         problems.push(`${key}: '${name}' cannot be set, expected one of ${listed}`);
-      } else if (typeof value !== "number" || !Number.isFinite(value)) {
-        problems.push(`${key}: '${name}' = ${value}, expected a finite number`);
       }
     }
   }
@@ -54,19 +81,25 @@ function problemsOf(variables, settings) {
   return problems;
 }
 
+/* 0, h, 2 h, ..., and the stop time [s]. */
+function communicationPoints(stop, step) {
+  const points = [0];
+  for (let n = 1; points[n - 1] < stop && !isClose(points[n - 1], stop); n++) {
+    const next = n * step;
+    points.push(next > stop && !isClose(next, stop) ? stop : next);
+  }
+  return Float64Array.from(points);
+}
+
 class Fmu {
-  /* `exports` of the module, and the variables as the page's facts list them. */
-  constructor(exports, variables) {
+  /* `exports` of the module, the variables as the page's facts list them, and the messages of the rules. */
+  constructor(exports, variables, rules) {
     this.c = exports;
     this.variables = variables;
+    this.rules = rules;
     this.byName = new Map(variables.map((v) => [v.name, v]));
     this.columns = variables.filter((v) => v.column);
     if (this.c._initialize) this.c._initialize();
-    this.references = this.c.page_memory(4 * this.columns.length + 8);
-    new Int32Array(this.c.memory.buffer, this.references, this.columns.length).set(
-      this.columns.map((v) => v.reference)
-    );
-    this.row = this.c.page_memory(8 * this.columns.length + 8);
     this.menu = this.byName.get("solver.method");
     this.methods = this.menu ? this.menu.items.map((item) => item.name) : [];
   }
@@ -79,14 +112,10 @@ class Fmu {
       const bytes = new Uint8Array(this.c.memory.buffer, at, end - at);
       const size = bytes.indexOf(0);
       const text = new TextDecoder().decode(bytes.slice(0, size));
-      found.push({ status: STATUS[Number(text[0])] || "error", message: text.slice(1).trim() });
+      found.push({ status: NOTES[Number(text[0])], message: text.slice(1).trim() });
       at += size + 1;
     }
     return found;
-  }
-
-  check(status, what) {
-    if (status > OK) throw new Refused(this.log(), what);
   }
 
   /* settings: parameters, start, inputs: {name: value}; tolerance or null; method or null; stopTime,
@@ -94,65 +123,54 @@ class Fmu {
    * reason of a step that could not be done, the rows end before it.  Throws Refused, or a RangeError
    * that names all problems. */
   run(settings) {
-    const problems = problemsOf(this.variables, settings);
-    const { method } = settings;
+    const problems = problemsOf(this.variables, this.rules, settings);
+    const { method, tolerance, stopTime, stepSize } = settings;
     if (method !== null && !this.methods.includes(method)) {
       problems.push(`method = '${method}', expected one of ${this.methods.join(", ")}`);
     }
     if (problems.length) throw new RangeError(problems.join("; "));
+    const given = { ...settings.parameters, ...settings.start, ...settings.inputs };
+    if (method !== null) given[this.menu.name] = this.menu.items.find((item) => item.name === method).value;
     const began = performance.now();
-    const c = this.c;
-    this.check(c.page_instantiate(), "fmi2Instantiate");
-    for (const key of ["parameters", "start", "inputs"]) {
-      for (const [name, value] of Object.entries(settings[key] || {})) {
-        this.check(c.page_set(this.byName.get(name).reference, value), name);
-      }
-    }
-    if (method !== null) {
-      const { value } = this.menu.items.find((item) => item.name === method);
-      this.check(c.page_set(this.menu.reference, value), "solver.method");
-    }
-    this.check(c.page_setup(settings.tolerance || 0, settings.stopTime), "fmi2SetupExperiment");
-    this.check(c.page_initialize(), "initialization");
-    const found = this.stepped(settings.stopTime, settings.stepSize);
+    const found = this.stepped(given, tolerance || 0, communicationPoints(stopTime, stepSize));
     found.milliseconds = performance.now() - began;
     return found;
   }
 
-  stepped(stop, step) {
+  stepped(given, tolerance, times) {
+    const { c } = this;
     const width = this.columns.length;
-    let room = Math.ceil(stop / step) + 3;
-    const time = new Float64Array(room);
-    const columns = this.columns.map(() => new Float64Array(room));
-    let rows = 0;
-    const sample = (t) => {
-      this.check(this.c.page_read(this.references, width, this.row), "values");
-      const values = new Float64Array(this.c.memory.buffer, this.row, width);
-      time[rows] = t;
-      for (let k = 0; k < width; k++) columns[k][rows] = values[k];
-      rows++;
+    const references = Object.keys(given).map((name) => this.byName.get(name).reference);
+    const held = [];
+    const put = (numbers, Kind, room = numbers.length) => {
+      const at = c.page_memory(Math.max(1, room) * Kind.BYTES_PER_ELEMENT);
+      if (at === 0) throw new RangeError(`${times.length} points are more than fit in memory`);
+      held.push(at);
+      new Kind(c.memory.buffer, at, numbers.length).set(numbers);
+      return at;
     };
-    let t = 0;
-    let failed = null;
-    sample(t);
-    for (let n = 1; t < stop && !isClose(t, stop); n++) {
-      let next = n * step;
-      if (next > stop && !isClose(next, stop)) next = stop;
-      const status = this.c.page_step(t, next - t);
-      if (status > OK) {
-        failed = new Refused(this.log(), "fmi2DoStep").message;
-        const reached = this.c.page_reached();
-        if (reached > t) sample(reached);
-        break;
-      }
-      t = next;
-      sample(t);
+    try {
+      const vary = put(references, Uint32Array);
+      const values = put(Object.values(given), Float64Array);
+      const points = put(times, Float64Array);
+      const keep = put(this.columns.map((v) => v.reference), Uint32Array);
+      const rows = put([], Float64Array, width * times.length);
+      const status = c.page_run(
+        ...[references.length, vary, values, tolerance, times.length, points, width, keep, rows]
+      );
+      if (status === NO_MEMORY) throw new RangeError("a run needs more memory than there is");
+      const reached = c.page_reached();
+      if (status === REFUSED && reached === times[0]) throw new Refused(this.log(), "initialization");
+      const time = times.filter((t) => t <= reached);
+      const table = new Float64Array(c.memory.buffer, rows, width * time.length);
+      return {
+        time,
+        columns: this.columns.map((_, k) => time.map((_, n) => table[n * width + k])),
+        log: this.log(),
+        failed: status === DONE ? null : new Refused(this.log(), "the step").message,
+      };
+    } finally {
+      held.forEach((at) => c.page_release(at));
     }
-    return {
-      time: time.slice(0, rows),
-      columns: columns.map((column) => column.slice(0, rows)),
-      log: this.log(),
-      failed,
-    };
   }
 }

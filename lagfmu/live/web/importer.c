@@ -1,104 +1,78 @@
-/* importer.c -- an importer of co-simulation FMUs for a page, compiled with an FMU's own sources to
- * wasm32.  Everything goes through the fmi2 functions; statuses are theirs.
+/* importer.c -- a run of an FMU for a page, compiled with the FMU's own sources to wasm32: below the FMI, for a
+ * page knows the instance itself.
  *
- * JavaScript cannot write a logger of C (it takes a variable number of arguments), and a call for each
- * value would cost more than the step: so a row of values is read here.  A module is one page's own, so
- * that its instance and its log may be static. */
-#include <stdarg.h>
-#include <stdio.h>
+ * JavaScript cannot be told a text by C, and a call for each step would cost more than the step: so messages are
+ * kept, and a run is one call.  A module is one page's own, so that its instance and its log may be static. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmi2.h"
-#include "variables.h"
+#include "batch.h"
 
 #define EXPORT(name) __attribute__((export_name(#name)))
 
 enum { ROOM = 1 << 16 };
-static char text[ROOM]; /* messages: the status as a digit, the text, a zero byte; one after the other */
-static int used;
-static fmi2Component instance;
+static char text[ROOM]; /* messages: the note as a digit, the text, a zero byte; one after the other */
+static size_t used;
+static Instance *instance;
+static double reached;
 
-static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
-                   fmi2String category, fmi2String message, ...) {
-    const int left = ROOM - used - 2;
-    va_list arguments;
-    (void)environment;
-    (void)name;
-    (void)category;
-    if (left < 2) return; /* full: the first messages say why */
-    text[used] = (char)('0' + (int)status);
-    va_start(arguments, message);
-    const int length = vsnprintf(text + used + 1, (size_t)left, message, arguments);
-    va_end(arguments);
-    if (length >= 0) used += 2 + (length < left ? length : left - 1);
+static void keep_message(void *context, Note note, const char *message) {
+    const size_t length = strlen(message) + 2;
+    (void)context;
+    if (used + length > ROOM) return; /* full: the first messages say why */
+    text[used] = (char)('0' + (int)note);
+    memcpy(text + used + 1, message, length - 1);
+    used += length;
 }
-
-static const fmi2CallbackFunctions CALLBACKS = {logger, calloc, free, NULL, NULL};
 
 EXPORT(page_log) const char *page_log(void) { return text; }
 
-EXPORT(page_log_size) int page_log_size(void) { return used; }
+EXPORT(page_log_size) int page_log_size(void) { return (int)used; }
 
-/* Zeroed memory, for what the page hands in and reads. */
-EXPORT(page_memory) void *page_memory(int bytes) { return calloc(1, (size_t)bytes); }
+/* Zeroed memory, for what the page hands in and reads; NULL if there is not so much. */
+EXPORT(page_memory) void *page_memory(unsigned bytes) { return calloc(1, bytes); }
 
 EXPORT(page_release) void page_release(void *memory) { free(memory); }
 
-/* A new instance in place of the last one, and an empty log. */
-EXPORT(page_instantiate) int page_instantiate(void) {
+/* The one instance, made at the first run. */
+static Instance *made(void) {
+    Instance draft;
+    Arena arena = {NULL, 0};
+    memset(&draft, 0, sizeof draft);
+    (void)arena_take(&arena, 1, sizeof(Instance));
+    instance_layout(&draft, &arena);
+    arena = (Arena){calloc(1, arena.used), 0};
+    if (arena.base == NULL) return NULL;
+    Instance *x = arena_take(&arena, 1, sizeof *x);
+    instance_layout(x, &arena);
+    x->tell = keep_message;
+    return x;
+}
+
+/* A run over `points` communication points `times` [s] after `varied` variables were set, tolerance 0: the FMU's
+ * own; `kept` values a point into `rows`, as far as page_reached() says.  A RunStatus; -1 without memory. */
+EXPORT(page_run)
+int page_run(int varied, const unsigned *vary, const double *values, double tolerance, int points,
+             const double *times, int kept, const unsigned *keep, double *rows) {
+    int status = -1;
     used = 0;
-    if (instance != NULL) fmi2FreeInstance(instance);
-    instance = fmi2Instantiate("page", fmi2CoSimulation, MODEL_GUID, NULL, &CALLBACKS, 0, 1);
-    return instance == NULL ? fmi2Error : fmi2OK;
-}
-
-/* tolerance 0: the FMU's own; times in seconds */
-EXPORT(page_setup) int page_setup(double tolerance, double stop) {
-    return fmi2SetupExperiment(instance, tolerance != 0, tolerance, 0, 1, stop);
-}
-
-/* A number for a Real, Integer, Boolean or Enumeration variable. */
-EXPORT(page_set) int page_set(int reference, double value) {
-    const fmi2ValueReference vr = (fmi2ValueReference)reference;
-    const int whole = (int)value;
-    if (reference < 0 || reference >= VARIABLE_COUNT) return fmi2Error;
-    switch (VARIABLES[reference].type) {
-        case TYPE_REAL: return fmi2SetReal(instance, &vr, 1, &value);
-        case TYPE_INTEGER: return fmi2SetInteger(instance, &vr, 1, &whole);
-        case TYPE_BOOLEAN: return fmi2SetBoolean(instance, &vr, 1, &whole);
-        default: return fmi2Error;
+    if (instance == NULL) instance = made();
+    const size_t width = (size_t)kept;
+    double *room = calloc(3 * width + 1, sizeof *room); /* result, scratch */
+    int *last = calloc(width + 1, sizeof *last);        /* KEEP_LAST */
+    char *states = instance == NULL ? NULL : calloc(2, instance_record_size(instance));
+    if (room != NULL && last != NULL && states != NULL) {
+        Batch batch = {.runs = 1, .varied = (size_t)varied, .points = (size_t)points, .kept = width,
+                       .vary = vary, .values = values, .times = times, .tolerance = tolerance, .keep = keep,
+                       .what = last, .whole = 1, .result = room, .trajectory = rows, .status = &status,
+                       .reached = &reached, .scratch = room + width};
+        batch_run(instance, &batch, states);
     }
+    free(room);
+    free(last);
+    free(states);
+    return status;
 }
 
-EXPORT(page_initialize) int page_initialize(void) {
-    const fmi2Status entered = fmi2EnterInitializationMode(instance);
-    return entered > fmi2Warning ? entered : fmi2ExitInitializationMode(instance);
-}
-
-EXPORT(page_step) int page_step(double t, double h) { return fmi2DoStep(instance, t, h, 1); }
-
-/* The time up to which a discarded step came [s]. */
-EXPORT(page_reached) double page_reached(void) {
-    double t = 0;
-    return fmi2GetRealStatus(instance, fmi2LastSuccessfulTime, &t) == fmi2OK ? t : 0;
-}
-
-/* The values of `count` variables, numbers all of them. */
-EXPORT(page_read) int page_read(const int *references, int count, double *row) {
-    for (int k = 0; k < count; k++) {
-        const fmi2ValueReference vr = (fmi2ValueReference)references[k];
-        fmi2Status status = fmi2Error;
-        int whole = 0;
-        if (references[k] < 0 || references[k] >= VARIABLE_COUNT) return fmi2Error;
-        switch (VARIABLES[vr].type) {
-            case TYPE_REAL: status = fmi2GetReal(instance, &vr, 1, &row[k]); break;
-            case TYPE_INTEGER: status = fmi2GetInteger(instance, &vr, 1, &whole); break;
-            case TYPE_BOOLEAN: status = fmi2GetBoolean(instance, &vr, 1, &whole); break;
-            default: break;
-        }
-        if (status > fmi2Warning) return status;
-        if (VARIABLES[vr].type != TYPE_REAL) row[k] = whole;
-    }
-    return fmi2OK;
-}
+/* The time to which the latest run came [s]. */
+EXPORT(page_reached) double page_reached(void) { return reached; }

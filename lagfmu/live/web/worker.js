@@ -1,6 +1,6 @@
 /* worker.js -- the thread that computes: one FMU, one job after the other.
  *
- * In: {kind: "load", module, variables}, then {kind: "run" | "compare", id, settings[, reference]}.
+ * In: {kind: "load", module, variables, rules}, then {kind: "run" | "compare", id, settings[, reference]}.
  * Out: {id, ...} with the result, or {id, error, log}. */
 
 let fmu = null;
@@ -31,9 +31,9 @@ function exact(settings, tight) {
 }
 
 const JOBS = {
-  load: async ({ module, variables }) => {
+  load: async ({ module, variables, rules }) => {
     const { instance } = await WebAssembly.instantiate(module, {});
-    fmu = new Fmu(instance.exports, variables);
+    fmu = new Fmu(instance.exports, variables, rules);
     return { methods: fmu.methods };
   },
   run: async ({ settings }) => fmu.run(settings),

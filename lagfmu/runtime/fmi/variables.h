@@ -1,4 +1,4 @@
-/* variables.h -- the FMU's variables as fmi2.c sees them; variables.c is generated from the same table
+/* variables.h -- the FMU's variables as an importer sees them; variables.c is generated from the same table
  * as modelDescription.xml (table.py).  The position is the value reference. */
 #ifndef LAGFMU_VARIABLES_H
 #define LAGFMU_VARIABLES_H

@@ -1,6 +1,6 @@
 """What must hold in every run, whatever its parameters: the invariants of Lagrange's equations.
 
-  finite       every output that came with fmi2OK is a finite number
+  finite       every output that a successful call gave is a finite number
   shares       Q.q = sum of Q.c.q over the constraints c, to rounding of the summands
   residual     |f| (or |G v - nu|) of what acts is at rounding: at most ROUNDING of its own size,
                the sum over q of |G_q| max(|q| so far, its start, parameters of its unit), with
