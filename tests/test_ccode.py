@@ -383,23 +383,6 @@ def test_tangent_is_the_directional_derivative(case: Callable[[str], Case], name
             assert_tangent(one.native, full, Point(eom, seed))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_tangent_is_the_limit_of_differences(case: Callable[[str], Case], name: str) -> None:
-    """(y(x + h d) - y(x - h d)) / 2h -> dy, with the error O(h^2) of a central difference."""
-    one = case(name)
-    h = 1e-5
-    for full, eom, _ in one.systems():
-        point = Point(eom, 3)
-        found = tangents(one.native, full, point)
-        ahead = computed(one.native, full, eom, point.moved(h))
-        behind = computed(one.native, full, eom, point.moved(-h))
-        for label, after in ahead.items():
-            for k, x in enumerate(after):
-                quotient = (x - behind[label][k]) / (2 * h)
-                scale = 1 + abs(found[label][k]) + abs(x)
-                assert abs(quotient - found[label][k]) < 1e-8 * scale, (label, k)
-
-
 @pytest.mark.parametrize("name", ["PendulumAngle", "InclineDiskMinimal"])
 def test_embedding_and_its_tangent(case: Callable[[str], Case], name: str) -> None:
     """q = phi(s, t), v = J sdot + dphi/dt, and their change along (dt, ds, dsdot, du)."""
