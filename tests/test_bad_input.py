@@ -717,12 +717,17 @@ def test_a_temporary_folder_that_cannot_be_written_is_told(tmp_path):
 @pytest.mark.parametrize(
     ("command", "kept"),
     [
-        ("simulate FMU --csv KEPT", "runs.csv"),
-        ("verify FMU --json KEPT", "all.json"),
-        ("sweep FMU --vary m1=1,2 --out KEPT", "runs.csv"),
-        ("tradeoff FMU --json KEPT", "all.json"),
-        ("stress FMU --quick --json KEPT", "all.json"),
         ("build MODEL --target python --out KEPT", "Atwood.fmu"),
+        ("sweep FMU --vary m1=1,2 --out KEPT", "runs.csv"),
+        *(
+            pytest.param(words, kept, marks=pytest.mark.thorough)
+            for words, kept in (
+                ("simulate FMU --csv KEPT", "runs.csv"),
+                ("verify FMU --json KEPT", "all.json"),
+                ("tradeoff FMU --json KEPT", "all.json"),
+                ("stress FMU --quick --json KEPT", "all.json"),
+            )
+        ),
     ],
 )
 def test_a_full_disk_is_told_with_its_folder_and_the_remedy(native_fmu, tmp_path, command, kept):
@@ -1211,6 +1216,7 @@ print("alive")
 """
 
 
+@pytest.mark.thorough
 def test_the_process_survives_hundreds_of_refusals(fmu):
     """800 refused calls in ten instances: no crash, neither then nor at the end of the process."""
     command = [

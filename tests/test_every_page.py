@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 from browser import Page
-from conftest import EVERY, MODELS
+from conftest import EVERY, MODELS, of_each_kind
 
 from lagfmu.testing import (
     LAST,
@@ -95,7 +95,7 @@ def is_set(v: Any) -> bool:
     return settable and v.type == "Real" and not v.name.startswith("solver.")
 
 
-@pytest.fixture(scope="module", params=list(EVERY))
+@pytest.fixture(scope="module", params=of_each_kind(EVERY))
 def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

@@ -18,7 +18,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 import scipy
-from conftest import FILES
+from conftest import FILES, of_each_kind
 from coupled_model import absorber
 from fmi2 import DISCARD, ERROR, OK
 from fmpy.fmi1 import FMICallException
@@ -270,11 +270,8 @@ TABULATED = {"HalfCar"}  # the points of its road stay in metres
 
 def in_units(scales: dict[str, tuple[float, ...]]) -> list[Any]:
     """(model, units) for every model whose motion these units must not change."""
-    return [
-        pytest.param(name, units, id=f"{name}-{label}")
-        for label, units in scales.items()
-        for name in sorted(set(FILES) - STIFF - TABULATED)
-    ]
+    names = sorted(set(FILES) - STIFF - TABULATED)
+    return [case for k, v in scales.items() for case in of_each_kind(names, v, label=k)]
 
 
 @pytest.mark.parametrize(("name", "units"), in_units(SCALES))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +15,7 @@ from runs import simulate_fmu
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Model, Parameter, Scene, simulate
+from lagfmu import Contact, Model, Parameter, Scene, build_fmu, simulate
 from lagfmu.errors import LagfmuError
 from lagfmu.testing import (
     find_compiler,
@@ -106,13 +105,15 @@ def test_a_ball_flies_out_of_a_corner_the_way_it_came(run, order, tilt):
         assert result[f"der({q})"][-1] == pytest.approx(-0.8 * values[f"der({q})"], rel=1e-12)
 
 
-@pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
-def test_a_cradle_whose_balls_touch_is_the_same_from_both_sides(run, value):
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
+def test_a_cradle_whose_balls_touch_is_the_same_from_both_sides(tmp_path, order, mirrored):
     """n equal balls: by Newton's law and complementarity those at rest move on together with
     (1 + e)/n, whatever their order and whether the first or the last is struck."""
-    count, ways = 4, [(0, 1, 2), (2, 1, 0), (1, 2, 0)]
-    for order, mirrored in itertools.product(ways, (False, True)):
-        last = run(cradle(count, order, value, mirrored), 1.0, 0.25)[-1]
+    count = 4
+    fmu = build_fmu(cradle(count, order, 0.5, mirrored), tmp_path, target="native", check=False)
+    for value in (0.0, 0.5, 1.0):
+        last = simulate(fmu, 1.0, 0.25, 1e-10, {"e": value})[-1]
         v = np.array([last[f"der(x{k})"] for k in range(count)])
         if mirrored:
             v = -v[::-1]

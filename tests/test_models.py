@@ -294,6 +294,7 @@ def test_kinetic_energy_with_all_forces_gives_the_equations_of_the_lagrangian() 
     assert sp.expand(first.potential - second.potential) == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", EVERY)
 def test_statements_hold_with_parameters_and_starts_drawn_at_random(name: str, native_fmu) -> None:
     """Each parameter, then each start value too, times e^-0.4 to e^0.4: whatever a model states of its FMU,

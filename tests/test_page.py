@@ -133,7 +133,7 @@ def test_a_page_is_the_same_from_model_and_fmu(
     assert pages[0] == pages[1]
 
 
-@pytest.mark.parametrize("target", ["python", "native"])
+@pytest.mark.parametrize("target", ["native", pytest.param("python", marks=pytest.mark.thorough)])
 def test_the_page_travels_in_the_fmu(target: str, tmp_path: Path, browser: Any) -> None:
     """lagfmu build --page: the page lies beside the documentation, which has a link to it, and the FMU
     grows by 250 kB at most; without the option it is as it was."""

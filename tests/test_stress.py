@@ -482,6 +482,7 @@ def test_what_balances_is_no_difference_of_runs(tmp_path):
         assert one.differences(standing, against)["Q.b"].max() > 1e-9
 
 
+@pytest.mark.thorough
 def test_rates_that_an_fmu_estimates_are_read_by_the_judge(tmp_path):
     """A cam whose angle alone is given, a contact with a table, friction: nothing is wrong, and the laws that
     need the angle's rates are held against those that the FMU reports."""

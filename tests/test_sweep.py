@@ -472,6 +472,7 @@ def test_the_mass_has_no_part_in_when_the_particle_leaves(dist):
     assert force == pytest.approx(expected, abs=0.05)
 
 
+@pytest.mark.thorough
 def test_an_optimizer_finds_the_damping_at_which_the_spring_just_holds(dist):
     """Optuna, as docs/sweeps.md has it: softer rides better and travels farther, so that the best damping is
     where the travel is the 60 mm that are allowed."""
