@@ -235,6 +235,17 @@ def test_figures_that_cannot_be_made_are_one_message(small, tmp_path):
             assert part in text
 
 
+def test_what_only_a_model_file_can_be_is_refused_of_an_fmu(native_fmu, tmp_path):
+    """--scene, -p, --add-output, --target of an FMU change nothing: they are named, all at once."""
+    fmu = native_fmu("Hemisphere")
+    options = ("--scene", "Dome", "-p", "n=4", "--add-output", "h = r [m]")
+    for command, more in (("simulate", ("--target", "python")), ("page", ("--fixed", "m"))):
+        text = lagfmu(command, fmu, *options, *more, code=WRONG_USAGE)
+        assert f"--scene and -p and {'--fixed and ' * (command == 'page')}--add-output" in text
+        assert ("--target" in text) == (command == "simulate")
+        assert f"{fmu} is an FMU" in text
+
+
 VARIED = ("--vary", "m=1,2")
 MEANT_WRONG = {  # each command with what cannot be meant
     "build": ("MODEL", "--outputs", "nothing"),

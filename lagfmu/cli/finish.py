@@ -12,7 +12,7 @@ from ..fmu.write import write_whole
 from ..page.table import new_table, print_whole
 from ..verification.pipeline import Report, as_json, as_junit, exit_code
 from ..verification.verify import Verification
-from .terminal import console, errors, say_error
+from .terminal import console, errors, say, say_error
 
 
 def finish(command: str, reports: Sequence[Report], json: Path | None, junit: Path | None) -> None:
@@ -41,8 +41,4 @@ def print_verdicts(found: Verification) -> None:
         console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
     for check in found.checks:
         if check.failed and check.detail:
-            errors.print(
-                f"[red]{escape(check.name)}:[/] {escape(check.detail)}",
-                highlight=False,
-                soft_wrap=True,
-            )
+            say(check.detail, f"{escape(check.name)}:", "red", errors)

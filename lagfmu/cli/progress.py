@@ -1,4 +1,4 @@
-"""How far a sweep has come, on a terminal and in a log."""
+"""How far a study has come, on a terminal and in a log."""
 
 from __future__ import annotations
 
@@ -7,31 +7,54 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    TextColumn,
+)
 
 from ..errors import UserInterruptError
-from .terminal import console
+from .terminal import console, say
 
-FIRST, QUIET = (
-    2.0,
-    10.0,
-)  # [s] until the first line, and between lines, of progress without a terminal
+FIRST, QUIET = 2.0, 10.0  # [s] until the first line, and between lines, without a terminal
+Tick = Callable[[str, int, int], None]  # what is done, how far, of how many
+
+
+@contextmanager
+def progress(console: Console, title: str) -> Iterator[Tick]:
+    """A bar that goes when the work is done; what it yields is told how far it has come.  Without a terminal
+    the title alone."""
+    if not console.is_terminal:
+        say(f"{title} ...", on=console)
+    with _bar(console, title, SpinnerColumn()) as tick:
+        yield tick
+
+
+@contextmanager
+def _bar(console: Console, title: str, *first: ProgressColumn) -> Iterator[Tick]:
+    what = TextColumn("{task.fields[what]}", markup=False)
+    columns = (*first, TextColumn(title, markup=False), BarColumn(), MofNCompleteColumn(), what)
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as shown:
+        task = shown.add_task("", total=None, what="")
+
+        def tick(what: str, done: int, total: int) -> None:
+            shown.update(task, completed=done, total=total, what=what)
+
+        yield tick
 
 
 @contextmanager
 def told(out: Path | None, workers: int | None) -> Iterator[Callable[[int, int, int], None]]:
     """Progress with rate, remaining time and what a run costs on one of the `workers`; after an interruption,
     what is left and how to go on."""
-    columns = (
-        TextColumn("runs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[pace]}"),
-    )
-    shown = console.is_terminal
     begun, due, first = time.monotonic(), FIRST, -1
-    with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
-        task = progress.add_task("", total=None, pace="")
+    with _bar(console, "runs") as tick:
 
         def tell(done: int, total: int, refused: int) -> None:
             nonlocal begun, due, first
@@ -40,10 +63,10 @@ def told(out: Path | None, workers: int | None) -> Iterator[Callable[[int, int, 
                 begun, first = now, done
             pace = _pace(done - first, total - done, now - begun, workers)
             pace += f", {refused} refused" if refused else ""
-            progress.update(task, completed=done, total=total, pace=pace)
-            if not shown and now - begun > due and done < total:
+            tick(pace, done, total)
+            if not console.is_terminal and now - begun > due and done < total:
                 due = now - begun + QUIET
-                console.print(f"{done} of {total} runs: {pace}", highlight=False, soft_wrap=True)
+                say(f"{done} of {total} runs: {pace}")
 
         try:
             yield tell

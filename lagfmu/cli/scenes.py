@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ..errors import UsageError
 from ..model.file import ModelFile, load
@@ -19,8 +20,19 @@ def loaded(path: Path, added: Names, arguments: Names = None) -> ModelFile:
     return replace(file, model=with_outputs(file.model, added or []))
 
 
-def chosen(file: ModelFile, names: Names) -> list[Scene]:
+def for_models(path: Path, **options: Any) -> None:
+    """Refuse options that an FMU has no use for.  Raises UsageError with those that were given."""
+    given = [n for n, value in options.items() if value is not None]
+    if given:
+        said = " and ".join(f"--{n.replace('_', '-')}" if len(n) > 1 else f"-{n}" for n in given)
+        raise UsageError(
+            f"{said}: for model files; {path} is an FMU, one scene that is built already"
+        )
+
+
+def chosen(file: ModelFile, names: Names | str) -> list[Scene]:
     """The scenes of a file that are called so; all of them without names.  Raises UsageError."""
+    names = [names] if isinstance(names, str) else names
     known = [s.name for s in file.scenes]
     unknown = ", ".join(repr(n) for n in names or [] if n not in known)
     if unknown:

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
 
 from ..errors import BuildError, TemporaryFolderError, UsageError
 from ..fmu.target import target_of
@@ -30,7 +29,8 @@ from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import NO_ROOM, UNFINISHED, WRONG, Verdict
 from ..study.stress.report import MEANING, Stressed, as_markdown, data, report, summary, table
 from ..verification.pipeline import Report, text_of
-from .tradeoff import progress
+from .progress import progress
+from .terminal import say_wrote
 from .works import studied
 
 START = 120.0  # [s] for the process to begin with the first one
@@ -76,7 +76,7 @@ def _file(found: Sequence[Stressed], out: Path, console: Console) -> None:
     for target in dict.fromkeys(f.target for f in found):
         path = out / f"{target}.md"
         write_whole(path, as_markdown([f for f in found if f.target == target]).encode())
-        console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
+        say_wrote(path, on=console)
 
 
 def build(file: ModelFile, scene: Scene, folder: Path, target: str, console: Console) -> Path:
@@ -97,7 +97,7 @@ def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> S
     stem = out / one.target / one.name
     write_whole(stem.with_suffix(".json"), text_of(data(one)).encode())
     write_whole(stem.with_suffix(".md"), as_markdown([one]).encode())
-    console.print(f"[green]wrote[/] {escape(str(stem))}.json, .md", soft_wrap=True)
+    say_wrote(stem, ".json, .md", on=console)
     return one
 
 

@@ -14,7 +14,7 @@ from rich.markup import escape
 from ..model.units import for_reading
 from ..page.table import new_table, print_whole
 from ..study.sweep.table import INFINITE, happened, numbers, one_by_one, varied
-from .terminal import console
+from .terminal import console, say
 
 SHOWN = 5  # reasons in the summary
 FEW = 20  # runs that are shown each by itself
@@ -29,11 +29,10 @@ def print_sweep(found: Any) -> None:
     refused = int((status != "ok").sum())
     title = f"{Path(found.attrs['fmu']).stem}: {len(status)} runs, {refused} refused"
     names = numbers(found)
-    console.print(escape(title), highlight=False)
+    say(title)
     if len(status) > FEW or not names:
         for name in names:
-            text = _range(runs, name, refused)
-            console.print(f"  {escape(name)}: {escape(text)}", highlight=False, soft_wrap=True)
+            say(f"  {name}: {_range(runs, name, refused)}")
     else:
         _print_runs(runs, names, refused > 0)
     _print_reasons([str(r) for r in runs["reason"].values if r])
@@ -95,7 +94,7 @@ def _print_reasons(texts: Sequence[str]) -> None:
     reasons = Counter(NUMBER.sub("#", r) for r in texts)
     for kind, count in reasons.most_common(SHOWN):
         text = first[kind] if count == 1 else f"{first[kind]}, and {count - 1} like it"
-        console.print(f"  {count} refused: {escape(text)}", highlight=False, soft_wrap=True)
+        say(f"  {count} refused: {text}")
     if len(reasons) > SHOWN:
         rest = sum(reasons.values()) - sum(c for _, c in reasons.most_common(SHOWN))
-        console.print(f"  {rest} refused for {len(reasons) - SHOWN} other reasons", highlight=False)
+        say(f"  {rest} refused for {len(reasons) - SHOWN} other reasons")

@@ -9,6 +9,7 @@ import sys
 import unicodedata
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -61,9 +62,24 @@ def prepare_streams() -> None:
             reconfigure(errors="lagfmu.spelled")
 
 
+def say(text: str, word: str = "", colour: str = "green", on: Console = console) -> None:
+    """One message as it is, on one line however narrow the console, behind a word in a colour."""
+    on.print(f"[{colour}]{word}[/] " * bool(word) + escape(text), highlight=False, soft_wrap=True)
+
+
+def say_wrote(path: Path, more: str = "", word: str = "wrote", on: Console = console) -> None:
+    """A file stands at `path`."""
+    say(f"{path}{more}", word, on=on)
+
+
+def kilobytes(path: Path) -> str:
+    """The size of a file, in brackets."""
+    return f" ({path.stat().st_size / 1e3:.0f} kB)"
+
+
 def say_error(text: str) -> None:
     """One message on stderr."""
-    errors.print(f"[bold red]error:[/] {escape(text)}", highlight=False, soft_wrap=True)
+    say(text, "error:", "bold red", errors)
 
 
 class _Notes(logging.Handler):
@@ -77,7 +93,7 @@ class _Notes(logging.Handler):
         """Print it, if it was not."""
         text = record.getMessage()
         if text not in self.told:
-            errors.print(f"[cyan]note:[/] {escape(text)}", highlight=False, soft_wrap=True)
+            say(text, "note:", "cyan", errors)
         self.told.add(text)
 
 
@@ -104,15 +120,13 @@ def plainly() -> Iterator[None]:
         except (LagfmuError, OSError) as raised:
             error = raised if isinstance(raised, LagfmuError) else TemporaryFolderError(raised)
             if isinstance(error, UserInterruptError):
-                errors.print(escape(str(error)), highlight=False, soft_wrap=True)
+                say(str(error), on=errors)
             else:
                 say_error(str(error))
             raise typer.Exit(code_of(error)) from None
         finally:
             for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
-                errors.print(
-                    f"[yellow]warning:[/] {escape(message)}", highlight=False, soft_wrap=True
-                )
+                say(message, "warning:", "yellow", errors)
 
 
 def _ours(warning: Any) -> bool:

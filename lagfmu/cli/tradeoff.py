@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
 from ..errors import UsageError
 from ..fmu.described import is_python
@@ -23,36 +20,15 @@ from ..model.scene import Scene
 from ..numeric.tolerance import tolerance_problem
 from ..page.table import print_whole
 from ..prepare.prepare import prepare
-from ..study.tradeoff.choose import Choice, Tick, choose
+from ..study.tradeoff.choose import Choice, choose
 from ..study.tradeoff.figure import draw
 from ..study.tradeoff.measure import DECADES, Plan, Tradeoff, measure
 from ..study.tradeoff.observe import opened
 from ..study.tradeoff.report import data, remarks, report, table
 from ..verification.pipeline import Report, text_of
+from .progress import progress
+from .terminal import say, say_wrote
 from .works import studied
-
-
-@contextlib.contextmanager
-def progress(console: Console, title: str) -> Iterator[Tick]:
-    """A bar that goes when the work is done; what it yields is told how far it has come."""
-    columns = (
-        SpinnerColumn(),
-        TextColumn(escape(title)),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[what]}"),
-    )
-    if not console.is_terminal:
-        console.print(f"{escape(title)} ...", highlight=False)
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
-        task = bar.add_task("", total=None, what="")
-
-        def tick(what: str, done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total, what=escape(what))
-
-        yield tick
 
 
 def compare(
@@ -116,27 +92,23 @@ def _one(name: str, fmu: Path, plan: Plan, out: Path, console: Console) -> Repor
 def _show(one: Tradeoff, out: Path, console: Console) -> None:
     print_whole(console, table(one))
     for line in remarks(one):
-        console.print(f"  {escape(line)}", highlight=False, soft_wrap=True)
+        say(f"  {line}", on=console)
     stem = out / one.target / one.name
     write_whole(stem.with_suffix(".json"), text_of(data(one)).encode())
     draw(one, [stem.with_suffix(".svg"), stem.with_suffix(".png")])
-    console.print(f"[green]wrote[/] {escape(str(stem))}.json, .svg, .png", soft_wrap=True)
+    say_wrote(stem, ".json, .svg, .png", on=console)
 
 
 def chosen_for(file: ModelFile, scene: Scene, goal: Goal, target: str, console: Console) -> Choice:
     """Bisect and say what was chosen.  Raises BuildError if nothing holds the accuracy."""
     with progress(console, scene.name) as tick:
         choice = choose(file.model, scene, goal, tick, target)
-    console.print(
-        f"[green]chosen[/] for {escape(str(goal))}: {choice.trial.setting}; error {choice.trial.error:.1e} "
-        f"on the scene, {choice.held_out_error:.1e} at most on held-out values; {choice.trial.steps} steps",
-        highlight=False,
-        soft_wrap=True,
+    say(
+        f"for {goal}: {choice.trial.setting}; error {choice.trial.error:.1e} on the scene, "
+        f"{choice.held_out_error:.1e} at most on held-out values; {choice.trial.steps} steps",
+        "chosen",
+        on=console,
     )
     for trial, error in choice.failed:
-        console.print(
-            f"  refused: {trial} on the scene, {error:.1e} elsewhere",
-            highlight=False,
-            soft_wrap=True,
-        )
+        say(f"  refused: {trial} on the scene, {error:.1e} elsewhere", on=console)
     return choice

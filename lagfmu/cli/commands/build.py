@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
 from ...errors import UsageError, VerificationError
 from ...fmu.compiler import HOST, NAMES
@@ -23,7 +22,7 @@ from ..options import (
     Target,
     takes,
 )
-from ..terminal import console, plainly
+from ..terminal import console, kilobytes, plainly, say_wrote
 
 if TYPE_CHECKING:
     from ...interface.variables import VariableTable
@@ -113,10 +112,7 @@ def build(
                     sources,
                 )
             path, found = built.path, built.verification
-            console.print(
-                f"[green]built[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
-                soft_wrap=True,
-            )
+            say_wrote(path, kilobytes(path), "built")
             if found is not None:
                 print_verdicts(found)
                 failed |= not found.passed

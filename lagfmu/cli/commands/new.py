@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 
 from ...model.library import known
 from ...model.library import new as written
-from ..terminal import console, plainly
+from ..terminal import plainly, say, say_wrote
 
 
 def new(
@@ -22,5 +21,5 @@ def new(
     """Write a commented model to start from."""
     with plainly():
         path = written(file, source)
-        console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
-        console.print(f"next: lagfmu show {escape(str(path))}", soft_wrap=True, highlight=False)
+        say_wrote(path)
+        say(f"next: lagfmu show {path}")

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
-from ...errors import UsageError
 from ..options import AddOutput, Arguments, Needs, takes
-from ..terminal import console, plainly
+from ..terminal import console, kilobytes, plainly, say_wrote
 
 if TYPE_CHECKING:
     from ...model.model import Model
@@ -32,27 +30,17 @@ def page(
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
     from ...live.command import write_page
-    from ..scenes import chosen, loaded, narrowed
+    from ..scenes import chosen, for_models, loaded, narrowed
 
-    given = {"scene": scene, "p": arguments, **needs, "add-output": add_output}
     with plainly():
         source: Model | Path = target
         shown = None
         if target.suffix == ".py":
             file = loaded(target, add_output, arguments)
             source = file.model
-            scenes = chosen(file, None if scene is None else [scene])
-            shown = narrowed(scenes[:1], needs)[0]
-        elif said := [
-            f"{'--' if len(n) > 1 else '-'}{n}" for n, value in given.items() if value is not None
-        ]:
-            raise UsageError(
-                f"{' and '.join(said)}: an FMU is one scene with outputs of its own; leave it out, or "
-                "make the page from the model file"
-            )
+            shown = narrowed(chosen(file, scene)[:1], needs)[0]
+        else:
+            for_models(target, scene=scene, p=arguments, **needs, add_output=add_output)
         with console.status("compiling to WebAssembly"):
             path = write_page(source, out, shown)
-        console.print(
-            f"[green]wrote[/] {escape(str(path))} ({path.stat().st_size / 1e3:.0f} kB)",
-            soft_wrap=True,
-        )
+        say_wrote(path, kilobytes(path))

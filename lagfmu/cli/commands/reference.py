@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 
 from ..options import FmuPath, InputFile, StepSize, StopTime
-from ..terminal import console, plainly
+from ..terminal import plainly, say_wrote
 
 
 def reference(
@@ -27,4 +26,4 @@ def reference(
         signals = None if inputs is None else read_table(inputs)
         folder = out or Path(fmu.stem)
         for path in write_crosscheck(fmu, folder, stop_time, step_size, signals):
-            console.print(f"[green]wrote[/] {escape(str(path))}", soft_wrap=True)
+            say_wrote(path)

@@ -33,7 +33,7 @@ def show(
 
     with plainly():
         file = loaded(model, add_output, arguments)
-        for s in narrowed(chosen(file, None if scene is None else [scene]), needs):
+        for s in narrowed(chosen(file, scene), needs):
             try:
                 prepared = prepare(file.model, s)
                 untried = try_start(prepared)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from ...errors import SettingError, UsageError
+from ...errors import SettingError
 from ..options import (
     AddOutput,
     Arguments,
@@ -23,7 +22,7 @@ from ..options import (
     Tolerance,
     assignments,
 )
-from ..terminal import console, plainly
+from ..terminal import console, plainly, say_wrote
 
 if TYPE_CHECKING:
     from ...verification.result import Result
@@ -67,22 +66,17 @@ def simulate(
     from ...verification.reference import read_table
     from ...verification.simulate import simulate as simulated
     from ..film import film
-    from ..scenes import chosen, loaded, narrowed
+    from ..scenes import chosen, for_models, loaded, narrowed
 
     with plainly():
         run: Any = source
         if source.suffix == ".py":
             file = loaded(source, add_output, arguments)
-            scenes = chosen(file, None if scene is None else [scene])
-            run = prepare(file.model, narrowed(scenes, {"error_bars": error_bars})[0])
+            scenes = narrowed(chosen(file, scene), {"error_bars": error_bars})
+            run = prepare(file.model, scenes[0])
             name, variables = run.scene.name, run.table.variables
-        elif arguments:
-            raise UsageError(f"-p {arguments[0]} is for a model file: an FMU is one of its family")
-        elif add_output:
-            raise UsageError(
-                "--add-output is for a model file: an FMU has the outputs it was built with"
-            )
         else:
+            for_models(source, scene=scene, p=arguments, add_output=add_output, target=target)
             description = read_description(source)
             name, variables = description.modelName, description.modelVariables
         known = {v.name: v.causality for v in variables if v.causality != "parameter"}
@@ -105,16 +99,13 @@ def simulate(
         _print_last(result, variable or (_first_of(result) if written else ()))
         if csv is not None:
             _save(csv, result)
-            console.print(f"[green]wrote[/] {escape(str(csv))}", soft_wrap=True)
+            say_wrote(csv)
         if plot_ is not None:
-            console.print(
-                f"[green]wrote[/] {escape(str(result.plot(*(variable or ()), out=plot_)))}",
-                soft_wrap=True,
-            )
+            say_wrote(result.plot(*(variable or ()), out=plot_))
         if animate is not None:
             with console.status(f"drawing {name}"):
                 film(told_by(run), result, given, animate, name)
-            console.print(f"[green]wrote[/] {escape(str(animate))}", soft_wrap=True)
+            say_wrote(animate)
 
 
 def _besides(names: Sequence[str], known: Mapping[str, str]) -> list[str]:
@@ -122,13 +113,11 @@ def _besides(names: Sequence[str], known: Mapping[str, str]) -> list[str]:
 
     Raises SettingError with all that is unknown.
     """
+    from ...interface.rules import missing
+
     unknown = [n for n in names if n not in known and n != "time"]
     if unknown:
-        near = {n: difflib.get_close_matches(n, known, 1) for n in unknown}
-        hints = [f"{n!r} (did you mean {m[0]!r}?)" if (m := near[n]) else repr(n) for n in unknown]
-        raise SettingError(
-            f"--variable: there is no {', '.join(hints)}, expected some of {', '.join(known)}"
-        )
+        raise SettingError(f"--variable: {'; '.join(missing(n, known) for n in unknown)}")
     return [n for n in names if n in known and known[n] != "output"]
 
 

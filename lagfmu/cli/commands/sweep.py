@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.markup import escape
 
 from ...errors import SettingError
 from ..options import InputFile, StepSize, StopTime, Tolerance
-from ..terminal import console, plainly
+from ..terminal import plainly, say_wrote
 
 
 def sweep(
@@ -124,9 +123,9 @@ def sweep(
             )
         print_sweep(found)
         if out is not None:
-            console.print(f"[green]wrote[/] {escape(str(out))}", soft_wrap=True)
+            say_wrote(out)
         if figure is not None:
-            console.print(f"[green]wrote[/] {escape(str(plot(found, figure)))}", soft_wrap=True)
+            say_wrote(plot(found, figure))
 
 
 def _once(pairs: Iterator[tuple[str, Any]]) -> Mapping[str, Any]:
