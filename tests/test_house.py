@@ -146,6 +146,17 @@ def test_only_the_fmi_layer_says_fmi() -> None:
         assert name.startswith(("fmu/", "runtime/fmi/fmi2")), name
 
 
+def test_one_loop_runs_an_fmu() -> None:
+    """A session steps instances, fmpy what no session can; nothing else in lagfmu steps or loads one."""
+    steps = re.compile(r"\.doStep\b|\bsimulate_fmu\b|\binstantiate_fmu\b|\bFMU[123](Slave|Model)\(")
+    found = {path for path in MODULES if steps.search(path.read_text(encoding="utf-8"))}
+    assert {p.relative_to(ROOT).as_posix() for p in found} == {
+        "fmu/binary.py",
+        "fmu/exchange.py",
+        "fmu/session.py",
+    }
+
+
 def test_names_of_variables_are_composed_in_one_place() -> None:
     """What a variable is of is looked up: outside names.py no f-string makes a name, and nothing takes one
     apart by its beginning."""

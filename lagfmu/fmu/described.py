@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import VerificationError
-from ..interface.rules import Rule
+from ..model.rule import Rule
 from .archive import opened
 
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
@@ -78,9 +77,8 @@ def _rule(v: Any) -> Rule:
         v.name,
         v.type,
         v.causality in ("parameter", "input") or v.initial in ("exact", "approx"),
-        v.causality != "input",
-        -math.inf if v.min is None else float(v.min),
-        math.inf if v.max is None else float(v.max),
+        None if v.min is None else float(v.min),
+        None if v.max is None else float(v.max),
         items={item.name: int(item.value) for item in items},
         start=float(v.start) if v.type == "Real" and v.start is not None else None,
         follows=(v.description or "").endswith(names.FOLLOWS),

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SettingError
-from ..interface.rules import Rule, missing, problems_of
+from ..interface.rules import problems_of
+from ..model.rule import Rule, missing
 from .described import Trajectory
 
 

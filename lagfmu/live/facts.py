@@ -14,7 +14,7 @@ import fmpy
 from .. import names
 from ..fmu.archive import pack
 from ..fmu.described import experiment_of
-from ..interface.rules import MESSAGES
+from ..model.rule import MESSAGES
 from ..model.units import for_reading
 from ..page.preset import SETTABLE
 

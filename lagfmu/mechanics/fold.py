@@ -10,6 +10,7 @@ import sympy as sp
 from ..errors import RequestError, UnitError
 from ..model.elements import Expr
 from ..model.model import Contact, Model, Parameter, name_of
+from ..model.rule import Rule
 from ..model.scene import Scene
 from ..model.selection import select
 from ..model.units import Unit, parse_quantity
@@ -48,17 +49,11 @@ def _value(p: Parameter, unit: Unit, text: str, problems: list[str]) -> float | 
     except UnitError as error:
         problems.append(str(error))
         return None
-    low = float("-inf") if p.min is None else p.min
-    high = float("inf") if p.max is None else p.max
-    if not (abs(value) < float("inf") and low <= value <= high):
-        problems.append(
-            f"fixed parameter {name!r} = {value!r} is outside its bounds [{low}, {high}]"
-        )
-    elif p.symbol.is_positive and not value > 0:
-        problems.append(f"fixed parameter {name!r} = {value!r}, expected a positive number")
-    else:
-        return value
-    return None
+    rule = Rule(name, minimum=p.min, maximum=p.max, positive=bool(p.symbol.is_positive))
+    if problem := rule.problem(value):
+        problems.append(f"fixed parameter {problem}")
+        return None
+    return value
 
 
 def _number(value: float) -> Expr:

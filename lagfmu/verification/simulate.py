@@ -37,8 +37,9 @@ from ..fmu.session import (
 )
 from ..fmu.target import NATIVE, PYTHON, target_of
 from ..fmu.write import as_built
-from ..interface.rules import Rule, problems_of
+from ..interface.rules import problems_of
 from ..model.model import Model
+from ..model.rule import Rule
 from ..model.scene import Scene
 from ..numeric.start_priority import LEFT_OUT
 from ..numeric.tolerance import tolerance_problem

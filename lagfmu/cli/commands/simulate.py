@@ -113,7 +113,7 @@ def _besides(names: Sequence[str], known: Mapping[str, str]) -> list[str]:
 
     Raises SettingError with all that is unknown.
     """
-    from ...interface.rules import missing
+    from ...model.rule import missing
 
     unknown = [n for n in names if n not in known and n != "time"]
     if unknown:

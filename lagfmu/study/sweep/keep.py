@@ -9,7 +9,7 @@ from ... import names
 from ...errors import SettingError
 from ...fmu.batch import LAST, MAX, MEAN, MIN, TIME_OF_MAX
 from ...fmu.session import KINDS
-from ...interface.rules import missing
+from ...model.rule import missing
 
 REDUCTIONS = {"last": LAST, "max": MAX, "min": MIN, "mean": MEAN, "time-of-max": TIME_OF_MAX}
 TRAJECTORY = "trajectory"

@@ -24,8 +24,9 @@ from ...fmu.described import Trajectory, described_rules, experiment_of, read_de
 from ...fmu.inputs import check_inputs, columns_at
 from ...fmu.session import communication_points, obstacle
 from ...fmu.write import as_fmu
-from ...interface.rules import Rule, unsettable
+from ...interface.rules import unsettable
 from ...model.model import Model
+from ...model.rule import Rule
 from ...model.scene import Scene
 from ...numeric.tolerance import tolerance_problem
 from .design import Design, Values, design
