@@ -26,6 +26,7 @@ from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_cl
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
 from .fmu.described import Trajectory, described_rules, file_stem, is_python, read_description
 from .fmu.description import model_description
+from .fmu.exchange import by_fmpy
 from .fmu.formula import LONGEST_SUM, read_formula, text_of
 from .fmu.native import GENERATED
 from .fmu.session import RefusalError, Session, communication_points
@@ -84,11 +85,11 @@ from .page.wrapped import wrapped
 from .prepare.consistency import RedundantConstraintWarning
 from .prepare.prepare import Prepared, prepare
 from .prepare.starts import StartMovedWarning
-from .study.stress import exchange, runs, worker
+from .study.stress import runs, worker
 from .study.stress.bench import Bench, Finding
 from .study.stress.closed_forms import judged, magnitude
 from .study.stress.facts import facts_of
-from .study.stress.judge import Check, differ, first_landing
+from .study.stress.judge import Check, first_landing
 from .study.stress.lagrange import lagrange, lay_beside
 from .study.stress.player import Run, clear
 from .study.stress.player import opened as session_of
@@ -105,7 +106,7 @@ from .study.stress.probe import (
     verdict,
 )
 from .study.stress.probes import probes
-from .study.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed, as_markdown
+from .study.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed
 from .study.stress.runs import departures, started
 from .study.sweep import engine
 from .study.sweep.design import axis, design, distribution, sampled

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from crossings import covering, model, pairs, together
+from same_motion import compared, rolled_back
 
 from lagfmu import simulate
 from lagfmu.testing import (
@@ -20,7 +21,6 @@ from lagfmu.testing import (
     WRONG,
     Bench,
     attempt,
-    exchange,
     find_compiler,
     first_landing,
     lay_beside,
@@ -102,7 +102,7 @@ def test_energy_is_neither_made_nor_lost(crossed):
 def test_a_saved_state_goes_on_with_the_same_bits(crossed):
     """Rollback, again, and through bytes in another instance, in the middle of the run."""
     _, bench = crossed
-    checks = runs.rolled_back(0.5, bench).checks
+    checks = rolled_back(0.5, bench).checks
     assert [c for c in checks if not c.ratio <= 1] == []
 
 
@@ -111,7 +111,7 @@ def test_an_importers_integrator_comes_to_the_same_motion(crossed):
     _, bench = crossed
     if bench.facts.motions:
         pytest.skip("a prescribed motion needs an importer that moves it")
-    assert [c for c in exchange.compared(bench).checks if not c.ratio <= 1] == []
+    assert [c for c in compared(bench).checks if not c.ratio <= 1] == []
 
 
 def test_the_order_of_declaration_is_free(crossed, tmp_path):
@@ -151,7 +151,7 @@ def test_a_slip_that_has_to_pass_zero_is_not_stopped(tmp_path):
         assert rows["der(x)"][turned - 1] > 0 > rows["der(x)"][turned]
         assert rows["der(y)"][turned] > 0.5
         assert not rows["sticks.grip"].any()
-        assert [c for c in exchange.compared(bench).checks if not c.ratio <= 1] == []
+        assert [c for c in compared(bench).checks if not c.ratio <= 1] == []
 
 
 @pytest.mark.thorough

@@ -42,7 +42,6 @@ from lagfmu.testing import (
     Verdict,
     app,
     applies,
-    as_markdown,
     attempt,
     first_landing,
     lagrange,
@@ -90,7 +89,7 @@ def judged(bench, change):
 
 
 def test_the_hemisphere_is_never_wrong(native_fmu, tmp_path):
-    """Every quick probe is right or refused; the summary is a table, a JSON file and a Markdown file."""
+    """Every quick probe is right or refused; the summary is a table and a JSON file."""
     text = io.StringIO()
     (tried,) = stress(
         [native_fmu("Hemisphere")], tmp_path, Console(file=text), quick=True, limit=60.0
@@ -100,13 +99,9 @@ def test_the_hemisphere_is_never_wrong(native_fmu, tmp_path):
     assert sum(r.verdict == RIGHT for r in found.rows) > 25
     assert not any(r.worry for r in found.rows)
     families = {"parameters", "starts", "communication step", "tolerance", "method", "long run"}
-    assert families | {"rollback", "model exchange"} <= {r.family for r in found.rows}
+    assert families <= {r.family for r in found.rows}
     data = json.loads((tmp_path / "native" / "Hemisphere.json").read_text())
     assert [data["verdicts"][v] for v in VERDICTS] == found.counts()[1:-2]
-    assert "| Hemisphere | " in (tmp_path / "native.md").read_text()
-    page = (tmp_path / "native" / "Hemisphere.md").read_text()
-    assert f"`{data['sha256']}`" in page
-    assert "| parameters | m = " in page
     assert "Hemisphere (native)" in text.getvalue()
 
 
@@ -169,25 +164,6 @@ def test_a_small_error_of_what_follows_from_other_outputs_is_found(
                 rows[column][int(np.argmax(rows["sticks.grip"]))] = -1e-100
 
             assert what in judged(one, heat)
-
-
-@pytest.mark.parametrize("name", ["J_s", "J_p", "J_c"])
-def test_an_acceleration_is_known_to_what_rounding_leaves_of_the_forces(tmp_path, name):
-    """Beside a part of 1e300 kg m^2 the light parts of a gear stand still but for 1e-16 of what would drive
-    them alone; an error of 1e-10 of the gear as it is built is found all the same."""
-    file = load(UNSEEN / "planetary_gear.py")
-    with pytest.warns(RedundantConstraintWarning):
-        prepared = prepare(file.model, file.scenes[0])
-    fmu = write(prepared, tmp_path, file.closed_forms, target="native")
-    lay_beside(fmu, prepared)
-    with Bench(fmu, quick=True) as one:
-        run = one.run({name: 1e300}, [0.0])
-        assert [c for c in one.checks(run) if c.ratio > 1] == []
-
-        def change(rows):
-            rows["der(carrier,2)"][3] *= 1 + 1e-10
-
-        assert "der(carrier,2)" in judged(one, change)
 
 
 def test_a_condition_without_a_value_does_not_hold(bench):
@@ -303,8 +279,8 @@ def test_a_solver_that_is_slightly_wrong_is_found(mutant, tmp_path):
 
 
 def test_the_summary_names_what_is_not_right():
-    """One page over all FMUs: versions, counts by FMU, each row that is wrong, and the refusals within a
-    factor of ten of the model's own values, which alone a user should look at."""
+    """Each row that is wrong says what is; of the refusals those within a factor of ten of the model's own
+    values are the ones that a user should look at."""
     refused = "doStep: discard: the mass matrix is singular at t = 0 s"
     rows = (
         Verdict("parameters", "m = 1", RIGHT, "", "energy", 0.1, 9, 0.1),
@@ -314,19 +290,14 @@ def test_the_summary_names_what_is_not_right():
         Verdict("parameters", "m = 0.1", REFUSED, refused, "", 0, 0, 0.1, near=True),
         Verdict("parameters", "m = 1e-6", REFUSED, refused, "", 0, 0, 0.1),
     )
-    page = as_markdown([Stressed(n, "native", "ab" * 32, False, 60.0, True, rows) for n in "AB"])
-    assert "lagfmu " in page
-    assert "scipy " in page
-    assert "| A | 4 | 1 | 0 | 2 | 1 | 0 | 1 | 18 | `abababababababab` |" in page
-    assert "## Wrong: 2" in page
-    assert "- B, parameters, m = 2: energy: 2.0e+00, allowed 1.0e+00" in page
-    assert "## Unfinished: none" in page
-    assert "values: 2" in page
-    assert "- B, parameters, m = 0.1: " in page
-    assert "m = 1e-6" not in page
-    page = as_markdown([Stressed("A", "native", "ab" * 32, False, 60.0, True, rows)])
-    assert f"| m = 0.1 | refused | 0 |  | {WORRY}; " in page
-    assert f"| m = 1e-6 | refused | 0 |  | {NO_WORRY}; " in page
+    found = Stressed("A", "native", "ab" * 32, False, 60.0, True, rows)
+    assert found.counts() == [4, 1, 0, 2, 1, 0, 1, 18]
+    text = io.StringIO()
+    Console(file=text, width=160).print(command.table(found))
+    lines = {line.split("  ")[0].strip(): line for line in text.getvalue().splitlines()}
+    assert "energy: 2.0e+00, allowed 1.0e+00" in lines["m = 2"]
+    assert WORRY in lines["m = 0.1"]
+    assert NO_WORRY in lines["m = 1e-6"]
 
 
 def test_a_refusal_needs_a_cause():
@@ -413,7 +384,7 @@ def test_a_scale_of_a_difference_is_none_of_its_magnitudes(bench):
     theta, r = sp.symbols("theta r", real=True)
     small, zero = 1e-15 * theta, sp.Integer(0)
     law = CarriedForm("law", zero, small, scale=theta - 2 * r)
-    (form,) = judged_forms((law,), set(), {})
+    (form,) = judged_forms((law,), set())
     run = bench.ordinary
     rows = np.ones(len(run.rows))
     error, allowed, _ = form.judge(run, rows, rows == 1, {"theta": 2.0, "r": 1.0})
@@ -453,7 +424,6 @@ def test_probes_cover_the_ranges(bench):
     for wanted in ("communication step: 1e-09", "communication step: 1000"):
         assert f"{wanted} natural times" in found
     assert {"tolerance: 1e-2", "tolerance: 1e-12"} <= set(found)
-    assert "rollback: across the departure from surface" in found
     for p in "mga":
         assert sum(n.startswith(f"parameters: {p} = ") for n in found) >= 8
     assert found["parameters: m = 10"].near

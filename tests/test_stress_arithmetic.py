@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 import pytest
+from same_motion import another, differ
 
 from lagfmu.testing import (
     REFUSED,
@@ -24,7 +25,6 @@ from lagfmu.testing import (
     attempt,
     clear,
     departures,
-    differ,
     find_compiler,
     lay_beside,
     session_of,
@@ -69,7 +69,7 @@ def test_no_parameter_or_start_is_too_small_or_too_large(bench):
 def refused(ask: Callable[[Session], Any], bench: Bench) -> Finding:
     """It must be refused, and what goes on is as if it had not been asked."""
     h, refusal = bench.facts.step_size, None
-    with bench.another("asked") as one, bench.another("not asked") as two:
+    with another(bench) as one, another(bench) as two:
         for each in (one, two):
             each.begin({}, None)
             each.step(h)
@@ -134,7 +134,7 @@ def scaled(axis: int | None, power: int, bench: Bench) -> Finding:
 @pytest.mark.parametrize("what", ["cut", "altered", "foreign"])
 def test_bytes_that_are_no_state_are_refused(bench, what):
     """When they are read or when they are set, with the reason, and nothing changes."""
-    with bench.another("corrupted") as one:
+    with another(bench) as one:
         one.begin({}, None)
         one.step(bench.facts.step_size)
         before = one.read()
@@ -157,7 +157,7 @@ def test_a_reset_instance_is_as_new(bench):
     """The same bits as at first, after another run with other parameters."""
     times = bench.times(bench.facts.stop_time, 10)
     other = {p.name: p.start * 1.1 for p in bench.facts.parameters if p.allows(p.start * 1.1)}
-    with bench.another("fresh") as one:
+    with another(bench) as one:
         first = play(one, bench.facts, {}, times)
         play(one, bench.facts, other, times[:6])
         assert play(one, bench.facts, {}, times).rows.tobytes() == first.rows.tobytes()

@@ -27,7 +27,7 @@ from ..prepare.prepare import prepare
 from ..study.stress.facts import facts_of
 from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import NO_ROOM, UNFINISHED, WRONG, Verdict
-from ..study.stress.report import MEANING, Stressed, as_markdown, data, report, summary, table
+from ..study.stress.report import MEANING, Stressed, data, report, summary, table
 from ..verification.pipeline import Report, text_of
 from .progress import progress
 from .terminal import say_wrote
@@ -47,7 +47,7 @@ def stress(
     *,
     limit: float,
 ) -> list[Report]:
-    """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json, .md, and OUT/TARGET.md.
+    """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json.
 
     What cannot be built or run does not keep the others from it.  Raises UsageError.
     """
@@ -67,16 +67,7 @@ def stress(
     if found:
         console.print(summary(found))
         console.print(MEANING, highlight=False)
-        _file(found, out, console)
     return tried
-
-
-def _file(found: Sequence[Stressed], out: Path, console: Console) -> None:
-    """OUT/TARGET.md: one summary over all FMUs of a target."""
-    for target in dict.fromkeys(f.target for f in found):
-        path = out / f"{target}.md"
-        write_whole(path, as_markdown([f for f in found if f.target == target]).encode())
-        say_wrote(path, on=console)
 
 
 def build(file: ModelFile, scene: Scene, folder: Path, target: str, console: Console) -> Path:
@@ -96,8 +87,7 @@ def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> S
     console.print(table(one))
     stem = out / one.target / one.name
     write_whole(stem.with_suffix(".json"), text_of(data(one)).encode())
-    write_whole(stem.with_suffix(".md"), as_markdown([one]).encode())
-    say_wrote(stem, ".json, .md", on=console)
+    say_wrote(stem.with_suffix(".json"), on=console)
     return one
 
 

@@ -12,13 +12,11 @@ magnitude of the column.  N as in closed_forms.py.
 
 from __future__ import annotations
 
-import contextlib
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,11 +51,7 @@ class Bench:
         self.facts: Facts = facts_of(path)
         self.quick = quick
         self.forms = (
-            *judged(
-                self.facts.closed_forms,
-                {i.name for i in self.facts.inputs},
-                self.facts.roundings,
-            ),
+            *judged(self.facts.closed_forms, {i.name for i in self.facts.inputs}),
             *laws(self.facts.laws),
         )
         self.folder = Path(unpack(path))
@@ -78,15 +72,6 @@ class Bench:
             self._session = opened(self.facts, self.folder)
         return self._session
 
-    @contextlib.contextmanager
-    def another(self, name: str) -> Iterator[Session]:
-        """A further instance."""
-        one = opened(self.facts, self.folder, name)
-        try:
-            yield one
-        finally:
-            one.close()
-
     @property
     def points(self) -> int:
         """Communication steps of a run."""
@@ -94,27 +79,13 @@ class Bench:
 
     # ------------------------------------------------------------------ natural times
 
-    def first(self, values: Values) -> Mapping[str, Any]:
-        """The outputs after the initialization.  Raises RefusalError."""
-        try:
-            self.session.begin(values, None)
-            return self.session.read()
-        except RefusalError:
-            self.session.renew()
-            raise
-
     def rate(self, values: Values) -> float:
         """The natural rate [1/s] of the motion at these start values; 0 at rest.  Raises RefusalError."""
-        seen = self.first(values)
-        known = {p.name: float(values.get(p.name, p.start)) for p in self.facts.parameters}
-        largest = 0.0
-        for q in self.facts.coordinates:
-            rounding = EPS * abs(float(values.get(q, 0.0)))  # of a start that was projected onto 0
-            place = abs(seen[q]) if abs(seen[q]) > rounding else 0.0
-            size = max(place, self.facts.same_unit(q, known)) or 1.0
-            v, vdot = abs(seen[names.derivative(q)]), abs(seen[names.derivative(q, 2)])
-            largest = max(largest, v / size, float(np.sqrt(vdot / size)))
-        return largest if np.isfinite(largest) else 0.0
+        run = self.run(values, [0.0, self.facts.step_size])
+        if run.refusal is not None and len(run.rows) == 0:
+            raise run.refusal
+        rate = float(self._rates(run)[0])
+        return rate if np.isfinite(rate) else 0.0
 
     @cached_property
     def ordinary_rate(self) -> float:
@@ -171,7 +142,10 @@ class Bench:
         rate = np.zeros(len(run.rows))
         with np.errstate(all="ignore"):
             for q in self.facts.coordinates:
-                size = np.maximum(np.abs(run.rows[q]), self.facts.same_unit(q, run.values))
+                place = np.abs(run.rows[q])
+                rounding = EPS * abs(run.values.get(q, 0.0))  # of a start that was projected onto 0
+                place = np.where(place > rounding, place, 0.0)
+                size = np.maximum(place, self.facts.same_unit(q, run.values))
                 size = np.where(size > 0, size, 1.0)
                 v = np.abs(run.rows[names.derivative(q)])
                 vdot = np.abs(run.rows[names.derivative(q, 2)])

@@ -13,13 +13,12 @@ largest angle so far [rad], at least 1: its error is tol * |angle|, that of its 
 `within` holds at the default tolerance, and errors are proportional to the tolerance only roughly.
 
 A closed form among the outputs of one instant has nothing to do with the integration: whatever the tolerance,
-it may be off by  LEEWAY * rounding * size,  with the size at that instant, and by what rounding leaves of
-accelerations in it: where forces balance on a light part, of what they would make of it alone (lagrange.py).
+it may be off by  LEEWAY * rounding * size,  with the size at that instant.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,7 +64,6 @@ class JudgedForm:
 
     `instantaneous`: it relates the outputs of one instant, so that no error of the integration enters;
     `law`: an equation that is solved at that instant, so that nothing but its own terms is its size;
-    `left`: what rounding leaves in it of the accelerations that it speaks of.
     """
 
     closed_form: CarriedForm
@@ -75,7 +73,6 @@ class JudgedForm:
     pointwise: bool
     instantaneous: bool
     law: bool
-    left: Compiled
 
     def judge(
         self,
@@ -115,8 +112,7 @@ class JudgedForm:
             size = np.full(len(actual), size[known].max())
             tolerance = LEEWAY * self.closed_form.within * run.tolerance
             relative = np.maximum(relative, tolerance) * growth[chosen]
-        left = np.nan_to_num(self.left.at(rows, result, values), posinf=0.0)
-        allowed = relative * size + LEEWAY * left + np.finfo(float).tiny
+        allowed = relative * size + np.finfo(float).tiny
         error = np.abs(actual - expected)
         worst = int(np.argmax(np.where(known, error / allowed, -1.0)))
         return float(error[worst]), float(allowed[worst]), int(known.sum())
@@ -132,10 +128,8 @@ class JudgedForm:
         return np.asarray(speed <= SLOW * speed.max(initial=0.0))
 
 
-def judged(
-    closed_forms: tuple[CarriedForm, ...], inputs: set[str], roundings: Mapping[str, Expr]
-) -> tuple[JudgedForm, ...]:
-    """Every closed form, compiled; `roundings` of accelerations (lagrange.py)."""
+def judged(closed_forms: tuple[CarriedForm, ...], inputs: set[str]) -> tuple[JudgedForm, ...]:
+    """Every closed form, compiled."""
     found = []
     for c in closed_forms:
         parts = [c.actual] + ([] if c.expected is None else [c.expected])
@@ -144,8 +138,7 @@ def judged(
             u == "time" or names.initially(u) or names.read(u).head in names.EVENTS for u in used
         )
         instantaneous = c.expected is not None and not follows
-        left = _left(parts, roundings) if instantaneous else sp.S.Zero
-        found.append(_judged(c, instantaneous, False, inputs, left))
+        found.append(_judged(c, instantaneous, False, inputs))
     return tuple(found)
 
 
@@ -159,23 +152,10 @@ def laws(closed_forms: tuple[CarriedForm, ...]) -> tuple[JudgedForm, ...]:
         or (c.expected == 0 and sp.sympify(c.actual).is_Symbol)
         for c in closed_forms
     ]
-    return tuple(
-        _judged(c, True, not a, set(), sp.S.Zero) for c, a in zip(closed_forms, alone, strict=True)
-    )
+    return tuple(_judged(c, True, not a, set()) for c, a in zip(closed_forms, alone, strict=True))
 
 
-def _left(parts: Sequence[Expr], roundings: Mapping[str, Expr]) -> Expr:
-    """By how much a statement may be missed where each acceleration is off by its rounding."""
-    difference = sp.Add(parts[0], *(-e for e in parts[1:]))
-    named = {str(s): s for s in difference.free_symbols}
-    return sp.Add(
-        *(sp.Abs(difference.diff(named[n])) * e for n, e in roundings.items() if n in named)
-    )
-
-
-def _judged(
-    c: CarriedForm, instantaneous: bool, law: bool, inputs: set[str], left: Expr
-) -> JudgedForm:
+def _judged(c: CarriedForm, instantaneous: bool, law: bool, inputs: set[str]) -> JudgedForm:
     parts = [c.actual] + ([] if c.expected is None else [c.expected])
     scale = [] if c.scale is None else [sp.sympify(c.scale)]
     # a difference of velocities is not one of the magnitudes that they have at least (Compiled.at)
@@ -190,10 +170,4 @@ def _judged(
         instantaneous or not inputs,
         instantaneous,
         law,
-        Compiled(left, c.name),
     )
-
-
-def undisturbed(run: Run, found: tuple[JudgedForm, ...]) -> tuple[JudgedForm, ...]:
-    """Those that say something about this run: driven, only what holds at each instant."""
-    return tuple(s for s in found if s.pointwise or not run.driven)

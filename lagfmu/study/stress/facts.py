@@ -7,18 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import sympy as sp
-
 from ... import names
 from ...errors import VerificationError
 from ...fmu.archive import opened
 from ...fmu.closed_forms import CarriedForm, tables_in, unpack_closed_forms
 from ...fmu.described import experiment_of, file_stem, is_python, read_description
-from ...model.elements import Expr
 from ...verification.verify import RECORD, closed_forms_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
-ROUNDED = "rounding of "  # an acceleration: what the judge reads beside the laws
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
@@ -41,7 +37,6 @@ class Settable:
 class Facts:
     """An FMU of lagfmu as its modelDescription.xml and resources/lagfmu.json describe it."""
 
-    path: Path
     name: str
     target: str
     description: Any
@@ -55,7 +50,6 @@ class Facts:
     contacts: tuple[str, ...]
     closed_forms: tuple[CarriedForm, ...]
     laws: tuple[CarriedForm, ...]
-    roundings: Mapping[str, Expr]
     dimensions: Mapping[str, Dimension]
     stop_time: float
     step_size: float
@@ -83,25 +77,13 @@ class Facts:
 
     def usual(self, coordinate: str) -> float:
         """The largest default start among the coordinates of the same unit, or 1."""
-        return (
-            max(
-                (
-                    abs(s.start)
-                    for s in self.starts
-                    if self.dimensions[s.name] == self.dimensions[coordinate]
-                ),
-                default=0.0,
-            )
-            or 1.0
-        )
+        peers = (abs(s.start) for s in self.starts if self.alike(s.name, coordinate))
+        return max(peers, default=0.0) or 1.0
 
     def same_unit(self, name: str, values: Mapping[str, float]) -> float:
         """The largest magnitude among the parameters that have the dimension of `name`, or 0."""
-        dimension = self.dimensions[name]
-        return max(
-            (abs(values[p.name]) for p in self.parameters if self.dimensions[p.name] == dimension),
-            default=0.0,
-        )
+        peers = (abs(values[p.name]) for p in self.parameters if self.alike(p.name, name))
+        return max(peers, default=0.0)
 
 
 def facts_of(path: Path) -> Facts:
@@ -122,7 +104,6 @@ def facts_of(path: Path) -> Facts:
         for u in description.unitDefinitions
         if u.baseUnit is not None
     }
-    laid = _beside(path)
     experiment = experiment_of(description)
     coordinates = tuple(
         v.name for v in reals if names.derivative(v.name, 2) in variables and v.causality != "input"
@@ -132,7 +113,6 @@ def facts_of(path: Path) -> Facts:
     rates = [names.derivative(name, k) for name in inputs for k in (1, 2)]
     estimated = tuple(n for n in rates if n in variables and n not in inputs)
     return Facts(
-        path=path,
         name=file_stem(description),
         target="python" if is_python(path) else "native",
         description=description,
@@ -156,12 +136,7 @@ def facts_of(path: Path) -> Facts:
         constraints=tuple(names.constraints((v.name for v in reals), names.MULTIPLIER)),
         contacts=tuple(names.constraints(variables, names.CONTACT)),
         closed_forms=tuple(closed_forms),
-        laws=tuple(c for c in laid if not c.name.startswith(ROUNDED)),
-        roundings={
-            c.name.removeprefix(ROUNDED): sp.sympify(c.expected)
-            for c in laid
-            if c.name.startswith(ROUNDED)
-        },
+        laws=_beside(path),
         dimensions={v.name: bases.get(v.unit, (0,) * len(BASE)) for v in reals}
         | {"time": (0, 0, 1) + (0,) * (len(BASE) - 3)},
         stop_time=experiment.stop_time,
@@ -182,9 +157,9 @@ def beside(path: Path) -> Path:
     return path.with_suffix(".lagrange.json")
 
 
-def _beside(path: Path) -> list[CarriedForm]:
+def _beside(path: Path) -> tuple[CarriedForm, ...]:
     file = beside(path)
-    return list(unpack_closed_forms(file.read_bytes(), str(file))) if file.exists() else []
+    return tuple(unpack_closed_forms(file.read_bytes(), str(file))) if file.exists() else ()
 
 
 def _settable(v: Any) -> Settable:

@@ -18,13 +18,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ... import names
-from .closed_forms import JudgedForm, undisturbed
+from .closed_forms import JudgedForm
 from .facts import Facts
 from .player import Run
 
@@ -51,12 +50,6 @@ class Check:
         return self.error / self.allowed if self.allowed > 0 else float(self.error > 0) * np.inf
 
 
-def differ(a: Mapping[str, Any], b: Mapping[str, Any], what: str) -> Check:
-    """To the last bit; the first names of those that are not."""
-    names = [n for n in a if a[n] != b[n]]
-    return Check(what + "".join(f" {n}" for n in names[:3]), float(len(names)), 0.5)
-
-
 def invariants(facts: Facts, run: Run, forms: Sequence[JudgedForm], elapsed: Column) -> list[Check]:
     """All checks of a run, at the points that were reached; `elapsed` as in closed_forms.py."""
     if len(run.rows) == 0:
@@ -72,7 +65,9 @@ def invariants(facts: Facts, run: Run, forms: Sequence[JudgedForm], elapsed: Col
     checks = [replace(c, instant=True) for c in checks]
     digits = not lost(facts, run)
     before, floors = first_landing(facts, run), magnitudes(facts, run)
-    for form in undisturbed(run, tuple(forms)):
+    for form in forms:
+        if run.driven and not form.pointwise:  # it says something of the motion without inputs
+            continue
         if not (digits or form.instantaneous):
             continue
         error, allowed, points = form.judge(
@@ -164,21 +159,15 @@ def _worst(what: str, error: Column, allowed: Column) -> Check:
 def _shares(facts: Facts, run: Run) -> list[Check]:
     checks = []
     for q in facts.coordinates:
-        if names.name(names.FORCE, "", q) not in facts.variables:
+        whole = names.name(names.FORCE, "", q)
+        if whole not in facts.variables:
             continue
-        shares = [
-            run.rows[name] for c in facts.constraints if (name := facts.share(c, q)) is not None
-        ]
-        total = sum(shares, np.zeros(len(run.rows)))
-        size = sum((np.abs(s) for s in shares), np.zeros(len(run.rows)))
-        allowed = 4 * (1 + len(shares)) * EPS * size + np.finfo(float).tiny
-        checks.append(
-            _worst(
-                f"shares of Q.{q}",
-                np.abs(run.rows[names.name(names.FORCE, "", q)] - total),
-                allowed,
-            )
-        )
+        found = [facts.share(c, q) for c in facts.constraints]
+        shares = [run.rows[name] for name in found if name is not None]
+        none = np.zeros(len(run.rows))
+        allowed = 4 * (1 + len(shares)) * EPS * sum(map(np.abs, shares), none)
+        error = np.abs(run.rows[whole] - sum(shares, none))
+        checks.append(_worst(f"shares of Q.{q}", error, allowed + np.finfo(float).tiny))
     return checks
 
 
@@ -244,17 +233,14 @@ def _contacts(facts: Facts, run: Run, sizes: Mapping[str, Column | None]) -> lis
     checks = []
     for c in facts.contacts:
         closed = np.asarray(run.rows[names.name(names.CONTACT, c)], dtype=bool)
-        lam, f, size = (
-            run.rows[names.name(names.MULTIPLIER, c)],
-            run.rows[names.name(names.RESIDUAL, c)],
-            sizes[c],
-        )
+        lam, f = (run.rows[names.name(n, c)] for n in (names.MULTIPLIER, names.RESIDUAL))
         largest = float(np.abs(lam).max())
         push = float(np.maximum(-lam[closed], 0.0).max(initial=0.0))
         allowed = (10 * run.tolerance + 1e-12) * largest + np.finfo(float).tiny
         checks.append(Check(f"push of {c}", push, allowed))
         pull = float(np.abs(lam[~closed]).max(initial=0.0))
         checks.append(Check(f"no pull of {c} in the open", pull, np.finfo(float).tiny))
+        size = sizes[c]
         if size is not None and (~closed).any():
             inside = np.where(closed, 0.0, np.maximum(-f, 0.0))
             checks.append(_worst(f"outside of {c}", inside, GAP * size))

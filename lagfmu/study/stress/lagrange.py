@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +31,8 @@ from ...model.closed_form import TIME, ClosedForm, in_variables, output
 from ...model.elements import Constraint, Expr
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...prepare.prepare import Prepared
-from ...verification.verify import closed_forms_in
 from .closed_forms import EQUATION, SLOW, magnitude
-from .facts import ROUNDED, beside
+from .facts import beside
 
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
@@ -47,8 +45,7 @@ GAP = 4e-10  # of f, whose level a contact that closes within the gap of touchin
 def lay_beside(fmu: Path, prepared: Prepared) -> None:
     """Write the equations to where the judge of the FMU looks for them."""
     variables = frozenset(v.name for v in prepared.table.variables)
-    used = frozenset(n for c in closed_forms_in(fmu) for n in c.variables)
-    forms = [*lagrange(prepared.model, variables), *roundings(prepared.model, variables, used)]
+    forms = lagrange(prepared.model, variables)
     beside(fmu).write_bytes(pack_closed_forms(prepared.scene, forms, prepared.table))
 
 
@@ -64,7 +61,8 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
             for least in (NOTHING if model.coordinates[q] == model.coordinates[k] else 0,)
         ]
         name, scale = EQUATION + name_of(q), sp.Add(terms[q], *others)
-        forms.append(replace(_form(name, inertia, force, scale, None), when=_beside_jumps(model)))
+        when = _beside_jumps(model)
+        forms.append(ClosedForm(name, force, inertia, scale=scale, when=when, rounding=ROUNDING))
     forms += _of_constraints(model, _alone(masses, terms))
     forms += _of_shares(model, variables)
     for law in model.frictions:
@@ -83,16 +81,6 @@ def _beside_jumps(model: Model) -> Expr | None:
     known = [in_variables(h) for h in surfaces]
     beside = [sp.Heaviside(sp.Abs(h) - ON * magnitude(h), 0) for h in known]
     return sp.Mul(*beside) if beside else None
-
-
-def roundings(model: Model, variables: frozenset[str], used: frozenset[str]) -> list[ClosedForm]:
-    """What rounding leaves of each `used` acceleration in the metric of M, eps S / sqrt(M_jj), as forms
-    called ROUNDED + der(q,2): no solution of the equations in doubles is sure to be better, and where a
-    part of 1e300 kg m^2 hardly moves, a light one that turns with it is known to 1e-16 of what drives it."""
-    _, masses, terms = _sides(model, variables)
-    sizes = {names.derivative(name_of(q), 2): e for q, e in _alone(masses, terms).items()}
-    forms = [ClosedForm(ROUNDED + n, NOTHING * sizes[n], sp.S.Zero) for n in sizes if n in used]
-    return [form for form in forms if _names(form) <= variables]
 
 
 def _sides(model: Model, variables: frozenset[str]) -> tuple[Any, Any, Any]:
@@ -128,77 +116,38 @@ def _shares(model: Model, variables: frozenset[str]) -> dict[Expr, Expr]:
 
 def _of_friction(model: Model, law: Friction) -> list[ClosedForm]:
     """Coulomb's law, whichever mode the FMU says that it is in."""
+    zero, forms, size = sp.S.Zero, [], sp.S.Zero
+
+    def holds(name: str, expected: Expr, actual: Expr, scale: Expr, **more: Any) -> None:
+        form = ClosedForm(name, expected, actual, scale=scale, **{"rounding": ROUNDING} | more)
+        forms.append(form)
+
     sticks = output(names.name(names.STICKS, law.name))
     lam = [output(names.name(names.MULTIPLIER, name)) for name in law.of]
     slip = [output(names.name(names.SLIP, name)) for name in law.of]
-    N, force = sp.Abs(in_variables(sp.sympify(law.normal))), sp.sqrt(sum(x**2 for x in lam))
-    static, kinetic = in_variables(sp.sympify(law.static)), in_variables(sp.sympify(law.sliding))
-    speed, forms, size = sp.sqrt(sum(s**2 for s in slip)), [], sp.Integer(0)
     for name, s in zip(law.of, slip, strict=True):
         rate = sp.sympify(model.constraint(name).expression)
         if not isinstance(model.constraint(name), Nonholonomic):
             rate = rate.diff(TIME)
         terms = magnitude(in_variables(rate))
         size += terms
-        forms.append(
-            ClosedForm(names.name(names.SLIP, name), rate, s, scale=terms, rounding=ROUNDING)
-        )
-        sticking = ClosedForm(
-            f"{name} while it sticks", sp.Integer(0), s, scale=terms, when=sticks, rounding=ROUNDING
-        )
-        forms.append(sticking)
-    cone, heat = sp.Max(0, force - static * N), sp.Max(0, output(names.name(names.POWER, law.name)))
+        holds(names.name(names.SLIP, name), rate, s, terms)
+        holds(f"{name} while it sticks", zero, s, terms, when=sticks)
+    N, force = sp.Abs(in_variables(sp.sympify(law.normal))), sp.sqrt(sum(x**2 for x in lam))
+    static, kinetic = in_variables(sp.sympify(law.static)), in_variables(sp.sympify(law.sliding))
+    speed = sp.sqrt(sum(s**2 for s in slip))
     slips = (1 - sticks) * sp.Max(0, speed - SLOW * size)
-    forms.append(
-        ClosedForm(
-            f"cone of {law.name}",
-            sp.Integer(0),
-            cone,
-            scale=force + static * N,
-            when=sticks,
-            rounding=CONE,
-        )
-    )
-    forms.append(
-        ClosedForm(
-            *(f"heat of {law.name}", sp.Integer(0), heat),
-            scale=force * speed,
-            when=slips,
-            rounding=ROUNDING,
-        )
-    )
     margin, power = names.name(names.MARGIN, law.name), names.name(names.POWER, law.name)
     work = (1 - sticks) * sp.Add(*(x * s for x, s in zip(lam, slip, strict=True)))
-    forms.append(
-        ClosedForm(
-            margin,
-            static * N - force,
-            output(margin),
-            scale=force + static * N,
-            rounding=ROUNDING,
-        )
-    )
-    forms.append(
-        ClosedForm(
-            power,
-            work,
-            output(power),
-            scale=(1 - sticks) * force * speed,
-            rounding=ROUNDING,
-        )
-    )
+    cone = sp.Max(0, force - static * N)
+    holds(f"cone of {law.name}", zero, cone, force + static * N, when=sticks, rounding=CONE)
+    holds(f"heat of {law.name}", zero, sp.Max(0, output(power)), force * speed, when=slips)
+    holds(margin, static * N - force, output(margin), force + static * N)
+    holds(power, work, output(power), (1 - sticks) * force * speed)
     for x, s in zip(lam, slip, strict=True):
         along = sp.sign(s) if len(slip) == 1 else s / speed
-        forms.append(
-            ClosedForm(
-                f"{x} while it slips",
-                -kinetic * N * along,
-                x,
-                scale=kinetic * N,
-                when=slips,
-                rounding=CONE,
-            )
-        )
+        pull = -kinetic * N * along
+        holds(f"{x} while it slips", pull, x, kinetic * N, when=slips, rounding=CONE)
     return forms
 
 
@@ -238,19 +187,19 @@ def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[Close
         for _ in range(1 if isinstance(c, Nonholonomic) else 2):
             rate = rate.diff(TIME)
         contact = c.name if isinstance(c, Contact) else c.while_closed
-        form = _form(f"d2/dt2 of {c.name}", rate, sp.Integer(0), scale, contact)
-        if c.name in model.limited:
-            form = replace(form, when=output(names.name(names.STICKS, model.limited[c.name].name)))
-        found.append(form)
+        friction = model.limited.get(c.name)
+        found.append(
+            ClosedForm(
+                f"d2/dt2 of {c.name}",
+                sp.S.Zero,
+                rate,
+                while_closed=contact,
+                when=None if friction is None else output(names.name(names.STICKS, friction.name)),
+                scale=scale,
+                rounding=ROUNDING,
+            )
+        )
     return found
-
-
-def _form(
-    name: str, actual: Expr, expected: Expr, scale: Expr, while_closed: str | None
-) -> ClosedForm:
-    return ClosedForm(
-        name, expected, actual, while_closed=while_closed, scale=scale, rounding=ROUNDING
-    )
 
 
 def _names(form: ClosedForm) -> set[str]:

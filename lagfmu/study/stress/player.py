@@ -6,13 +6,10 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from ... import names
 from ...fmu.described import Trajectory
-from ...fmu.session import COLUMNS, RefusalError, Session
+from ...fmu.session import RefusalError, Session
 from .facts import Facts
 
 VAGUE = r"internal error|traceback|assert|unknown error|no message|\w+Error\(|<class"
@@ -42,14 +39,6 @@ def opened(facts: Facts, folder: Path, name: str = "stress") -> Session:
     session = Session(folder, name)
     session.outputs = [v.name for v in facts.outputs]
     return session
-
-
-def table(facts: Facts, count: int) -> Trajectory:
-    """An empty table: time, outputs, inputs."""
-    columns: list[tuple[str, Any]] = [("time", np.float64)]
-    columns += [(v.name, COLUMNS[v.type]) for v in facts.outputs]
-    columns += [(i.name, np.float64) for i in facts.inputs]
-    return np.zeros(count, dtype=columns)
 
 
 def play(

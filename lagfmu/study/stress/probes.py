@@ -10,7 +10,7 @@ from functools import partial
 
 from ...methods import FIXED_STEP, INTEGRATORS
 from ...names import derivative, read
-from . import exchange, runs
+from . import runs
 from .facts import Facts
 from .probe import Probe
 
@@ -26,7 +26,6 @@ PIECES = ((1, 7), (1, 7, 333))  # communication steps in the default experiment
 EXPONENTS = ((4, 12), (2, 4, 6, 10, 12))  # of tolerances
 SHAPES = ("jumps", "chatters", "a spike")
 PUSHES = ((1.0, 1e3), (1e-3, 1.0, 10.0, 1e3))  # of an input's start, or of one unit
-PARTS = ((0.5,), (0.1, 0.5, 0.8))  # of the default experiment: rollback
 NEAR = 10.0  # a factor off the model's own values that a user may well set
 
 
@@ -34,10 +33,8 @@ def probes(facts: Facts, quick: bool) -> list[Probe]:
     """All of them, in the order of the report."""
     take = 0 if quick else 1
     found = [Probe("ordinary", "as described", partial(runs.started, {}), False, True)]
-    for make in (_parameters, _starts, _stepping, _inputs, _rollback):
+    for make in (_parameters, _starts, _stepping, _inputs):
         found += make(facts, take)
-    if facts.description.modelExchange is not None and not facts.motions:
-        found.append(Probe("model exchange", "default experiment", exchange.compared, False, True))
     return found
 
 
@@ -125,12 +122,3 @@ def _inputs(facts: Facts, take: int) -> Iterator[Probe]:
         elif not read(i.name).order and derivative(i.name) not in facts.estimated:
             do = partial(runs.swung, i.name)
             yield Probe("inputs", f"{i.name} swings", do, near=True)
-
-
-def _rollback(facts: Facts, take: int) -> Iterator[Probe]:
-    for c in facts.contacts:
-        do = partial(runs.rolled_back_at, c)
-        yield Probe("rollback", f"across the departure from {c}", do, False, True)
-    for part in PARTS[take]:
-        do = partial(runs.rolled_back, part)
-        yield Probe("rollback", f"at {part:g} of the default experiment", do, False, True)

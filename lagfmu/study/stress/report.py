@@ -1,12 +1,9 @@
-"""A stress run for the terminal, as Markdown for a reviewer, and with every row for a pipeline."""
+"""A stress run for the terminal, and with every row for a pipeline."""
 
 from __future__ import annotations
 
-import platform
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from importlib import metadata
 from typing import Any
 
 from rich.markup import escape
@@ -19,8 +16,8 @@ from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Verdict
 FORMAT = 2
 VERDICTS = (RIGHT, CONSISTENT, REFUSED, WRONG, UNFINISHED)
 COLOURS = dict(zip(VERDICTS, ("green", "green", "cyan", "bold red", "yellow"), strict=True))
-PACKAGES = ("lagfmu", "sympy", "numpy", "scipy", "fmpy", "pythonfmu")
 WORRY, NO_WORRY = "look at it: near the model's own values", "no worry: far from them"
+UNFIT = "no worry: a method for other models"
 MEANING = (
     "right: every check held. consistent: so did Lagrange's equations and the constraints at each "
     "instant, but nothing could be said of the course of the motion. refused: discard or error, with a "
@@ -28,10 +25,6 @@ MEANING = (
     "was taken down, or a refusal had no cause. unfinished: still at work at the time limit; nothing is "
     "known. near: refusals of values within a factor of ten of the model's own, which a user should look "
     "at. Ratio: the error of the check that came nearest to its limit, over that limit."
-)
-WITHOUT = (
-    "An FMU without its model file: judged by the closed forms and invariants that it carries, not by "
-    "Lagrange's equations."
 )
 
 
@@ -62,7 +55,7 @@ def table(found: Stressed) -> Table:
     """One line a probe."""
     last = "nearest to its limit, or the reason"
     drawn = new_table(
-        f"{found.name} ({found.target})",
+        f"{found.name} ({found.target})" + ("" if found.laws else ", without Lagrange's equations"),
         *("probe", "verdict", "checks", "ratio", last),
         text=("probe", last),
         words=("verdict",),
@@ -99,66 +92,10 @@ def _ratio(row: Verdict) -> str:
 def remark(row: Verdict) -> str:
     """What came nearest to its limit, or the reason; of a refusal, whether to worry."""
     nearest = row.closest if row.verdict == RIGHT and row.ratio else ""
-    advice = "" if row.verdict != REFUSED else WORRY if row.near else NO_WORRY
+    advice = ""
+    if row.verdict == REFUSED:
+        advice = WORRY if row.near else UNFIT if row.family == "method" else NO_WORRY
     return "; ".join(t for t in (advice, nearest, row.detail) if t)
-
-
-def as_markdown(found: Sequence[Stressed]) -> str:
-    """Versions, counts by FMU, whatever is not right, and of one FMU every row."""
-    names = f"{len(found)} FMUs" if len(found) > 1 else found[0].name
-    lines = [
-        f"# Stress of {names} ({found[0].target})",
-        "",
-        *_circumstances(found),
-        "",
-        MEANING,
-        "",
-    ]
-    lines += [cells("FMU", *HEADS, "SHA-256"), cells("---", *["---:"] * len(HEADS), "---")]
-    width = 16 if len(found) > 1 else 64
-    lines += [cells(f.name, *f.counts(), f"`{f.digest[:width]}`") for f in found]
-    for what in (WRONG, UNFINISHED, CONSISTENT):
-        rows = [(f.name, r) for f in found for r in f.rows if r.verdict == what]
-        lines += _listed(what.capitalize(), rows)
-    worries = [(f.name, r) for f in found for r in f.rows if r.worry]
-    lines += _listed("Refused within a factor of ten of the model's own values", worries)
-    if len(found) == 1:
-        heads = ("family", "probe", "verdict", "checks", "ratio", "nearest to its limit, or reason")
-        lines += ["", "## Every probe", "", cells(*heads), cells(*["---"] * len(heads))]
-        lines += [
-            cells(r.family, r.probe, r.verdict, r.checks, _ratio(r), remark(r))
-            for r in found[0].rows
-        ]
-    return "\n".join(lines) + "\n"
-
-
-def cells(*contents: object) -> str:
-    """A row of a table."""
-    return "| " + " | ".join(str(c).replace("|", "\\|") for c in contents) + " |"
-
-
-def _listed(title: str, rows: Sequence[tuple[str, Verdict]]) -> list[str]:
-    lines = ["", f"## {title}: {len(rows) or 'none'}", ""]
-    return lines + [f"- {name}, {r.family}, {r.probe}: {r.detail}" for name, r in rows]
-
-
-def _circumstances(found: Sequence[Stressed]) -> list[str]:
-    versions = ", ".join(f"{p} {_version(p)}" for p in PACKAGES)
-    machine = f"{platform.system()} {platform.machine()}, Python {sys.version.split()[0]}"
-    limits = ", ".join(f"{x:g} s" for x in sorted({f.limit for f in found}))
-    lines = [f"{versions}; {machine}. At most {limits} for each probe."]
-    if any(f.quick for f in found):
-        lines.append("A quick run: some of the probes only.")
-    if without := [f.name for f in found if not f.laws]:
-        lines.append(f"{', '.join(without)}: {WITHOUT}")
-    return lines
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 def report(file: str, found: Stressed) -> Report:

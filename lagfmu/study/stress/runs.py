@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ... import names
 from ...methods import FIXED_STEP
 from .bench import REFERENCE, Bench, Finding
-from .judge import Check, differ
-from .player import Run, table
+from .judge import Check
+from .player import Run
 
 LONGEST = 100.0  # default experiments: at rest nothing but rounding gives the motion a rate
-PIECES = 7  # of a step that is repeated
 SWING, SWINGS = 0.05, 3  # of a motion's start, or of one unit; in the default experiment
 
 
@@ -112,15 +110,13 @@ def departures(bench: Bench, run: Run, other: Run, growth: float) -> list[Check]
         return []
     a, b = run.rows[-1], other.rows[-1]
     tolerance = max(run.tolerance, other.tolerance, REFERENCE)
-    return list(_departures(bench, a, b, 30 * tolerance * (1 + growth) * float(a["time"]), "same"))
-
-
-def _departures(bench: Bench, a: Any, b: Any, allowed: float, what: str) -> Iterator[Check]:
+    allowed, checks = 30 * tolerance * (1 + growth) * float(a["time"]), []
     for c in bench.facts.contacts:
         count, time = names.name(names.DEPARTURES, c), names.name(names.DEPARTURE_TIME, c)
-        yield Check(f"{count} {what}", float(abs(a[count] - b[count])), 0.5)
+        checks.append(Check(f"{count} same", float(abs(a[count] - b[count])), 0.5))
         if a[count] == b[count] and a[count] > 0:
-            yield Check(f"{time} {what}", float(abs(a[time] - b[time])), allowed)
+            checks.append(Check(f"{time} same", float(abs(a[time] - b[time])), allowed))
+    return checks
 
 
 # ------------------------------------------------------------------ inputs
@@ -165,71 +161,3 @@ def swung(name: str, bench: Bench) -> Finding:
         way[t] = dict(zip(orders, (u, rate, pull), strict=True))
         u, rate = u + rate * h + pull * h**2 / 2, rate + pull * h
     return bench.judged(bench.run({}, times, None, way.__getitem__, late=True))
-
-
-# ------------------------------------------------------------------ rollback
-
-
-def rolled_back_at(contact: str, bench: Bench) -> Finding:
-    """Across a departure."""
-    last = bench.ordinary.rows[-1]
-    if last[names.name(names.DEPARTURES, contact)] == 0:
-        return bench.judged(bench.ordinary, None, "no departure in the default experiment")
-    return _window(bench, float(last[names.name(names.DEPARTURE_TIME, contact)]))
-
-
-def rolled_back(part: float, bench: Bench) -> Finding:
-    """At a part of the default experiment."""
-    return _window(bench, part * bench.facts.stop_time)
-
-
-def _window(bench: Bench, middle: float) -> Finding:
-    """Save before, step across, restore: the same bits the same way, also from the state's bytes in another
-    instance; in pieces within tolerance."""
-    h = min(5 * bench.facts.step_size, middle)
-    begin, seen = middle - 0.4 * h, []
-    with bench.another("rolled back") as one, bench.another("taken over") as two:
-        one.begin({}, None)
-        one.step(begin)
-        state = one.save()
-        for turn in range(2):
-            if turn:
-                one.restore(state, begin)
-            seen.append(one.read())
-            for _ in range(2):
-                one.step(h)
-                seen.append(one.read())
-        two.begin({}, None)
-        one.hand(two, state, begin)
-        seen.append(two.read())
-        two.step(h)
-        seen.append(two.read())
-        one.restore(state, begin)
-        for _ in range(PIECES):
-            one.step(h / PIECES)
-        last = one.read()
-        one.call("freeFMUstate", state)
-    what = ("restored as it was:", "same bits when repeated:", "same bits after that:")
-    checks = [differ(seen[k], seen[k + 3], text) for k, text in enumerate(what)]
-    checks.append(differ(seen[0], seen[6], "as serialized:"))
-    checks.append(differ(seen[1], seen[7], "same bits from the bytes:"))
-    checks += _near(bench, seen[1], last, begin + h)
-    return Finding(tuple(checks), None, f"t = {middle:.6g} s")
-
-
-def _near(bench: Bench, right: dict[str, Any], other: dict[str, Any], time: float) -> list[Check]:
-    """One step or seven: the same within what the problem makes of the tolerance."""
-    base = bench.ordinary
-    grown = np.interp(time, base.rows["time"], bench.amplification)
-    one, two = (_end(bench, seen, time) for seen in (right, other))
-    checks = bench.agreement(one, two, np.array([grown]), "in pieces", bench.facts.stop_time)
-    allowed = 30 * base.tolerance * (1 + float(grown)) * time
-    return [*checks, *_departures(bench, right, other, allowed, "in pieces")]
-
-
-def _end(bench: Bench, seen: dict[str, Any], time: float) -> Run:
-    """The default experiment's run, of one point alone."""
-    rows = table(bench.facts, 1)
-    for name, value in (seen | {"time": time}).items():
-        rows[name][0] = value
-    return replace(bench.ordinary, rows=rows)

@@ -1,4 +1,4 @@
-"""Model exchange in `stress`: an error of the FMU is found, one of the integrator is none of its."""
+"""Model exchange on a bench: an error of the FMU is found, one of the integrator is none of its."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import Any
 
 import fmpy
 import pytest
+from same_motion import compared
 
-from lagfmu.testing import RIGHT, WRONG, Bench, Probe, attempt, exchange, find_compiler, verdict
+from lagfmu.testing import RIGHT, WRONG, Bench, Probe, attempt, find_compiler, verdict
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
-EXCHANGE = Probe("model exchange", "the default experiment", exchange.compared, False)
+EXCHANGE = Probe("model exchange", "the default experiment", compared, False)
 
 
 @pytest.fixture(scope="module")
