@@ -21,7 +21,7 @@ from typing import Any
 import pytest
 import sympy as sp
 from conftest import FILES, MODELS
-from runtime import FLAGS, INCLUDES, compile_library, compiler
+from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compile_library, compiler
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -36,6 +36,7 @@ from lagfmu import (
     derive,
 )
 from lagfmu.errors import DerivationError
+from lagfmu.methods import NUMBERS as NUMBERS_OF_METHODS
 from lagfmu.testing import (
     TIME,
     Differential,
@@ -49,6 +50,7 @@ from lagfmu.testing import (
     model_source,
     number,
     reduce,
+    string,
 )
 
 CLOSE = 1e-14  # of the magnitude of what is added up, about 45 roundings
@@ -104,15 +106,12 @@ int number_of(int full, int which) {
 }
 const char *coordinate_of(int full, int j) { return pick(full)->coordinates[j]; }
 const char *row_of(int full, int k) { return pick(full)->rows[k].name; }
-int kind_of(int full, int k) { return (int)pick(full)->rows[k].kind; }
 int gate_of(int full, int k) { return pick(full)->rows[k].while_closed; }
 """
 TABLES = ("mass_row", "mass_column", "entry_row", "entry_column", "row_start", "contact")
 TABLES += ("prescribed", "dimension", "extent_dimension")
 NUMBERS = ("n", "m", "contacts", "inputs", "parameters", "masses", "entries", "prescribed_count")
 NUMBERS += ("constant_mass", "separable", "formulation")
-KINDS = ("holonomic", "nonholonomic", "contact")
-FORMULATIONS = ("multipliers", "nullspace", "minimal")
 
 
 def array(values: Sequence[float]) -> Any:
@@ -400,49 +399,6 @@ def test_embedding_and_its_tangent(case: Callable[[str], Case], name: str) -> No
             assert abs(found[label][k] - expected) <= CLOSE * size
             expected, size = derivative(e, point, values)
             assert abs(change[label][k] - expected) <= CLOSE * size
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_tables_are_those_of_the_twin(case: Callable[[str], Case], name: str) -> None:
-    """Patterns, rows, counts and flags of the C system are those of the Python one."""
-    one = case(name)
-    for full, eom, twin in one.systems():
-        native = one.native
-        n, m = native.number("n", full), native.number("m", full)
-        assert (n, m) == (twin.n, twin.m)
-        masses, entries = native.number("masses", full), native.number("entries", full)
-        assert [
-            native.table("mass_row", masses, full),
-            native.table("mass_column", masses, full),
-        ] == [list(a) for a in twin.mass]
-        entry_row = native.table("entry_row", entries, full)
-        assert [entry_row, native.table("entry_column", entries, full)] == [
-            list(a) for a in twin.jacobian
-        ]
-        start = native.table("row_start", m + 1, full)
-        assert [entry_row[a:b] for a, b in pairwise(start)] == [
-            [k] * entry_row.count(k) for k in range(m)
-        ]
-        assert start[-1] == entries
-        count = native.number("contacts", full)
-        assert tuple(native.table("contact", count, full)) == twin.contacts
-        count = native.number("prescribed_count", full)
-        assert tuple(native.table("prescribed", count, full)) == twin.prescribed
-        assert FORMULATIONS[native.number("formulation", full)] == twin.formulation
-        library = native.library
-        assert tuple(library.coordinate_of(full, j).decode() for j in range(n)) == twin.coordinates
-        for k, row in enumerate(twin.rows):
-            assert library.row_of(full, k).decode() == row.name
-            assert KINDS[library.kind_of(full, k)] == row.kind
-            gate = library.gate_of(full, k)
-            assert (None if gate < 0 else gate) == row.while_closed
-        dimension = native.table("dimension", n, full)
-        extent = native.table("extent_dimension", len(eom.p), full)
-        for j in range(n):
-            like = tuple(i for i in range(n) if dimension[i] == dimension[j])
-            assert like == twin.like[j]
-            near = tuple(i for i, d in enumerate(extent) if d == dimension[j])
-            assert near == twin.extent[j]
 
 
 @pytest.mark.parametrize(
@@ -942,3 +898,19 @@ def test_text_does_not_depend_on_the_hash_seed() -> None:
     assert len(found) == 1
     assert len(found.pop().strip()) == hashlib.sha256().digest_size * 2
     assert shutil.which(compiler()) is not None
+
+
+def test_strings_are_escaped() -> None:
+    """Quotes, backslashes, trigraphs and letters beyond ASCII survive a C string literal."""
+    assert string('a"b\\c') == '"a\\042b\\134c"'
+    assert string("??/") == '"\\077\\077/"'
+    assert string("µ") == '"\\302\\265"'
+
+
+def test_methods_have_one_number_in_python_and_in_c() -> None:
+    """MethodName of state.h numbers the methods as methods.py does."""
+    header = RUNTIME_FILES["state.h"].read_text(encoding="utf-8")
+    found = re.search(r"enum \{([^}]*)\} MethodName", header)
+    assert found is not None
+    numbers = {k.lower(): int(v) for k, v in re.findall(r"(\w+) = (\d+)", found[1])}
+    assert numbers == dict(NUMBERS_OF_METHODS)

@@ -15,7 +15,7 @@ from pathlib import Path
 import binaries
 import numpy as np
 import pytest
-from conftest import FILES, KINDS, MODELS
+from conftest import FILES, KINDS, MODELS, of_each_kind
 from fmi2 import FUNCTIONS
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
@@ -108,7 +108,7 @@ def described(path: Path) -> dict[str, dict[str, dict[str, str]]]:
     return found
 
 
-@pytest.mark.parametrize("name", sorted(FILES))
+@pytest.mark.parametrize("name", of_each_kind(FILES))
 def test_both_targets_have_the_same_variables(native_fmu, python_fmu, name):
     """Names, causality, units, starts, structure: one table, but for what native FMUs alone tell."""
     native, python = (described(target(name)) for target in (native_fmu, python_fmu))

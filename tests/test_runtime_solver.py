@@ -258,38 +258,6 @@ def test_every_system_starts_in_its_own_equations(name, bench):
     check_start(one, *defaults(one.system, one.prepared.table))
 
 
-@pytest.mark.parametrize("speed", [0.0, 0.7])
-def test_surface_pushes_with_the_radial_component_of_the_weight(speed, bench):
-    """lambda = m g cos(theta) - m a theta'^2 on the hemisphere, whatever the mass."""
-    one = bench("Hemisphere")
-    m, g, a = one.p[:] = [2.5, 9.81, 0.8]
-    assert one.start([a, 0.3], [0.0, speed])
-    expected = m * g * np.cos(0.3) - m * a * speed**2
-    assert one.observe()["lambda.surface"] == pytest.approx(expected, rel=1e-14)
-
-
-def test_a_start_in_flight_is_free(bench):
-    """Above the surface r'' = r theta'^2 - g cos(theta), and lambda and Q are exactly zero."""
-    one = bench("Hemisphere")
-    seen = check_start(one, [1.5, 0.3], [0.1, 0.2], [])
-    assert seen["lambda.surface"] == seen["Q.r"] == 0
-    assert seen["der(r,2)"] == pytest.approx(1.5 * 0.04 - 9.81 * np.cos(0.3), rel=1e-14)
-    assert seen["residual.surface"] == 0.5
-
-
-def test_a_penetrated_surface_is_left_and_a_parting_one_opens(bench):
-    """r = a/2 is moved out to r = a and told; with r' > 0 there the particle is off the surface."""
-    one = bench("Hemisphere")
-    check_start(one, [0.5, 0.3], [0.0, 0.0], [])
-    assert one.moved() == [("r", 0.5, 1.0)]
-    assert one.state()["closed"].tolist() == [1]
-    check_start(one, [1.0, 0.3], [0.5, 0.0], [])
-    assert one.state()["closed"].tolist() == [0]
-    assert one.moved() == []
-    check_start(one, [1.0, 0.3], [0.0, 4.0], [])  # faster than sqrt(g a cos(theta)): it flies
-    assert one.state()["closed"].tolist() == [0]
-
-
 @pytest.mark.parametrize(("x", "y"), [(3.0, 4.0), (-30.0, 40.0), (1e-3, -2e-3), (0.6, 0.8)])
 def test_a_pendulum_starts_at_the_nearest_point_of_its_circle(x, y, bench):
     """All masses are equal, so the nearest point of the circle lies on the same ray; of the velocity

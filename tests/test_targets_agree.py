@@ -32,17 +32,6 @@ FORGETS = {  # s: changed, a speed that differs by 1e-10 changes accelerations b
 }
 
 
-def declared(path: Path) -> list[tuple[str, Any, Any]]:
-    """Attributes of every variable and of its type, in the order of the description."""
-    with zipfile.ZipFile(path) as archive:
-        root = ET.fromstring(archive.read("modelDescription.xml"))
-    found = []
-    for element in root.find("ModelVariables"):
-        (typed,) = (e for e in element if e.tag != "Annotations")
-        found.append((typed.tag, element.attrib, typed.attrib))
-    return found
-
-
 def scales(run: Any) -> dict[str, float]:
     """The scale of every Real output, as the module says; of the others 0: they must be equal."""
     largest = {
@@ -82,28 +71,6 @@ def check(expected: Any, found: Any, agree: float = AGREE) -> None:
 
 def both(python_fmu, native_fmu, name: str, values: dict[str, Any], **options: Any) -> list[Any]:
     return [simulate(fmu(name), start_values=values, **options) for fmu in (python_fmu, native_fmu)]
-
-
-@pytest.mark.parametrize("name", sorted(FILES))
-def test_both_start_with_what_they_declare(fmu, name):
-    """What can be set stands, before it is set, at the start value in the description: to the bit."""
-    path = fmu(name)
-    starts = {
-        variable["name"]: typed["start"]
-        for _, variable, typed in declared(path)
-        if "start" in typed and variable.get("initial") != "calculated"
-    }
-    with instance(path) as one:
-        one.fmu.setupExperiment()
-        one.fmu.enterInitializationMode()
-        for variable, text in starts.items():
-            value = one.get(variable)
-            if isinstance(value, bytes):
-                assert value.decode() == text
-            elif one.variables[variable].initial == "approx":  # may be moved onto the constraints
-                assert value == pytest.approx(float(text), abs=1e-15)
-            else:
-                assert value == float(text)
 
 
 @pytest.mark.parametrize("changed", [False, True], ids=["defaults", "changed"])
