@@ -17,13 +17,14 @@ from .. import names
 from ..errors import BuildError, SettingError
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import load
-from ..model.model import Contact, Model
+from ..model.model import Contact, Model, Peak
 from ..model.scene import Scene
+from ..model.selection import select
 from ..page import picture as pictures
 from ..page import preset as presets
 from ..page.documentation import page, with_figures
 from ..prepare.consistency import values_at_start
-from ..prepare.prepare import Prepared, prepare, with_peaks
+from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
@@ -126,6 +127,19 @@ def as_fmu(
         if kind == NATIVE:
             prepared = with_peaks(prepared, peaks)
         yield write(prepared, folder, closed_forms, kind)
+
+
+def with_peaks(prepared: Prepared, wanted: Sequence[str]) -> Prepared:
+    """What was prepared with the extremes of those of its outputs that these names and patterns mean."""
+    more = select(wanted, [v.name for v in prepared.table.measurable], "", [])
+    if not more:
+        return prepared
+    model, asked = prepared.model, prepared.asked
+    model = replace(model, peaks=(*model.peaks, *map(Peak, more)))
+    if not asked.complete:
+        told = [names.name(quantity, "", name) for name in more for quantity in names.PEAKS]
+        asked = replace(asked, outputs=(*asked.outputs, *told))
+    return prepare(model, asked, replace(prepared.derived, model=model))
 
 
 def license_of(target: str) -> str:

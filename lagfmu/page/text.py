@@ -16,7 +16,7 @@ from ..model.model import Contact, Nonholonomic, name_of
 from ..names import FORCE, MULTIPLIER, OWN
 from ..numeric.start_priority import OMITTED
 from ..prepare.consistency import of_undecided
-from ..prepare.prepare import Derived, Prepared
+from ..prepare.steps import Lowered, Prepared
 from .documentation import as_given, shown
 from .savings import Savings, savings
 from .typeset import Notation, typeset
@@ -70,7 +70,7 @@ def show(prepared: Prepared, console: Console, untried: str = "") -> None:
     console.print()
 
 
-def show_equations(prepared: Prepared | Derived, console: Console) -> None:
+def show_equations(prepared: Lowered, console: Console) -> None:
     """Print the name, the formulation and the equations of a model in a scene, whether it starts or not."""
     model, scene = prepared.model, prepared.scene
     head = Text(scene.name, style="bold")
@@ -89,14 +89,14 @@ def show_equations(prepared: Prepared | Derived, console: Console) -> None:
             _line(console, f"{equation.label:{width}}", equation.text)
 
 
-def show_what_is_known(known: Derived, console: Console) -> None:
+def show_what_is_known(known: Lowered, console: Console) -> None:
     """Print what can be said of a model that cannot start."""
     show_equations(known, console)
     _given(known, console)
     console.print()
 
 
-def _given(prepared: Prepared | Derived, console: Console) -> None:
+def _given(prepared: Lowered, console: Console) -> None:
     """Parameters and inputs with their values."""
     for title, role in (("Parameters", "parameter"), ("Inputs", "input")):
         rows = [v for v in prepared.whole.variables if v.role == role]

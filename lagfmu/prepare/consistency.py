@@ -9,16 +9,20 @@ from __future__ import annotations
 
 import random
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..codegen.py.equations import lower
 from ..errors import DerivationError, ModelError
+from ..interface.table import variable_table
 from ..interface.variables import VariableTable
+from ..mechanics import prune
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
+from ..model.model import Contact, name_of
 from ..model.units import ONE, for_reading
 from ..names import RESIDUAL, derivative, motion, name
 from ..numeric.failure import OmittedStartError, StepFailureError
@@ -33,6 +37,7 @@ from ..numeric.system import NONHOLONOMIC, Matrix, System, Vector
 from ..numeric.thresholds import RANK
 from .diagnosis import cause_of_failure, negative_energy
 from .starts import priorities
+from .steps import Lowered, Structure
 
 TRIALS = 5
 
@@ -42,41 +47,41 @@ class RedundantConstraintWarning(UserWarning):
 
 
 @dataclass(frozen=True)
-class Structure:
-    """n, m, rank of G with all constraints acting, degrees of freedom, redundant constraints, all whose
-    multipliers are not unique, frictions whose normal forces are not, start, and the constraints that the
-    given start values miss, in words."""
+class Posed:
+    """A start as it is asked for: equations, their variables, their numeric form, and the values of
+    parameters and inputs (plain symbols) that are not the model's own."""
 
-    n: int
-    m: int
-    rank: int
-    redundant: tuple[str, ...]
-    shared: tuple[str, ...]
-    undecided: tuple[str, ...]
-    start: Start
-    missed: tuple[str, ...]
+    equations: EquationsOfMotion
+    table: VariableTable
+    system: System
+    fixed: Mapping[Any, Any]
 
     @property
-    def degrees_of_freedom(self) -> int:
-        """N = n - rank G."""
-        return self.n - self.rank
+    def values(self) -> tuple[list[float], list[float]]:
+        """The inputs and the parameters."""
+        return values_at_start(self.equations, self.table, self.fixed)
 
 
-def examine(
-    eom: EquationsOfMotion,
-    table: VariableTable,
-    system: System,
-    numbers: Mapping[Any, Any] | None = None,
-) -> Structure:
+def posed(value: Lowered) -> Posed:
+    """The start in the scene, before anything was left out of the code."""
+    return Posed(value.equations, value.whole, value.examined, value.fixed)
+
+
+def whole(value: Lowered) -> Posed:
+    """The start of the model in all its coordinates, every contact free to open."""
+    form = Form(value.derived)
+    return Posed(value.derived, variable_table(form, value.scene), lower(form), value.fixed)
+
+
+def structure_of(posed: Posed) -> Structure:
     """Check that the model can start, and count its degrees of freedom.
-
-    `numbers`: values of parameters and inputs (plain symbols) that are not the model's own.
 
     Warns of redundant constraints.  Raises ModelError if no configuration satisfies the constraints,
     they contradict each other, the mass matrix is singular on the constraint surface, or the kinetic
     energy is negative for some velocities at the start.
     """
-    begun, u, p = begin(eom, table, system, numbers or {})
+    eom, system, (u, p) = posed.equations, posed.system, posed.values
+    begun = begin(posed)
     generator = random.Random(1)
     ranks, masses = [], []
     for trial in range(TRIALS):
@@ -110,15 +115,15 @@ def examine(
             f"others; lambda of {', '.join(map(repr, shared))} is shared with least norm and flagged by "
             "unique.*, Q is right",
             RedundantConstraintWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     if undecided:
         warnings.warn(
             f"model {eom.model.name!r}: {of_undecided(undecided, redundant)}",
             RedundantConstraintWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
-    missed = _missed(table, system, begun, u, p)
+    missed = _missed(posed, begun)
     return Structure(eom.n, eom.m, found.rank, redundant, shared, undecided, begun, missed)
 
 
@@ -147,10 +152,9 @@ def _spans(system: System, begun: Start, p: Sequence[float]) -> list[float]:
     return spans
 
 
-def _missed(
-    table: VariableTable, system: System, begun: Start, u: Sequence[float], p: Sequence[float]
-) -> tuple[str, ...]:
+def _missed(posed: Posed, begun: Start) -> tuple[str, ...]:
     """The constraints that act at the start and that the values of the model miss: by how much."""
+    table, system, (u, p) = posed.table, posed.system, posed.values
     n, rows = system.n, system.active(begun.closed)
     q, v = begun.q.copy(), begun.v.copy()
     free = np.ones(2 * n, dtype=bool)  # nobody said what these are: they follow
@@ -190,42 +194,35 @@ def values_at_start(
     return [float(numbers.get(s, table[str(s)].start or 0.0)) for s in eom.u], p
 
 
-def begin(
-    eom: EquationsOfMotion, table: VariableTable, system: System, numbers: Mapping[Any, Any]
-) -> tuple[Start, list[float], list[float]]:
-    """The start with the values of the table and `numbers`, the inputs and the parameters then."""
-    u, p = values_at_start(eom, table, numbers)
-    given = {name: eom.at_parameters(e, numbers) for name, e in eom.starts().items()}
+def begin(posed: Posed) -> Start:
+    """The start with the values of the table and those that are fixed.  Raises ModelError with the cause."""
+    eom, system, (u, p) = posed.equations, posed.system, posed.values
+    given = {name: eom.at_parameters(e, posed.fixed) for name, e in eom.starts().items()}
     q0 = [given.get(c, 0.0) for c in system.coordinates]
     v0 = [given.get(derivative(c), 0.0) for c in system.coordinates]
     try:
-        begun = start(system, q0, v0, u, p, priorities(system, table))
+        return start(system, q0, v0, u, p, priorities(system, posed.table))
     except OmittedStartError as error:
         raise ModelError(eom.model.name, [str(error)]) from error
     except StepFailureError as error:
         at = at_start(system, np.array(q0), u, p)
         cause = cause_of_failure(at, np.array(q0), np.array(v0)) or str(error)
         raise ModelError(eom.model.name, [cause]) from error
-    return begun, u, p
 
 
-def check_held(
-    eom: EquationsOfMotion,
-    table: VariableTable,
-    system: System,
-    numbers: Mapping[Any, Any],
-    kept: Collection[str],
-) -> None:
-    """Contacts that a scene does not let open are closed at the start.  Raises ModelError naming others.
-
-    The equations, `table` and `system` are the model's, with all contacts; `kept` may open.
-    """
-    closed = begin(eom, table, system, numbers)[0].closed
-    names = [system.rows[k].name for k in system.contacts]
-    away = [n for n, shut in zip(names, closed, strict=True) if n not in kept and not shut]
+def check_held(value: Lowered) -> None:
+    """Contacts that the scene does not let open are closed at the start.  Raises ModelError naming others."""
+    acting = prune.held(value.derived, value.asked, [])
+    if acting is value.derived:
+        return
+    kept = {c.name for c in acting.constraints if isinstance(c, Contact)}
+    posed = whole(value)
+    names = [posed.system.rows[k].name for k in posed.system.contacts]
+    shut = dict(zip(names, begin(posed).closed, strict=True))
+    away = [name for name in names if name not in kept and not shut[name]]
     if away:
         raise ModelError(
-            eom.model.name,
+            value.model.name,
             [
                 f"contact {name!r} is open at the start, but the scene says that it cannot open: name "
                 "it in `contacts`, or start on it"
@@ -266,3 +263,13 @@ def _nearby(
     with np.errstate(all="ignore"):
         rows = system.active(begun.closed)
         return initial_positions(at_start(system, q, u, p), q, v, rows, begun.size)
+
+
+def resting_motions(eom: EquationsOfMotion) -> list[str]:
+    """Prescribed motions that start at 0 because nobody said otherwise: a likely cause."""
+    return [
+        f"the prescribed motion {name_of(i.symbol)!r} starts at 0 {i.unit}, as no start is given: if the "
+        f"constraints need another value, write Input({name_of(i.symbol)}, {i.unit!r}, start=...)"
+        for i in eom.model.prescribed
+        if float(i.start) == 0
+    ]

@@ -1,0 +1,111 @@
+"""What a scene asks of a model: its formulation, and outputs by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from .. import names
+from ..errors import DerivationError, ModelError, RequestError
+from ..interface.table import variable_table
+from ..interface.variables import VariableTable
+from ..mechanics import prune
+from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.form import Form
+from ..mechanics.formulations.minimal import reduce
+from ..model.scene import EVERYTHING, Scene
+from ..model.selection import select
+from .steps import Derived
+
+Choice = tuple[Scene, Form, tuple[str, ...]]
+
+
+def formulated(derived: Derived, acting: EquationsOfMotion, problems: list[str]) -> Choice:
+    """The scene with its formulation, the form that this gives, and the outputs by name.
+
+    `acting`: the equations with contacts that cannot open as constraints; `problems`: what is wrong with the
+    scene so far.  Raises RequestError with all of them, DerivationError, and ModelError for peaks.
+    """
+    scene = derived.asked
+    if acting.frictions:
+        problems += _refused_with_friction(acting, scene)
+    found = _least(acting, scene)
+    if found is None:
+        chosen = replace(scene, formulation=scene.formulation or "multipliers")
+        form = _form(acting, chosen)
+        table = variable_table(form, chosen)
+        found = chosen, form, _outputs(table, chosen, problems)
+    if problems:
+        raise RequestError(scene.name, problems)
+    _check_peaks(derived, *found[:2])
+    return found
+
+
+def with_measured(outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """With the quantities whose extremes are read, which are computed for that."""
+    measured = [names.measured(name) for name in outputs]
+    return tuple(dict.fromkeys((*outputs, *(name for name in measured if name))))
+
+
+def _form(eom: EquationsOfMotion, scene: Scene) -> Form:
+    form = Form(eom, None, scene.formulation or "multipliers")
+    if form.formulation != "minimal" or eom.frictions:
+        return form
+    try:
+        return replace(form, reduction=reduce(eom))
+    except DerivationError as error:
+        raise DerivationError(f"scene {scene.name!r}: {error}") from error
+
+
+def _least(eom: EquationsOfMotion, scene: Scene) -> Choice | None:
+    """In the minimal formulation, where the scene leaves it open and no multiplier is solved for then."""
+    movable = any(e.free_symbols for e in eom.starts().values())  # follows what is set
+    if scene.formulation is not None or scene.complete or eom.frictions or movable:
+        return None
+    try:
+        form = Form(eom, reduce(eom), "minimal")
+    except DerivationError:
+        return None
+    if form.reduction is None or form.reduction.rows:
+        return None
+    scene, unknown = replace(scene, formulation="minimal"), list[str]()
+    outputs = _outputs(variable_table(form, scene), scene, unknown)
+    if unknown or prune.read_only(form, with_measured(outputs)) is form:
+        return None
+    return scene, form, outputs
+
+
+def _refused_with_friction(eom: EquationsOfMotion, scene: Scene) -> list[str]:
+    """What a scene of a model with friction cannot ask for."""
+    names = ", ".join(repr(law.name) for law in eom.frictions)
+    problems = []
+    if scene.formulation == "minimal":
+        problems.append(
+            f"formulation 'minimal' with friction ({names}): the normal force is needed in every mode, "
+            "and the reduction eliminates it: choose 'multipliers' or 'nullspace'"
+        )
+    if scene.derivatives:
+        problems.append(
+            f"derivatives with friction ({names}): directional derivatives do not know the force of "
+            "sliding: leave `derivatives` out"
+        )
+    return problems
+
+
+def _check_peaks(derived: Derived, scene: Scene, form: Form) -> None:
+    """Each Peak is of a Real output of the FMU that has everything.  Raises ModelError."""
+    wanted, problems = [peak.of for peak in derived.model.peaks], list[str]()
+    if wanted and tuple(scene.frictions) == EVERYTHING:
+        forms: Sequence[Form] = (Form(derived.derived), form)
+        known = [v.name for each in forms for v in variable_table(each, scene).measurable]
+        select(wanted, list(dict.fromkeys(known)), "Peak: the Real output", problems)
+    if problems:
+        raise ModelError(derived.model.name, problems)
+
+
+def _outputs(table: VariableTable, scene: Scene, problems: list[str]) -> tuple[str, ...]:
+    known = [v.name for v in table.outputs]
+    found = set(select(scene.outputs, known, "output", problems))
+    found |= {names.barred(name) for name in found}  # a bar is of an output, ...
+    found |= {names.bar(name) for name in found}  # ... and an output has its own
+    return tuple(name for name in known if name in found)
