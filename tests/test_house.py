@@ -132,6 +132,21 @@ def test_the_runtime_stands_in_layers(floor: str) -> None:
                 assert FLOORS.index(place[header]) <= FLOORS.index(floor), (path.name, header)
 
 
+def test_preparing_is_a_pipeline() -> None:
+    """Five steps in the order in which they stand, each from one value to one value; none calls another or
+    the whole, and no file beside them leads back."""
+    steps = ("derive", "narrow", "reduce", "lower", "examine")
+    tree = ast.parse(ROOT.joinpath("prepare", "prepare.py").read_text(encoding="utf-8"))
+    found = {n.name: n for n in tree.body if isinstance(n, ast.FunctionDef)}
+    assert tuple(name for name in found if name in steps) == steps
+    for name in steps:
+        assert len(found[name].args.args) == 1, name
+        called = {ast.unparse(n.func) for n in ast.walk(found[name]) if isinstance(n, ast.Call)}
+        assert not called & {*steps, "prepare"}, name
+    for path in ROOT.glob("prepare/*.py"):
+        assert "from .prepare import" not in path.read_text(encoding="utf-8"), path.name
+
+
 def test_only_the_fmi_layer_says_fmi() -> None:
     """Nothing outside fmu/ and runtime/fmi/ names a function, a type or a file of FMI 2.0: another version is
     theirs alone; and in runtime/fmi/ the instance knows no version."""
