@@ -10,8 +10,8 @@ from ..names import VALUE, read
 def identifier(symbol: Any) -> str:
     """A word for a symbol, which may be taken."""
     text = str(symbol)
-    if text.startswith("level("):  # jumps.py
-        return f"level_{text[len('level(') : -1]}"
+    if text.startswith("switch("):  # jumps.py
+        return f"switch_{text[len('switch(') : -1]}"
     of = read(text)
     if of.quantity == VALUE and of.order:
         return f"der{of.order if of.order > 1 else ''}_{of.coordinate}"

@@ -113,7 +113,7 @@ class Parts:
     @cached_property
     def at_integers(self) -> tuple[bool, ...]:
         """Which of the jumps are wherever h is a whole number."""
-        return tuple(s.floor for s in self.jumps.surfaces)
+        return tuple(s.at_integers for s in self.jumps.surfaces)
 
     @cached_property
     def prescribed(self) -> tuple[int, ...]:
@@ -219,7 +219,7 @@ class Parts:
             found.append(Function("starts", text, {"p": eom.p}, {"w": w}))
         if self.jumps.surfaces:
             text = "h of each jump of the forces: where it passes 0, or a whole number."
-            h = values([s.h for s in self.jumps.surfaces], eom.levels)
+            h = values([s.h for s in self.jumps.surfaces], eom.switch_states)
             found.append(Function("surfaces", text, still, {"h": h}))
         if eom.outputs and not self.prefix:
             found += self._of_outputs()
@@ -304,7 +304,7 @@ def parts_of(
 ) -> tuple[Parts, ...]:
     """The system of all coordinates and, where it is reduced, the one of those that are stepped.
 
-    `form` and `jumps` as jumps.levelled gives them; `time`: the symbol in them.
+    `form` and `jumps` as jumps.with_switch_states gives them; `time`: the symbol in them.
     """
     eom, reduction = form.equations, form.reduction
     more: dict[str, Any] = {"tangents": tangents, "time": time}

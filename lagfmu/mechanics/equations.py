@@ -79,8 +79,8 @@ class EquationsOfMotion(Displayed):
 
     A scene may need less than the model (prune.py): then some coordinates and constraints are not
     there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
-    equations are of coordinates that are only read: nothing is solved for them.  `levels`: where forces
-    jump, the symbols behind the inputs that say on which side (jumps.py).  `frictions` say which
+    equations are of coordinates that are only read: nothing is solved for them.  `switch_states`: where
+    forces jump, the symbols behind the inputs that say on which side (jumps.py).  `frictions` say which
     constraints hold only as long as their multipliers stay below a part of a normal force.
     """
 
@@ -104,7 +104,7 @@ class EquationsOfMotion(Displayed):
     outputs: tuple[Output, ...] = ()
     numbers: Mapping[Expr, Expr] = field(default_factory=dict)
     bare: bool = False
-    levels: tuple[Expr, ...] = ()
+    switch_states: tuple[Expr, ...] = ()
 
     def multipliers(self) -> dict[str, Expr]:
         """Constraint -> lambda in q, v, t and parameters [J/[f]; W/[expression] if nonholonomic].
@@ -117,8 +117,8 @@ class EquationsOfMotion(Displayed):
 
     @property
     def driven(self) -> tuple[Expr, ...]:
-        """What the argument u of numeric functions holds: the inputs, then the levels of jumps."""
-        return (*self.u, *self.levels)
+        """What the argument u of numeric functions holds: the inputs, then the switch states."""
+        return (*self.u, *self.switch_states)
 
     @property
     def n(self) -> int:

@@ -3,7 +3,8 @@
 A jump in position, time or inputs is an event: within a step the argument h of the function stands at the
 value that says on which side of its surface h = 0 the motion is (for floor: between which integers), and
 the side changes where h passes the surface.  Each argument is therefore wrapped: held(h, k), with the
-number k of its surface, which is h for the reader, and a level for the numeric code (`levelled`).
+number k of its surface, which is h for the reader, and for the numeric code its switch state
+(`with_switch_states`).
 
 A jump in a velocity is refused: such a force (dry friction) holds the motion on its surface, which is not
 an event but a mode of motion.  A kink without a jump, as in x*sign(x) or a Piecewise that is continuous at
@@ -33,13 +34,13 @@ DIGITS = 30
 
 
 class held(sp.Function):  # type: ignore[misc]  # noqa: N801 - written like the function that it is
-    """held(h, k): h for the reader; for numeric code the level of surface k, on whose side the motion is."""
+    """held(h, k): h for the reader; for numeric code the switch state of surface k: which side of it."""
 
     nargs = 2
     is_extended_real = True
 
     def fdiff(self, argindex: int = 1) -> Expr:
-        """0: between two events the level stands."""
+        """0: between two events the switch state stands."""
         return sp.S.Zero
 
     def _eval_derivative(self, s: Expr) -> Expr:
@@ -59,18 +60,18 @@ class held(sp.Function):  # type: ignore[misc]  # noqa: N801 - written like the 
 
 @dataclass(frozen=True)
 class Surface:
-    """h(q, t, u) of a jump at h = 0, or, of a `floor`, wherever h is a whole number."""
+    """h(q, t, u) of a jump at h = 0, or, `at_integers`, wherever h is a whole number."""
 
     h: Expr
-    floor: bool
+    at_integers: bool
 
 
 @dataclass(frozen=True)
 class Jumps:
-    """The surfaces of a system's jumps in the order of its levels; `levels`: their symbols."""
+    """The surfaces of a system's jumps in order; `states`: the symbols of their switch states."""
 
     surfaces: tuple[Surface, ...] = ()
-    levels: tuple[Expr, ...] = ()
+    states: tuple[Expr, ...] = ()
 
     def mapped(self, table: Mapping[Expr, Expr]) -> Jumps:
         """The same in other symbols."""
@@ -122,7 +123,7 @@ def _refusal(
     on = [
         str(q) for q, e in zip(eom.q, eom.F, strict=True) if surface in set(_candidates(plain[e]))
     ]
-    where = f"where {surface.h} {'is a whole number' if surface.floor else '= 0'}"
+    where = f"where {surface.h} {'is a whole number' if surface.at_integers else '= 0'}"
     return (
         f"the force on {', '.join(on) or 'the constraints'} jumps with the velocity "
         f"{', '.join(map(str, speeds))}, {where}: a motion would stay there, in no direction of the jump; "
@@ -170,7 +171,7 @@ def _at(node: Expr, table: Mapping[Surface, Expr]) -> Expr:
     new = table[surface]
     if isinstance(node, Relational):
         return node.func(new if node.lhs - node.rhs == surface.h else -new, 0)
-    argument = new if surface.floor or node.args[0] == surface.h else -new
+    argument = new if surface.at_integers or node.args[0] == surface.h else -new
     return node.func(argument, *node.args[1:])
 
 
@@ -185,16 +186,16 @@ def _jumps(e: Expr, surface: Surface, eom: EquationsOfMotion) -> bool:
         return False
     values = {p.symbol: _exact(float(p.value) or 1.0) for p in eom.parameters}
     generator = random.Random(3)
-    levels = (sp.Integer(generator.randint(-3, 3)) for _ in range(SAMPLES))
-    for level in levels if surface.floor else (sp.S.Zero,) * SAMPLES:
-        h = (surface.h - level).xreplace(values)
+    integers = (sp.Integer(generator.randint(-3, 3)) for _ in range(SAMPLES))
+    for integer in integers if surface.at_integers else (sp.S.Zero,) * SAMPLES:
+        h = (surface.h - integer).xreplace(values)
         point = _on(h, generator)
         if point is None:
             continue
         everything = {**_scattered(e.xreplace(values).free_symbols, generator), **values, **point}
-        half = sp.Rational(1, 2) if surface.floor else sp.S.One
+        half = sp.Rational(1, 2) if surface.at_integers else sp.S.One
         over, under = (
-            _number(_wrapped(e, {surface: level + s * half}), everything) for s in (1, -1)
+            _number(_wrapped(e, {surface: integer + s * half}), everything) for s in (1, -1)
         )
         if over is None or under is None:
             continue
@@ -266,8 +267,8 @@ def jumps_of(form: Form) -> Jumps:
     if not found:
         return NONE
     numbers = sorted(found, key=int)
-    levels = tuple(level(k) for k in numbers)
-    return Jumps(tuple(found[k] for k in numbers), levels)
+    states = tuple(switch_state(k) for k in numbers)
+    return Jumps(tuple(found[k] for k in numbers), states)
 
 
 def _collect(
@@ -279,26 +280,27 @@ def _collect(
             found.setdefault(x.args[1], Surface(x.args[0].xreplace(dict(inside)), x in floors))
 
 
-def level(number: Expr) -> Expr:
-    """The symbol of a surface's level; no name in a model is written like this."""
-    return sp.Symbol(f"level({int(number) + 1})", real=True)
+def switch_state(number: Expr) -> Expr:
+    """The symbol of a surface's switch state; no name in a model is written like this."""
+    return sp.Symbol(f"switch({int(number) + 1})", real=True)
 
 
-def levelled(form: Form) -> tuple[Form, Jumps]:
-    """The same for numeric code: what is held is the symbol of its level, which stands behind the inputs."""
+def with_switch_states(form: Form) -> tuple[Form, Jumps]:
+    """The same for numeric code: what is held is the symbol of its switch state, behind the inputs."""
     jumps, reduction = jumps_of(form), form.reduction
-    if not jumps.levels:
+    if not jumps.states:
         return form, jumps
     if reduction is not None:
-        reduction = replace(reduction, reduced=_levelled(reduction.reduced, jumps))
-    return replace(form, equations=_levelled(form.equations, jumps), reduction=reduction), jumps
+        reduction = replace(reduction, reduced=_in_switch_states(reduction.reduced, jumps))
+    equations = _in_switch_states(form.equations, jumps)
+    return replace(form, equations=equations, reduction=reduction), jumps
 
 
-def _levelled(eom: EquationsOfMotion, jumps: Jumps) -> EquationsOfMotion:
+def _in_switch_states(eom: EquationsOfMotion, jumps: Jumps) -> EquationsOfMotion:
 
     def put(e: Expr) -> Expr:
-        table = {x: level(x.args[1]) for x in e.atoms(held)}
+        table = {x: switch_state(x.args[1]) for x in e.atoms(held)}
         return e.xreplace(table) if table else e
 
     F, gamma = tuple(map(put, eom.F)), tuple(map(put, eom.gamma))
-    return replace(eom, F=F, gamma=gamma, levels=jumps.levels)
+    return replace(eom, F=F, gamma=gamma, switch_states=jumps.states)

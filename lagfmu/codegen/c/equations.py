@@ -14,7 +14,7 @@ import sympy as sp
 
 from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.form import Form
-from ...mechanics.jumps import levelled
+from ...mechanics.jumps import with_switch_states
 from ...model.elements import Expr
 from .. import bounds
 from ..parts import Function, Parts, parts_of
@@ -47,7 +47,7 @@ def model_source(form: Form, tangents: bool = True) -> str:
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
-    form, jumps = levelled(form)
+    form, jumps = with_switch_states(form)
     given = form.equations
     symbols = _real([*given.q, *given.v, *given.u, *given.p, TIME])
     time = symbols.get(TIME, TIME)
@@ -124,7 +124,7 @@ def _names(parts: Parts) -> dict[Expr, str]:
     """The C names of the symbols of a state, and of their changes."""
     eom, change = parts.eom, parts.change
     moving = [*eom.q, *eom.v, *eom.u]
-    names = identifiers([*moving, *eom.p, *eom.levels, *(change[s] for s in moving)])
+    names = identifiers([*moving, *eom.p, *eom.switch_states, *(change[s] for s in moving)])
     return names | {parts.time: "t", change[parts.time]: "dt"}
 
 

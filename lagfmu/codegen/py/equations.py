@@ -10,7 +10,7 @@ from typing import Any
 
 from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.form import Form
-from ...mechanics.jumps import levelled
+from ...mechanics.jumps import with_switch_states
 from ...model.elements import Expr
 from ...model.units import Unit
 from ...numeric.cubic import Cubic
@@ -26,7 +26,7 @@ def source(form: Form) -> str:
     It needs the names System, Row, Own, Friction, Lookups and Embedding of `lagfmu.numeric.system`, and Cubic
     where there are tables.
     """
-    form, jumps = levelled(form)
+    form, jumps = with_switch_states(form)
     whole = parts_of(form, jumps)
     pieces = [piece for parts in whole for piece in (*_embedding(parts), *_system(parts))]
     text = "\n\n".join([*pieces, f"SYSTEM = {_label(whole[-1])}\n"])
