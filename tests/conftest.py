@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -68,13 +68,15 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
 KINDS = ("PendulumAngle", "Hemisphere", "KnifeEdge", "CartPendulum", "HalfCar", "BouncingBall")
 
 
-def of_each_kind(names: Iterable[str], *values: Any, label: str = "") -> list[Any]:
-    """Parameters (name, *values): those of KINDS always, the others where there is time."""
+def of_each_kind(
+    names: Iterable[str], *values: Any, label: str = "", kinds: Container[str] = KINDS
+) -> list[Any]:
+    """Parameters (name, *values): those of `kinds` always, the others where there is time."""
     return [
         pytest.param(
             *(name, *values),
             id=f"{name}-{label}" if label else name,
-            marks=() if name in KINDS else pytest.mark.thorough,
+            marks=() if name in kinds else pytest.mark.thorough,
         )
         for name in names
     ]

@@ -80,6 +80,7 @@ def test_a_damaged_member_is_one_message(native_fmu, tmp_path, command):
         assert done.exception is None or isinstance(done.exception, SystemExit)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM there")
 @pytest.mark.parametrize(
     "words",

@@ -880,6 +880,7 @@ print(digest.hexdigest())
 """
 
 
+@pytest.mark.thorough
 def test_text_does_not_depend_on_the_hash_seed() -> None:
     """Two processes with different PYTHONHASHSEED print the same bytes."""
     found = set()

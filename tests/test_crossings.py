@@ -114,6 +114,7 @@ def test_an_importers_integrator_comes_to_the_same_motion(crossed):
     assert [c for c in compared(bench).checks if not c.ratio <= 1] == []
 
 
+@pytest.mark.thorough
 def test_the_order_of_declaration_is_free(crossed, tmp_path):
     """Constraints and coordinates the other way round: the same motion, within the tolerance."""
     features, bench = crossed

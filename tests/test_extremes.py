@@ -680,6 +680,7 @@ ANYTHING = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", sorted(ANYTHING))
 @settings(
     max_examples=40,

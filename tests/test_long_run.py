@@ -47,6 +47,7 @@ def check_rattle(pendulum: Library, span: float, interval: float) -> None:
     assert abs(angle).max() == pytest.approx(1.0, abs=1e-3)  # it swings as high as ever
 
 
+@pytest.mark.thorough
 def test_rattle_keeps_rod_and_energy(pendulum):
     """1e5 s, 48,000 swings: |f| <= 1e-12 L^2 and the energy within 1e-7 m g L, at instants that come at
     every phase of the swing."""

@@ -166,6 +166,7 @@ def test_the_readme_is_read_in_five_minutes():
         assert (REPOSITORY / link).is_file(), link
 
 
+@pytest.mark.thorough
 def test_the_tutorial_runs_as_a_notebook(tmp_path, monkeypatch):
     """Cell by cell: lambda = -M g sin(alpha)/3; the particle leaves where the energy says; equations as
     mathematics, a figure, and the page in which the FMU runs."""

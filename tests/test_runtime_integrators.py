@@ -984,6 +984,7 @@ def test_dense_output_of_rattle(library: ctypes.CDLL) -> None:
     assert observed_order(parts, v_errors) == pytest.approx(5, abs=0.15)
 
 
+@pytest.mark.thorough
 def test_energy_over_long_times(library: ctypes.CDLL) -> None:
     """|f| <= 1e-15 L^2 throughout; |E - E0| <= 1e-8 m g L, of which rounding drifts by 1e-9 in 1e6 s.
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import fmpy
 import pytest
+from conftest import of_each_kind
 from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
 from test_extremes import isosceles, swing
 from test_jumps import MODELS as JUMPS
@@ -119,7 +120,9 @@ def arguments(description, step: float) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("name", sorted(LIVES))
+@pytest.mark.parametrize(
+    "name", of_each_kind(sorted(LIVES), kinds=("Hemisphere", "SlippingSphere"))
+)
 def test_nothing_is_undefined_and_no_byte_is_left_behind(unpacked, name):
     """AddressSanitizer, LeakSanitizer and UndefinedBehaviorSanitizer are silent."""
     folder, description = unpacked(name)
@@ -135,6 +138,7 @@ def test_nothing_is_undefined_and_no_byte_is_left_behind(unpacked, name):
     assert run.stderr == ""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["Hemisphere", "CartPendulum", "Isosceles"])
 def test_valgrind_finds_nothing(unpacked, name):
     """No value is used before it is set, no block is left."""

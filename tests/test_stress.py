@@ -339,6 +339,7 @@ def four_probes(monkeypatch, tmp_path):
     monkeypatch.setattr(command.subprocess, "Popen", start)
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("four_probes")
 def test_a_crash_is_one_wrong_row(native_fmu, tmp_path):
     """A probe that takes the process down is wrong, one that hangs is unfinished, the rest goes on; JSON and
