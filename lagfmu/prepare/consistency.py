@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..codegen.py.equations import lower
-from ..errors import DerivationError, ModelError
+from ..errors import CannotStartError, DerivationError, ModelError
 from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import prune
@@ -64,13 +64,26 @@ class Posed:
 
 def posed(value: Lowered) -> Posed:
     """The start in the scene, before anything was left out of the code."""
-    return Posed(value.equations, value.whole, value.examined, value.fixed)
+    return Posed(value.form.equations, value.whole, value.examined, value.fixed)
 
 
 def whole(value: Lowered) -> Posed:
     """The start of the model in all its coordinates, every contact free to open."""
     form = Form(value.derived)
     return Posed(value.derived, variable_table(form, value.scene), lower(form), value.fixed)
+
+
+def examined_structure(value: Lowered) -> Structure:
+    """That of the scene; contacts that it does not let open are closed.  Warns of redundant constraints.
+
+    Raises ModelError for contacts that are not, CannotStartError with the cause for a start that is none.
+    """
+    _check_held(value)
+    try:
+        return structure_of(posed(value))
+    except ModelError as error:
+        problems = [*error.problems, *_resting_motions(value.form.equations)]
+        raise CannotStartError(error.name, problems, value) from error
 
 
 def structure_of(posed: Posed) -> Structure:
@@ -115,13 +128,13 @@ def structure_of(posed: Posed) -> Structure:
             f"others; lambda of {', '.join(map(repr, shared))} is shared with least norm and flagged by "
             "unique.*, Q is right",
             RedundantConstraintWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
     if undecided:
         warnings.warn(
             f"model {eom.model.name!r}: {of_undecided(undecided, redundant)}",
             RedundantConstraintWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
     missed = _missed(posed, begun)
     return Structure(eom.n, eom.m, found.rank, redundant, shared, undecided, begun, missed)
@@ -210,7 +223,7 @@ def begin(posed: Posed) -> Start:
         raise ModelError(eom.model.name, [cause]) from error
 
 
-def check_held(value: Lowered) -> None:
+def _check_held(value: Lowered) -> None:
     """Contacts that the scene does not let open are closed at the start.  Raises ModelError naming others."""
     acting = prune.held(value.derived, value.asked, [])
     if acting is value.derived:
@@ -265,7 +278,7 @@ def _nearby(
         return initial_positions(at_start(system, q, u, p), q, v, rows, begun.size)
 
 
-def resting_motions(eom: EquationsOfMotion) -> list[str]:
+def _resting_motions(eom: EquationsOfMotion) -> list[str]:
     """Prescribed motions that start at 0 because nobody said otherwise: a likely cause."""
     return [
         f"the prescribed motion {name_of(i.symbol)!r} starts at 0 {i.unit}, as no start is given: if the "

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..codegen.py.equations import compile_system, source
 from ..codegen.py.equations import lower as lowered_form
-from ..errors import CannotStartError, ModelError, RequestError
+from ..errors import RequestError
 from ..interface.table import variable_table
 from ..mechanics import equations as mechanics
 from ..mechanics import fold, prune
@@ -18,10 +18,10 @@ from ..model.elements import Expr
 from ..model.model import Model
 from ..model.scene import Scene
 from ..model.stuck import stuck
-from .consistency import check_embedding, check_held, posed, resting_motions, structure_of
+from .consistency import check_embedding, examined_structure
 from .reduced_start import with_reduced_start
-from .request import formulated, with_measured
-from .steps import Derived, Lowered, Narrowed, Reduced, Request, step
+from .request import formulated
+from .steps import Derived, Lowered, Narrowed, Reduced, Request
 from .steps import Prepared as Prepared
 
 
@@ -53,14 +53,14 @@ def narrow(derived: Derived) -> Narrowed:
     scene, problems = derived.asked, list[str]()
     acting = prune.held(derived.derived, scene, problems)
     fixed = fold.numbers_of(derived.derived, scene, problems)
-    scene, form, outputs = formulated(derived, acting, problems)
-    return step(Narrowed, derived, scene=scene, form=form, outputs=outputs, fixed=fixed)
+    asked = formulated(derived, acting, problems)
+    return Narrowed(**vars(derived), **vars(asked), fixed=fixed)
 
 
 def reduce(narrowed: Narrowed) -> Reduced:
     """To what the outputs need: coordinates and rows, energies and equations that are read, parameters."""
     form, scene, fixed = narrowed.form, narrowed.scene, dict(narrowed.fixed)
-    coded, read = form, with_measured(narrowed.outputs)
+    coded, read = form, narrowed.read
     if not scene.complete:
         equations = prune.only(form.equations, *prune.needed(_with_numbers(form, fixed), read))
         reduction = form.reduction
@@ -77,7 +77,9 @@ def reduce(narrowed: Narrowed) -> Reduced:
             scene = replace(scene, method="dop853")
     check_embedding(form)
     coded = fold.folded_form(coded, fixed)
-    return step(Reduced, narrowed, scene=scene, form=form, fixed=fixed, coded=coded)
+    numbers = {str(s): n for s, n in coded.equations.numbers.items()}
+    made = {"scene": scene, "form": form, "fixed": fixed, "coded": coded, "numbers": numbers}
+    return Reduced(**vars(narrowed) | made)
 
 
 def _with_numbers(form: Form, fixed: Mapping[Expr, Expr]) -> Form:
@@ -93,16 +95,12 @@ def lower(reduced: Reduced) -> Lowered:
     if reduced.coded is not reduced.form:
         table, examined = variable_table(reduced.coded, reduced.scene), lowered_form(reduced.form)
     table = table.keeping(reduced.outputs)
-    made = {"whole": whole, "table": table, "text": text, "system": system, "examined": examined}
-    return step(Lowered, reduced, **made)
+    return Lowered(
+        **vars(reduced), whole=whole, table=table, text=text, system=system, examined=examined
+    )
 
 
 def examine(lowered: Lowered) -> Prepared:
     """Whether and where it starts, its rank and what is redundant."""
-    check_held(lowered)
-    try:
-        structure = structure_of(posed(lowered))
-    except ModelError as error:
-        problems = [*error.problems, *resting_motions(lowered.equations)]
-        raise CannotStartError(error.name, problems, lowered) from error
-    return with_reduced_start(step(Prepared, lowered, structure=structure))
+    prepared = Prepared(**vars(lowered), structure=examined_structure(lowered))
+    return with_reduced_start(prepared) if lowered.form.reduction is not None else prepared

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from .. import names
 from ..errors import DerivationError, ModelError, RequestError
 from ..interface.table import variable_table
-from ..interface.variables import VariableTable
 from ..mechanics import prune
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
@@ -17,11 +16,20 @@ from ..model.scene import EVERYTHING, Scene
 from ..model.selection import select
 from .steps import Derived
 
-Choice = tuple[Scene, Form, tuple[str, ...]]
+
+@dataclass(frozen=True)
+class Asked:
+    """The scene with its formulation, the form that this gives, the outputs by name, and with them what is
+    computed for them."""
+
+    scene: Scene
+    form: Form
+    outputs: tuple[str, ...]
+    read: tuple[str, ...]
 
 
-def formulated(derived: Derived, acting: EquationsOfMotion, problems: list[str]) -> Choice:
-    """The scene with its formulation, the form that this gives, and the outputs by name.
+def formulated(derived: Derived, acting: EquationsOfMotion, problems: list[str]) -> Asked:
+    """What the scene asks for.
 
     `acting`: the equations with contacts that cannot open as constraints; `problems`: what is wrong with the
     scene so far.  Raises RequestError with all of them, DerivationError, and ModelError for peaks.
@@ -33,18 +41,11 @@ def formulated(derived: Derived, acting: EquationsOfMotion, problems: list[str])
     if found is None:
         chosen = replace(scene, formulation=scene.formulation or "multipliers")
         form = _form(acting, chosen)
-        table = variable_table(form, chosen)
-        found = chosen, form, _outputs(table, chosen, problems)
+        found = _asked(form, chosen, problems)
     if problems:
         raise RequestError(scene.name, problems)
-    _check_peaks(derived, *found[:2])
+    _check_peaks(derived, found.scene, found.form)
     return found
-
-
-def with_measured(outputs: tuple[str, ...]) -> tuple[str, ...]:
-    """With the quantities whose extremes are read, which are computed for that."""
-    measured = [names.measured(name) for name in outputs]
-    return tuple(dict.fromkeys((*outputs, *(name for name in measured if name))))
 
 
 def _form(eom: EquationsOfMotion, scene: Scene) -> Form:
@@ -57,7 +58,7 @@ def _form(eom: EquationsOfMotion, scene: Scene) -> Form:
         raise DerivationError(f"scene {scene.name!r}: {error}") from error
 
 
-def _least(eom: EquationsOfMotion, scene: Scene) -> Choice | None:
+def _least(eom: EquationsOfMotion, scene: Scene) -> Asked | None:
     """In the minimal formulation, where the scene leaves it open and no multiplier is solved for then."""
     movable = any(e.free_symbols for e in eom.starts().values())  # follows what is set
     if scene.formulation is not None or scene.complete or eom.frictions or movable:
@@ -68,11 +69,9 @@ def _least(eom: EquationsOfMotion, scene: Scene) -> Choice | None:
         return None
     if form.reduction is None or form.reduction.rows:
         return None
-    scene, unknown = replace(scene, formulation="minimal"), list[str]()
-    outputs = _outputs(variable_table(form, scene), scene, unknown)
-    if unknown or prune.read_only(form, with_measured(outputs)) is form:
-        return None
-    return scene, form, outputs
+    unknown = list[str]()
+    found = _asked(form, replace(scene, formulation="minimal"), unknown)
+    return None if unknown or prune.read_only(form, found.read) is form else found
 
 
 def _refused_with_friction(eom: EquationsOfMotion, scene: Scene) -> list[str]:
@@ -103,9 +102,14 @@ def _check_peaks(derived: Derived, scene: Scene, form: Form) -> None:
         raise ModelError(derived.model.name, problems)
 
 
-def _outputs(table: VariableTable, scene: Scene, problems: list[str]) -> tuple[str, ...]:
-    known = [v.name for v in table.outputs]
+def _asked(form: Form, scene: Scene, problems: list[str]) -> Asked:
+    known = [v.name for v in variable_table(form, scene).outputs]
     found = set(select(scene.outputs, known, "output", problems))
     found |= {names.barred(name) for name in found}  # a bar is of an output, ...
     found |= {names.bar(name) for name in found}  # ... and an output has its own
-    return tuple(name for name in known if name in found)
+    outputs = tuple(name for name in known if name in found)
+    measured = [
+        names.measured(name) for name in outputs
+    ]  # extremes are of what is computed for them
+    read = tuple(dict.fromkeys((*outputs, *(name for name in measured if name))))
+    return Asked(scene, form, outputs, read)

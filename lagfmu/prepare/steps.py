@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 from ..interface.variables import VariableTable
 from ..mechanics.equations import EquationsOfMotion
@@ -58,11 +58,13 @@ class Derived:
 @dataclass(frozen=True)
 class Narrowed(Derived):
     """`scene`: with its formulation; `form`: the equations in it, contacts that cannot open as constraints;
-    `outputs`: those that are asked for, in the order of the table; `fixed`: symbols that are numbers."""
+    `outputs`: those that are asked for, in the order of the table; `read`: with those that are computed for
+    them; `fixed`: symbols that are numbers."""
 
     scene: Scene
     form: Form
     outputs: tuple[str, ...]
+    read: tuple[str, ...]
     fixed: Mapping[Expr, Expr]
 
     @property
@@ -80,14 +82,10 @@ class Narrowed(Derived):
 class Reduced(Narrowed):
     """`form`: what the outputs need, in symbols, for people to read; `coded`: what code is printed from,
     numbers put in, and of the full equations only what is read.  The same for a scene that asks for
-    everything and fixes nothing."""
+    everything and fixes nothing.  `numbers`: the values that are put in, by name."""
 
     coded: Form
-
-    @property
-    def numbers(self) -> dict[str, Any]:
-        """The values of the parameters and inputs that are numbers in the code, by name."""
-        return {str(s): n for s, n in self.coded.equations.numbers.items()}
+    numbers: Mapping[str, Any]
 
     @property
     def held(self) -> tuple[str, ...]:
@@ -114,11 +112,3 @@ class Prepared(Lowered):
     """All that is known before anything is packaged, each thing made once."""
 
     structure: Structure
-
-
-Step = TypeVar("Step", bound=Derived)
-
-
-def step(kind: type[Step], value: Derived, **made: Any) -> Step:
-    """The value after a step, with what it has made."""
-    return kind(**{f.name: getattr(value, f.name) for f in fields(value)} | made)
