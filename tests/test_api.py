@@ -23,7 +23,7 @@ from lagfmu import (
     verify,
 )
 from lagfmu.errors import SettingError
-from lagfmu.testing import NoCompilerWarning, app, is_python, targets
+from lagfmu.testing import NoCompilerWarning, app, target_in, targets
 
 m, g = symbols("m g", positive=True)
 z = dynamicsymbols("z")
@@ -112,7 +112,7 @@ def test_without_a_compiler_a_weight_is_carried_in_python_and_the_remedy_is_name
     assert run.target == "python"
     assert run["lambda.floor"] == pytest.approx(2.0 * 9.81, rel=1e-12)
     with pytest.warns(NoCompilerWarning):
-        assert is_python(build_fmu(RESTING, tmp_path, closed_forms=[WEIGHT]))
+        assert target_in(build_fmu(RESTING, tmp_path, closed_forms=[WEIGHT])) == "python"
     with pytest.warns(NoCompilerWarning):
         assert verify(RESTING, closed_forms=[WEIGHT]).passed
     assert simulate(tmp_path / "Resting.fmu", 0.1).target == "python"
@@ -134,7 +134,7 @@ def test_without_a_compiler_the_command_says_what_it_builds(tmp_path, monkeypatc
         assert done.exit_code == 0, done.output
         assert done.output.count("pip install ziglang") == 1
     assert "Resting (python) at t = " in done.output
-    assert is_python(tmp_path / "python" / "Resting.fmu")
+    assert target_in(tmp_path / "python" / "Resting.fmu") == "python"
     assert not (tmp_path / "native").exists()
 
 

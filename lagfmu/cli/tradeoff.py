@@ -10,8 +10,8 @@ from pathlib import Path
 from rich.console import Console
 
 from ..errors import UsageError
-from ..fmu.described import is_python
-from ..fmu.target import target_of
+from ..fmu.described import target_in
+from ..fmu.target import PYTHON, target_of
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile
@@ -66,7 +66,7 @@ def compare(
         def study(name: str, fmu: Path) -> Report:
             with opened(fmu) as session:
                 plan = Plan(communication or session.experiment.step_size)
-            if is_python(fmu):  # a run takes long
+            if target_in(fmu) == PYTHON:  # a run takes long
                 plan = replace(plan, halvings=2, repeats=1)
             if full:
                 plan = replace(plan, tolerances=DECADES, budget=20.0, limit=3.0)

@@ -15,6 +15,7 @@ from .. import names
 from ..errors import VerificationError
 from ..model.rule import Rule
 from .archive import opened
+from .target import NATIVE, PYTHON
 
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
@@ -54,10 +55,10 @@ def units_of(variables: Sequence[Any]) -> dict[str, str | None]:
     return {v.name: getattr(v.unit, "name", v.unit) for v in variables}
 
 
-def is_python(fmu: Path) -> bool:
-    """True for a python FMU."""
+def target_in(fmu: Path) -> str:
+    """What an FMU is made of: native or python."""
     with opened(fmu) as archive:
-        return "resources/slavemodule.txt" in archive.namelist()
+        return PYTHON if "resources/slavemodule.txt" in archive.namelist() else NATIVE
 
 
 def has_error_bars(variables: Sequence[Any]) -> bool:

@@ -30,7 +30,7 @@ from . import native, python
 from .archive import pack
 from .closed_forms import pack_closed_forms
 from .compiler import HOST
-from .target import NATIVE, target_of
+from .target import NATIVE, PYTHON, target_of
 
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
 PAGE = "documentation/index.html"
@@ -145,8 +145,8 @@ def with_peaks(prepared: Prepared, wanted: Sequence[str]) -> Prepared:
 def license_of(target: str) -> str:
     """Of what lagfmu itself puts into an FMU; the model is under the one that its author says, if any."""
     what = {
-        "native": "the compiled library, and sources/ but for model.c, optional.c, variables.c, identity.h",
-        "python": "resources/ but for the generated script, its tables and what they describe",
+        NATIVE: "the compiled library, and sources/ but for model.c, optional.c, variables.c, identity.h",
+        PYTHON: "resources/ but for the generated script, its tables and what they describe",
     }[target]
     text = importlib.metadata.distribution("lagfmu").read_text("licenses/LICENSE")
     if text is None:
@@ -172,9 +172,9 @@ def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]
 
 def as_built(prepared: Prepared, target: str) -> Prepared:
     """With the nominal values of states; a python FMU has no model exchange and no native variables."""
-    table = prepared.table if target == "native" else python.offered(prepared)
+    table = prepared.table if target == NATIVE else python.offered(prepared)
     table = table.with_nominals(_nominals(prepared))
-    if target != "native" or not native.offers_exchange(prepared):
+    if target != NATIVE or not native.offers_exchange(prepared):
         table = table.without_local_derivatives()
     return replace(prepared, table=table)
 

@@ -21,8 +21,8 @@ from ..fmu.described import (
     described_rules,
     experiment_of,
     has_error_bars,
-    is_python,
     read_description,
+    target_in,
 )
 from ..fmu.exchange import by_fmpy
 from ..fmu.inputs import check_inputs, columns_at, jumps
@@ -35,7 +35,7 @@ from ..fmu.session import (
     communication_points,
     obstacle,
 )
-from ..fmu.target import NATIVE, PYTHON, target_of
+from ..fmu.target import PYTHON, target_of
 from ..fmu.write import as_built
 from ..interface.rules import problems_of
 from ..model.model import Model
@@ -107,7 +107,7 @@ def simulate(
         )
     units = {v.name: v.unit for v in description.modelVariables if v.unit}
     rows = _of_fmu(path, repr(str(path)), description, asked)
-    return Result(rows, units, description.modelName, PYTHON if is_python(path) else NATIVE)
+    return Result(rows, units, description.modelName, target_in(path))
 
 
 @dataclass(frozen=True)

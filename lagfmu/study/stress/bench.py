@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ... import names
 from ...fmu.archive import unpack
 from ...fmu.session import RefusalError, Session
+from ...fmu.target import PYTHON
 from ...verification.verify import applies
 from .closed_forms import EQUATION, judged, laws
 from .facts import Facts, facts_of
@@ -75,7 +76,7 @@ class Bench:
     @property
     def points(self) -> int:
         """Communication steps of a run."""
-        return 20 if self.quick or self.facts.target == "python" else 60
+        return 20 if self.quick or self.facts.target == PYTHON else 60
 
     # ------------------------------------------------------------------ natural times
 

@@ -11,7 +11,7 @@ from ... import names
 from ...errors import VerificationError
 from ...fmu.archive import opened
 from ...fmu.closed_forms import CarriedForm, tables_in, unpack_closed_forms
-from ...fmu.described import experiment_of, file_stem, is_python, read_description
+from ...fmu.described import experiment_of, file_stem, read_description, target_in
 from ...verification.verify import RECORD, closed_forms_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
@@ -114,7 +114,7 @@ def facts_of(path: Path) -> Facts:
     estimated = tuple(n for n in rates if n in variables and n not in inputs)
     return Facts(
         name=file_stem(description),
-        target="python" if is_python(path) else "native",
+        target=target_in(path),
         description=description,
         variables=variables,
         outputs=tuple(

@@ -16,7 +16,7 @@ from pathlib import Path
 from ... import names
 from ...errors import SimulationError, VerificationError
 from ...fmu.closed_forms import CarriedForm
-from ...fmu.described import file_stem, is_python, numbers_of
+from ...fmu.described import file_stem, numbers_of, target_in
 from ...fmu.session import Session
 from ...methods import FIXED_STEP, INTEGRATORS
 from ...verification.simulate import steps_of
@@ -119,7 +119,7 @@ def measure(fmu: Path, plan: Plan | None = None, tick: Tick | None = None) -> Tr
         timed = take_turns(work, plan, say)
         return Tradeoff(
             name=file_stem(session.description),
-            target="python" if is_python(fmu) else "native",
+            target=target_in(fmu),
             simulated=session.experiment.stop_time,
             reference=reference,
             points=tuple(replace(p, seconds=s) for p, s in zip(points, timed, strict=True)),
