@@ -9,7 +9,7 @@ from instance import instance
 
 from lagfmu import simulate
 from lagfmu.errors import SettingError
-from lagfmu.testing import RefusalError, Session, described_rules, problems_of, read_description
+from lagfmu.testing import described_rules, problems_of, read_description
 
 BAD = {  # of the hemisphere
     "theta": [math.nan, math.inf],
@@ -50,17 +50,3 @@ def test_all_problems_are_told_at_once(path):
         simulate(path, 0.1, start_values={"a": -1.0, "m": math.nan, "thta": 0.1})
     for text in ("'a' = -1.0 is outside", "'m' = nan, expected a finite", "did you mean 'theta'?"):
         assert text in str(told.value)
-
-
-def test_a_session_goes_on_after_a_refusal(path):
-    """A run that cannot start tells why, and the next one of the same session has its rows."""
-    with Session(path) as session:
-        times = [0.0, 0.1, 0.2]
-        assert len(session.run(times, {"theta": 0.3}).rows) == 3
-        refused = session.run(times, {"a": -1.0})
-        assert isinstance(refused.refusal, RefusalError)
-        assert "outside its bounds" in refused.refusal.message
-        assert len(refused.rows) == 0
-        again = session.run(times, {"theta": 0.3})
-    assert again.refusal is None
-    assert again.rows["theta"][0] == 0.3

@@ -6,9 +6,8 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
-
-import numpy as np
 
 from ..methods import unknown
 
@@ -60,14 +59,15 @@ class Rule:
         """Which rule a value breaks first."""
         if not self.settable:
             return "settable"
-        if not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+        number = float(value) if isinstance(value, Real) else math.nan
+        if not math.isfinite(number):
             return "finite"
-        if self.kind != "Real" and value != np.round(value):
+        if self.kind != "Real" and not number.is_integer():
             return "whole"
         low, high = self._ends
-        if not low <= value <= high:
+        if not low <= number <= high:
             return "range"
-        return "positive" if self.positive and not value > 0 else ""
+        return "positive" if self.positive and not number > 0 else ""
 
     def number(self, value: Any) -> float:
         """A value as the FMU takes it: an item by its number, one that is none by a number that is none."""
