@@ -14,7 +14,6 @@
 #include "instance.h"
 #include "nominals.h"
 #include "optional.h"
-#include "restored.h"
 #include "segment.h"
 
 static const double INFINITE = DBL_MAX;

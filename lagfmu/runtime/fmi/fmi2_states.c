@@ -3,8 +3,6 @@
 
 #include <string.h>
 
-#include "restored.h"
-
 /* Before the record of a saved state: whose it is, and whether it is whole. */
 typedef struct {
     char magic[8];

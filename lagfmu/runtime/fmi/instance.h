@@ -117,4 +117,13 @@ SHARED size_t instance_record_size(const Instance *x);
 SHARED void instance_save(Instance *x, char *record);
 SHARED void instance_restore(Instance *x, const char *record);
 
+/* Is what was read from a saved state a state that this FMU can be in (restored.c)?
+ * Looks at everything that instance_restore() has just put into the instance.  FAILED: it is no state
+ * of this FMU, the cause is in x->solver.why; nothing of it must be used. */
+SHARED Status instance_restored(Instance *x);
+
+/* The same of one solver of it alone; and why a state is none. */
+SHARED Status restored_solver(Instance *x, const Solver *s);
+SHARED Status restored_none(Instance *x, const char *name, double value);
+
 #endif

@@ -6,7 +6,6 @@
 #include <stdio.h>
 
 #include "rates.h"
-#include "restored.h"
 
 static int is_estimated(const System *s, int k) {
     for (int i = 0; i < s->estimated_count; i++)

@@ -4,7 +4,7 @@
  * count, a mode or a time that no simulation has would be followed blindly.  So each number has a range,
  * and numbers that belong together are held against each other.  Whoever adds to State, Settings, Drive
  * or Instance what is saved adds a line here. */
-#include "restored.h"
+#include "instance.h"
 
 #include <float.h>
 #include <limits.h>
