@@ -29,7 +29,7 @@ class Method:
 MENU = (
     Method("auto", 1, "dop853, but radau5 where it is stiff", made_of=("dop853", "radau5")),
     Method("dop853", 2),
-    Method("rk4", 3, "fixed step", fixed_step=True),
+    Method("rk4", 3, "fixed step", fixed_step=True, native_only=True),
     Method("radau5", 4, "stiff"),
     Method("rattle", 5, "fixed step", fixed_step=True, native_only=True),
 )

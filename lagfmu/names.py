@@ -47,7 +47,6 @@ MAXIMUM_STEP, MAXIMUM_STEPS = "solver.maximum_step", "solver.maximum_steps"
 OF_ONE = (MULTIPLIER, UNIQUE, RESIDUAL, CONTACT, STICKS, MARGIN, POWER, SLIP)
 EVENTS = (DEPARTURE, CLOSING, SLIPPING, STICKING)
 PEAK = "peak"  # the extremes of another variable: peak.lambda.rod.max
-NATIVE = (CLOSING, STICKING, PEAK)  # what native FMUs alone tell
 PEAKS = tuple(f"{PEAK}.{part}" for part in ("max", "min", "max_time", "min_time"))
 RATES = ("", "velocity", "acceleration")  # a structured name has der() around it or not at all
 REACTIONS = (MULTIPLIER, FORCE)

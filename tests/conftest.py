@@ -54,6 +54,7 @@ FILES = {
     "HalfCar": "half_car",
     "SlippingSphere": "rolling_sphere",  # friction: it rolls, slips, leaves
 }
+BOTH = tuple(name for name in FILES if name != "SlippingSphere")  # what either target runs
 EVERY = {  # what is tried of every FMU of models/: that its page is the native FMU
     **FILES,
     "Belt": "belt",

@@ -16,7 +16,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, Scene, multiplier, sweep
-from lagfmu.errors import BuildError, ModelError
+from lagfmu.errors import ModelError
 from lagfmu.testing import happened, load, prepare, write
 
 Fmu = Callable[[str], Path]
@@ -239,22 +239,3 @@ def test_a_coordinate_called_impulse_needs_a_model_without_contacts() -> None:
     assert Model(**said)
     with pytest.raises(ModelError, match=r"closing\.floor\.impulse.*choose another"):
         Model(**said, constraints=[Contact("floor", impulse)])
-
-
-def test_python_fmus_leave_closings_out(tmp_path: Path) -> None:
-    """A scene that names one is refused with the remedy; one that asks for everything has all the others."""
-    model = Model(
-        name="Fall",
-        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
-        coordinates={z: "m"},
-        constraints=[Contact("floor", z)],
-        parameters=CONSTANTS,
-        start={z: 1.0},
-    )
-    asked = prepare(model, Scene("Fall", outputs=["closing.floor.time"]))
-    with pytest.raises(BuildError, match=r"closing\.floor\.time.*target native"):
-        write(asked, tmp_path, target="python")
-    with instance(write(prepare(model), tmp_path, target="python")) as one:
-        heads = {name.split(".")[0] for name in one.variables}
-        assert "departure" in heads
-        assert not heads & {"closing", "sticking"}

@@ -375,7 +375,7 @@ def test_a_run_whose_fixed_step_is_halved_warns(prepared):
     options = {"stop_time": 0.2, "step_size": 0.1, "error_bars": True}
     values = {"solver.method": "rk4", "solver.step": 0.02}
     with pytest.warns(ErrorBarWarning, match=r"0\.01 s in place of 0\.02 s"):
-        simulate(prepared("PendulumCartesian"), start_values=values, target="python", **options)
+        simulate(prepared("PendulumCartesian"), start_values=values, **options)
 
 
 def test_an_fmu_without_bars_is_refused_by_name(native_fmu):
@@ -384,14 +384,12 @@ def test_an_fmu_without_bars_is_refused_by_name(native_fmu):
         simulate(native_fmu("Hemisphere"), error_bars=True)
 
 
-def test_nothing_of_it_is_in_an_fmu_without(native_fmu, python_fmu):
-    """Neither its sources nor its python files hold a finer run."""
+def test_nothing_of_it_is_in_an_fmu_without(native_fmu):
+    """Its sources hold no finer run."""
     with zipfile.ZipFile(native_fmu("Hemisphere")) as archive:
         carried = archive.namelist()
     assert "sources/observe.c" in carried
     assert "sources/bars.c" not in carried
-    with zipfile.ZipFile(python_fmu("Hemisphere")) as archive:
-        assert [n for n in archive.namelist() if n.endswith("/bars.py")] == []
 
 
 def test_an_output_called_a_time_is_no_event(tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ ROOMS = (  # each imports from those before it, and from no other
     "methods",
     "numeric",
     "solver",
-    "engine",
     "model",
     "mechanics",
     "interface",

@@ -26,7 +26,7 @@ from lagfmu import (
     Peak,
     multiplier,
 )
-from lagfmu.errors import ModelError
+from lagfmu.errors import BuildError, ModelError
 from lagfmu.testing import load, prepare, write
 
 Peaked = Callable[..., Path]
@@ -336,8 +336,7 @@ def test_peaks_of_nothing_are_refused(outputs: Sequence[Any], words: Sequence[st
     assert prepare(oscillator([Output("peak.height", x, "m")]))
 
 
-def test_python_fmus_leave_peaks_out(tmp_path: Path) -> None:
-    """They have everything else."""
-    with instance(write(prepare(oscillator([Peak("x")])), tmp_path, target="python")) as one:
-        assert "energy.total" in one.variables
-        assert not any(n.startswith("peak.") for n in one.variables)
+def test_python_fmus_tell_no_peaks(tmp_path: Path) -> None:
+    """Refused by name when one is built, with the remedy."""
+    with pytest.raises(BuildError, match=r"peak\.x.*--target native"):
+        write(prepare(oscillator([Peak("x")])), tmp_path, target="python")

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import FILES
+from conftest import BOTH
 from instance import instance
 from test_models import CHANGED
 
@@ -24,8 +24,9 @@ from lagfmu import simulate
 POINTS = 40  # communication points of a run
 AGREE = 1e-9
 TOLERANCE = 1e-11
-CLOSER = {  # the spring's pull is 1e6 N/m times the difference of two places known to the tolerance
-    "SliderCrank": 1e-12
+CLOSER = {
+    "SliderCrank": 1e-13,  # a spring of 1e6 N/m pulls by a difference of two places known to the tolerance
+    "Chain": 1e-12,  # its links swing over: a small error grows, as that of the double pendulum
 }
 FORGETS = {  # s: changed, a speed that differs by 1e-10 changes accelerations by 1e-9 then, 1e-5 after 10 s
     "DoublePendulum": 2.0
@@ -47,6 +48,9 @@ def scales(run: Any) -> dict[str, float]:
         elif n.startswith("residual."):
             multiplier = largest[n.replace("residual.", "lambda.")]
             largest[n] = energy / multiplier if multiplier else energy
+        elif n.startswith(("departure.", "closing.")):  # of its coordinate
+            _, _, *rate, of = n.split(".")
+            largest[n] = max(largest[n], largest.get(f"der({of})" if rate else of, 0.0))
     return largest
 
 
@@ -74,7 +78,7 @@ def both(python_fmu, native_fmu, name: str, values: dict[str, Any], **options: A
 
 
 @pytest.mark.parametrize("changed", [False, True], ids=["defaults", "changed"])
-@pytest.mark.parametrize("name", sorted(FILES))
+@pytest.mark.parametrize("name", BOTH)
 def test_both_tell_the_same_motion(python_fmu, native_fmu, name, changed):
     """All outputs at 41 instants: positions, velocities, accelerations, lambda, Q and each constraint's
     share in it, energies, and of every contact its mode and the time, place and speed of its departure."""
@@ -85,12 +89,11 @@ def test_both_tell_the_same_motion(python_fmu, native_fmu, name, changed):
         stop = FORGETS.get(name, stop)
     run = {"tolerance": tolerance, "stop_time": stop, "step_size": stop / POINTS}
     expected, found = both(python_fmu, native_fmu, name, values, **run)
-    rubs = any(n.startswith("sticks.") for n in found.dtype.names)
-    alone = ("closing.", "sticking.", *(() if rubs else ("energy.dissipated",)))  # native FMUs
-    assert expected.dtype.names == tuple(n for n in found.dtype.names if not n.startswith(alone))
+    assert expected.dtype.names == found.dtype.names
     assert len(found) == len(expected) == POINTS + 1
     check(expected, found)
-    ended = [n for n in found.dtype.names if n.startswith("departure.") and n.endswith(".time")]
+    events = ("departure.", "closing.")
+    ended = [n for n in found.dtype.names if n.startswith(events) and n.endswith(".time")]
     for n in ended:  # an event's time, of itself
         np.testing.assert_allclose(found[n], expected[n], rtol=AGREE)
 
@@ -115,17 +118,12 @@ def test_both_meet_the_same_events_at_coarse_and_fine_steps(python_fmu, native_f
         assert ends[1][n] == pytest.approx(ends[0][n], rel=AGREE, abs=AGREE), n
 
 
-@pytest.mark.parametrize(
-    ("method", "step", "agree"),
-    [("radau5", 0.0, AGREE), ("rk4", 0.02, 1e-12)],
-)
 @pytest.mark.parametrize("name", ["PendulumCartesian", "Hemisphere", "CartPendulum"])
-def test_both_offer_the_same_methods(python_fmu, native_fmu, name, method, step, agree):
-    """At 1e-11 every method tells the same motion; rk4, which takes the same steps in both, tells it to
-    rounding even where its own error is a thousand times larger."""
-    values = {"solver.method": method, "solver.step": step}
+def test_both_are_stiff_alike(python_fmu, native_fmu, name):
+    """At 1e-11 radau5 tells the same motion in both."""
+    values = {"solver.method": "radau5"}
     run = {"tolerance": TOLERANCE, "stop_time": 2.0, "step_size": 0.25}
-    check(*both(python_fmu, native_fmu, name, values, **run), agree)
+    check(*both(python_fmu, native_fmu, name, values, **run))
 
 
 def driven(path: Path, variable: str, drive: Any, step: float, count: int) -> Any:

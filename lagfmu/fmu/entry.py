@@ -15,10 +15,12 @@ import platform
 import sys
 from typing import Any
 
+from .facts import Facts, Variable
 from .references import end_once, keep, keep_module_of
 
 try:
-    from ..numeric.system import Embedding, Friction, Lookups, Own, Row, System
+    from ..numeric.cubic import Cubic
+    from ..numeric.system import Embedding, Lookups, Own, Row, System
     from .slave import LagfmuSlave
 except Exception as error:  # a NumPy of another Python, or an old one, fails in many ways
     from pythonfmu.enums import Fmi2Status
@@ -37,7 +39,7 @@ except Exception as error:  # a NumPy of another Python, or an old one, fails in
     class LagfmuSlave(Fmi2Slave):  # type: ignore[no-redef,misc]
         """An instance that has no numbers and refuses to step, with the cause."""
 
-        variables: Any  # of the generated script: name, kind, ...
+        facts: Facts
 
         def __init__(self, **kwargs: Any) -> None:
             super().__init__(**kwargs)
@@ -63,7 +65,7 @@ except Exception as error:  # a NumPy of another Python, or an old one, fails in
         def _nothing_known(self, references: Any) -> list[Any]:
             """NaN for a Real; the other types have no such value."""
             kinds = {"Real": math.nan, "Boolean": False, "String": ""}
-            return [kinds.get(self.variables[k][1], 0) for k in references]
+            return [kinds.get(self.facts.variables[k].kind, 0) for k in references]
 
         enter_initialization_mode = exit_initialization_mode = _accept
         set_real = set_integer = set_boolean = set_string = _accept
@@ -72,6 +74,16 @@ except Exception as error:  # a NumPy of another Python, or an old one, fails in
     def _nothing(*_: Any, **__: Any) -> None:
         """In place of what the script builds of the equations."""
 
-    Embedding = Friction = Lookups = Own = Row = System = _nothing  # type: ignore[misc,assignment]
+    Cubic = Embedding = Lookups = Own = Row = System = _nothing  # type: ignore[misc,assignment]
 
-__all__ = ["Embedding", "Friction", "LagfmuSlave", "Lookups", "Own", "Row", "System"]
+__all__ = [
+    "Cubic",
+    "Embedding",
+    "Facts",
+    "LagfmuSlave",
+    "Lookups",
+    "Own",
+    "Row",
+    "System",
+    "Variable",
+]

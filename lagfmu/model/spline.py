@@ -5,7 +5,7 @@
 
 A cubic spline through the points (de Boor, A Practical Guide to Splines, ch. IV).  SymPy sees a function
 with derivatives road_x, road_xx, road_xxx and never its pieces; code that is printed for it searches
-the knots and evaluates a polynomial (solver/cubic.py).
+the knots and evaluates a polynomial (numeric/cubic.py).
 """
 
 from __future__ import annotations

@@ -43,10 +43,12 @@ class Instant:
         )
 
 
-def at_start(system: System, q: Vector, u: Sequence[float], p: Sequence[float]) -> Instant:
-    """The instant t = 0 under the inputs u, with the switch states that belong to q."""
+def at_start(
+    system: System, q: Vector, u: Sequence[float], p: Sequence[float], t: float = 0.0
+) -> Instant:
+    """The instant t [s] at which the inputs u are set, with the switch states that belong to q."""
     inputs = system.inputs_at(u, 0.0)
-    return Instant(system, 0.0, [*inputs, *switch_states(system, 0.0, q, inputs, p)], p)
+    return Instant(system, t, [*inputs, *switch_states(system, t, q, inputs, p)], p)
 
 
 def switch_states(

@@ -50,8 +50,9 @@ def start(
     u: Sequence[float],
     p: Sequence[float],
     priority: Sequence[int] | None = None,
+    t: float = 0.0,
 ) -> Start:
-    """The consistent start at t = 0 nearest to the start values.  Raises StartFailureError with the cause.
+    """The consistent start at t [s] nearest to the start values.  Raises StartFailureError with the cause.
 
     `priority` (2 n), of the coordinates and then of the velocities: which of them move first; without it they
     are all alike.
@@ -61,7 +62,7 @@ def start(
             check_restitution(system, p)
             q, v = np.array(q0, float), np.array(v0, float)
             order = [GIVEN] * (2 * system.n) if priority is None else list(priority)
-            return _start(at_start(system, q, u, p), q, v, order)
+            return _start(at_start(system, q, u, p, t), q, v, order)
     except StartFailureError:
         raise
     except StepFailureError as error:
@@ -72,7 +73,7 @@ def _start(at: Instant, q0: Vector, v0: Vector, priority: list[int]) -> Start:
     system, n = at.system, at.system.n
     q, size, gap, near = _positions(at, q0, v0, priority[:n])
     if system.floors:
-        at = at_start(system, q, at.u[: len(at.u) - len(system.floors)], at.p)
+        at = at_start(system, q, at.u[: len(at.u) - len(system.floors)], at.p, at.t)
     v, touching = _velocities(at, q, v0, near, size, gap, priority[n:])
     closed = closed_contacts(at, q, v, touching) if system.contacts else ()
     rows, slips = system.active(closed), NONE

@@ -1,26 +1,36 @@
-"""From one communication point to the next: flow after flow, each up to an event."""
+"""One communication step: SciPy's integrator step by step, projection after each, events in between.
+
+    y = (q, v) ,  y' = (v, vdot)      the index-1 equations; lambda is eliminated or solved for in each one
+
+The integrators are scipy.integrate's DOP853 (Hairer, Norsett & Wanner, Solving Ordinary Differential
+Equations I, sect. II.5 and II.6) and Radau (Hairer & Wanner II, sect. IV.8).  After each accepted step y
+is projected, and the next step begins there.  The error of a step is weighed by tolerance * max(|y_i|,
+s_i), s_i being the size of the coordinate, and that size times the natural rate for its velocity.  The
+integrator begins anew at each communication point and after each event.
+"""
 
 from __future__ import annotations
 
-import collections
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.integrate import DOP853, Radau
 
 from ..numeric.failure import StepFailureError
 from ..numeric.system import System, Vector
-from ..numeric.thresholds import AT_ONCE, CHATTER, HEADWAY, PATIENCE, STEP_LIMIT
-from . import optional_contacts, optional_events, optional_slides
-from .flow import AfterStep, Flow
-from .indicators import indicators
-from .instant import Instant
-from .jumps import levels_at, passed
-from .magnitudes import complete, is_incomplete
-from .motion import project
+from .equations import Motion, Ranks
+from .events import Found, Search
+from .projection import project_positions, project_velocities
 from .state import Settings, State
-from .stiffness import Choice, Slope, explicit, explicit_step, implicit_step, is_due, unjudged_step
+from .switch import at_event, begun
+
+INTEGRATORS = {"auto": DOP853, "dop853": DOP853, "radau5": Radau}
+HEADWAY = 1e-6  # of the natural time: shorter steps are counted
+CROWD = (
+    200  # events within 1e-9 of the natural time, and attempts at one step: there is no going on
+)
 
 
 def advance(
@@ -29,199 +39,201 @@ def advance(
     state: State,
     u: Sequence[float],
     p: Sequence[float],
-    t_end: float,
-    after_step: AfterStep | None = None,
+    end: float,
 ) -> State:
-    """The state at t_end [s].  Raises StepFailureError; `state` is a value and stays what it was.
+    """The state at `end` [s], with the inputs u as they were set at state.t.
 
-    `after_step`: with error bars (bars.py), what is done to the integrator after a step, and makes of
-    State.local.
+    Raises StepFailureError with the reason why that is not reached.
     """
-    begun = state.t
-    events: collections.deque[float] = collections.deque(maxlen=CHATTER)
-    if not np.isfinite(t_end) or t_end <= state.t:
-        raise StepFailureError(
-            f"a communication step must end after t = {state.t!r} s, got {t_end!r} s"
-        )
+    motion, start, tiny = Motion(system, u, p, state.t), state.t, 0
     with np.errstate(all="ignore"):
-        at, state = beginning(system, state, u, p)
-        if is_incomplete(state):
-            state = complete(at, settings, state, t_end - state.t)
-        headway = Headway(settings, begun, t_end, state.rate)
-        while state.t < t_end:
-            flow = Flow(system, settings, state, u, p, begun, after_step)
-            state = _travel(flow, state, t_end, headway)
-            events.append(state.t)
-            if len(events) == CHATTER and events[-1] - events[0] < AT_ONCE / state.rate:
+        settings = _scaled(motion, settings, state, end - start)
+        state, latest, crowd = begun(motion, settings, state), state.t, 0
+        while state.t < end:
+            state, found, short = _segment(motion, settings, state, end, tiny)
+            tiny += short
+            if found is None:
+                continue
+            state = replace(at_event(motion, settings, state, found), step=0.0)
+            crowd = crowd + 1 if state.t - latest <= 1e-9 / settings.rate else 0
+            latest = state.t
+            if crowd > CROWD:
                 raise StepFailureError(
-                    f"{CHATTER} events in {events[-1] - events[0]:.1g} s at t = {state.t!r} s: contacts "
-                    "chatter without end, or a force jumps to and fro"
+                    f"more than {CROWD} events follow each other at t = {state.t!r} s without headway"
                 )
-    return replace(state, span=t_end - begun)
+    return replace(state, span=end - start)
 
 
-def beginning(
-    system: System, state: State, u: Sequence[float], p: Sequence[float]
-) -> tuple[Instant, State]:
-    """What each step begins with: the inputs may have been set.  Levels of jumps are those of now, contacts
-    whose surface went away open, the others go with it; a prescribed motion may have another place and other
-    rates than it went by.  Raises StepFailureError."""
-    inputs = system.inputs_at(u, 0.0)
-    if system.floors:
-        levels = levels_at(system, state.t, np.array(state.q), inputs, p)
-        state = replace(state, levels=levels)
-    at = Instant(system, state.t, [*inputs, *state.levels], p, state.slides)
-    if system.contacts and system.prescribed:
-        state = optional_contacts.released(at, state, state.span)
-    elif system.prescribed:
-        q, v, rows = np.array(state.q), np.array(state.v), system.active(state.closed)
-        q, v = project(at, q, v, rows, np.array(state.offset), np.array(state.size))
-        state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()))
-    if system.frictions:
-        state = optional_slides.renewed(at, state)
-        at = replace(at, slides=state.slides)
-    return at, state
+def looked_at(
+    system: System,
+    settings: Settings,
+    state: State,
+    u: Sequence[float],
+    p: Sequence[float],
+) -> State:
+    """The state with which a step would begin, the inputs being set to u; its counts tell of the past
+    alone.
+    """
+    with np.errstate(all="ignore"):
+        seen = begun(Motion(system, u, p, state.t), settings, state)
+    return replace(state, q=seen.q, v=seen.v, closed=seen.closed)
 
 
-@dataclass
-class Headway:
-    """Do the steps of one communication step, from `begun` to `t_end` [s], get anywhere?"""
-
-    settings: Settings
-    begun: float
-    t_end: float
-    rate: float
-    steps: int = 0
-    tiny: int = 0
-
-    def check(self, t0: float, t: float) -> None:
-        """Counts the step from t0 to t.  Raises StepFailureError if t_end is too far off for its kind."""
-        most, gone, way = self.settings.maximum_steps, t - self.begun, self.t_end - self.begun
-        self.steps += 1
-        self.tiny += (t - t0) * self.rate < HEADWAY
-        if 0 < most < self.tiny:
-            raise StepFailureError(
-                f"the communication step to t = {self.t_end!r} s makes no headway at t = {t!r} s: more "
-                f"than {most:.0f} internal steps (solver.maximum_steps) were shorter than "
-                f"{HEADWAY / self.rate:.2g} s, {HEADWAY:.0e} of the motion's natural time: is there a force "
-                "that jumps to and fro?"
-            )
-        if self.steps >= PATIENCE and self.steps * way > STEP_LIMIT * gone:
-            needed = self.steps * way / max(gone, HEADWAY * way)
-            raise StepFailureError(
-                f"the communication step to t = {self.t_end!r} s would need about {needed:.0e} internal "
-                f"steps, more than {STEP_LIMIT:.0e}: take a shorter one"
-            )
+def _scaled(motion: Motion, settings: Settings, state: State, h: float) -> Settings:
+    """With a size for each coordinate.  Where the start says none (all at 0, no lengths) it is the way that
+    it goes in this communication step, or else one that takes as much kinetic energy as those of the
+    others.
+    """
+    size = np.array(settings.size)
+    rate = settings.rate or 1 / h
+    if (size == 0).any():
+        q, v = np.array(state.q), np.array(state.v)
+        terms = motion.terms(state.t, q, v)
+        vdot, _, rows = motion.accelerations(terms.of(motion.system.active(state.closed)))
+        size = np.where(size > 0, size, np.abs(v) * h + np.abs(vdot) * h**2 / 2)
+        size = np.where(size > 0, size, rows.D * float((size / rows.D).max() or 1.0))
+    return replace(settings, size=tuple(size.tolist()), rate=rate)
 
 
-def _travel(flow: Flow, state: State, t_end: float, headway: Headway) -> State:
-    """Integrate until t_end or the first event, whichever comes first; at an event, switch modes."""
-    y = np.array(state.q + state.v)
-    f0 = flow.accept(state.t, y)
-    if not np.isfinite(f0).all():
-        raise StepFailureError(flow.cause)
-    solver = flow.stepper(state.t, y, t_end, state.step or None)
-    armed = list(state.armed)
-    steps, choice, local = state.steps, state.choice, state.local
-    watch, lost = flow.system.is_watched, state.dissipated
-    before = indicators(flow, state.t, y) if watch else np.zeros(0)
+def _segment(
+    motion: Motion, settings: Settings, state: State, end: float, tiny: int
+) -> tuple[State, Found | None, int]:
+    """The smooth motion to `end` or to the next event; the state there, the event, how many steps were
+    tiny.
+    """
+    system, n = motion.system, motion.system.n
+    size = np.array(settings.size)
+    rows = system.active(state.closed)
+    t, y = state.t, np.array([*state.q, *state.v])
+    ranks = motion.ranks(motion.terms(t, y[:n], y[n:]), rows)
+    stepper = _Stepper(motion, settings, (rows, ranks.all), t, y, end, state.step)
+    search = Search(motion, settings, state, rows, ranks.all) if system.contacts else None
+    steps, short, proposed = state.steps, 0, state.step
     while True:
-        t0, y0 = solver.t, solver.y
-        offered = solver.h_abs
-        try:
-            flow.step(solver)
-            before_it = local
-            if flow.after_step is not None:
-                local = flow.after_step(solver, state, local)
-            y1 = flow.project(solver.t, solver.y)
-            if not (
-                flow.system.prescribed and t0 == flow.begun
-            ):  # it may have jumped when it was set
-                flow.check_projection(t0, solver.t, solver.y, y1)
-        except StepFailureError:
-            if not choice.implicit:
-                raise
-            choice = explicit(choice, paid=False)
-            solver = _take_over(flow, choice, t0, y0, t_end)
-            continue
+        before, y = stepper.step(t, y)
         steps += 1
-        if watch:
-            event, before = optional_events.first_event(flow, solver, t0, y0, y1, before, armed)
-            if event is not None:
-                headway.check(t0, event[0])
-                if flow.after_step is not None:  # the way to the event counts, not the whole step
-                    flow.local = before_it
-                    flow.reach(t0, y0, event[0])
-                    local = flow.local
-                step = offered
-                if choice.implicit:
-                    choice, step = explicit(choice, paid=True), min(offered, choice.longest)
-                here = replace(
-                    state, step=step, steps=steps, armed=tuple(armed), choice=choice, local=local
-                )
-                if flow.system.frictions:
-                    lost += optional_slides.dissipated(flow, solver.dense_output(), t0, event[0])
-                    here = replace(here, slides=flow.state.slides, dissipated=lost)
-                return _meet(flow, here, t0, y0, *event)
-        if flow.system.frictions:
-            lost += optional_slides.dissipated(flow, solver.dense_output(), t0, solver.t)
-            flow.state = replace(flow.state, slides=optional_slides.turned(flow, solver.t, y1))
-        if choice.implicit:
-            choice = implicit_step(choice, float(solver.t - t0))
-        if solver.t == t_end:
-            n = flow.system.n
-            step = float(max(solver.h_abs, offered))  # the last step may have been cut short
-            if flow.settings.method == "radau5" and flow.auto and not choice.implicit:
-                step = choice.longest
-            return replace(
-                state,
-                t=t_end,
-                q=tuple(y1[:n].tolist()),
-                v=tuple(y1[n:].tolist()),
-                armed=tuple(armed),
-                step=step,
-                steps=steps,
-                choice=choice,
-                slides=flow.state.slides,
-                dissipated=lost,
-                local=local,
+        found, now = None, stepper.t
+        short += stepper.length < HEADWAY / settings.rate
+        if 0 < settings.maximum_steps < tiny + short:
+            raise StepFailureError(
+                f"no headway at t = {now!r} s: more than solver.maximum_steps = "
+                f"{settings.maximum_steps:.0f} steps were shorter than {HEADWAY:g} of the natural time "
+                f"{1 / settings.rate:.3g} s"
             )
-        solver.y, solver.f = y1, flow.accept(solver.t, y1)
-        if flow.auto and flow.settings.method == "dop853":
-            choice = _judged(flow, choice, solver, t0, y0)
-        if flow.auto and choice.implicit != (flow.settings.method == "radau5"):
-            solver = _take_over(flow, choice, solver.t, y1, t_end)
-        headway.check(t0, float(solver.t))
+        if search is not None:
+            search.rank = ranks.all
+            dense = stepper.dense()
+            found = search.first(t, now, dense)
+            if found is not None:
+                now, y = found.t, dense(found.t)
+        q, v, ranks = _projected(motion, now, y, rows, size, ranks)
+        t, y, stepper.rank = now, np.concatenate([q, v]), ranks.all
+        if found is not None or now >= end:
+            proposed = stepper.proposal(before)
+            break
+        stepper.go_on_from(y)
+    state = replace(
+        state, t=t, q=tuple(q.tolist()), v=tuple(v.tolist()), steps=steps, step=proposed
+    )
+    return state, found, short
 
 
-def _meet(flow: Flow, state: State, t0: float, y0: Vector, t: float, left: dict[int, int]) -> State:
-    """The state right after the event at t at which these indicators left their ranges."""
-    n, contacts = flow.system.n, len(flow.system.contacts)
-    jumps = range(contacts, contacts + len(flow.system.floors))
-    ways = {k - contacts: way for k, way in left.items() if k in jumps}
-    if ways:
-        y0, t0 = flow.reach(t0, y0, t), t
-        levels = passed(flow.system, state.levels, ways)
-        state = replace(
-            state, t=t, q=tuple(y0[:n].tolist()), v=tuple(y0[n:].tolist()), levels=levels
+def _projected(
+    motion: Motion, t: float, y: Vector, rows: Sequence[int], size: Vector, ranks: Ranks
+) -> tuple[Vector, Vector, Ranks]:
+    """q and v (n) on the constraints, and how many of `rows` are independent there."""
+    n = motion.system.n
+    q, v = y[:n], y[n:]
+    if not rows:
+        return q, v, ranks
+    q = project_positions(motion, t, q, v, rows, size, ranks.positions)
+    terms = motion.terms(t, q, v)
+    ranks = motion.ranks(terms, rows)
+    return q, project_velocities(terms.of(rows), v), ranks
+
+
+class _Stepper:
+    """One of SciPy's integrators on the index-1 equations of one mode."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        settings: Settings,
+        rows: tuple[Sequence[int], int],
+        t: float,
+        y: Vector,
+        end: float,
+        first: float,
+    ) -> None:
+        self.motion, self.settings, self.end = motion, settings, end
+        self.rows, self.rank = rows
+        size = np.array(settings.size)
+        self.weights = settings.tolerance * np.concatenate([size, settings.rate * size])
+        self.method: Any = self._begin(t, y, first)
+
+    @property
+    def t(self) -> float:
+        """Where it stands [s]."""
+        return float(self.method.t)
+
+    @property
+    def length(self) -> float:
+        """Of the latest step [s]."""
+        return float(self.method.step_size)
+
+    def step(self, t: float, y: Vector) -> tuple[float, Vector]:
+        """One accepted step from (t, y): the length [s] that was tried for it, and y at its end.
+
+        A step on which the equations cannot be evaluated is tried again, shorter.
+        """
+        for _ in range(CROWD):
+            tried = float(self.method.h_abs)
+            try:
+                message = self.method.step()
+            except StepFailureError as error:
+                shorter = tried / 4
+                if not t + shorter > t:
+                    raise
+                cause = error
+                self.method = self._begin(t, y, shorter)
+                continue
+            if self.method.status == "failed":
+                raise StepFailureError(f"step size underflow at t = {self.t!r} s: {message}")
+            return tried, self.method.y
+        raise cause
+
+    def dense(self) -> Any:
+        """The continuous extension of the latest step: y(t)."""
+        return self.method.dense_output()
+
+    def go_on_from(self, y: Vector) -> None:
+        """Let the next step begin at y instead of where the latest ended."""
+        self.method.y, self.method.f = y, self._rates(self.t, y)
+
+    def proposal(self, tried: float) -> float:
+        """The next step [s]: the latest was cut at the end, so that it says little itself."""
+        return max(tried, float(self.method.h_abs))
+
+    def _begin(self, t: float, y: Vector, first: float) -> Any:
+        settings = self.settings
+        longest = settings.maximum_step or np.inf
+        method = INTEGRATORS[settings.method](
+            self._rates,
+            t,
+            y,
+            self.end,
+            max_step=longest,
+            rtol=settings.tolerance,
+            atol=self.weights,
+            first_step=min(first, self.end - t, longest) or None,
         )
-        flow = replace(flow, state=state)
-    if not (contacts or flow.system.frictions):
-        return state
-    return optional_contacts.switched(flow, state, t0, y0, t, [k for k in left if k not in jumps])
+        if not 0 < method.h_abs < np.inf:  # SciPy's first step, of numbers beyond what doubles hold
+            raise StepFailureError(f"no step can be chosen at t = {t!r} s")
+        return method
 
-
-def _judged(flow: Flow, choice: Choice, solver: Any, t0: float, y0: Vector) -> Choice:
-    """The choice after the step that dop853 has just taken."""
-    if not is_due(choice):
-        return unjudged_step(choice)
-    stage, rate = solver.last_stage(y0)
-    stages = Slope(stage, rate, solver.y, solver.f)
-    step = Slope(y0, solver.K[0], solver.y, solver.f)
-    return explicit_step(choice, float(solver.t), float(solver.t - t0), stages, step, flow.size)
-
-
-def _take_over(flow: Flow, choice: Choice, t: float, y: Vector, t_end: float) -> Any:
-    """The other method of `auto`, at (t, y); it begins with the steps that dop853 took last."""
-    flow.choose(choice)
-    return flow.stepper(t, y, t_end, choice.longest)
+    def _rates(self, t: float, y: Vector) -> Vector:
+        """(v, vdot) at y = (q, v)."""
+        n = len(y) // 2
+        terms = self.motion.terms(t, y[:n], y[n:]).of(self.rows)
+        vdot, _, _ = self.motion.accelerations(terms, self.rank)
+        return np.concatenate([y[n:], vdot])

@@ -1,53 +1,54 @@
-"""0 <= z  _|_  w = A z + b >= 0  for a symmetric positive semidefinite A: linear complementarity.
+"""Which of several contacts act together: 0 <= a_k, 0 <= b_k, a_k b_k = 0, found by trying.
 
-These are the conditions of the quadratic program  min z^T A z / 2 + b^T z, z >= 0  (Cottle, Pang & Stone,
-The Linear Complementarity Problem, 1992, sect. 1.2), solved by the dual active set method (Goldfarb &
-Idnani, Math. Programming 27 (1983) 1): the most violated w joins the set that is held at zero, and those
-whose z would turn negative leave it.  The set stays independent, so dependent rows do no harm; w is
-unique, whatever the order of the rows.
+a are multipliers (or impulses) of contacts that act, b the accelerations (or speeds) with which the others
+open. The matrix that leads from a to b, G M^-1 G^T, is positive semidefinite, so that a solution exists
+unless the other constraints forbid every one, and the motion is the same for all solutions (Cottle, Pang &
+Stone, The Linear Complementarity Problem, sect. 3.1).  For a handful of contacts all sets are tried, the
+largest first, so that of several solutions that one is taken in which most push.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable, Collection
+from itertools import combinations
+from typing import TypeVar
 
-from ..numeric.system import Matrix, Vector
-from ..numeric.thresholds import LCP_DEPENDENT, LCP_ZERO
+from ..numeric.failure import StepFailureError
 
+HANDFUL = 12
+EXACT = 1e-11  # of what is compared: a condition missed by less holds to rounding
+ALLOWED = 1e-6  # likewise, of the best set, where none holds to rounding
 
-def complementary(A: Matrix, b: Vector) -> tuple[Vector, Vector] | None:
-    """z and w (k), rows that count as zero set to 0; None if there is no solution."""
-    d = np.sqrt(np.maximum(A.diagonal(), 0.0))
-    d[d == 0] = 1.0
-    A, b = A / d / d[:, None], b / d
-    floor = LCP_ZERO * np.abs(b).max(initial=0.0)
-    z = np.zeros(len(b))
-    held: list[int] = []
-    for _ in range(50 * (len(b) + 1)):
-        w = A @ z + b
-        w[held] = 0.0
-        j = int(w.argmin()) if len(w) else 0
-        if not len(w) or w[j] >= -floor:
-            return z / d, np.where(np.abs(w) <= floor, 0.0, w) * d
-        if not _join(A, b, z, held, j):
-            return None
-    return None
+Found = TypeVar("Found")
 
 
-def _join(A: Matrix, b: Vector, z: Vector, held: list[int], j: int) -> bool:
-    """Raises z_j until w_j = 0, w staying 0 on the set; False if that cannot be."""
-    while True:
-        r = np.linalg.solve(A[np.ix_(held, held)], A[held, j]) if held else np.zeros(0)
-        stands_out = float(A[j, j] - A[j, held] @ r)
-        full = -float(A[j] @ z + b[j]) / stands_out if stands_out > LCP_DEPENDENT else np.inf
-        ways = [z[i] / x if x > LCP_DEPENDENT else np.inf for i, x in zip(held, r, strict=True)]
-        way = min(ways, default=np.inf)
-        step = min(way, full)
-        if not np.isfinite(step):
-            return False
-        z[held] -= step * r
-        z[j] += step
-        if full <= way:
-            held.append(j)
-            return True
-        z[held.pop(int(np.argmin(ways)))] = 0.0
+def acting_together(
+    candidates: Collection[int],
+    trial: Callable[[frozenset[int]], tuple[Found, float]],
+) -> tuple[frozenset[int], Found]:
+    """The set of `candidates` that acts, and what `trial` found for it: a pair (found, by how much the
+    conditions are missed, relative).
+
+    Raises StepFailureError if no set does.
+    """
+    some = sorted(candidates)
+    if len(some) > HANDFUL:
+        raise StepFailureError(
+            f"{len(some)} contacts touch at once, and the python target tries all sets of at most "
+            f"{HANDFUL}: build --target native"
+        )
+    best, failure = None, None
+    for size in range(len(some), -1, -1):
+        for chosen in map(frozenset, combinations(some, size)):
+            try:
+                found, missed = trial(chosen)
+            except StepFailureError as error:
+                failure = error
+                continue
+            if missed <= EXACT:
+                return chosen, found
+            if best is None or missed < best[2]:
+                best = chosen, found, missed
+    if best is None or best[2] > ALLOWED:
+        raise failure or StepFailureError("no set of contacts that act satisfies their conditions")
+    return best[0], best[1]

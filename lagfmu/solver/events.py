@@ -1,88 +1,158 @@
-"""Event location: indicators are watched (indicators.py), lambda of a closed contact, f of an open one.
+"""Event search: the first instant of a step at which a contact departs or closes, on the step's dense output.
 
-Where one leaves its range the time is bracketed to rounding, each trial being an integration from the
-last accepted point, so that the event does not depend on the communication step (Hairer, Norsett &
-Wanner I, sect. II.6, with exact trials).
+A contact that is closed departs where its lambda falls through 0; one that is open closes where its f does.
+A step is looked at in LOOKS + 1 points, so seldom that the following can pass unseen:
+
+* lambda of a closed contact dips below 0 and returns between two looks, and the parabola through three looks
+  stays above half of the middle one's value: a dip far narrower than a sixth of a step, out of a clear sky;
+* f of an open contact has more than one minimum between two looks.  One minimum is always found: its rate
+  f' = G v - nu changes sign between them.
+
+`solver.maximum_step` bounds the step, and so the length of what can be missed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
-from scipy.optimize import brentq
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
 
 from ..numeric.system import Vector
-from .flow import Flow
-from .indicators import indicators, ranges
-from .motion import EPS
-from .ranges import Range, first_of_frictions
-from .samples import look_into_dips, samples
+from .contacts import closed_rows, gap_of_rounding
+from .equations import Motion
+from .state import Settings, State
 
-Event = tuple[
-    float, dict[int, int]
-]  # its time [s], the indicators that leave their ranges: 1 up, -1 down
+LOOKS = 6
+TOGETHER = 1e-12  # of the time: roots no farther apart are one instant
 
-
-def first_event(
-    flow: Flow,
-    solver: Any,
-    t0: float,
-    y0: Vector,
-    y1: Vector,
-    before: Vector,
-    armed: list[bool],
-) -> tuple[Event | None, Vector]:
-    """The earliest event within the step just taken, if there is one, and the indicators at its end."""
-    times, values = samples(flow, solver, t0, y0, y1, before)
-    for c, closed in enumerate(flow.state.closed):
-        if closed:
-            look_into_dips(flow, solver, times, values, c)
-    for i in range(2 * len(flow.state.slides)):
-        look_into_dips(flow, solver, times, values, first_of_frictions(flow.system) + i)
-    found: list[tuple[float, int, int]] = []
-    for k, r in enumerate(ranges(flow)):
-        risen = flow.state.closed[k] or armed[k] if k < len(armed) else not r.rises
-        for i in range(1, len(times)):
-            risen = risen or r.inside(values[i - 1][k]) > r.slack
-            if r.inside(values[i][k]) < -r.slack:
-                limit = r if risen else r.widened()
-                inside = max((j for j in range(i) if limit.inside(values[j][k]) > 0), default=0)
-                t = _locate(flow, t0, y0, times[inside], times[i], k, limit)
-                if t is not None:
-                    found.append((t, k, r.way(values[i][k])))
-                    break
-    if not found:
-        gap = flow.state.gap
-        for c, closed in enumerate(flow.state.closed):
-            armed[c] = bool(armed[c] or (not closed and any(v[c] > gap[c] for v in values)))
-        return None, values[-1]
-    earliest = min(t for t, _, _ in found)
-    return (earliest, {k: way for t, k, way in found if t == earliest}), values[-1]
+Curve = Callable[[float], float]
 
 
-def _past(height: Callable[[float], float], root: float, b: float) -> float:
-    """The root, or the next time after it at which the limit has been passed, rounding included."""
-    step, elapsed = EPS * b, root
-    while elapsed < b and height(elapsed) > 0:
-        elapsed, step = min(root + step, b), 2 * step
-    return elapsed
+class Found(NamedTuple):
+    """When [s], and the contacts (rows) that depart and that close then."""
+
+    t: float
+    departing: frozenset[int]
+    closing: frozenset[int]
 
 
-def _locate(
-    flow: Flow, t0: float, y0: Vector, lo: float, hi: float, indicator: int, limit: Range
+class Search:
+    """The root functions of one mode."""
+
+    def __init__(
+        self, motion: Motion, settings: Settings, state: State, rows: Sequence[int], rank: int
+    ) -> None:
+        self.motion, self.settings, self.rows, self.rank = motion, settings, list(rows), rank
+        self.closed = sorted(closed_rows(motion.system, state.closed))
+        self.open = [k for k in motion.system.contacts if k not in self.closed]
+
+    def first(self, t0: float, t1: float, dense: Callable[[float], Vector]) -> Found | None:
+        """The first event in t0 < t <= t1 of the motion y(t) = dense(t) = (q, v) (2 n); None if there is
+        none.
+        """
+        times = np.linspace(t0, t1, LOOKS + 1).tolist()
+        looks = [self._look(t, dense) for t in times]
+        n = self.motion.system.n
+        terms = self.motion.terms(t1, dense(t1)[:n], dense(t1)[n:])
+        small = gap_of_rounding(terms, dense(t1)[:n], self.settings)
+        roots: dict[int, float] = {}
+        for k in self.closed:
+
+            def pull(t: float, k: int = k) -> float:
+                return self._look(t, dense)[0][k]
+
+            root = _departure(pull, times, [values[k] for values, _ in looks])
+            if root is not None:
+                roots[k] = root
+        for k in self.open:
+
+            def gap(t: float, k: int = k) -> float:
+                return self._look(t, dense)[0][k]
+
+            def rate(t: float, k: int = k) -> float:
+                return self._look(t, dense)[1][k]
+
+            places = [values[k] for values, _ in looks]
+            rates = [rates[k] for _, rates in looks]
+            root = _closing(gap, rate, times, places, rates, float(small[k]))
+            if root is not None:
+                roots[k] = root
+        if not roots:
+            return None
+        t = min(roots.values())
+        now = {k for k, root in roots.items() if root - t <= TOGETHER * max(abs(t), t1 - t0)}
+        return Found(t, frozenset(now & {*self.closed}), frozenset(now & {*self.open}))
+
+    def _look(
+        self, t: float, dense: Callable[[float], Vector]
+    ) -> tuple[dict[int, float], dict[int, float]]:
+        """By row: lambda of a closed contact or f of an open one; f' of an open one."""
+        n, y = self.motion.system.n, dense(t)
+        terms = self.motion.terms(t, y[:n], y[n:])
+        values: dict[int, float] = {}
+        if self.closed:
+            _, lam, _ = self.motion.accelerations(terms.of(self.rows), self.rank)
+            at = dict(zip(self.rows, lam.tolist(), strict=True))
+            values |= {k: at[k] for k in self.closed}
+        if not self.open:
+            return values, {}
+        f, s = self.motion.residual(t, y[:n]), terms.G @ y[n:] - terms.nu
+        values |= {k: float(f[k]) for k in self.open}
+        return values, {k: float(s[k]) for k in self.open}
+
+
+def _departure(pull: Curve, times: Sequence[float], values: Sequence[float]) -> float | None:
+    """The first root of lambda, which falls through it."""
+    if values[0] < 0 and values[1] < 0:
+        return times[0]  # it fell by the projection at the end of the step before
+    for i in range(len(times) - 1):
+        a, b = values[i], values[i + 1]
+        if a >= 0 > b:
+            return _root(pull, times[i], times[i + 1])
+        if i and values[i - 1] > a < b and _parabola(values[i - 1], a, b) < a / 2:
+            lowest = minimize_scalar(pull, bounds=(times[i - 1], times[i + 1]), method="bounded")
+            if lowest.fun < 0:
+                return _root(pull, times[i - 1], lowest.x)
+    return None
+
+
+def _root(curve: Curve, a: float, b: float) -> float:
+    """A root between a and b, at which the curve has unlike signs, to rounding (Brent 1973, ch. 4)."""
+    return float(brentq(curve, a, b, xtol=1e-15 * (b - a), rtol=4 * np.finfo(float).eps))
+
+
+def _parabola(a: float, b: float, c: float) -> float:
+    """The least value of the parabola through three equidistant points whose middle is lowest."""
+    return b - (c - a) ** 2 / (8 * (a - 2 * b + c))
+
+
+def _closing(
+    gap: Curve,
+    rate: Curve,
+    times: Sequence[float],
+    values: Sequence[float],
+    rates: Sequence[float],
+    small: float,
 ) -> float | None:
-    """The time in [lo, hi] at which the indicator leaves the range, to rounding."""
+    """The first root of f, which falls through it.
 
-    def height(elapsed: float) -> float:
-        t = t0 + elapsed
-        return limit.inside(indicators(flow, t, flow.reach(t0, y0, t))[indicator])
-
-    for a in dict.fromkeys((lo - t0, 0.0)):
-        b = hi - t0
-        if height(b) >= 0:
-            return None  # it only grazed: within the tolerance there is no event
-        if height(a) > 0:
-            root = float(brentq(height, a, b, xtol=EPS * b, rtol=4 * EPS, maxiter=200))
-            return t0 + (root if indicator < len(flow.state.closed) else _past(height, root, b))
-    return float(t0)
+    What touches (f <= small) is met once it is farther inside.
+    """
+    for i in range(len(times) - 1):
+        a, b = times[i], times[i + 1]
+        if values[i + 1] < -small or (values[i + 1] < 0 and values[i] > small):
+            if values[i] > 0 and (values[i] > small or rates[i] <= 0):
+                return _root(gap, a, b)
+            if rates[i] <= 0:
+                return a
+            top = _root(rate, a, b)  # it had left, and is back
+            if gap(top) <= 0:
+                return a
+            return _root(gap, top, b)
+        if rates[i] < 0 < rates[i + 1]:
+            lowest = _root(rate, a, b)
+            if gap(lowest) < -small and values[i] > 0:
+                return _root(gap, a, lowest)
+    return None

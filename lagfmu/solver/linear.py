@@ -1,76 +1,111 @@
-"""Accelerations and multipliers:  M x = b + G^T lambda ,  G x = c .
+"""M x = F + G^T lambda ,  G x = gamma :  the one linear problem of constrained mechanics.
 
-The ladder, each rung for a measured reason:
+With forces F and gamma it gives accelerations and multipliers; with F = 0 and gamma = -f the least
+correction of positions, with gamma = nu - G v that of velocities, least in the metric of M (the same
+equations are those of Gauss's principle of least constraint, Lanczos, The Variational Principles of
+Mechanics, sect. IV.8); with F = 0 and gamma the jump of the contacts' speeds, an impact.
 
-1. schur.py: Cholesky of the Schur complement, where its condition and that of M allow it;
-2. kkt.py: LU of the scaled KKT matrix with refinement, for extreme masses;
-3. orthogonal.py: singular value decomposition of the weighted G, for dependent constraints.
-
-Sign: +G^T lambda stands on the side of the forces, as in equations.py.
+Scaling: x = D y with D = diag(M)^(-1/2), so that y counts in units of the square root of energy, and each
+row of G D is divided by its length.  Redundant rows: with the singular value decomposition of what this
+gives, U S V^T (Golub & Van Loan, Matrix Computations, sect. 2.4 and 5.5.2), its r largest singular values
+say all that the rows say, V_r^T y = S_r^-1 U_r^T gamma: r orthonormal rows.  Their multipliers kappa are
+unique, and lambda = U_r S_r^-1 kappa is the solution of least norm for the rows as they are scaled.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.linalg.lapack import dposv, dsysvx
 
-from ..numeric.failure import MasslessError, StepFailureError
+from ..numeric.failure import MasslessError
 from ..numeric.system import Matrix, Vector
-from ..numeric.thresholds import ON_CONSTRAINTS
-from . import dependent
-from .kkt import kkt
-from .schur import schur
-from .solution import Solution, loose
 
-TAKES_PART = 1e-6  # part of a motion by which a coordinate counts as moving
+INDEPENDENT = 1e-10  # of the largest singular value: smaller ones are rounding of redundant rows
+ALONE = (
+    1e-6  # part that a multiplier may have in lambda that push nothing, and still be called unique
+)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rows of a G (m, n) in the scale of an M (n, n): D (n), the rows' lengths (m), and U, S, V^T of the
+    scaled rows, of which `rank` singular values count."""
+
+    D: Vector
+    length: Vector
+    U: Matrix
+    S: Vector
+    Vt: Matrix
+    rank: int
+
+    @property
+    def unique(self) -> list[bool]:
+        """(m): has the multiplier no part in the null space of G^T (Wojtyra 2005)?"""
+        null = self.U[:, self.rank :]
+        found: list[bool] = (np.linalg.norm(null, axis=1) <= ALONE).tolist()
+        return found
+
+
+def rows_of(M: Matrix, G: Matrix, rank: int | None = None) -> Rows:
+    """Scale and decompose; `rank` where it is known: off the constraints redundant rows seem independent."""
+    D = _scale(M, G)
+    scaled = G * D
+    length = np.linalg.norm(scaled, axis=1)
+    length[length == 0] = 1.0
+    U, S, Vt = np.linalg.svd(scaled / length[:, None])
+    if rank is None:
+        rank = int(np.sum(INDEPENDENT * S.max(initial=0.0) < S))
+    return Rows(D, length, U, S, Vt, rank)
 
 
 def solve(
-    M: Matrix, b: Vector, G: Matrix, c: Vector, nearest: bool = False, off: float = 0.0
-) -> Solution:
-    """x (n) and lambda (m) of M x = b + G^T lambda, G x = c.
+    M: Matrix, F: Vector, rows: Rows, gamma: Vector, eliminate: bool = False
+) -> tuple[Vector, Vector]:
+    """x (n) and lambda (m).  `eliminate`: by the null space of G, else by the symmetric bordered matrix.
 
-    `nearest`, for a projection: a coordinate with neither mass nor constraint stays; where dependent rows
-    contradict each other, as those of a c do that is nothing but rounding, c is met as nearly as can be
-    (least squares in rows of comparable units).  `off`: how far the state is off the constraints, relative to
-    their size; rows that depend on each other on them do so there, and are not asked to agree.
-
-    Raises StepFailureError if a value is not finite, the mass matrix is singular on the constraint
-    surface, or dependent constraints contradict each other.
+    Raises MasslessError if M leaves a motion without mass that the rows allow.
     """
-    _check_finite(M, b, G, c)
-    least = loose(off) ** 2
-    found = schur(M, b, G, c, least) or kkt(M, b, G, c, least)
-    if found is None:
-        if dependent.orthogonal is None:
-            raise MasslessError(
-                "the mass matrix is singular at this state: a coordinate has no mass", _massless(M)
-            )
-        found = dependent.orthogonal(M, b, G, c, nearest, off)
-    return _finite(found)
+    D, r = rows.D, rows.rank
+    MD, FD = M * np.outer(D, D), F * D
+    U, S, V, Z = rows.U[:, :r], rows.S[:r], rows.Vt[:r].T, rows.Vt[r:].T
+    bound = (U.T @ (gamma / rows.length)) / S
+    if eliminate:  # y = V bound + Z z,  Z^T M Z z = Z^T (F - M V bound)
+        y = V @ bound
+        if Z.shape[1]:
+            _, z, failed = dposv(Z.T @ MD @ Z, Z.T @ (FD - MD @ y))
+            if failed:
+                raise _singular(MD, Z)
+            y = y + Z @ z
+        kappa = V.T @ (MD @ y - FD)
+    else:
+        n = len(FD)
+        K = np.block([[MD, V], [V.T, np.zeros((r, r))]])
+        *_, found, condition, _, _, failed = dsysvx(K, np.concatenate([FD, bound]))
+        if failed or not condition > np.finfo(float).eps:
+            raise _singular(MD, Z)
+        y, kappa = found[:n, 0], -found[n:, 0]
+    return D * y, (U @ (kappa / S)) / rows.length
 
 
-def _massless(M: Matrix) -> list[int]:
-    """The coordinates that take part in the motion with the least kinetic energy, masses scaled to 1."""
-    size = np.sqrt(np.where(M.diagonal() > 0, M.diagonal(), 1.0))
-    motion = np.linalg.eigh(M / size / size[:, None])[1][:, 0]
-    return [int(j) for j in np.flatnonzero(np.abs(motion) > TAKES_PART)]
+def _scale(M: Matrix, G: Matrix) -> Vector:
+    """D (n): diag(M)^(-1/2); without a mass of its own a coordinate counts as the others in its rows."""
+    mass = M.diagonal()
+    D = np.where(mass > 0, 1 / np.sqrt(np.where(mass > 0, mass, 1.0)), 0.0)
+    for j in np.flatnonzero(D == 0):
+        k = int(np.argmax(np.abs(G[:, j]))) if len(G) else -1
+        others = float(np.abs(G[k] * D).max()) if k >= 0 else 0.0
+        D[j] = others / abs(G[k, j]) if others > 0 and G[k, j] != 0 else 1.0
+    return D
 
 
-def solve_nullspace(M: Matrix, b: Vector, G: Matrix, c: Vector, off: float = 0.0) -> Solution:
-    """The same by nullspace.py, where that is safe."""
-    _check_finite(M, b, G, c)
-    found = dependent.nullspace(M, b, G, c) if len(G) and off <= ON_CONSTRAINTS else None
-    return solve(M, b, G, c, off=off) if found is None else _finite(found)
-
-
-def _check_finite(M: Matrix, b: Vector, G: Matrix, c: Vector) -> None:
-    if not (np.isfinite(M).all() and np.isfinite(b).all()):
-        raise StepFailureError("a mass or a force is not finite at this state")
-    if not (np.isfinite(G).all() and np.isfinite(c).all()):
-        raise StepFailureError("a constraint or its derivative is not finite at this state")
-
-
-def _finite(found: Solution) -> Solution:
-    if not (np.isfinite(found.x).all() and np.isfinite(found.lam).all()):
-        raise StepFailureError("the accelerations overflow at this state")
-    return found
+def _singular(M: Matrix, Z: Matrix) -> MasslessError:
+    """The cause: what moves in the null space Z of the rows, and has no kinetic energy."""
+    values, vectors = np.linalg.eigh(Z.T @ M @ Z)
+    idle = np.abs(Z @ vectors[:, 0])
+    what = "is singular" if values[0] > -ALONE else "is not positive"
+    return MasslessError(
+        f"the mass matrix {what} for a motion that the constraints allow",
+        np.flatnonzero(idle > 0.1 * idle.max()).tolist(),
+    )

@@ -1,171 +1,177 @@
-"""A state -> everything that the FMU reports, by name."""
+"""What can be read at a state: motion, accelerations, multipliers, generalized forces, energies, events.
+
+lambda, Q and the accelerations are those of one solve at this very state.  With an embedding q = phi(s, t)
+the coordinates are embedded and lambda is recovered from the equations of the model itself.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from .. import names
-from ..names import derivative
+from ..names import derivative, name
 from ..numeric.failure import StepFailureError, plain
 from ..numeric.system import NONHOLONOMIC, System, Vector
-from . import optional_slides
-from .instant import Instant
-from .motion import motion
-from .state import State
-
-Values = dict[str, float | int | bool]
+from .contacts import as_flags, closed_rows
+from .equations import Motion
+from .state import Event, State
 
 
-def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]) -> Values:
-    """Coordinates, velocities, accelerations, lambda, Q, residuals, energies and contact states.
+@dataclass(frozen=True)
+class _Forces:
+    """Of a model at a state: accelerations (n), lambda (m; 0 of rows that do not act), Q (n), each row's
+    share of it (m, n), what is missed by each row (m), and whether its multiplier is unique (m)."""
 
-    lambda, Q and the accelerations are solved for at this very state and these inputs, so that they
-    are consistent with what the importer reads.  Raises StepFailureError if a value is not finite.
-    """
-    try:
-        with np.errstate(all="ignore"):
-            values = _observe(system, state, u, p)
-    except (ArithmeticError, ValueError) as error:
-        raise StepFailureError(
-            f"the outputs cannot be evaluated at t = {state.t!r} s ({plain(error)})"
-        ) from error
-    bad = [name for name, value in values.items() if not math.isfinite(value)]
-    if bad:
-        raise StepFailureError(f"not finite at t = {state.t!r} s: {', '.join(bad)}")
-    return values
+    vdot: Vector
+    lam: Vector
+    Q: Vector
+    shares: Vector
+    residual: Vector
+    unique: list[bool]
 
 
-def _observe(system: System, state: State, u: Sequence[float], p: Sequence[float]) -> Values:
-    values: Values = {}
-    u = [*u, *state.levels]
-    full, q, v = expand(system, state.t, np.array(state.q), np.array(state.v), u, p)
-    for name, x, xdot in zip(full.coordinates, q.tolist(), v.tolist(), strict=True):
-        values[name] = x
-        values[derivative(name)] = xdot
-    if full.dynamics is not None:
-        values |= _solved(system, full, state, q, v, u, p)
-    if system.embedding is not None:
-        stepped = Instant(system, state.t, u, p)
-        acting = system.active(state.closed)
-        reduced = motion(stepped, np.array(state.q), np.array(state.v), acting)
-        for j, name in enumerate(system.coordinates):
-            values.setdefault(name, state.q[j])
-            values.setdefault(derivative(name), state.v[j])
-            values.setdefault(derivative(name, 2), float(reduced.vdot[j]))
-    if full.energies is not None:
-        kinetic, potential = full.energies(state.t, q.tolist(), v.tolist(), u, p)
-        values[names.KINETIC] = float(kinetic)
-        values[names.POTENTIAL] = float(potential)
-        values[names.TOTAL] = float(kinetic + potential)
-    if full.outputs:
-        values |= _own(full, state.t, values, q, v, u, p)
-    for c, k in enumerate(system.contacts):
-        values |= _contact(system, state, c, system.rows[k].name, u, p)
-    values[names.STEPS] = state.steps
-    return values
+def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]) -> dict[str, Any]:
+    """Values by the names of the FMU's variables.  Raises StepFailureError if one is not finite."""
+    motion, t = Motion(system, u, p, state.t), state.t
+    with np.errstate(all="ignore"):
+        q, v = np.array(state.q), np.array(state.v)
+        seen = dict(zip(names.motion(system.coordinates), [*state.q, *state.v], strict=True))
+        model, forces = system, None
+        if system.embedding is not None:
+            model = system.embedding.full
+            places, rates = motion.whole(t, q, v)
+            terms = motion.terms(t, q, v).of(system.active(state.closed))
+            vdot, *_ = motion.accelerations(terms)
+            seen |= _accelerations(system, vdot)
+            q, v = np.array(places), np.array(rates)
+            seen |= dict(zip(names.motion(model.coordinates), [*places, *rates], strict=True))
+        if model.dynamics is not None:
+            forces = _forces(Motion(model, u, p, t), state, system, q, v)
+            seen |= _accelerations(model, forces.vdot) | _of_constraints(model, forces)
+        seen |= _energies(model, state, q, v, u, p) | _own(model, t, q, v, u, p, forces)
+    seen |= _of_contacts(system, model, state)
+    seen[names.STEPS] = state.steps
+    wrong = [k for k, x in seen.items() if not math.isfinite(x)]
+    if wrong:
+        raise StepFailureError(f"{', '.join(wrong)} is not finite at t = {t!r} s")
+    return seen
 
 
-def _solved(
-    system: System,
-    full: System,
-    state: State,
-    q: Vector,
-    v: Vector,
-    u: Sequence[float],
-    p: Sequence[float],
-) -> Values:
-    """Accelerations, lambda, Q and residuals of the full system."""
-    values: Values = {}
-    shut = {system.rows[k].name: c for k, c in zip(system.contacts, state.closed, strict=True)}
-    active = full.active([shut[full.rows[k].name] for k in full.contacts])
-    at = Instant(full, state.t, u, p, state.slides)
-    now = motion(at, q, v, active)
-    if system.frictions:
-        values |= optional_slides.observed(system, state, now)
-    for name, a in zip(full.coordinates, now.vdot.tolist(), strict=True):
-        values[derivative(name, 2)] = a
-    f, lam, unique = at.residual(q), now.lam.tolist(), now.unique.tolist()
-    slip = now.G @ v - now.nu
-    kept = {row.name: level for row, level in zip(system.rows, state.offset, strict=True)}
-    for k, row in enumerate(full.rows):
-        values[names.name(names.MULTIPLIER, row.name)] = lam[k]
-        values[names.name(names.UNIQUE, row.name)] = unique[k]
-        miss = (
-            slip[k]
-            if row.kind == NONHOLONOMIC or row.friction is not None
-            else f[k] - kept.get(row.name, 0.0)
-        )
-        values[names.name(names.RESIDUAL, row.name)] = float(miss)
-    share = now.G * now.lam[:, None]
-    for name, Q in zip(full.coordinates, share.sum(axis=0).tolist(), strict=True):
-        values[names.name(names.FORCE, "", name)] = Q
-    for k, j in zip(*full.jacobian, strict=True):
-        name = names.name(names.FORCE, full.rows[k].name, full.coordinates[j])
-        values[name] = float(share[k, j])
-    return values
+def _forces(motion: Motion, state: State, stepped: System, q: Vector, v: Vector) -> _Forces:
+    model, t = motion.system, state.t
+    closed = {stepped.rows[k].name for k in closed_rows(stepped, state.closed)}
+    rows = model.active(
+        as_flags(model, [k for k in model.contacts if model.rows[k].name in closed])
+    )
+    terms = motion.terms(t, q, v)
+    vdot, part, decomposed = motion.accelerations(terms.of(rows))
+    lam, unique = np.zeros(model.m), [True] * model.m
+    lam[rows] = part
+    for k, alone in zip(rows, decomposed.unique, strict=True):
+        unique[k] = alone
+    residual, missed = motion.residual(t, q) if model.m else np.zeros(0), terms.G @ v - terms.nu
+    rolling = [k for k, row in enumerate(model.rows) if row.kind == NONHOLONOMIC]
+    residual[rolling] = missed[rolling]
+    shares = terms.G * lam[:, None]
+    return _Forces(vdot, lam, shares.sum(axis=0), shares, residual, unique)
+
+
+def _accelerations(system: System, vdot: Vector) -> dict[str, float]:
+    found = zip(system.coordinates, vdot.tolist(), strict=True)
+    return {derivative(q, 2): a for q, a in found}
+
+
+def _of_constraints(model: System, forces: _Forces) -> dict[str, Any]:
+    seen: dict[str, Any] = {
+        name(names.FORCE, "", q): x
+        for q, x in zip(model.coordinates, forces.Q.tolist(), strict=True)
+    }
+    for k, row in enumerate(model.rows):
+        seen[name(names.MULTIPLIER, row.name)] = float(forces.lam[k])
+        seen[name(names.RESIDUAL, row.name)] = float(forces.residual[k])
+        seen[name(names.UNIQUE, row.name)] = forces.unique[k]
+    for k, j in zip(*model.jacobian, strict=True):
+        of = name(names.FORCE, model.rows[k].name, model.coordinates[j])
+        seen[of] = float(forces.shares[k, j])
+    return seen
+
+
+def _energies(
+    model: System, state: State, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
+) -> dict[str, float]:
+    if model.energies is None:
+        return {}
+    values = _values(model.energies, "the energies", state.t, q.tolist(), v.tolist(), u, p)
+    kinetic, potential = (float(x) for x in values)
+    return {
+        names.KINETIC: kinetic,
+        names.POTENTIAL: potential,
+        names.TOTAL: kinetic + potential,
+    }
 
 
 def _own(
-    full: System,
+    model: System,
     t: float,
-    values: Values,
     q: Vector,
     v: Vector,
     u: Sequence[float],
     p: Sequence[float],
-) -> Values:
-    """The outputs of the model's own, from what is solved for at this state."""
-    lam = [values.get(names.name(names.MULTIPLIER, row.name), 0.0) for row in full.rows]
-    vdot = [values.get(derivative(name, 2), 0.0) for name in full.coordinates]
-    Q = [values.get(names.name(names.FORCE, "", name), 0.0) for name in full.coordinates]
-    state = (t, q.tolist(), v.tolist(), vdot, u, p, lam, Q)
-    found: Values = {}
-    for own in full.outputs:
-        value, cause = np.nan, "not finite"
+    forces: _Forces | None,
+) -> dict[str, float]:
+    """The outputs of the model's own."""
+    none: list[float] = []
+    of = [none] * 3 if forces is None else [x.tolist() for x in (forces.vdot, forces.lam, forces.Q)]
+    arguments = t, q.tolist(), v.tolist(), of[0], u, p, of[1], of[2]
+    seen = {}
+    for own in model.outputs:
         try:
-            (value,) = own.value(*state)
-        except (ArithmeticError, ValueError) as error:
-            cause = plain(error)
-        if own.otherwise is not None and not np.isfinite(value):
-            (value,) = own.otherwise(*state)
-        if not np.isfinite(value):
-            raise StepFailureError(
-                f"the output {own.name!r} has no value at t = {t!r} s ({cause}): give the model's "
-                "Output an `otherwise`"
-            )
-        found[own.name] = float(value)
-    return found
+            (value,) = own.value(*arguments)
+        except (ArithmeticError, ValueError):
+            value = math.nan
+        if not math.isfinite(value):
+            if own.otherwise is None:
+                raise StepFailureError(
+                    f"output {own.name!r} has no value at t = {t!r} s: `otherwise` can say what it is there"
+                )
+            (value,) = _values(own.otherwise, own.name, *arguments)
+        seen[own.name] = float(value)
+    return seen
 
 
-def expand(
-    system: System, t: float, s: Vector, sdot: Vector, u: Sequence[float], p: Sequence[float]
-) -> tuple[System, Vector, Vector]:
-    """The full system with its q (n) and v (n), from the coordinates that are stepped."""
-    if system.embedding is None:
-        return system, s, sdot
-    q, v = system.embedding.embed(t, s.tolist(), sdot.tolist(), u, p)
-    return system.embedding.full, np.array(q, dtype=float), np.array(v, dtype=float)
+def _of_contacts(system: System, model: System, state: State) -> dict[str, Any]:
+    seen: dict[str, Any] = {}
+    for c, k in enumerate(system.contacts):
+        contact = system.rows[k].name
+        seen[name(names.CONTACT, contact)] = state.closed[c]
+        seen[name(names.IMPULSE, contact)] = state.closings[c].impulse
+        seen |= _told(model, names.DEPARTURE, contact, state.departures[c])
+        seen |= _told(model, names.CLOSING, contact, state.closings[c])
+    return seen | ({names.DISSIPATED: state.dissipated} if system.contacts else {})
 
 
-def _contact(
-    system: System, state: State, c: int, name: str, u: Sequence[float], p: Sequence[float]
-) -> Values:
-    latest = state.departures[c]
-    values: Values = {
-        names.name(names.CONTACT, name): state.closed[c],
-        names.name(names.DEPARTURES, name): latest.count,
-        names.name(names.DEPARTURE_TIME, name): latest.time,
+def _told(model: System, kind: str, contact: str, event: Event) -> Mapping[str, Any]:
+    q, v = event.q or (0.0,) * model.n, event.v or (0.0,) * model.n
+    seen: dict[str, Any] = {
+        name(f"{kind}.count", contact): event.count,
+        name(f"{kind}.time", contact): event.time,
     }
-    q, v = np.array(latest.q), np.array(latest.v)
-    full = system if system.embedding is None else system.embedding.full
-    if latest.count:
-        full, q, v = expand(system, latest.time, q, v, u, p)
-    else:
-        q = v = np.zeros(full.n)
-    for j, coordinate in enumerate(full.coordinates):
-        values[names.name(names.DEPARTURE, name, coordinate)] = float(q[j])
-        values[names.name(names.DEPARTURE, name, coordinate, 1)] = float(v[j])
-    return values
+    for j, coordinate in enumerate(model.coordinates):
+        seen[name(kind, contact, coordinate)] = q[j]
+        seen[name(kind, contact, coordinate, 1)] = v[j]
+    return seen
+
+
+def _values(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
+    try:
+        return function(*arguments)
+    except (ArithmeticError, ValueError) as error:
+        t = arguments[0]
+        raise StepFailureError(
+            f"{what} cannot be evaluated at t = {t!r} s: {plain(error)}"
+        ) from None

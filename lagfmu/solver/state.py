@@ -1,117 +1,119 @@
-"""Everything that a simulation remembers between two communication points, and nothing else.
+"""What the engine remembers between two communication points, and how it was told to go.
 
-A State is a value: saving it is keeping it, rolling back is putting it back, bit for bit.
+A step is a function of (state, settings, inputs, parameters) alone: a state that is restored goes on with
+the same bits.
 """
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, field, fields
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from ..numeric.tolerance import DEFAULT_TOLERANCE, MAXIMUM_STEPS
-from .stiffness import Choice
+from ..numeric.system import System
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to step: the method, the relative tolerance, the step [s] of rk4, the largest step [s], and how
-    many steps shorter than 1e-6 of the natural time a communication step may take (0: no limit)."""
-
-    method: str = "auto"
-    tolerance: float = DEFAULT_TOLERANCE
-    step: float = 0.0
-    maximum_step: float = 0.0
-    maximum_steps: float = MAXIMUM_STEPS
-
-
-@dataclass(frozen=True)
-class Departure:
-    """The latest opening of a contact: its time [s], the state then, and how many there were."""
-
-    count: int
-    time: float
-    q: tuple[float, ...]
-    v: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Slide:
-    """How a friction stands: it sticks, or slips.
-
-    `sign` is that of the multipliers' sum N, so that the normal force is sign * N; `direction` the unit
-    vector of the slip velocity, where that is zero or was last known; slip velocities up to `noise` [m/s]
-    are rounding.
+    """Method, relative tolerance, longest step [s] (0: any), how many tiny steps a communication step may
+    take (0: any), and the scale of the motion at the start: the size of each coordinate (n) and its rate
+    [1/s].
     """
 
-    sticks: bool = False
-    sign: float = 1.0
-    direction: tuple[float, float] = (1.0, 0.0)
-    noise: float = 0.0
+    method: str
+    tolerance: float
+    maximum_step: float
+    maximum_steps: float
+    size: tuple[float, ...]
+    rate: float
 
 
-Local = tuple[float, float, float, float]
-NO_LOCAL: Local = (0.0, 0.0, 0.0, 0.0)
+@dataclass(frozen=True)
+class Event:
+    """The latest of a kind that happened to a contact: how many there were, time [s], and where: the model's
+    coordinates and velocities just before; the impulse [lambda times s]."""
+
+    count: int = 0
+    time: float = 0.0
+    q: tuple[float, ...] = ()
+    v: tuple[float, ...] = ()
+    impulse: float = 0.0
 
 
 @dataclass(frozen=True)
 class State:
-    """Time, motion, contact modes, step-size memory.
-
-    q, v (n); closed, armed, departures: one entry a contact; offset (m): the level f = offset that a
-    constraint keeps which came back with its contact; scale (2 n): the magnitudes below which errors
-    in q and v are measured absolutely; size (n): the coordinates' magnitudes, for rounding; gap: |f|
-    below which a contact touches; step [s]: the next step to try; span [s]: the communication step that
-    led to t (0: none); rate [1/s]: the motion's
-    natural rate at the start; choice: what `auto` remembers; levels: those of jumps (jumps.py);
-    slides, slippings: one entry a friction, how it stands and its latest start of slipping; dissipated
-    [J]: by frictions and impacts so far; strikes: contacts that were struck so far;
-    hits, hit_times [s], impulses [of lambda times s]: one entry a contact, how often, when last, how hard;
-    local: with error bars, of the local errors of explicit and of implicit steps the sums, then the largest
-    of each (bars.py).
-    """
+    """Time [s], coordinates, velocities (n); of each contact: is it closed, latest departure and closing; the
+    next step [s] (0: to be found), the latest communication step [s], steps so far, energy lost in impacts
+    [J]."""
 
     t: float
     q: tuple[float, ...]
     v: tuple[float, ...]
     closed: tuple[bool, ...]
-    armed: tuple[bool, ...]
-    offset: tuple[float, ...]
-    scale: tuple[float, ...]
-    size: tuple[float, ...]
-    gap: tuple[float, ...]
-    rate: float
-    step: float
-    span: float
-    steps: int
-    departures: tuple[Departure, ...]
-    choice: Choice = field(default_factory=Choice)
-    slides: tuple[Slide, ...] = ()
-    slippings: tuple[Departure, ...] = ()
+    departures: tuple[Event, ...]
+    closings: tuple[Event, ...]
+    step: float = 0.0
+    span: float = 0.0
+    steps: int = 0
     dissipated: float = 0.0
-    strikes: int = 0
-    hits: tuple[int, ...] = ()
-    hit_times: tuple[float, ...] = ()
-    impulses: tuple[float, ...] = ()
-    local: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    levels: tuple[float, ...] = ()
 
-    def to_json(self) -> str:
-        """Text that `from_json` turns into an equal state; floats keep every bit."""
-        return json.dumps(asdict(self))
 
-    @staticmethod
-    def from_json(text: str) -> State:
-        """The state written by `to_json`."""
-        raw = json.loads(text)
-        for f in fields(State):
-            if isinstance(raw[f.name], list):
-                raw[f.name] = tuple(raw[f.name])
-        for name in ("departures", "slippings"):
-            raw[name] = tuple(
-                Departure(d["count"], d["time"], tuple(d["q"]), tuple(d["v"])) for d in raw[name]
-            )
-        raw["slides"] = tuple(
-            Slide(x["sticks"], x["sign"], tuple(x["direction"]), x["noise"]) for x in raw["slides"]
-        )
-        raw["choice"] = Choice(**raw["choice"])
-        return State(**raw)
+def restored_settings(kept: dict[str, Any], methods: Sequence[str], n: int) -> Settings:
+    """From what asdict made of them.  Raises ValueError, TypeError or KeyError if that is none."""
+    size = _numbers(kept.pop("size"), n)
+    settings = Settings(**kept, size=size)
+    if settings.method not in methods:
+        raise ValueError(f"its method is {settings.method!r}")
+    numbers = settings.tolerance, settings.maximum_step, settings.maximum_steps, settings.rate
+    if not all(_is_number(x) and x >= 0 for x in numbers) or not 0 < settings.tolerance < 1:
+        raise ValueError(f"its settings are {numbers!r}")
+    return settings
+
+
+def restored(system: System, kept: dict[str, Any]) -> State:
+    """From what asdict made of it.
+
+    Raises ValueError, TypeError or KeyError if that is none of this system's.
+    """
+    n, contacts = system.n, len(system.contacts)
+    whole = n if system.embedding is None else system.embedding.full.n
+    closed = tuple(kept.pop("closed"))
+    if len(closed) != contacts or not all(isinstance(c, bool) for c in closed):
+        raise ValueError(f"its contacts are {closed!r}")
+    q, v = _numbers(kept.pop("q"), n), _numbers(kept.pop("v"), n)
+    departures, closings = (
+        tuple(_event(e, whole) for e in kept.pop(what)) for what in ("departures", "closings")
+    )
+    if not len(departures) == len(closings) == contacts:
+        raise ValueError("it has other contacts")
+    state = State(q=q, v=v, closed=closed, departures=departures, closings=closings, **kept)
+    if not _is_count(state.steps) or not all(
+        _is_number(x) for x in (state.t, state.step, state.span, state.dissipated)
+    ):
+        raise ValueError("its time or its steps are no numbers")
+    if state.step < 0 or state.span < 0:
+        raise ValueError(f"its steps are {state.step!r} s and {state.span!r} s")
+    return state
+
+
+def _event(kept: dict[str, Any], n: int) -> Event:
+    n = n if kept["count"] else 0
+    event = Event(**kept | {"q": _numbers(kept["q"], n), "v": _numbers(kept["v"], n)})
+    if not (_is_count(event.count) and _is_number(event.time) and _is_number(event.impulse)):
+        raise ValueError(f"one of its events is {kept!r}")
+    return event
+
+
+def _numbers(kept: Any, n: int) -> tuple[float, ...]:
+    if not isinstance(kept, (list, tuple)) or len(kept) != n or not all(map(_is_number, kept)):
+        raise ValueError(f"{kept!r} are not {n} numbers")
+    return tuple(float(x) for x in kept)
+
+
+def _is_number(x: Any) -> bool:
+    return isinstance(x, (int, float)) and not isinstance(x, bool) and math.isfinite(x)
+
+
+def _is_count(x: Any) -> bool:
+    return isinstance(x, int) and not isinstance(x, bool) and 0 <= x < 2**53

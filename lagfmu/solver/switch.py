@@ -1,183 +1,199 @@
-"""What happens at contacts: impacts (impact.py), rest, and the modes of all contacts together (contacts.py;
-Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chs. 4, 6).  Nothing depends on the
-order in which contacts are declared."""
+"""What happens at an instant: contacts that close are struck, those that pull open, surfaces that jump are
+met.
+
+A state is taken to the one from which the motion goes on: on the constraints as they stand now, no contact
+approached, and a choice of closed contacts that is consistent.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from ..numeric.system import Vector
-from ..numeric.thresholds import SLOW
-from . import optional_slides
-from .contacts import complementary_modes, low
-from .flow import Flow
-from .impact import impacts
-from .instant import Instant
-from .motion import motion, project
-from .state import Departure, State
+from .contacts import (
+    accelerations_at_hand,
+    as_flags,
+    closed_at_rest,
+    closed_rows,
+    gap_of_rounding,
+    speed_of_rounding,
+)
+from .equations import Motion, Terms
+from .events import Found
+from .impact import Impact, coefficients, strike
+from .linear import rows_of
+from .projection import project_positions, project_velocities
+from .state import Event, Settings, State
+
+AT_ONCE = (
+    1e-6  # of the accelerations at hand: f'' of a contact whose lambda is 0 may miss 0 by less
+)
 
 
-def released(at: Instant, state: State, span: float) -> State:
-    """Contacts opened that a jump of a prescribed motion has left a gap in, or a speed at which they part:
-    departures; the state on the rows that go on acting, which go with the motion.
+def begun(motion: Motion, settings: Settings, state: State) -> State:
+    """The state with which a communication step begins, its inputs being set.
 
-    A gap that the contact, pressed as it is, would have closed within `span` [s] is none: the motion went
-    on a little otherwise than its derivatives had foreseen over a step of that length.
+    A surface whose prescribed motion was set to another place or speed than it went to takes a closed
+    contact along if, pressed as it is, the contact could have followed within the latest communication
+    step; otherwise it has jumped away, and the contact departs.
     """
-    system, q, v = at.system, np.array(state.q), np.array(state.v)
-    closed, armed, departures = list(state.closed), list(state.armed), list(state.departures)
-    for c, shut in enumerate(state.closed):
-        if shut and _has_parted(at, q, v, closed, c, state, span):
-            closed[c], armed[c] = False, True
-            departures[c] = Departure(departures[c].count + 1, state.t, state.q, state.v)
-    size, offset = np.array(state.size), np.array(state.offset)
-    q, v = project(at, q, v, system.active(closed), offset, size)
-    return replace(
-        state,
-        q=tuple(q.tolist()),
-        v=tuple(v.tolist()),
-        closed=tuple(closed),
-        armed=tuple(armed),
-        departures=tuple(departures),
-    )
+    system = motion.system
+    if not system.m:
+        return state
+    q, v = np.array(state.q), np.array(state.v)
+    terms, closed = motion.terms(state.t, q, v), closed_rows(system, state.closed)
+    if system.prescribed:
+        left = _left_behind(motion, settings, state, terms)
+        closed -= left
+        f, small = motion.residual(state.t, q), gap_of_rounding(terms, q, settings)
+        met = frozenset(k for k in system.contacts if k not in closed and f[k] < -small[k])
+        rows = system.active(as_flags(system, closed | met))
+        q = project_positions(motion, state.t, q, v, rows, np.array(settings.size))
+        terms = motion.terms(state.t, q, v)
+        if not met:
+            v = project_velocities(terms.of(system.active(as_flags(system, closed))), v)
+        closed |= met
+    elif not system.contacts:
+        return state
+    return _settled(motion, settings, state, q, v, closed)
 
 
-def _has_parted(
-    at: Instant, q: Vector, v: Vector, closed: Sequence[bool], c: int, state: State, span: float
-) -> bool:
-    """True if contact c opens by more than it would have closed by itself, had it been free for `span`."""
-    k = at.system.contacts[c]
-    _, _, G, nu, _ = at.evaluate(q, v)
-    gap, speed = at.residual(q)[k], G[k] @ v - nu[k]
-    natural = np.abs(G[k]) @ np.array(state.size) * state.rate
-    slow = SLOW * max(natural, np.abs(G[k]) @ np.abs(v) + abs(nu[k]))
-    if not (gap > state.gap[c] or speed > slow):
-        return False
-    others = [shut and i != c for i, shut in enumerate(closed)]
-    free = motion(at, q, v, at.system.active(others))
-    approach = max(free.gamma[k] - free.G[k] @ free.vdot, 0.0)
-    return bool(
-        gap > max(state.gap[c], approach * span**2 / 2) or speed > max(slow, approach * span)
-    )
-
-
-def switched(flow: Flow, state: State, t0: float, y0: Vector, t: float, left: list[int]) -> State:
-    """The state right after the event at t: contacts opened or struck, modes settled together.
-
-    `left`: the indicators that leave their ranges, of which the first are the contacts'.
-    """
-    system, at = flow.system, flow.at(t)
-    q, v = flow.split(flow.reach(t0, y0, t))
-    contacts, arriving = [c for c in left if c < len(system.contacts)], v
-    leaving = {c for c in contacts if state.closed[c]}
-    landing = set(contacts) - leaving
-    closed = [shut and c not in leaving for c, shut in enumerate(state.closed)]
-    f = at.residual(q)[list(system.contacts)]
-    near = {c for c, shut in enumerate(closed) if shut or c in landing or abs(f[c]) <= state.gap[c]}
-    slow = _slow(at, q, v, state)
-    struck: dict[int, float] = {}
-    if landing:
-        v, struck = impacts(
-            at, q, v, near, slow, optional_slides.rubbed if system.frictions else None
-        )
-    bounced = {*struck, *landing}
-    leaving -= {*struck}
-    modes = _settled(at, q, v, state, closed, near, leaving, bounced)
-    offset = _levels(at, q, state, modes)
-    if system.frictions:
-
-        def settled(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
-            return _settled(at, q, v, state, shut, near, leaving, bounced)
-
-        touching = _touching(at, q, v, state, near)
-
-        def complementary(at: Instant, shut: Sequence[bool]) -> tuple[bool, ...]:
-            return complementary_modes(at, q, v, shut, touching, leaving)
-
-        found = optional_slides.Contacts(settled, complementary, touching, leaving)
-        here = replace(state, t=t, closed=modes, offset=tuple(offset.tolist()))
-        at, here = optional_slides.switched_slides(at, q, v, arriving, here, left, found)
-        state, modes, offset = (
-            replace(here, closed=state.closed),
-            here.closed,
-            np.array(here.offset),
-        )
-    q, v = project(at, q, v, system.active(modes), offset, flow.size)
-    departures = list(state.departures)
-    for c, (old, new) in enumerate(zip(state.closed, modes, strict=True)):
-        if old and not new:
-            count = departures[c].count + 1
-            departures[c] = Departure(count, t, tuple(q.tolist()), tuple(v.tolist()))
-    return replace(
-        state,
-        t=t,
-        q=tuple(q.tolist()),
-        v=tuple(v.tolist()),
-        closed=modes,
-        armed=tuple(a and c not in contacts and c not in struck for c, a in enumerate(state.armed)),
-        offset=tuple(offset.tolist()),
-        departures=tuple(departures),
-        strikes=state.strikes + len(bounced),
-        hits=tuple(k + (c in struck) for c, k in enumerate(state.hits)),
-        hit_times=tuple(t if c in struck else x for c, x in enumerate(state.hit_times)),
-        impulses=tuple(struck.get(c, x) for c, x in enumerate(state.impulses)),
-    )
-
-
-def _slow(at: Instant, q: Vector, v: Vector, state: State) -> Vector:
-    """Speeds (m) of the rows that count as none."""
-    G = np.abs(at.evaluate(q, v)[2])
-    natural = np.array(state.size) * state.rate
-    speed = np.maximum(G @ natural, G @ np.array(state.scale[at.system.n :]))
-    return np.asarray(SLOW * speed)
-
-
-def _touching(at: Instant, q: Vector, v: Vector, state: State, near: Collection[int]) -> set[int]:
-    """Contacts with f = 0 and df/dt = 0: the accelerations decide."""
-    slow = _slow(at, q, v, state)
-    _, _, G, nu, _ = at.evaluate(q, v)
-    return {c for c in near if abs((G @ v - nu)[k := at.system.contacts[c]]) <= slow[k]}
+def at_event(motion: Motion, settings: Settings, state: State, found: Found) -> State:
+    """The state after contacts closed or departed at the time of `state`."""
+    system = motion.system
+    q, v = np.array(state.q), np.array(state.v)
+    closed = closed_rows(system, state.closed)
+    together = system.active(as_flags(system, closed | found.closing))
+    q = project_positions(motion, state.t, q, v, together, np.array(settings.size))
+    return _settled(motion, settings, state, q, v, closed, found.departing)
 
 
 def _settled(
-    at: Instant,
+    motion: Motion,
+    settings: Settings,
+    state: State,
     q: Vector,
     v: Vector,
-    state: State,
-    closed: Sequence[bool],
-    near: Collection[int],
-    leaving: Collection[int],
-    bounced: Collection[int],
-) -> tuple[bool, ...]:
-    """The modes after the impacts: accelerations decide where df/dt is zero; what parts is open.
+    closed: frozenset[int],
+    departing: frozenset[int] = frozenset(),
+) -> State:
+    """The state after the impacts of all contacts that touch, with those closed that then press."""
+    system, t, was = motion.system, state.t, closed_rows(motion.system, state.closed)
+    terms, f = motion.terms(t, q, v), motion.residual(t, q)
+    small, slow = gap_of_rounding(terms, q, settings), speed_of_rounding(terms, v, settings)
+    touching = closed | {k for k in system.contacts if f[k] <= small[k]}
+    s = terms.G @ v - terms.nu
+    before, struck = v, None
+    if any(s[k] < -slow[k] for k in touching):
+        struck = strike(motion, terms, v, touching, coefficients(motion), settings)
+        state = replace(state, dissipated=state.dissipated + struck.lost)
+        v = _without_hops(motion, terms, struck.v, touching, small, slow)
+        terms = motion.terms(t, q, v)
+        s = terms.G @ v - terms.nu
+    resting = {k for k in touching if abs(s[k]) <= slow[k]}
+    now = _chosen(motion, settings, terms, resting, departing)
+    if now != closed or struck is not None:
+        rows = system.active(as_flags(system, now))
+        v = project_velocities(terms.of(rows), v)
+    state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()), closed=as_flags(system, now))
+    return _told(motion, state, q, before, was, struck, slow, terms)
 
-    Contacts that were struck rest if the rebound would not rise above the gap (contacts.py).
+
+def _chosen(
+    motion: Motion,
+    settings: Settings,
+    terms: Terms,
+    resting: Collection[int],
+    departing: frozenset[int],
+) -> frozenset[int]:
+    """The contacts that are closed.
+
+    One whose multiplier has just fallen through 0 departs, if it opens then.
     """
-    touching = _touching(at, q, v, state, near)
-    slow = _slow(at, q, v, state)
-    _, _, G, nu, _ = at.evaluate(q, v)
-    slip = (G @ v - nu)[list(at.system.contacts)]
-    limit = slow[list(at.system.contacts)]
-    guess = [c in touching and (shut or c in bounced) for c, shut in enumerate(closed)]
-    modes = complementary_modes(at, q, v, guess, touching, leaving)
-    parting = [c for c in near if (closed[c] or c in bounced) and slip[c] > limit[c]]
-    rest = low(at, q, v, modes, parting, np.array(state.gap)) if parting else []
-    if not rest:
-        return modes
-    guess = [shut or c in rest for c, shut in enumerate(modes)]
-    return complementary_modes(at, q, v, guess, touching | {*rest}, leaving)
+    if not resting:
+        return frozenset()
+    if departing:
+        others = frozenset(resting) - departing
+        now = closed_at_rest(motion, terms, others, settings)
+        rows = motion.system.active(as_flags(motion.system, now))
+        vdot, _, _ = motion.accelerations(terms.of(rows))
+        opening, size = terms.G @ vdot - terms.gamma, accelerations_at_hand(terms, settings)
+        if all(opening[k] >= -AT_ONCE * size[k] for k in departing):
+            return now
+    return closed_at_rest(motion, terms, resting, settings)
 
 
-def _levels(at: Instant, q: Vector, state: State, modes: Sequence[bool]) -> Vector:
-    """The levels f = offset: rows that come back with a contact keep the one at which they do."""
-    system, offset, f = at.system, np.array(state.offset), at.residual(q)
-    come = {
-        k for k, old, new in zip(system.contacts, state.closed, modes, strict=True) if new > old
-    }
-    for j, row in enumerate(system.rows):
-        if row.while_closed in come:
-            offset[j] = f[j]
-    return offset
+def _without_hops(
+    motion: Motion,
+    terms: Terms,
+    v: Vector,
+    touching: Collection[int],
+    small: Vector,
+    slow: Vector,
+) -> Vector:
+    """The velocities after an impact (n), in which a contact rests that would rise by no more than touching
+    contacts may be apart, s^2 / (2 |f''|): so bounces, and a block's rocking, that would never end do end.
+    """
+    s = terms.G @ v - terms.nu
+    resting = {k for k in touching if abs(s[k]) <= slow[k]}
+    rising = {k for k in touching if s[k] > slow[k]}
+    if not rising:
+        return v
+    rows = motion.system.active(as_flags(motion.system, resting))
+    vdot, _, _ = motion.accelerations(terms.of(rows))
+    fall = terms.gamma - terms.G @ vdot
+    hops = {k for k in rising if s[k] ** 2 <= 2 * fall[k] * small[k]}
+    if not hops:
+        return v
+    rows = motion.system.active(as_flags(motion.system, resting | hops))
+    return project_velocities(terms.of(rows), v)
+
+
+def _left_behind(motion: Motion, settings: Settings, state: State, terms: Terms) -> frozenset[int]:
+    """The closed contacts that cannot have followed their surface to where it stands now."""
+    system = motion.system
+    closed = closed_rows(system, state.closed)
+    if not closed:
+        return frozenset()
+    q, v = np.array(state.q), np.array(state.v)
+    rows = system.active(state.closed)
+    _, lam, decomposed = motion.accelerations(terms.of(rows))
+    pressed = {
+        k: max(x, 0.0) * size**2
+        for k, x, size in zip(rows, lam.tolist(), decomposed.length.tolist(), strict=True)
+    }  # the accelerations with which they would follow
+    f, s, h = motion.residual(state.t, q), terms.G @ v - terms.nu, state.span
+    small, slow = gap_of_rounding(terms, q, settings), speed_of_rounding(terms, v, settings)
+    return frozenset(
+        k
+        for k in closed
+        if f[k] > small[k] + pressed[k] * h**2 / 2 or s[k] > slow[k] + pressed[k] * h
+    )
+
+
+def _told(
+    motion: Motion,
+    state: State,
+    q: Vector,
+    before: Vector,
+    was: frozenset[int],
+    struck: Impact | None,
+    slow: Vector,
+    terms: Terms,
+) -> State:
+    """The same with what happened to each contact written down."""
+    system, t = motion.system, state.t
+    length = rows_of(terms.M, terms.G).length
+    where = motion.whole(t, q, before)
+    departures, closings = list(state.departures), list(state.closings)
+    for c, k in enumerate(system.contacts):
+        impulse = 0.0 if struck is None else float(struck.impulses[k])
+        blow = impulse * length[k] ** 2 > slow[k]
+        if blow or (state.closed[c] and k not in was):
+            closings[c] = Event(closings[c].count + 1, t, *where, impulse)
+        elif k in was and not state.closed[c] and struck is None:
+            departures[c] = Event(departures[c].count + 1, t, *where)
+    return replace(state, departures=tuple(departures), closings=tuple(closings))

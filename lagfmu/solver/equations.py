@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..numeric.failure import StepFailureError, plain
+from ..numeric.failure import MasslessError, StepFailureError, plain
 from ..numeric.system import NONHOLONOMIC, Matrix, System, Vector
 from .linear import Rows, rows_of, solve
 
@@ -84,7 +84,10 @@ class Motion:
     def accelerations(self, terms: Terms, rank: int | None = None) -> tuple[Vector, Vector, Rows]:
         """vdot (n), lambda (m) of the rows in `terms`, and these rows decomposed."""
         rows = rows_of(terms.M, terms.G, rank)
-        vdot, lam = solve(terms.M, terms.F, rows, terms.gamma, self.eliminate)
+        try:
+            vdot, lam = solve(terms.M, terms.F, rows, terms.gamma, self.eliminate)
+        except MasslessError as error:
+            raise error.named(self.system.coordinates) from None
         return vdot, lam, rows
 
     def holonomic(self, rows: Sequence[int]) -> list[int]:
