@@ -365,7 +365,7 @@ def test_the_built_fmu_says_what_was_chosen_and_why(tmp_path):
     arguments = ("--scene", "Link", "--accuracy", "1e-6:lambda.link", "--out")
     text = lagfmu("build", model, *arguments, tmp_path / "dist")
     assert "Link: pass" in text
-    fmu = tmp_path / "dist" / "python" / "Link.fmu"
+    fmu = tmp_path / "dist" / "native" / "Link.fmu"
     with zipfile.ZipFile(fmu) as archive:
         page = archive.read("documentation/index.html").decode()
         description = archive.read("modelDescription.xml").decode()
@@ -375,4 +375,4 @@ def test_the_built_fmu_says_what_was_chosen_and_why(tmp_path):
     assert "Held-out values" in section
     assert section.count('"pass">chosen<') == 1
     lagfmu("build", model, *arguments, tmp_path / "again")
-    assert (tmp_path / "again" / "python" / "Link.fmu").read_bytes() == fmu.read_bytes()
+    assert (tmp_path / "again" / "native" / "Link.fmu").read_bytes() == fmu.read_bytes()
