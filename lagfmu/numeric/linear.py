@@ -13,7 +13,16 @@ from scipy.linalg import lapack, qr, solve_triangular
 
 from .failure import MasslessError, StepFailureError
 from .system import Matrix, Vector
-from .thresholds import CONSISTENT, ON_CONSTRAINTS, RANK, RANK_LOOSEST, RANK_TURNED, VANISHES
+from .thresholds import (
+    CONSISTENT,
+    HIDDEN,
+    HIDES,
+    ON_CONSTRAINTS,
+    RANK,
+    RANK_LOOSEST,
+    RANK_TURNED,
+    VANISHES,
+)
 
 REGULAR = 1e-14  # reciprocal condition above which a matrix is not singular
 DEFINITE = 1e-4  # least pivot of the Cholesky factor of a mass matrix with a unit diagonal
@@ -48,7 +57,7 @@ def solve(
     found = next(
         (x for s in scalings if (x := _regular(M, b, G, c, turned**2, s)) is not None), None
     )
-    if found is None and factor is not None:
+    if found is None and factor is not None and not _hides(*factor, M, G, max(RANK, turned)):
         found = _weighted(*factor, b, G, c, max(RANK, turned), agree)
     elif found is None:
         found = _least_norm(M, b, G, c, max(RANK, turned), not nearest, agree)
@@ -126,12 +135,31 @@ def _weighted(
     return x, lam
 
 
+def _hides(L: Matrix, s: Vector, M: Matrix, G: Matrix, least: float) -> bool:
+    """Whether rows seem to depend on each other because light coordinates hide what heavy ones are held by;
+    in the KKT matrix they do not."""
+    W = solve_triangular(L, (G * s).T, lower=True)
+    W = W / np.maximum(np.linalg.norm(W, axis=0), np.finfo(float).tiny)
+    parts = np.abs(G) > HIDES * np.abs(G).max(axis=1, initial=0.0)[:, None]
+    if not (parts & (np.abs(W.T) < HIDDEN)).any():
+        return False
+    d, K = _equilibrated(M, G)
+    sizes = np.linalg.svd(K * d * d[:, None], compute_uv=False)
+    rank = np.linalg.matrix_rank(W, tol=least)
+    return int((sizes > least * sizes[0]).sum()) >= len(M) + int(rank)
+
+
+def _equilibrated(M: Matrix, G: Matrix) -> tuple[Vector, Matrix]:
+    """The KKT matrix, and 1 / sqrt of the largest element of each of its rows."""
+    K = _kkt(M, G)
+    return 1 / np.sqrt(np.maximum(np.abs(K).max(axis=1), np.finfo(float).tiny)), K
+
+
 def _least_norm(
     M: Matrix, b: Vector, G: Matrix, c: Vector, least: float, held: bool, agree: bool
 ) -> Solution:
     """Dependent constraints and a massless coordinate together; `held`: each must have an acceleration."""
-    n, K = len(b), _kkt(M, G)
-    d = 1 / np.sqrt(np.maximum(np.abs(K).max(axis=1), np.finfo(float).tiny))
+    n, (d, K) = len(b), _equilibrated(M, G)
     U, sigma, Vt = np.linalg.svd(K * d * d[:, None])
     kept = sigma > least * sigma[0]
     free = np.abs(Vt[~kept, :n]).max(axis=0, initial=0.0) > VANISHES
