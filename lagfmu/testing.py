@@ -68,7 +68,9 @@ from .model.units import (
     plain,
 )
 from .numeric import thresholds
+from .numeric.failure import StepFailureError
 from .numeric.initialization import Stage
+from .numeric.linear import solve as solve_at_start
 from .numeric.start_priority import GIVEN, OMITTED, SET
 from .numeric.system import System
 from .page.documentation import page as documentation_page
