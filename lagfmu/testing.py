@@ -24,12 +24,19 @@ from .fmu.archive import version as archive_version
 from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch
 from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
-from .fmu.described import Trajectory, described_rules, file_stem, read_description, target_in
+from .fmu.described import (
+    Trajectory,
+    communication_points,
+    described_rules,
+    file_stem,
+    read_description,
+    target_in,
+)
 from .fmu.description import model_description
 from .fmu.exchange import by_fmpy
 from .fmu.formula import LONGEST_SUM, read_formula, text_of
 from .fmu.native import GENERATED
-from .fmu.session import RefusalError, Session, communication_points
+from .fmu.session import RefusalError, Session
 from .fmu.target import NoCompilerWarning
 from .fmu.write import write
 from .interface.rules import problems_of

@@ -9,14 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+import numpy as np
 from numpy.typing import NDArray
 
 from .. import names
-from ..errors import VerificationError
+from ..errors import SimulationError, VerificationError
 from ..model.rule import Rule
-from .archive import opened
+from .archive import opened, platforms
 from .target import NATIVE, PYTHON
 
+MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
 
@@ -39,6 +41,32 @@ def experiment_of(
     if step is None:
         step = float(getattr(said, "stepSize", None) or stop / 500)
     return Experiment(stop, step, float(getattr(said, "tolerance", None) or 1e-8))
+
+
+def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
+    """0, h, 2 h, ..., and the stop time [s].  Raises SimulationError for more than fit a memory."""
+    if stop_time / step_size > MOST_POINTS:
+        raise SimulationError(
+            f"step_size = {step_size!r} s asks for {stop_time / step_size:.3g} communication points "
+            f"until {stop_time!r} s, expected at most {MOST_POINTS:.0e}: choose a larger step_size, or "
+            "an earlier stop_time"
+        )
+    count = max(1, int(np.ceil(stop_time / step_size * (1 - 1e-12))))
+    times = np.arange(count + 1, dtype=np.float64) * step_size
+    times[-1] = stop_time
+    return times
+
+
+def obstacle(path: Path, description: Any) -> str:
+    """Why a session cannot step an FMU, a file or an unpacked folder, on this machine; empty if it can."""
+    if description.fmiVersion != "2.0":
+        return f"is an FMU of FMI {description.fmiVersion}, expected FMI 2.0"
+    if description.coSimulation is None:
+        return "has no co-simulation"
+    found = platforms(path)
+    if fmpy.platform in found:
+        return ""
+    return f"has no binary for this machine ({fmpy.platform}), but for {', '.join(found) or 'none'}"
 
 
 def numbers_of(description: Any) -> dict[str, float]:

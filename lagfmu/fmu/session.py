@@ -17,17 +17,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from numpy.typing import NDArray
 
-from ..errors import LagfmuError, SimulationError
+from ..errors import SimulationError
 from ..interface.rules import rules_of
 from ..prepare.prepare import Prepared
-from .archive import platforms, unpack
+from .archive import unpack
 from .binary import instantiated, listen
-from .described import Experiment, Trajectory, described_rules, experiment_of, read_description
+from .described import (
+    Experiment,
+    Trajectory,
+    described_rules,
+    experiment_of,
+    obstacle,
+    read_description,
+)
 from .inprocess import CallError, SlaveInProcess
 from .python import offered
 
@@ -35,11 +40,8 @@ STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 WARNING, DISCARD, ERROR = 1, 2, 3
 KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
 COLUMNS: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
-MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 Columns = Mapping[str, Sequence[float]]  # of inputs by name, a value a communication point
-Events = Sequence[
-    tuple[str, str]
-]  # of each the variables with its count, and the latest one's time [s]
+Events = Sequence[tuple[str, str]]  # of each what counts it, and when it was last [s]
 
 
 class RefusalError(Exception):
@@ -83,6 +85,7 @@ class Session:
         self.instance: Any = None
         self._said: list[str] = []  # of calls that fail
         self._unpacked = ""
+        self.folder: Path | None = None
         if isinstance(target, Prepared):
             table = offered(target)
             self.rules, variables = rules_of(table), table.variables
@@ -102,8 +105,8 @@ class Session:
             self.reference = {v.name: int(v.valueReference) for v in variables}
             self.experiment = experiment_of(self.description)
             self._unpacked = "" if path.is_dir() else unpack(path)
-            self.folder = Path(self._unpacked or path)
-            self._make = lambda: instantiated(self.folder, self.description, name, log)
+            self.folder = folder = Path(self._unpacked or path)
+            self._make = lambda: instantiated(folder, self.description, name, log)
         readable = [v for v in variables if self.rules[v.name].kind in KINDS]
         self.outputs = [v.name for v in readable if v.causality == "output"]
         self.inputs = [v.name for v in readable if v.causality == "input"]
@@ -128,7 +131,7 @@ class Session:
         try:
             self.instance = self._make()
         except Exception as error:
-            if isinstance(error, LagfmuError):
+            if self.folder is None:  # of the slave in this process
                 raise
             raise RefusalError("instantiate", ERROR, self.reason(str(error))) from None
         self.used = False
@@ -361,29 +364,3 @@ class Session:
         columns = [("time", np.float64)]
         columns += [(n, COLUMNS[KINDS[self.rules[n].kind]]) for n in names]
         return np.array(rows, dtype=columns)
-
-
-def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:
-    """0, h, 2 h, ..., and the stop time [s].  Raises SimulationError for more than fit a memory."""
-    if stop_time / step_size > MOST_POINTS:
-        raise SimulationError(
-            f"step_size = {step_size!r} s asks for {stop_time / step_size:.3g} communication points "
-            f"until {stop_time!r} s, expected at most {MOST_POINTS:.0e}: choose a larger step_size, or "
-            "an earlier stop_time"
-        )
-    count = max(1, int(np.ceil(stop_time / step_size * (1 - 1e-12))))
-    times = np.arange(count + 1, dtype=np.float64) * step_size
-    times[-1] = stop_time
-    return times
-
-
-def obstacle(path: Path, description: Any) -> str:
-    """Why a session cannot step an FMU, a file or an unpacked folder, on this machine; empty if it can."""
-    if description.fmiVersion != "2.0":
-        return f"is an FMU of FMI {description.fmiVersion}, expected FMI 2.0"
-    if description.coSimulation is None:
-        return "has no co-simulation"
-    found = platforms(path)
-    if fmpy.platform in found:
-        return ""
-    return f"has no binary for this machine ({fmpy.platform}), but for {', '.join(found) or 'none'}"

@@ -17,8 +17,7 @@ from xml.etree import ElementTree as ET
 
 from .. import names
 from ..errors import SimulationError
-from ..fmu.described import Trajectory, experiment_of, read_description
-from ..fmu.session import communication_points
+from ..fmu.described import Trajectory, communication_points, experiment_of, read_description
 from ..fmu.write import REFERENCES, write_whole
 from .pipeline import as_json
 from .report import report

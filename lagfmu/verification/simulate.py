@@ -18,9 +18,11 @@ from ..errors import SettingError, SimulationError
 from ..fmu import native
 from ..fmu.described import (
     Trajectory,
+    communication_points,
     described_rules,
     experiment_of,
     has_error_bars,
+    obstacle,
     read_description,
     target_in,
 )
@@ -32,8 +34,6 @@ from ..fmu.session import (
     RefusalError,
     Run,
     Session,
-    communication_points,
-    obstacle,
 )
 from ..fmu.target import PYTHON, target_of
 from ..fmu.write import as_built

@@ -20,9 +20,15 @@ from ... import names
 from ...errors import SettingError, SimulationError
 from ...fmu.archive import unpack, version
 from ...fmu.batch import Plan
-from ...fmu.described import Trajectory, described_rules, experiment_of, read_description
+from ...fmu.described import (
+    Trajectory,
+    communication_points,
+    described_rules,
+    experiment_of,
+    obstacle,
+    read_description,
+)
 from ...fmu.inputs import check_inputs, columns_at
-from ...fmu.session import communication_points, obstacle
 from ...fmu.write import as_fmu
 from ...interface.rules import unsettable
 from ...model.model import Model

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import SimulationError, VerificationError
-from ...fmu.described import Trajectory
-from ...fmu.session import RefusalError, Run, Session, communication_points
+from ...fmu.described import Trajectory, communication_points
+from ...fmu.session import RefusalError, Run, Session
 from ...names import TOLERANCE
 from .setting import Setting
 
