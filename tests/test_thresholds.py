@@ -1,4 +1,4 @@
-"""What both engines decide by stands once, in runtime/base/thresholds.h."""
+"""What the runtime and the build decide by stands once, in runtime/base/thresholds.h."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NAMES = sorted(thresholds._VALUES)
 
 
 def test_python_reads_what_c_compiles(tmp_path: Path) -> None:
-    """Each threshold is the same double in both engines, to the last bit."""
+    """Each threshold is the same double in C and in Python, to the last bit."""
     rows = "".join(f'    printf("{n} %a\\n", (double){n});\n' for n in NAMES)
     text = (
         f'#include "thresholds.h"\n#include <stdio.h>\nint main(void) {{\n{rows}    return 0;\n}}\n'
