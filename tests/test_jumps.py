@@ -292,7 +292,7 @@ def test_a_jump_in_a_velocity_is_refused_by_name(force):
 def test_a_kink_is_no_jump(force, lagrangian):
     """Springs with play, drag in |v| v, a law in two pieces that meet: nothing is refused or watched."""
     prepared = prepare(cart("Kink", force, lagrangian))
-    assert prepared.system.floors == ()
+    assert prepared.system.switches == ()
 
 
 @pytest.mark.parametrize(

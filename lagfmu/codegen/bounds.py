@@ -1,9 +1,9 @@
-"""How fast the indicators of events can change: their rates in interval arithmetic, as C99 or Python.
+"""How fast the indicators of events can change: their rates in interval arithmetic, as C99.
 
     f' = G v - nu  of a contact,   h' = dh/dt + dh/dq v  of a jump of the forces
 
 evaluated for boxes of t, q, v and u, they bound what f and h can have done between two looks (Moore,
-Interval Analysis, 1966).  The same text serves both languages but for the names of the operations.
+Interval Analysis, 1966).
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ FUNCTIONS = {
     sp.Min: "smaller",
     sp.Max: "larger",
 }
-C, PYTHON = "interval_", "interval."
 
 
 class _UnknownError(Exception):
@@ -54,13 +53,11 @@ def _plain(s: Expr) -> Expr:
     return sp.Symbol(str(s), real=True) if s.is_real is None else s
 
 
-def body(
-    expressions: Sequence[Expr], places: Mapping[Expr, str], prefix: str
-) -> tuple[list[str], list[str]]:
+def body(expressions: Sequence[Expr], places: Mapping[Expr, str]) -> tuple[list[str], list[str]]:
     """Statements `name = text` that compute common parts, and the text of each rate; one of which nothing
     is known is no number.  `places`: where each symbol's interval stands."""
     known = [e if _is_known(e) else None for e in map(sp.sympify, expressions)]
-    printer = _Printer(places, prefix)
+    printer = _Printer(places)
     common, reduced = sp.cse([e for e in known if e is not None], order="none", list=True)
     statements = []
     for s, e in common:
@@ -68,13 +65,12 @@ def body(
         printer.places[s] = str(s)
         statements.append(f"{s} = {text}")
     texts = iter([printer(e) for e in reduced])
-    unknown = f"{prefix}unknown()"
-    return statements, [unknown if e is None else next(texts) for e in known]
+    return statements, ["interval_unknown()" if e is None else next(texts) for e in known]
 
 
 def _is_known(e: Expr) -> bool:
     try:
-        _Printer({}, C)(e)
+        _Printer({})(e)
     except _UnknownError:
         return False
     return True
@@ -83,8 +79,8 @@ def _is_known(e: Expr) -> bool:
 class _Printer:
     """The text of an expression of intervals."""
 
-    def __init__(self, places: Mapping[Expr, str], prefix: str) -> None:
-        self.places, self.prefix = dict(places), prefix
+    def __init__(self, places: Mapping[Expr, str]) -> None:
+        self.places = dict(places)
 
     def __call__(self, e: Expr) -> str:
         if e.is_Symbol:
@@ -106,7 +102,7 @@ class _Printer:
         raise _UnknownError(str(e.func))
 
     def _of(self, name: str, *arguments: str) -> str:
-        return f"{self.prefix}{name}({', '.join(arguments)})"
+        return f"interval_{name}({', '.join(arguments)})"
 
     def _chain(self, name: str, parts: Sequence[Expr]) -> str:
         text = self(parts[0])

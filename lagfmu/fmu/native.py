@@ -144,7 +144,7 @@ def sources_of(prepared: Prepared, listed: bool = True) -> Sources:
     }
     order = {"maxOutputDerivativeOrder": "1" if differentiable else "0"}
     exchanged = offers_exchange(prepared)
-    watched = len(system.contacts) + len(system.floors) + 2 * len(system.frictions)
+    watched = len(system.contacts) + len(system.switches) + 2 * len(system.frictions)
     description = model_description(
         table,
         scene,

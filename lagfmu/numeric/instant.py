@@ -60,11 +60,11 @@ def switch_states(
         return ()
     padded = [*u, *(0.0,) * (system.driven - len(u))]
     values = system.surfaces(t, q.tolist(), padded, p)
-    return tuple(_side(h, floor) for h, floor in zip(values, system.floors, strict=True))
+    return tuple(_side(h, whole) for h, whole in zip(values, system.switches, strict=True))
 
 
-def _side(h: float, floor: bool) -> float:
-    if floor:
+def _side(h: float, whole: bool) -> float:
+    if whole:
         return math.floor(h) + 0.5 if math.isfinite(h) else h
     return float(np.sign(h))
 

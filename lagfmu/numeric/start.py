@@ -72,8 +72,8 @@ def start(
 def _start(at: Instant, q0: Vector, v0: Vector, priority: list[int]) -> Start:
     system, n = at.system, at.system.n
     q, size, gap, near = _positions(at, q0, v0, priority[:n])
-    if system.floors:
-        at = at_start(system, q, at.u[: len(at.u) - len(system.floors)], at.p, at.t)
+    if system.switches:
+        at = at_start(system, q, at.u[: len(at.u) - len(system.switches)], at.p, at.t)
     v, touching = _velocities(at, q, v0, near, size, gap, priority[n:])
     closed = closed_contacts(at, q, v, touching) if system.contacts else ()
     rows, slips = system.active(closed), NONE
@@ -82,7 +82,7 @@ def _start(at: Instant, q0: Vector, v0: Vector, priority: list[int]) -> Start:
     now = motion(at, q, v, rows, slips)
     held = [rows[i] for i in independent(now.M, now.G[rows])]
     size, rate = natural(at, q, v, size, now, lambda there: motion(at, there, v, held, slips))
-    states = tuple(at.u[len(at.u) - len(system.floors) :])
+    states = tuple(at.u[len(at.u) - len(system.switches) :])
     moved = _moved(system, [*q0, *v0], [*q, *v], size, rate, priority)
     return Start(q, v, closed, states, size, rate, moved)
 

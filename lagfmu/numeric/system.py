@@ -79,10 +79,8 @@ class System:
     coulomb(t, q, v, u, p) -> (static, kinetic, load, normal) of the `frictions`: coefficients, and
     N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`, one after the other.
 
-    surfaces(t, q, u, p) -> h of each jump of the forces (jumps.py); `floors`: which of them jump wherever h
-    is a whole number; bounds(t, q, v, u, p) -> how fast f of the contacts and h of the jumps can change in
-    boxes of t, q, v and u (interval.py); `driven`: length of u, the inputs and the
-    levels of jumps behind them.
+    surfaces(t, q, u, p) -> h of each surface at which forces jump (instant.py); `switches`: which of them
+    jump wherever h is a whole number; `driven`: length of u, the inputs and the switch states behind them.
 
     starts(p) -> the start values that are expressions of parameters, at the positions `started` of (q, v).
 
@@ -114,8 +112,7 @@ class System:
     lookups: Lookups | None = None
     estimated: tuple[int, ...] = ()
     surfaces: Callable[..., Any] | None = None
-    floors: tuple[bool, ...] = ()
-    bounds: Callable[..., Any] | None = None
+    switches: tuple[bool, ...] = ()
     driven: int = 0
     started: tuple[int, ...] = ()
     starts: Callable[..., Any] | None = None
@@ -138,7 +135,7 @@ class System:
     @property
     def is_watched(self) -> bool:
         """True if there are events to watch for: contacts, jumps of forces, frictions."""
-        return bool(self.contacts or self.floors or self.frictions)
+        return bool(self.contacts or self.switches or self.frictions)
 
     @property
     def is_constrained(self) -> bool:
@@ -165,35 +162,9 @@ class System:
         k, j = (np.asarray(a, dtype=np.intp) for a in self.jacobian)
         return k, j
 
-    @cached_property
-    def alike(self) -> NDArray[np.bool_]:
-        """(n, n) for each coordinate those that turn into each other, itself among them, by another choice of
-        axes: of one dimension, and tied by a constraint or the mass matrix; angles by a constraint.  None in
-        the row of a coordinate that is like no other."""
-        tied = np.eye(self.n, dtype=bool)
-        entries: dict[int, list[int]] = {}
-        for k, j in zip(*self.jacobian, strict=True):
-            entries.setdefault(k, []).append(j)
-        for row in entries.values():
-            tied[np.ix_(row, row)] = True
-        for i, j in zip(*self.mass, strict=True):
-            if i not in self.angles:
-                tied[i, j] = tied[j, i] = True
-        same = np.zeros_like(tied)
-        for j in range(self.n):
-            same[j, list(self.like[j]) if self.like else [j]] = True
-        found: NDArray[np.bool_] = tied & same
-        found[found.sum(axis=1) < 2] = False
-        return found
-
-    @cached_property
-    def written(self) -> dict[tuple[int, ...], Any]:
-        """What straight.py wrote for this system so far, by the rows that act."""
-        return {}
-
     def active(self, closed: Sequence[bool]) -> list[int]:
         """Rows that act while the contacts stand as in `closed` (one entry a contact); those that stick
-        by friction come to them in friction.py."""
+        by friction come to them."""
         shut = {k for k, c in zip(self.contacts, closed, strict=True) if c}
         return [
             k
@@ -207,11 +178,7 @@ class System:
     ) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
         """M (n, n), F (n), G (m, n), nu (m), gamma (m) at a state; all constraint rows."""
         assert self.dynamics is not None
-        return self.placed(self.dynamics(t, q.tolist(), v.tolist(), u, p))
-
-    def placed(self, values: Any) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
-        """The same from the values that `dynamics` gave."""
-        mass, F, jacobian, nu, gamma = values
+        mass, F, jacobian, nu, gamma = self.dynamics(t, q.tolist(), v.tolist(), u, p)
         M = np.zeros((self.n, self.n))
         i, j = self._mass
         M[i, j] = mass

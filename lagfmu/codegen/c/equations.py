@@ -164,7 +164,7 @@ def _bounds(parts: Parts, changing: Sequence[Expr]) -> str:
     places = {s: f"{a}[{j}]" for a, group in groups.items() for j, s in enumerate(group)}
     places |= {p: f"interval_of(p[{k}])" for k, p in enumerate(eom.p)}
     places[parts.time] = "t"
-    lines, found = bounds.body(changing, places, bounds.C)
+    lines, found = bounds.body(changing, places)
     text = [f"    const Interval {line};\n" for line in lines]
     text += [f"    rate[{k}] = {value};\n" for k, value in enumerate(found)]
     whole = "".join(text)

@@ -70,7 +70,7 @@ def optional_source(
     rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
     rows += [f"    .{name} = {name},\n" for name in AT_EVENTS if system.is_watched]
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
-    rows += ["    .switches = &SWITCHES,\n"] if system.floors else []
+    rows += ["    .switches = &SWITCHES,\n"] if system.switches else []
     rows += ["    .peaks = &PEAKS,\n"] if peaks else []
     rows += ["    .passage = &PASSAGE,\n"] if _may_pass(system) else []
     rows += ["    .friction = &FRICTION_EVENTS,\n"] if system.frictions else []
@@ -104,7 +104,7 @@ def files_left_out(
         gone.add(PASSAGE)
     if {PEAKS, PASSAGE} <= gone:
         gone.add(BEHIND_BOTH)
-    if not system.floors:
+    if not system.switches:
         gone.add("switches.c")
     if not system.prescribed:
         gone |= {*MOTIONS}

@@ -15,7 +15,6 @@ from ...model.elements import Expr
 from ...model.units import Unit
 from ...numeric.cubic import Cubic
 from ...numeric.system import System
-from .. import bounds
 from ..parts import Function, Parts, parts_of
 from .function import function, identifiers, table_name
 
@@ -57,11 +56,9 @@ def _imported(text: str) -> str:
 
 def compile_system(text: str) -> System:
     """Run generated source in memory and take its SYSTEM."""
-    from ...numeric import interval
     from ...numeric import system as vocabulary
 
     scope: dict[str, Any] = {
-        "interval": interval,
         "System": vocabulary.System,
         "Own": vocabulary.Own,
         "Lookups": vocabulary.Lookups,
@@ -110,9 +107,6 @@ def _functions(parts: Parts) -> dict[str, str]:
             f = replace(f, results={a: x for a, x in results.items() if a != "coefficients"})
         if f.name != "outputs" and not (f.name == "energies" and parts.prefix):
             found[f.name] = _define(f, names, parts.prefix)
-    changing = [] if eom.bare else bounds.rates(eom, parts.constraints, parts.jumps)
-    if changing:
-        found["bounds"] = _bounds(parts, changing)
     return found
 
 
@@ -145,12 +139,12 @@ def _system(parts: Parts) -> list[str]:
     if parts.estimated:
         fields["estimated"] = repr(parts.estimated)
     if parts.at_integers:
-        fields |= {"floors": repr(parts.at_integers), "driven": str(len(eom.driven))}
+        fields |= {"switches": repr(parts.at_integers), "driven": str(len(eom.driven))}
     if parts.formulas:
         fields["started"] = repr(tuple(parts.formulas))
     if parts.frictions:
         fields["frictions"] = _frictions(parts)
-    for name in ("surfaces", "starts", "bounds", "coulomb"):
+    for name in ("surfaces", "starts", "coulomb"):
         if name in texts:
             fields[name] = f"{p}{name}"
     if "lookups" in texts:
@@ -160,22 +154,6 @@ def _system(parts: Parts) -> list[str]:
         fields["outputs"] = "".join(["(\n", *(f"        {made},\n" for made in own), "    )"])
     lines = "".join(f"    {name}={value},\n" for name, value in fields.items())
     return [*texts.values(), *own.values(), f"{_label(parts)} = System(\n{lines})\n"]
-
-
-def _bounds(parts: Parts, changing: Sequence[Expr]) -> str:
-    """Bounds on the rates of the indicators, in interval arithmetic."""
-    eom = parts.eom
-    groups = {"q": eom.q, "v": eom.v, "u": eom.u}
-    places = {s: f"{a}[{j}]" for a, group in groups.items() for j, s in enumerate(group)}
-    places |= {p: f"interval.of(p[{k}])" for k, p in enumerate(eom.p)}
-    places[TIME] = "t"
-    lines, found = bounds.body(changing, places, bounds.PYTHON)
-    text = "".join(f"    {line}\n" for line in lines)
-    return (
-        f"def {parts.prefix}bounds(t, q, v, u, p):\n"
-        '    """How fast the indicators of events can change: f of contacts, h of jumps."""\n'
-        f"{text}    return [{', '.join(found)}]\n"
-    )
 
 
 def _outputs(parts: Parts) -> dict[str, str]:
