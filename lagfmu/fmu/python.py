@@ -134,7 +134,7 @@ def offered(prepared: Prepared) -> VariableTable:
     """The variables that it has, with the methods that it offers.  Raises BuildError with all `refusals`."""
     if reasons := refusals(prepared):
         raise BuildError(
-            f"scene {prepared.scene.name!r} is none for the python target: {'; '.join(reasons)}: build "
+            f"the python target cannot run scene {prepared.scene.name!r}: {'; '.join(reasons)}; build "
             "--target native"
         )
     table = prepared.table.without(names.STEP)  # no method of this target has a fixed step
