@@ -44,7 +44,6 @@ from lagfmu.testing import (
     applies,
     attempt,
     first_landing,
-    lagrange,
     lay_beside,
     load,
     magnitude,
@@ -390,31 +389,6 @@ def test_a_scale_of_a_difference_is_none_of_its_magnitudes(bench):
     rows = np.ones(len(run.rows))
     error, allowed, _ = form.judge(run, rows, rows == 1, {"theta": 2.0, "r": 1.0})
     assert 0 < error < 1e-3 * allowed
-
-
-def test_a_force_is_known_to_what_the_smallest_lambda_makes_of_it(prepared):
-    """A constraint whose derivative is 2e300 acts with 1e-23 N or not at all: no double lies between the two
-    lambda, so that Lagrange's equation cannot hold to less."""
-    one = prepared("PendulumCartesian")
-    forms = lagrange(one.model, frozenset(v.name for v in one.table.variables))
-    (law,) = [form for form in forms if form.name == "Lagrange's equation of x"]
-    values = {s: {"x": 1e300, "m": 1.0}.get(s.name, 0.0) for s in law.scale.free_symbols}
-    assert float(law.scale.subs(values)) == pytest.approx(
-        2e300 * np.finfo(float).smallest_subnormal
-    )
-
-
-def test_a_closed_form_is_not_judged_by_what_underflows_on_its_way(bench):
-    """2 l (f^2/g) with l = 5e-324, f = 1e-10 and g = 1e-50 is 1e-293 and no 0: only l f underflows."""
-    from lagfmu.testing import Compiled
-
-    if np.finfo(np.longdouble).maxexp <= np.finfo(float).maxexp:
-        pytest.skip("no numbers of a wider range here")
-    length, f, g = sp.symbols("length f g", positive=True)
-    compiled = Compiled(sp.Mul(2, length, f, f, 1 / g, evaluate=False), "thrust")
-    rows = bench.ordinary.rows
-    found = compiled.at(rows, rows, {"length": 5e-324, "f": 1e-10, "g": 1e-50})
-    assert found == pytest.approx(2 * 5e-324 * 1e30, rel=1e-12)
 
 
 def test_probes_cover_the_ranges(bench):

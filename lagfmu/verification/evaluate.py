@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -15,8 +14,6 @@ from .. import names
 from ..errors import VerificationError
 from ..fmu.described import Trajectory
 from ..model.elements import Expr
-
-TINY = 1e-150  # whose square a double holds
 
 
 def function(symbols: Sequence[Expr], expressions: Any) -> Callable[..., Any]:
@@ -67,19 +64,8 @@ class Compiled:
                 column = np.maximum(np.abs(column), floors[text])
             columns.append(column)
         with np.errstate(all="ignore"):
-            found = np.asarray(self._evaluated(columns), dtype=float)
+            found = np.asarray(self.function(*columns), dtype=float)
         return np.broadcast_to(found, len(rows)).copy()
-
-    def _evaluated(self, columns: list[Any]) -> Any:
-        """In a wider range of exponents, where there is one and what comes in is near the end of a double's:
-        a product of several factors passes through places at which doubles have no digits left."""
-        far = [
-            c for c in columns if np.any((c != 0) & ~((np.abs(c) > TINY) & (np.abs(c) < 1 / TINY)))
-        ]
-        if far:
-            with contextlib.suppress(TypeError):  # functions that know doubles only
-                return self.function(*(c.astype(np.longdouble) for c in columns))
-        return self.function(*columns)
 
 
 _compiled = lru_cache(maxsize=1024)(Compiled)  # SymPy takes longer for one than the run takes

@@ -9,10 +9,9 @@ from typing import Any
 
 from ... import names
 from ...errors import VerificationError
-from ...fmu.archive import opened
-from ...fmu.closed_forms import CarriedForm, tables_in, unpack_closed_forms
+from ...fmu.closed_forms import CarriedForm, unpack_closed_forms
 from ...fmu.described import experiment_of, file_stem, read_description, target_in
-from ...verification.verify import RECORD, closed_forms_in
+from ...verification.verify import closed_forms_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -58,7 +57,6 @@ class Facts:
     estimated: tuple[
         str, ...
     ] = ()  # rates of inputs that the FMU estimates: read, not set; 0 at first
-    tabulated: bool = False  # numbers with units that no parameter scales
 
     def share(self, constraint: str, coordinate: str) -> str | None:
         """The output with the constraint's share in Q, if it acts on the coordinate."""
@@ -96,8 +94,6 @@ def facts_of(path: Path) -> Facts:
             f"{str(path)!r} was not built by lagfmu, or for a scene that leaves out what it would be "
             "judged by: stress the model's full FMU"
         )
-    with opened(path) as archive:
-        tables = tables_in(archive.read(RECORD), str(path))
     reals = [v for v in description.modelVariables if v.type == "Real"]
     bases = {
         u.name: tuple(int(getattr(u.baseUnit, b, 0) or 0) for b in BASE)
@@ -142,7 +138,6 @@ def facts_of(path: Path) -> Facts:
         stop_time=experiment.stop_time,
         step_size=experiment.step_size,
         tolerance=experiment.tolerance,
-        tabulated=bool(tables),
     )
 
 

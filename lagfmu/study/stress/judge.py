@@ -15,7 +15,6 @@ Each comes as an error and what is allowed; the run is right if no error exceeds
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -126,9 +125,8 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
     """The magnitude that an error is relative to, at the least: of coordinates, velocities, energy.
 
     A coordinate is known to the rounding of the value that it was given at the start, however small the
-    one is onto which that was projected; a velocity to that of the motion's natural one, sqrt(|vdot| size),
-    beside which a throw at 8 m/s is none where g = 1e300 m/s^2, and to what would move the coordinate by its
-    rounding within the run; the energy to the work of Q over the rounding of the sizes.
+    one is onto which that was projected; a velocity to what would move the coordinate by its rounding within
+    the run; the energy to the work of Q over the rounding of the sizes.
     """
     found = {}
     work, span = 0.0, float(run.rows["time"][-1] - run.rows["time"][0])
@@ -138,9 +136,8 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
         peers = [p for p in facts.coordinates if facts.dimensions[p] == facts.dimensions[q]]
         fastest = max(float(np.abs(run.rows[names.derivative(p)]).max()) for p in peers)
         size = found[q] or facts.usual(q)
-        natural = math.sqrt(size) * math.sqrt(float(np.abs(run.rows[names.derivative(q, 2)]).max()))
         creep = EPS * (size / span) if span > 0 else 0.0
-        found[names.derivative(q)] = max(fastest, EPS * natural, creep)
+        found[names.derivative(q)] = max(fastest, creep)
         if names.name(names.FORCE, "", q) in facts.variables:
             work += EPS * size * float(np.abs(run.rows[names.name(names.FORCE, "", q)]).max())
     if names.POTENTIAL in facts.variables:

@@ -17,7 +17,6 @@ where the terms of Q_j are its shares.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -36,8 +35,6 @@ from .facts import beside
 
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone
-NOTHING = 2.0**-52  # of the forces on others: a force that is none, however light what it acts on
-LEAST = sp.Float(math.ulp(0.0))  # of a lambda: what is smaller is 0 to a double
 ON = 1e-12  # of the terms of a jump's surface: a motion that stands on it
 GAP = 4e-10  # of f, whose level a contact that closes within the gap of touching keeps
 
@@ -55,10 +52,7 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
     forms = []
     for q, (inertia, force) in sides.items():
         others = [
-            sp.Max(sp.sqrt(masses[q] / masses[k]), least) * terms[k]
-            for k in sides
-            if k != q and masses[k] != 0
-            for least in (NOTHING if model.coordinates[q] == model.coordinates[k] else 0,)
+            sp.sqrt(masses[q] / masses[k]) * terms[k] for k in sides if k != q and masses[k] != 0
         ]
         name, scale = EQUATION + name_of(q), sp.Add(terms[q], *others)
         when = _beside_jumps(model)
@@ -104,13 +98,11 @@ def _alone(masses: Mapping[Expr, Expr], terms: Mapping[Expr, Expr]) -> dict[Expr
 
 
 def _shares(model: Model, variables: frozenset[str]) -> dict[Expr, Expr]:
-    """The magnitudes of what constraints contribute to Q, whose sum may be far smaller; at least of what the
-    smallest lambda does that a double holds: on a lever of 1e300 m it is known no better."""
+    """The magnitudes of what constraints contribute to Q, whose sum may be far smaller."""
     found = {}
     for q in model.coordinates:
         of = [names.name(names.FORCE, c.name, name_of(q)) for c in model.constraints]
-        least = [LEAST * sp.Abs(in_variables(_along(c, q))) for c in model.constraints]
-        found[q] = sp.Add(*(sp.Abs(output(n)) for n in of if n in variables), *least)
+        found[q] = sp.Add(*(sp.Abs(output(n)) for n in of if n in variables))
     return found
 
 
