@@ -1,0 +1,143 @@
+"""The engine of the python target where its own choices matter: redundant rows, impacts, sizes, events."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sympy import exp, log, sin, sqrt, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import (
+    Contact,
+    Friction,
+    Holonomic,
+    Model,
+    Nonholonomic,
+    Parameter,
+    Peak,
+    Scene,
+    multiplier,
+    simulate,
+)
+from lagfmu.errors import BuildError
+from lagfmu.testing import prepare, write
+
+t = dynamicsymbols._t
+x, z, theta = dynamicsymbols("x z theta")
+m, g, L, w, F = symbols("m g L w F", positive=True)
+PARAMETERS = [Parameter(m, 2.0, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1.0, "m")]
+
+
+def swing(rods: int) -> Model:
+    """A bob on a rod that is said as often."""
+    return Model(
+        name="Swing",
+        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
+        coordinates={x: "m", z: "m"},
+        constraints=[Holonomic(f"rod{k}", x**2 + z**2 - L**2) for k in range(rods)],
+        parameters=PARAMETERS,
+        start={x: 0.6, z: -0.8},
+    )
+
+
+@pytest.mark.filterwarnings("ignore:.*follow")
+def test_a_rod_that_is_said_twice_carries_half_each():
+    """Of two rows alike the least norm is half of lambda each, neither is unique, and Q is that of the one:
+    also within the steps, where the two rows differ by rounding in the step's error."""
+    one, two = (simulate(swing(n), 2.0, 0.25, target="python") for n in (1, 2))
+    for name in ("lambda.rod0", "lambda.rod1"):
+        np.testing.assert_allclose(two[name], one["lambda.rod0"] / 2, rtol=1e-9)
+    np.testing.assert_allclose(two["Q.x"], one["Q.x"], rtol=1e-9, atol=1e-9)
+    assert not two["unique.rod0"].any()
+    assert one["unique.rod0"].all()
+
+
+def plank(**start: float) -> Model:
+    """A plank on two feet that rebound with e = 0.25."""
+    kinetic = m * z.diff() ** 2 / 2 + m * L**2 * theta.diff() ** 2 / 24
+    return Model(
+        name="Plank",
+        lagrangian=kinetic - m * g * z,
+        coordinates={z: "m", theta: "rad"},
+        constraints=[
+            Contact("left", z - L * sin(theta) / 2, restitution=0.25),
+            Contact("right", z + L * sin(theta) / 2, restitution=0.25),
+        ],
+        parameters=PARAMETERS,
+        start={z: start["z"], theta: start["theta"]},
+    )
+
+
+def test_a_plank_that_falls_flat_rebounds_flat():
+    """Both feet are struck together: v becomes e v, nothing turns, and (1 - e^2) m g h is lost."""
+    run = simulate(plank(z=0.1, theta=0.0), 0.16, 0.02, target="python")
+    assert run["closing.left.count"][-1] == run["closing.right.count"][-1] == 1
+    fall = np.sqrt(2 * 0.1 / 9.81)
+    np.testing.assert_allclose(run["closing.left.time"][-1], fall, rtol=1e-9)
+    speed = 0.25 * np.sqrt(2 * 9.81 * 0.1) - 9.81 * (0.16 - fall)
+    np.testing.assert_allclose(run["der(z)"][-1], speed, rtol=1e-8)
+    assert np.abs(run["theta"]).max() < 1e-12
+    lost = (1 - 0.25**2) * 2.0 * 9.81 * 0.1
+    np.testing.assert_allclose(run["energy.dissipated"][-1], lost, rtol=1e-8)
+
+
+def test_a_plank_that_rocks_comes_to_rest():
+    """It strikes with one foot, then the other, ever faster, and ends: both feet carry half of it."""
+    run = simulate(plank(z=0.1, theta=0.1), 1.5, 0.1, target="python")
+    assert run["closing.left.count"][-1] > 5
+    for foot in ("left", "right"):
+        assert run[f"contact.{foot}"][-1]
+        np.testing.assert_allclose(run[f"lambda.{foot}"][-1], 2.0 * 9.81 / 2, rtol=1e-9)
+
+
+def test_a_fall_from_nothing_has_a_size():
+    """From rest at 0, without a length in the model, the way itself is the size of z: z = -g t^2 / 2."""
+    model = Model(
+        name="Fall",
+        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
+        coordinates={z: "m"},
+        parameters=PARAMETERS[:2],
+    )
+    run = simulate(model, 1.0, 0.1, target="python")
+    np.testing.assert_allclose(run["z"], -9.81 * run["time"] ** 2 / 2, rtol=1e-12, atol=1e-15)
+
+
+def test_a_dip_of_lambda_within_a_step_is_found():
+    """A pull of F exp(-((t - 0.055)/w)^2) lifts a body off its floor, at t = 0.055 - w sqrt(ln(F/(m g))),
+    though lambda is m g again at the end of the communication step."""
+    pull = Parameter(F, 40.0, "N"), Parameter(w, 0.01, "s")
+    T = symbols("T", positive=True)
+    model = Model(
+        name="Lifted",
+        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
+        forces={z: F * exp(-(((t - T) / w) ** 2))},
+        coordinates={z: "m"},
+        constraints=[Contact("floor", z)],
+        parameters=[*PARAMETERS[:2], *pull, Parameter(T, 0.055, "s")],
+    )
+    run = simulate(model, 0.1, 0.1, target="python")
+    assert run["departure.floor.count"][-1] == 1
+    expected = 0.055 - 0.01 * float(sqrt(log(40.0 / (2.0 * 9.81))))
+    np.testing.assert_allclose(run["departure.floor.time"][-1], expected, rtol=1e-6)
+
+
+def test_all_that_native_fmus_alone_do_is_refused_at_once(tmp_path):
+    """Friction, error bars, a peak, a method: one message, with the remedy."""
+    mu = symbols("mu", positive=True)
+    model = Model(
+        name="Block",
+        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
+        coordinates={x: "m", z: "m"},
+        constraints=[
+            Contact("floor", z),
+            Nonholonomic("hold", x.diff()),
+            Friction("grip", of=["hold"], normal=multiplier("floor"), static=mu),
+        ],
+        parameters=[*PARAMETERS[:2], Parameter(mu, 0.5, "1")],
+        outputs=[Peak("x")],
+    )
+    scene = Scene("Block", method="rk4", error_bars=True)
+    with pytest.raises(BuildError) as refused:
+        write(prepare(model, scene), tmp_path, target="python")
+    for part in ("'grip'", "error bars", "peak.x", "'rk4'", "--target native"):
+        assert part in str(refused.value)
