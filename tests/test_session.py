@@ -77,6 +77,15 @@ def test_an_fmu_of_model_exchange_alone_is_simulated(path, tmp_path):
     assert np.abs(run["lambda.surface"] - weight).max() < 1e-5
 
 
+def test_a_name_that_the_fmu_does_not_have_is_a_refusal(path):
+    """It is told with the nearest one, and the session goes on."""
+    with Session(path) as session:
+        run = session.run([0.0, 0.1], {"thta": 0.3})
+        assert run.refusal is not None
+        assert "did you mean 'theta'?" in run.refusal.message
+        assert session.run([0.0, 0.1], {"theta": 0.3}).refusal is None
+
+
 def test_rows_end_where_a_run_does(path):
     """There is no step of 0 s: what was reached before it is there, with the cause."""
     with Session(path) as session:

@@ -191,7 +191,7 @@ def test_the_command_writes_table_files_and_figure(tmp_path):
     model.write_text("from lagfmu import Output, multiplier\n" + text)
     text = lagfmu(
         *("tradeoff", model, "--scene", "Link", "--out", out, "--repeats", 2, "--target", "python"),
-        *("--tolerance", 1e-4, "--method", "dop853", "--method", "rk4", "--step-size", 0.02),
+        *("--tolerance", 1e-4, "--method", "dop853", "--method", "radau5", "--step-size", 0.02),
     )
     assert "Link (python), every 0.02 s" in text
     assert "own error" in text

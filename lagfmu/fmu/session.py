@@ -22,6 +22,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..errors import SimulationError
 from ..interface.rules import rules_of
+from ..model.rule import missing
 from ..prepare.prepare import Prepared
 from .archive import unpack
 from .binary import instantiated, listen
@@ -213,7 +214,10 @@ class Session:
         return [self.reference[n] for n in names]
 
     def give(self, values: Mapping[str, Any]) -> None:
-        """Set variables of any kind; an item of an Enumeration also by name."""
+        """Set variables of any kind; an item of an Enumeration also by name.  Raises RefusalError."""
+        unknown = [missing(n, self.rules) for n in values if n not in self.rules]
+        if unknown:
+            raise RefusalError("set", ERROR, "; ".join(unknown))
         for kind, names in reversed(self._by_kind(values)):
             numbers = [self.rules[n].number(values[n]) for n in names]
             self.call(f"set{kind}", self.references(names), numbers)
