@@ -11,6 +11,7 @@ from ... import names
 from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm, unpack_closed_forms
 from ...fmu.described import experiment_of, file_stem, read_description, target_in
+from ...methods import integrators
 from ...verification.verify import closed_forms_in
 
 Dimension = tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd, rad
@@ -57,6 +58,11 @@ class Facts:
     estimated: tuple[
         str, ...
     ] = ()  # rates of inputs that the FMU estimates: read, not set; 0 at first
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The integrators that it offers."""
+        return integrators([item.name for item in self.variables[names.METHOD].declaredType.items])
 
     def share(self, constraint: str, coordinate: str) -> str | None:
         """The output with the constraint's share in Q, if it acts on the coordinate."""

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterator
 from functools import partial
 
-from ...methods import FIXED_STEP, INTEGRATORS
+from ...methods import FIXED_STEP
 from ...names import derivative, read
 from . import runs
 from .facts import Facts
@@ -104,7 +104,7 @@ def _stepping(facts: Facts, take: int) -> Iterator[Probe]:
         yield Probe(family, name, partial(runs.pieces, count), False, True)
     for k in EXPONENTS[take]:
         yield Probe("tolerance", f"1e-{k}", partial(runs.tolerated, 10.0**-k), False, True)
-    for method in INTEGRATORS:
+    for method in facts.methods:
         near = method not in FIXED_STEP  # which is for some models only
         yield Probe("method", method, partial(runs.integrated, method), near=near)
     yield Probe("long run", "10 default experiments", partial(runs.prolonged, 10), near=True)
