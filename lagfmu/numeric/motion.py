@@ -59,7 +59,8 @@ def friction_law(at: Instant, q: Vector, v: Vector) -> FrictionLaw:
     """Raises StepFailureError if a coefficient is negative, or kinetic above static."""
     system = at.system
     assert system.coulomb is not None
-    static, kinetic, load, normal = system.coulomb(at.t, q.tolist(), v.tolist(), at.u, at.p)
+    coefficients, load, normal = system.coulomb(at.t, q.tolist(), v.tolist(), at.u, at.p)
+    static, kinetic = coefficients[::2], coefficients[1::2]
     C = np.zeros((len(system.frictions), system.m))
     values = iter(normal)
     for i, friction in enumerate(system.frictions):

@@ -76,8 +76,8 @@ class System:
     `extent` (n) the positions in p whose values have it, `folded` (n) the largest magnitude of it among
     the parameters that are numbers in the code; `angles` are those without dimension.
 
-    coulomb(t, q, v, u, p) -> (static, kinetic, load, normal) of the `frictions`: coefficients, and
-    N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`, one after the other.
+    coulomb(t, q, v, u, p) -> (coefficients, load, normal) of the `frictions`: the static and the kinetic one
+    of each in turn, and N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`.
 
     surfaces(t, q, u, p) -> h of each surface at which forces jump (instant.py); `switches`: which of them
     jump wherever h is a whole number; `driven`: length of u, the inputs and the switch states behind them.

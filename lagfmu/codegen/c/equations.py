@@ -16,8 +16,8 @@ from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.form import Form
 from ...mechanics.jumps import with_switch_states
 from ...model.elements import Expr
-from .. import bounds
 from ..parts import Function, Parts, parts_of
+from . import bounds
 from .function import FILL, function
 from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from ...mechanics.equations import TIME, EquationsOfMotion
@@ -101,10 +100,6 @@ def _functions(parts: Parts) -> dict[str, str]:
     eom, found = parts.eom, {}
     names = _names(eom.q, eom.v, eom.driven, eom.p)
     for f in parts.functions:
-        if f.name == "coulomb":
-            mu = f.results["coefficients"]
-            results = {"static": mu[::2], "kinetic": mu[1::2], **f.results}
-            f = replace(f, results={a: x for a, x in results.items() if a != "coefficients"})
         if f.name != "outputs" and not (f.name == "energies" and parts.prefix):
             found[f.name] = _define(f, names, parts.prefix)
     return found

@@ -20,7 +20,7 @@ from ..identifier import identifier
 
 ARGUMENTS = (
     *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "h", "e", "energy"),
-    *("vdot", "lam", "Q", "w", "static", "kinetic", "load", "normal", "places"),
+    *("vdot", "lam", "Q", "w", "coefficients", "load", "normal", "places"),
 )
 
 TABLE = "table_of_"

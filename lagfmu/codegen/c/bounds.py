@@ -1,4 +1,4 @@
-"""How fast the indicators of events can change: their rates in interval arithmetic, as C99.
+"""How fast the indicators of events can change: their rates in interval arithmetic as C99.
 
     f' = G v - nu  of a contact,   h' = dh/dt + dh/dq v  of a jump of the forces
 
@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 from sympy.core.relational import Relational
 
-from ..mechanics.differential import Differential
-from ..mechanics.equations import TIME, EquationsOfMotion
-from ..mechanics.jumps import Jumps
-from ..model.elements import Expr
-from ..model.model import Constraint, Contact
+from ...mechanics.differential import Differential
+from ...mechanics.equations import TIME, EquationsOfMotion
+from ...mechanics.jumps import Jumps
+from ...model.elements import Expr
+from ...model.model import Constraint, Contact
 
 FUNCTIONS = {
     **{f: f.__name__ for f in (sp.sin, sp.cos, sp.tan, sp.exp, sp.log, sp.atan, sp.asin, sp.acos)},
