@@ -6,6 +6,7 @@ import zipfile
 from dataclasses import replace
 
 import pytest
+from conftest import MODELS
 from fmpy import read_model_description
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
@@ -22,8 +23,8 @@ from lagfmu import (
     simulate,
     verify,
 )
-from lagfmu.errors import SettingError
-from lagfmu.testing import NoCompilerWarning, app, target_in, targets
+from lagfmu.errors import BuildError, SettingError
+from lagfmu.testing import NoCompilerWarning, app, load, target_in, targets
 
 m, g = symbols("m g", positive=True)
 z = dynamicsymbols("z")
@@ -116,6 +117,16 @@ def test_without_a_compiler_a_weight_is_carried_in_python_and_the_remedy_is_name
     with pytest.warns(NoCompilerWarning):
         assert verify(RESTING, closed_forms=[WEIGHT]).passed
     assert simulate(tmp_path / "Resting.fmu", 0.1).target == "python"
+
+
+def test_without_a_compiler_what_slips_is_refused_with_the_remedy(monkeypatch):
+    """A block on a belt sticks and slips, which native FMUs alone do: the refusal names the friction, and the
+    package that compiles it."""
+    monkeypatch.setattr(targets, "find_compiler", lambda: None)
+    file = load(MODELS / "belt.py")
+    told = r"does not slip \(friction 'grip'\); build --target native \(.*pip install ziglang"
+    with pytest.warns(NoCompilerWarning), pytest.raises(BuildError, match=told):
+        simulate(file.model, 0.1, scene=file.scenes[0])
 
 
 def test_without_a_compiler_the_command_says_what_it_builds(tmp_path, monkeypatch):

@@ -24,6 +24,7 @@ from . import facts
 from .archive import pack, version
 from .description import model_description
 from .slave import LagfmuSlave
+from .target import missing_for_native
 
 SHIPPED = (
     "names.py",
@@ -133,9 +134,10 @@ def refusals(prepared: Prepared) -> list[str]:
 def offered(prepared: Prepared) -> VariableTable:
     """The variables that it has, with the methods that it offers.  Raises BuildError with all `refusals`."""
     if reasons := refusals(prepared):
+        missing = missing_for_native()
         raise BuildError(
             f"the python target cannot run scene {prepared.scene.name!r}: {'; '.join(reasons)}; build "
-            "--target native"
+            f"--target native{f' ({missing})' * bool(missing)}"
         )
     table = prepared.table.without(names.STEP)  # no method of this target has a fixed step
     return table.offering([m for m in prepared.scene.selectable if m in IN_PYTHON])

@@ -1,4 +1,4 @@
-"""How fast the indicators of events can change: their rates in interval arithmetic as C99.
+"""How fast the indicators of events can change: their rates in interval arithmetic, as C99.
 
     f' = G v - nu  of a contact,   h' = dh/dt + dh/dq v  of a jump of the forces
 
