@@ -34,6 +34,7 @@ from .fmu.described import (
 )
 from .fmu.description import model_description
 from .fmu.exchange import by_fmpy
+from .fmu.facts import Variable as SlaveVariable
 from .fmu.formula import LONGEST_SUM, read_formula, text_of
 from .fmu.native import GENERATED
 from .fmu.session import RefusalError, Session
@@ -58,6 +59,7 @@ from .model.goal import Goal
 from .model.goal import parse as parse_goal
 from .model.library import known
 from .model.model import name_of
+from .model.rule import Rule
 from .model.spline import SplineBase
 from .model.units import (
     ENERGY,

@@ -42,8 +42,9 @@ class Variable(NamedTuple):
             return ""
         if not isinstance(value, (int, float)) or not math.isfinite(value):
             return f"{self.name!r} = {value!r}, expected a finite number"
-        low, high = self.minimum, self.maximum
-        if (low is not None and value < low) or (high is not None and value > high):
+        low = -math.inf if self.minimum is None else self.minimum
+        high = math.inf if self.maximum is None else self.maximum
+        if not low <= value <= high:
             return f"{self.name!r} = {value!r} is outside its bounds [{low}, {high}]"
         if self.positive and not value > 0:
             return f"{self.name!r} = {value!r}, expected a positive number"
