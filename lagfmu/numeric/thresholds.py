@@ -1,4 +1,4 @@
-"""What both engines decide by, read from the C runtime's thresholds.h: each value stands once.
+"""What a start is decided by, read from the C runtime's thresholds.h: each value stands once.
 
 `from .thresholds import RANK` gives the number; its meaning stands beside it there.
 """

@@ -22,7 +22,6 @@
 #include "schur.h"
 #include "segment.h"
 
-
 void exchange_begin(Instance *x) {
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
 }

@@ -79,7 +79,6 @@ fmi2Status component_missing(Component *c, const char *function) {
     return component_refuse(c, text.text);
 }
 
-
 static const char *const TYPE_NAMES[] = {"Real", "Integer", "Boolean", "String"};
 
 fmi2Status component_unknown(Component *c, const char *function, fmi2ValueReference vr, Type type) {

@@ -16,7 +16,6 @@
 #include "indicators.h"
 #include "optional.h"
 #include "prescribed.h"
-#include "thresholds.h"
 
 enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased, ... */
 static const double MOST_EVER = 1 / DBL_EPSILON; /* ... and of what a run does: 2^52, in ten thousand years */

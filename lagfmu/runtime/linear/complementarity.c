@@ -11,7 +11,9 @@
 #include <math.h>
 
 #include "lu.h"
-#include "thresholds.h"
+
+static const double LCP_ZERO = 1e-12;     /* of the terms of A z + b in scaled rows: a w that counts as none */
+static const double LCP_DEPENDENT = 1e-10; /* of a row of unit norm that must stand out to join the set */
 
 typedef struct {
     int n, count;       /* rows, and how many of them are held at w = 0 */

@@ -10,6 +10,8 @@
 #include "linkage.h"
 #include "mechanism.h"
 
+static const double PAINLEVE_SAFE = 1e-9; /* 1 + A below this counts as not positive */
+
 /* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
  * slip velocity where that is zero or was last known; slip velocities up to `noise` [m/s] are rounding. */
 typedef struct {

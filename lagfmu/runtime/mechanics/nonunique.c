@@ -10,7 +10,10 @@
 #include <string.h>
 
 #include "friction.h"
-#include "thresholds.h"
+
+static const double NONUNIQUE_DEPENDENT = 1e-9; /* of a row's norm, left over by the others: nothing */
+static const double NONUNIQUE_WIDE = 1e2;       /* times the forces at work: how far is looked */
+enum { NONUNIQUE_ROUNDS = 60 };                 /* bisections, and ellipsoids for each pair of unknowns */
 
 size_t nonunique_doubles(const System *s) {
     const size_t m = (size_t)s->m, n = (size_t)s->n;

@@ -10,7 +10,8 @@
 #include <string.h>
 
 #include "digits.h"
-#include "thresholds.h"
+
+enum { PAINLEVE_OPENED = 8, PAINLEVE_ROWS = 16 }; /* contacts that are combined, and their rows */
 
 Status painleve_paradox(const Mechanism *b, double t, const int *which, int count, double value) {
     fail(b->why, "friction ");

@@ -14,7 +14,6 @@
 #include <string.h>
 
 #include "digits.h"
-#include "thresholds.h"
 
 static void layout_sliding(Mechanism *b, Arena *arena) {
     const System *s = b->system;

@@ -22,7 +22,18 @@
 #include <stdio.h>
 
 #include "digits.h"
-#include "thresholds.h"
+
+static const double STABLE = 6.1;   /* h rho beyond which dop853 is unstable */
+static const double SLOWER = 30;    /* rho / sigma, per price of a step, from which on the motion is slow */
+static const double BOUND = 0.1;    /* h rho below which only the motion, or a bound, limits a step */
+static const double STIFF_ROUNDING = 1e-14, STIFF_ROUNDING_FORCE = 1e-12; /* relative changes that say nothing */
+enum {
+    STIFF_EVERY = 3,  /* steps of dop853 of which one is judged while none was stiff */
+    STIFF_STEPS = 15, /* steps that decide, ... */
+    STIFF_OTHER = 6,  /* ... and others in a row after which they are counted anew */
+    STIFF_BRIEF = 6,  /* steps of radau5 in a row that do not pay, after which dop853 comes back */
+    STIFF_RETRY = 128 /* steps of radau5 before dop853 is tried again; twice as many each time */
+};
 
 /* Cost of a step of radau5 in steps of dop853: as measured for 4 to 64 states; the matrices are dense. */
 static double price(int ny) { return 1 + ny / 8.0 + (double)ny * ny / 170; }

@@ -13,8 +13,12 @@
 #include "nominals.h"
 #include "optional.h"
 #include "segment.h"
-#include "thresholds.h"
 
+enum { CHATTER = 200 };             /* events in next to no time after which the step is given up, ... */
+static const double AT_ONCE = 1e-9; /* ... natural times that are next to none */
+static const double PATIENCE = 200; /* steps after which a doStep is judged by its average step, ... */
+static const double STEP_LIMIT = 1e7; /* ... and the steps that it may need in all */
+static const double HEADWAY = 1e-6; /* natural times below which a step makes none */
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
 static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 

@@ -11,7 +11,9 @@
 #include "indicators.h"
 #include "minimum_gap.h"
 #include "segment.h"
-#include "thresholds.h"
+
+static const double SEARCH_SMALLEST = 0x1p-30; /* of a step */
+static const double SEARCH_SHALLOW = 0.1;      /* of the samples, how low a dip must go to be looked into */
 
 /* The time [s] in which an open contact that has just departed is farthest off, f' / (-f''). */
 static Status top_of_rebound(Solver *s, double t, const double *y, const double *values,

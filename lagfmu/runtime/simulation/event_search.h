@@ -4,7 +4,8 @@
 
 #include "linkage.h"
 #include "solver.h"
-#include "thresholds.h"
+
+enum { SEARCH_FIRST = 4, SEARCH_MOST = 512, SEARCH_DIPS = 3 }; /* in a step; parabolas drawn through a dip */
 
 /* Times t[0] < ... < t[count - 1] and the indicators then, a row of values for each sample. */
 typedef struct {

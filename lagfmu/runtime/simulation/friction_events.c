@@ -8,7 +8,6 @@
 #include "segment.h"
 #include "slip.h"
 #include "stick_slip.h"
-#include "thresholds.h"
 
 static const double UNDONE = 10; /* times what accelerations did since a slip was 0, at most */
 

@@ -11,7 +11,10 @@
 #include <string.h>
 
 #include "friction_events.h"
-#include "thresholds.h"
+
+enum { FRICTIONAL_SWEEPS = 20000 };
+static const double FRICTIONAL_CLOSE = 1e-15; /* of the largest impulse: what a sweep may still change */
+static const double FRICTIONAL_ROUGH = 1e-9;  /* beyond which the sweeps have not arrived */
 
 /* The contacts' rows, then those of the frictions whose normal force is theirs. */
 typedef struct {

@@ -15,7 +15,9 @@
 
 #include "digits.h"
 #include "optional.h"
-#include "thresholds.h"
+
+enum { IMPACT_ROUNDS = 1000 }; /* at one instant, after which the rest is one plastic impact */
+static const double IMPACT_ROUNDING = 1e-14; /* of the terms of a speed: one that is none; rest does not jam */
 
 /* What an impact starts from, and its workspace.  Rows are numbered as in the system, contacts by their
  * position among the contacts, `k` of them entering. */

@@ -6,6 +6,8 @@
 #include "linkage.h"
 #include "solver.h"
 
+static const double IMPACT_PULL = 1e-9; /* of the largest impulse: a negative one that is rounding */
+
 /* Doubles and ints of workspace for n coordinates, m rows and so many contacts. */
 static inline int impact_doubles(int n, int m, int contacts) {
     return 3 * n + 6 * m + contacts * contacts + 3 * contacts + complementarity_doubles(contacts);

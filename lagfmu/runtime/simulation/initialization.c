@@ -14,7 +14,6 @@
 #include "segment.h"
 #include "thresholds.h"
 
-
 /* An angle whose neighbouring numbers are no neighbouring directions is refused. */
 static Status check_angles(const Start *x) {
     const System *s = x->s->system;

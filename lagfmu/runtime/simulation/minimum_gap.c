@@ -14,7 +14,9 @@
 
 #include "indicators.h"
 #include "segment.h"
-#include "thresholds.h"
+
+static const double SEARCH_COARSE = 0x1p-5; /* of a step: as near as is looked where no rate is known */
+static const double SEARCH_FINE = 0x1p-6;   /* of a step: near enough to take the one event that is seen */
 
 static Interval box(double a, double middle, double b) {
     const double bend = fabs(a - 2 * middle + b);

@@ -14,6 +14,8 @@
 #include "segment.h"
 #include "thresholds.h"
 
+static const double SLOW = 1e-9;  /* speed of a gap, relative to the motion's own, that counts as none */
+
 /* What is said of each contact while an event is met: flags (contacts). */
 typedef struct {
     int *closed;   /* before the event, without those that depart; then the modes after it */

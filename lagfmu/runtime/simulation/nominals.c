@@ -31,6 +31,9 @@
 #include <float.h>
 #include <string.h>
 
+static const double MEASURED_PART = 1e-3; /* of the first step, in which a motion without scale is measured */
+static const double SHAKEN = 1e9; /* times the tolerance: roundings of q that an error of v may reach */
+static const double STILL = 1e-100; /* scale of what neither moves nor is pushed: anything else exceeds it */
 static const double FASTEST = 1e150; /* [1/s] of a motion */
 
 static double positive(double x) { return x > 0 ? x : STILL; }

@@ -7,9 +7,10 @@
  * to O(h^2). */
 #include "rates.h"
 
-#include "thresholds.h"
 
 #include <math.h>
+
+static const double RATES_ROUNDING = 1e-9; /* of a communication step */
 
 int rates_half_connected(const double *u, const double *went, double h) {
     const double a = went[2], v = went[1] - h * a, x = went[0] - h * (v + h * a / 2);

@@ -4,7 +4,8 @@
 #define LAGFMU_RATES_H
 
 #include "linkage.h"
-#include "thresholds.h"
+
+enum { RATES_KEPT = 4 }; /* points of a cubic polynomial through an estimated input */
 
 /* The latest communication points of an estimated motion, newest first. */
 typedef struct {

@@ -2,6 +2,7 @@
  * (Hairer & Wanner II, sect. VII.2: index reduction with projection). */
 #include "segment.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -9,9 +10,14 @@
 #include "optional.h"
 #include "sensitivity.h"
 #include "step_size.h"
-#include "thresholds.h"
 
+static const double FEWEST_STEPS_RK4 = 100; /* in one natural time of the motion, ... */
 static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
+static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may move the state: times the
+                                                  * tolerance, and at least, relative to the state */
+static const double BALANCED = 1e3 * DBL_EPSILON; /* of what the forces alone would make of a step: what they
+                                                   * leave of it where others hold the state still */
+static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the state: it means nothing */
 static const double PASSING = 1e-10; /* least tolerance of a step next to a singular configuration */
 static const double TOLERANCE_SHARE = 0.25; /* of the tolerance: errors of many steps add up */
 

@@ -16,6 +16,8 @@
 #include "optional.h"
 #include "thresholds.h"
 
+enum { FRICTION_MOST = 6, FRICTION_ROUNDS = 50, FRICTION_ANGLES = 48 }; /* frictions tried together, directions */
+static const double FRICTION_BACK = 1e-9;   /* of the accelerations at work, against its own direction: none */
 enum { BISECTIONS = 60 };
 static const double PI = 3.14159265358979323846;
 

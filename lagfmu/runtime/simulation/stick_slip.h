@@ -6,6 +6,8 @@
 #include "linkage.h"
 #include "solver.h"
 
+static const double FRICTION_JUMP = 1e3; /* times the noise: a slip velocity that no rounding makes */
+
 /* Frictions at s = 0, settled together; contacts as in `active`. */
 typedef struct {
     Solver *s;
