@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 class StepFailureError(Exception):
-    """A numerical or physical reason for which the solver refuses to go on."""
+    """A numerical or physical reason for which a start or a simulation does not go on."""
 
 
 class MasslessError(StepFailureError):

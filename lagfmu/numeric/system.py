@@ -1,4 +1,4 @@
-"""The numeric form of a model, as the solver sees it: callables and index patterns, no symbols.
+"""The numeric form of a model: callables and index patterns, no symbols.
 
     M(q,t) vdot = F(q,v,t,u) + G^T lambda ,   G v = nu(q,t,u) ,   G vdot = gamma(q,v,t,u) ,   f(q,t) = 0
 
