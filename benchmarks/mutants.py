@@ -44,7 +44,8 @@ class Defect:
     """`was` stands once in `file` (below lagfmu/) and becomes `becomes`; `breaks` says what no longer holds.
 
     `tests` (arguments of pytest) are tried first, then those aimed at the file.  `survives` says why nothing
-    can notice.  `stress`: a file of models/ that has the feature.
+    can notice.  `stress`: a file of models/ that has the feature.  `engines`: the scene by which seeded.py
+    lays the two engines beside each other; `alike` says why they cannot differ.
     """
 
     file: str
@@ -54,6 +55,8 @@ class Defect:
     tests: tuple[str, ...] = ()
     survives: str = ""
     stress: str = ""
+    engines: str = ""
+    alike: str = ""
 
     def made_in(self, text: str) -> str:
         """The file with the defect.  Raises ValueError if its place is not found, or not one."""

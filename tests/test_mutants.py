@@ -19,10 +19,16 @@ def test_each_defect_has_one_place() -> None:
 
 
 def test_what_is_aimed_at_a_defect_exists() -> None:
-    """Tests, and models with the feature."""
+    """Tests, and models and scenes with the feature."""
     for test in {t for d in DEFECTS for t in (*d.tests, *AIMED[d.file])}:
         file, _, name = test.partition("::")
         assert not name or f"def {name}(" in (ROOT / "tests" / file).read_text("utf-8"), test
         assert (ROOT / "tests" / file).exists()
     for model in {d.stress for d in DEFECTS} - {""}:
         assert (ROOT / "models" / f"{model}.py").exists(), model
+    for model, scene, *_ in {tuple(d.engines.split("/")) for d in DEFECTS if d.engines}:
+        places = (ROOT / "models", ROOT / "benchmarks" / "unseen")
+        text = "".join(
+            (p / f"{model}.py").read_text() for p in places if (p / f"{model}.py").exists()
+        )
+        assert f'Scene("{scene}"' in text, scene
