@@ -990,11 +990,13 @@ def refused(one, status, *parts):
         (1e-300, ("communication step",)),
     ],
 )
-@pytest.mark.parametrize("method", ["dop853", "rk4"])
+@pytest.mark.parametrize("method", ["dop853", "radau5", "rk4"])
 def test_a_communication_step_that_cannot_be_done_is_refused(fmu, step, parts, method):
     """fmi2Discard (fmi2Error where it can be returned and the call is illegal), with the reason in the
     log; nothing has changed, and the next step is done."""
     with instance(fmu("PendulumCartesian")) as one, instance(fmu("PendulumCartesian")) as calm:
+        if method == "rk4" and not one.native:
+            pytest.skip("the python target has no rk4")
         for each in (one, calm):
             each.start({"solver.method": method})
             each.step(0.1)

@@ -170,6 +170,10 @@ class Instance:
             raise StepFailureError("fmi2DoStep before the end of the initialization")
         if not h > 0 or not math.isfinite(h):
             raise StepFailureError(f"the communication step is {h!r} s, expected a positive number")
+        if state.t + h == state.t:
+            raise StepFailureError(
+                f"the communication step of {h!r} s is too short to be told from none at t = {state.t!r} s"
+            )
         slack = ROUNDING * h + 1e-12 * abs(state.t)
         if not abs(now - state.t) <= slack:
             raise StepFailureError(

@@ -109,6 +109,8 @@ def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
         with _imports_undone(module, package):
             try:
                 FmuBuilder.build_FMU(script, dest=archive, project_files=[Path(folder, package)])
+            except OSError:
+                raise  # of the disk, not of pythonfmu
             except Exception as error:
                 raise BuildError(f"pythonfmu cannot build {scene.name!r}: {error}") from error
         contents = _read(archive)

@@ -28,6 +28,8 @@ from .switch import at_event, begun
 
 INTEGRATORS = {"auto": DOP853, "dop853": DOP853, "radau5": Radau}
 HEADWAY = 1e-6  # of the natural time: shorter steps are counted
+PATIENCE = 200  # steps after which a communication step is judged by its average step, ...
+STEP_LIMIT = 1e6  # ... and the steps that it may need in all
 CROWD = (
     200  # events within 1e-9 of the natural time, and attempts at one step: there is no going on
 )
@@ -45,13 +47,13 @@ def advance(
 
     Raises StepFailureError with the reason why that is not reached.
     """
-    motion, start, tiny = Motion(system, u, p, state.t), state.t, 0
+    motion, start = Motion(system, u, p, state.t), state.t
     with np.errstate(all="ignore"):
         settings = _scaled(motion, settings, state, end - start)
+        headway = _Headway(settings, state, end)
         state, latest, crowd = begun(motion, settings, state), state.t, 0
         while state.t < end:
-            state, found, short = _segment(motion, settings, state, end, tiny)
-            tiny += short
+            state, found = _segment(motion, settings, state, end, headway)
             if found is None:
                 continue
             state = replace(at_event(motion, settings, state, found), step=0.0)
@@ -95,12 +97,34 @@ def _scaled(motion: Motion, settings: Settings, state: State, h: float) -> Setti
     return replace(settings, size=tuple(size.tolist()), rate=rate)
 
 
+class _Headway:
+    """What refuses a communication step that comes to no end."""
+
+    def __init__(self, settings: Settings, state: State, end: float) -> None:
+        self.begun, self.end, self.first, self.tiny = state.t, end, state.steps, 0
+        self.shortest, self.most = HEADWAY / settings.rate, settings.maximum_steps
+
+    def check(self, t: float, length: float, steps: int) -> None:
+        """After a step of that length to t, by which there were so many steps.  Raises StepFailureError."""
+        self.tiny += length < self.shortest
+        if 0 < self.most < self.tiny:
+            raise StepFailureError(
+                f"no headway at t = {t!r} s: more than {self.most:.0f} internal steps (solver.maximum_steps) "
+                f"were shorter than {self.shortest:.2g} s, {HEADWAY:.0e} of the motion's natural time"
+            )
+        done, gone = steps - self.first, t - self.begun
+        if done >= PATIENCE and done * (self.end - self.begun) > STEP_LIMIT * gone:
+            raise StepFailureError(
+                f"the communication step to t = {self.end!r} s would need about "
+                f"{done * (self.end - self.begun) / gone:.0e} internal steps, more than {STEP_LIMIT:.0e}: "
+                "take a shorter one"
+            )
+
+
 def _segment(
-    motion: Motion, settings: Settings, state: State, end: float, tiny: int
-) -> tuple[State, Found | None, int]:
-    """The smooth motion to `end` or to the next event; the state there, the event, how many steps were
-    tiny.
-    """
+    motion: Motion, settings: Settings, state: State, end: float, headway: _Headway
+) -> tuple[State, Found | None]:
+    """The smooth motion to `end` or to the next event; the state there, and the event."""
     system, n = motion.system, motion.system.n
     size = np.array(settings.size)
     rows = system.active(state.closed)
@@ -108,18 +132,12 @@ def _segment(
     ranks = motion.ranks(motion.terms(t, y[:n], y[n:]), rows)
     stepper = _Stepper(motion, settings, (rows, ranks.all), t, y, end, state.step)
     search = Search(motion, settings, state, rows, ranks.all) if system.contacts else None
-    steps, short, proposed = state.steps, 0, state.step
+    steps, proposed = state.steps, state.step
     while True:
         before, y = stepper.step(t, y)
         steps += 1
         found, now = None, stepper.t
-        short += stepper.length < HEADWAY / settings.rate
-        if 0 < settings.maximum_steps < tiny + short:
-            raise StepFailureError(
-                f"no headway at t = {now!r} s: more than solver.maximum_steps = "
-                f"{settings.maximum_steps:.0f} steps were shorter than {HEADWAY:g} of the natural time "
-                f"{1 / settings.rate:.3g} s"
-            )
+        headway.check(now, stepper.length, steps)
         if search is not None:
             search.rank = ranks.all
             dense = stepper.dense()
@@ -135,7 +153,7 @@ def _segment(
     state = replace(
         state, t=t, q=tuple(q.tolist()), v=tuple(v.tolist()), steps=steps, step=proposed
     )
-    return state, found, short
+    return state, found
 
 
 def _projected(
