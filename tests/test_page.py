@@ -138,7 +138,16 @@ def test_the_page_travels_in_the_fmu(target: str, tmp_path: Path, browser: Any) 
     """lagfmu build --page: the page lies beside the documentation, which has a link to it, and the FMU
     grows by 250 kB at most; without the option it is as it was."""
     model = str(Path(__file__).parent.parent / "models" / "rolling_sphere.py")
-    options = ["build", model, "--target", target, "--no-check", "--out"]
+    options = [
+        "build",
+        model,
+        "--scene",
+        "RollingSphere",
+        "--target",
+        target,
+        "--no-check",
+        "--out",
+    ]
     for out, extra in (("with", ["--page"]), ("without", [])):
         result = CliRunner().invoke(app, [*options, str(tmp_path / out), *extra])
         assert result.exit_code == 0, result.output
