@@ -27,7 +27,6 @@ from lagfmu import (
     verify,
 )
 from lagfmu.errors import LagfmuError, LagfmuWarning, ModelError, TableError
-from lagfmu.testing import facts_of
 
 x, z = dynamicsymbols("x z")
 m, g = symbols("m g", positive=True)
@@ -127,7 +126,6 @@ def test_a_closed_form_may_hold_a_table(tmp_path):
     found = verify(path, stop_time=0.5)
     assert found.passed
     assert [c.name for c in found.checks if c.name in ("z", "der(z)")] == ["z", "der(z)"]
-    assert facts_of(path).tabulated
     wrong = [ClosedForm("z", wire(x) * 1.001)]
     path = build_fmu(bead(), tmp_path, Scene("Bead"), wrong, target="native", check=False)
     assert not verify(path, stop_time=0.5).passed
