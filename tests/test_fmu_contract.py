@@ -288,7 +288,7 @@ def test_angles_are_shown_in_degrees(xml):
 
 def test_states_have_nominal_values_and_positive_parameters_a_minimum(name, xml, prepared):
     """The size of each coordinate that has one, of its velocity size times rate; m > 0 is told as min 0."""
-    state, states = prepared(name).structure.start.state, prepared(name).table.states
+    state, states = prepared(name).structure.start, prepared(name).table.states
     states = [s for s in states if s != "energy.dissipated"]
     for j, (q, v) in enumerate(zip(states[::2], states[1::2], strict=True)):
         if state.size[j] > 0:
