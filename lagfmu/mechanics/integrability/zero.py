@@ -160,7 +160,7 @@ def _tried(expr: Expr) -> Iterator[bool]:
     for _ in range(40):
         point = {s: _drawn(s, chance) for s in sorted(expr.free_symbols, key=str)}
         try:
-            value = expr.xreplace(point).evalf(DIGITS, strict=True, maxn=5 * DIGITS)
+            value = expr.evalf(DIGITS, subs=point, strict=True, maxn=5 * DIGITS)
         except PrecisionExhausted:
             yield False
         except (TypeError, ValueError, ArithmeticError):
