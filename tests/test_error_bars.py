@@ -25,7 +25,7 @@ from typer.testing import CliRunner
 from lagfmu import Model, Output, Parameter, Scene, simulate, sweep
 from lagfmu.errors import SimulationError
 from lagfmu.names import bar as bar_of
-from lagfmu.testing import ErrorBarWarning, app, figure_of, find_compiler, load, prepare, write
+from lagfmu.testing import app, figure_of, find_compiler, load, prepare, write
 
 INFINITE = np.finfo(float).max
 Barred = Callable[[str], Path]
@@ -368,14 +368,6 @@ def test_an_infinite_bar_is_printed_so(root, tmp_path):
          str(tmp_path / "bars.svg")],
     ).output  # fmt: skip
     assert "0.002 infinite" in " ".join(said.split()), said
-
-
-def test_a_run_whose_fixed_step_is_halved_warns(prepared):
-    """What was asked for and what is done, both in seconds."""
-    options = {"stop_time": 0.2, "step_size": 0.1, "error_bars": True}
-    values = {"solver.method": "rk4", "solver.step": 0.02}
-    with pytest.warns(ErrorBarWarning, match=r"0\.01 s in place of 0\.02 s"):
-        simulate(prepared("PendulumCartesian"), start_values=values, **options)
 
 
 def test_an_fmu_without_bars_is_refused_by_name(native_fmu):

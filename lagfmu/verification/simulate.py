@@ -52,7 +52,7 @@ BARS = "error bars"  # begins a message of them
 
 
 class ErrorBarWarning(UserWarning):
-    """Error bars that are lost, or that a method of fixed steps pays for with shorter ones."""
+    """Error bars that are lost from some time on."""
 
 
 def simulate(
