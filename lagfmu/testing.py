@@ -137,5 +137,4 @@ from .verification.evaluate import Compiled
 from .verification.pipeline import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
-from .verification.simulate import ErrorBarWarning
 from .verification.verify import RECORD, applies, check_closed_form
