@@ -3,7 +3,7 @@
 How builds and runs are shared:
 
 - `native_fmu`, `python_fmu`, `fmu` (both), `library`, `prepared`, `playable`, `page_file`: models/;
-  a model of a test's own is built in a fixture of its module;
+- `built`: models of a test's own, and scenes of models/ that it changes (`scene_of`);
 - `shared_folder` with `once(folder, make)` of once.py, for what tests in several files build;
 - `objects` and `compile_library` of runtime.py: the runtime's C files, compiled once for what they hold, also
   with SANITIZE;
@@ -28,7 +28,17 @@ from browser import Page, chromium
 from fmi2 import Library
 from once import once
 
-from lagfmu.testing import Playable, Prepared, find_compiler, load, prepare, render, write
+from lagfmu import Model, Scene, build_fmu
+from lagfmu.testing import (
+    ModelFile,
+    Playable,
+    Prepared,
+    find_compiler,
+    load,
+    prepare,
+    render,
+    write,
+)
 from lagfmu.testing import playable as playable_of
 
 MODELS = Path(__file__).parent.parent / "models"
@@ -83,19 +93,21 @@ def of_each_kind(
     ]
 
 
+def scene_of(name: str) -> tuple[ModelFile, Scene]:
+    """The model file and the scene of an FMU of models/."""
+    file = load(MODELS / f"{EVERY[name]}.py")
+    return file, next(s for s in file.scenes if s.name == name)
+
+
 @pytest.fixture(scope="session")
 def prepared() -> Callable[[str], Prepared]:
     """prepared(NAME): model and equations behind an FMU of models/, derived once."""
-    made: dict[str, Prepared] = {}
 
     def get(name: str) -> Prepared:
-        if name not in made:
-            file = load(MODELS / f"{EVERY[name]}.py")
-            scene = next(s for s in file.scenes if s.name == name)
-            made[name] = prepare(file.model, scene)
-        return made[name]
+        file, scene = scene_of(name)
+        return prepare(file.model, scene)
 
-    return get
+    return cache(get)
 
 
 Fmu = Callable[[str], Path]
@@ -135,17 +147,35 @@ def native_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
 
 
 @pytest.fixture(scope="session")
-def library(native_fmu: Fmu, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Library]:
-    """library(NAME): the native FMU's binary, loaded once, for single calls."""
-    folder = tmp_path_factory.mktemp("libraries")
-    made: dict[str, Library] = {}
+def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """built(model), built(model, scene): the native FMU of a model of a test's own, built once."""
+    if find_compiler() is None:
+        pytest.skip("no C compiler on this machine: native FMUs are not tested")
+    made: list[tuple[tuple[Model, Scene], Path]] = []
 
-    def get(name: str) -> Library:
-        if name not in made:
-            made[name] = Library(native_fmu(name), folder / name)
-        return made[name]
+    def get(model: Model, scene: Scene | None = None) -> Path:
+        wanted = model, scene or Scene(model.name)
+        for known, path in made:
+            if known == wanted:
+                return path
+        folder = tmp_path_factory.mktemp("own")
+        made.append((wanted, build_fmu(model, folder, wanted[1], target="native", check=False)))
+        return made[-1][1]
 
     return get
+
+
+@pytest.fixture(scope="session")
+def library(
+    native_fmu: Fmu, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str | Path], Library]:
+    """library(NAME), library(path): a native FMU's binary, loaded once, for single calls."""
+
+    def get(fmu: str | Path) -> Library:
+        path = native_fmu(fmu) if isinstance(fmu, str) else fmu
+        return Library(path, tmp_path_factory.mktemp("library"))
+
+    return cache(get)
 
 
 @pytest.fixture(scope="session", params=["python", "native"])
