@@ -34,7 +34,6 @@ from .fmu.described import (
 )
 from .fmu.description import model_description
 from .fmu.exchange import by_fmpy
-from .fmu.facts import Variable as SlaveVariable
 from .fmu.formula import LONGEST_SUM, read_formula, text_of
 from .fmu.native import GENERATED
 from .fmu.session import RefusalError, Session
@@ -59,7 +58,6 @@ from .model.goal import Goal
 from .model.goal import parse as parse_goal
 from .model.library import known
 from .model.model import name_of
-from .model.rule import Rule
 from .model.spline import SplineBase
 from .model.units import (
     ENERGY,

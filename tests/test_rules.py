@@ -9,7 +9,7 @@ from instance import instance
 
 from lagfmu import simulate
 from lagfmu.errors import SettingError
-from lagfmu.testing import Rule, SlaveVariable, described_rules, problems_of, read_description
+from lagfmu.testing import described_rules, problems_of, read_description
 
 BAD = {  # of the hemisphere
     "theta": [math.nan, math.inf],
@@ -42,15 +42,6 @@ def test_python_says_what_the_fmu_says(path, name, value):
         assert said == "'a' = 0.0, expected a positive number"
     with pytest.raises(SettingError) if told else pytest.raises(Exception, match="positive"):
         simulate(path, 0.1, start_values={name: value})
-
-
-@pytest.mark.parametrize("value", [1.5, -1.0, 0.0, 3.0, math.nan, -math.inf])
-@pytest.mark.parametrize(("low", "high"), [(0.0, None), (None, 2.0), (None, None)])
-def test_the_slave_says_what_python_says(value, low, high):
-    """A length of at most 2 m, one that is not negative, one that is positive: the same words of both."""
-    slave = SlaveVariable("a", "Real", "parameter", 1.0, low, high, True, False)
-    rule = Rule("a", minimum=low, maximum=high, positive=True)
-    assert slave.problem(value, {}) == rule.problem(value)
 
 
 def test_all_problems_are_told_at_once(path):

@@ -5,10 +5,11 @@ Imports neither NumPy nor SciPy, so that a script can be read where they are mis
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..model.rule import Rule
 
 if TYPE_CHECKING:
     from ..numeric.system import System
@@ -31,24 +32,10 @@ class Variable(NamedTuple):
         """It is read from the state."""
         return self.role in ("output", "start")
 
-    def problem(self, value: Any, methods: Mapping[int, str]) -> str:
-        """Why it cannot have the value; empty if it can.  `methods`: those that can be chosen, by number."""
-        if self.kind == "Integer" and self.role == "solver":
-            offered = ", ".join(f"{k} ({method})" for k, method in methods.items())
-            return (
-                "" if value in methods else f"{self.name!r} = {value!r}, expected one of {offered}"
-            )
-        if self.kind != "Real":
-            return ""
-        if not isinstance(value, (int, float)) or not math.isfinite(value):
-            return f"{self.name!r} = {value!r}, expected a finite number"
-        low = -math.inf if self.minimum is None else self.minimum
-        high = math.inf if self.maximum is None else self.maximum
-        if not low <= value <= high:
-            return f"{self.name!r} = {value!r} is outside its bounds [{low}, {high}]"
-        if self.positive and not value > 0:
-            return f"{self.name!r} = {value!r}, expected a positive number"
-        return ""
+    @property
+    def rule(self) -> Rule:
+        """Which values it can have; of `solver.method` the keys of Facts.methods."""
+        return Rule(self.name, self.kind, True, self.minimum, self.maximum, self.positive)
 
 
 @dataclass(frozen=True)

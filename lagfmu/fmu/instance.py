@@ -12,6 +12,7 @@ from dataclasses import asdict
 from typing import Any
 
 from .. import names
+from ..model.rule import MESSAGES
 from ..numeric.failure import StepFailureError
 from ..numeric.start import start
 from ..numeric.start_priority import GIVEN, OMITTED, SET, left_out
@@ -36,6 +37,7 @@ class Instance:
 
     def __init__(self, facts: Facts) -> None:
         self.facts, self.system, self.variables = facts, facts.system, facts.variables
+        self.rules = [v.rule for v in self.variables]
         self.values: list[Any] = [v.start for v in self.variables]
         self.reference = {v.name: k for k, v in enumerate(self.variables)}
         self.parameters = [k for k, v in enumerate(self.variables) if v.role == "parameter"]
@@ -107,11 +109,19 @@ class Instance:
     def _check_settable(self, k: int, value: Any, kind: str) -> None:
         variable = self._known(k, kind)
         if variable.role in ("output", "estimate"):
-            raise Refused(f"{variable.name!r} is calculated and cannot be set")
+            raise Refused(MESSAGES["settable"].format(name=variable.name))
         if self.running and variable.role != "input" and not self._is_same(k, value):
             raise Refused(f"{variable.name!r} can only be set before the end of the initialization")
-        if problem := variable.problem(value, self.facts.methods):
+        if problem := self._problem(k, value):
             raise Refused(problem)
+
+    def _problem(self, k: int, value: Any) -> str:
+        """Why a variable cannot have the value; empty if it can."""
+        name, methods = self.variables[k].name, self.facts.methods
+        if name != names.METHOD:
+            return self.rules[k].problem(value)
+        offered = ", ".join(f"{number} ({method})" for number, method in methods.items())
+        return "" if value in methods else f"{name!r} = {value!r}, expected one of {offered}"
 
     def _is_same(self, k: int, value: Any) -> bool:
         """A fixed parameter that is set once more to the bits that it has: some importers do."""
@@ -343,11 +353,8 @@ class Instance:
         values, running = saved["values"], saved["running"]
         if not isinstance(values, list) or len(values) != len(self.variables):
             raise ValueError("it has other variables")
-        for variable, value in zip(self.variables, values, strict=True):
-            problem = (
-                "" if variable.role == "output" else variable.problem(value, self.facts.methods)
-            )
-            if problem:
+        for k, value in enumerate(values):
+            if self.variables[k].role != "output" and (problem := self._problem(k, value)):
                 raise ValueError(problem)
         self.values = list(values)
         begin, end, tolerance = (float(x) for x in saved["experiment"])

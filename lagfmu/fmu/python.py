@@ -28,6 +28,8 @@ from .target import missing_for_native
 
 SHIPPED = (
     "names.py",
+    "methods.py",
+    "model/rule.py",
     "numeric",
     "solver",
     "runtime/base/thresholds.h",
@@ -193,7 +195,7 @@ def _row(v: Variable) -> tuple[Any, ...]:
 def _runtime() -> dict[str, bytes]:
     """Relative path -> content of the files of lagfmu that the FMU carries."""
     root = files("lagfmu")
-    found = {"__init__.py": b"", "fmu/__init__.py": b""}
+    found = dict.fromkeys(("__init__.py", "fmu/__init__.py", "model/__init__.py"), b"")
     for entry in SHIPPED:
         place = root.joinpath(entry)
         if place.is_file():
