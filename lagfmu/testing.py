@@ -24,7 +24,11 @@ from .fmu.archive import version as archive_version
 from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch
 from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
-from .fmu.described import (
+from .fmu.description import model_description
+from .fmu.exchange import by_fmpy
+from .fmu.formula import LONGEST_SUM, read_formula, text_of
+from .fmu.native import GENERATED
+from .fmu.read import (
     Trajectory,
     communication_points,
     described_rules,
@@ -32,10 +36,6 @@ from .fmu.described import (
     read_description,
     target_in,
 )
-from .fmu.description import model_description
-from .fmu.exchange import by_fmpy
-from .fmu.formula import LONGEST_SUM, read_formula, text_of
-from .fmu.native import GENERATED
 from .fmu.session import RefusalError, Session
 from .fmu.target import NoCompilerWarning
 from .fmu.write import write
@@ -44,7 +44,7 @@ from .live import moving, wasm
 from .live.moving import Moving
 from .live.playable import playable, told_by
 from .live.render import Playable, render
-from .mechanics import shorter
+from .mechanics import simplification
 from .mechanics.differential import Differential
 from .mechanics.form import Form
 from .mechanics.formulations.minimal import reduce
@@ -132,7 +132,7 @@ from .study.tradeoff.reference import refer
 from .study.tradeoff.report import table as tradeoff_table
 from .study.tradeoff.setting import Setting
 from .verification.evaluate import Compiled
-from .verification.pipeline import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
+from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
 from .verification.verify import RECORD, applies, check_closed_form

@@ -5,7 +5,7 @@ import sys
 from typing import Any, NoReturn
 
 from ..fmu.archive import tool
-from ..verification.pipeline import INTERRUPTED, TERMINATED
+from ..verification.exit_codes import INTERRUPTED, TERMINATED
 
 
 def main() -> None:

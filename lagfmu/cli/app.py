@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..fmu.archive import tool
-from ..verification.pipeline import EXIT_CODES
+from ..verification.exit_codes import EXIT_CODES
 from .commands.build import build
 from .commands.new import new
 from .commands.page import page

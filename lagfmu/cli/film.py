@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BuildError, UsageError
-from ..fmu.described import Trajectory
+from ..fmu.read import Trajectory
 from ..fmu.write import write_whole
 from ..live.moving import FORCE, INK, Moving, View
 from ..live.playable import Told

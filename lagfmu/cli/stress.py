@@ -28,7 +28,7 @@ from ..study.stress.facts import facts_of
 from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import NO_ROOM, UNFINISHED, WRONG, Verdict
 from ..study.stress.report import MEANING, Stressed, data, report, summary, table
-from ..verification.pipeline import Report, text_of
+from ..verification.junit import Report, text_of
 from .progress import progress
 from .terminal import say_wrote
 from .works import studied

@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from ..errors import UsageError
-from ..fmu.described import target_in
+from ..fmu.read import target_in
 from ..fmu.target import PYTHON, target_of
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
@@ -25,7 +25,7 @@ from ..study.tradeoff.figure import draw
 from ..study.tradeoff.measure import DECADES, Plan, Tradeoff, measure
 from ..study.tradeoff.observe import opened
 from ..study.tradeoff.report import data, remarks, report, table
-from ..verification.pipeline import Report, text_of
+from ..verification.junit import Report, text_of
 from .progress import progress
 from .terminal import say, say_wrote
 from .works import studied

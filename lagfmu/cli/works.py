@@ -9,7 +9,7 @@ from pathlib import Path
 from ..errors import LagfmuError, UsageError
 from ..model.file import ModelFile, load
 from ..model.scene import Scene
-from ..verification.pipeline import Report, refused
+from ..verification.junit import Report, refused
 
 Make = Callable[[], Path]
 

@@ -196,15 +196,6 @@ def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
 
     Raises VerificationError if the file is not lagfmu's.
     """
-    return _unpacked(content, name)[0]
-
-
-def tables_in(content: bytes, name: str) -> list[Spline]:
-    """The tables that an FMU's equations look up.  Raises VerificationError."""
-    return _unpacked(content, name)[1]
-
-
-def _unpacked(content: bytes, name: str) -> tuple[list[CarriedForm], list[Spline]]:
     try:
         if len(content) > LARGEST_RECORD:
             raise ValueError(f"{len(content)} bytes, expected at most {LARGEST_RECORD}")
@@ -214,9 +205,8 @@ def _unpacked(content: bytes, name: str) -> tuple[list[CarriedForm], list[Spline
         for what, field in (("closed forms", "closed_forms"), ("tables", "tables")):
             if not isinstance(data.get(field, []), list) or "closed_forms" not in data:
                 raise ValueError(f"expected a list of {what}")
-        tables = [_spline(entry) for entry in data.get("tables", [])]
-        functions = functions_of(tables)
-        return [_form(entry, functions) for entry in data["closed_forms"]], tables
+        functions = functions_of([_spline(entry) for entry in data.get("tables", [])])
+        return [_form(entry, functions) for entry in data["closed_forms"]]
     except (ValueError, RecursionError) as error:
         raise VerificationError(
             f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "

@@ -15,8 +15,8 @@ import platform
 import sys
 from typing import Any
 
-from .facts import Facts, Variable
 from .references import end_once, keep, keep_module_of
+from .script import Facts, Variable
 
 try:
     from ..numeric.cubic import Cubic

@@ -11,7 +11,7 @@ import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from .described import Trajectory
+from .read import Trajectory
 from .session import DISCARD, ERROR, WARNING, RefusalError, Run
 
 

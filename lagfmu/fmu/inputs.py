@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import SettingError
 from ..interface.rules import problems_of
 from ..model.rule import Rule, missing
-from .described import Trajectory
+from .read import Trajectory
 
 
 def check_inputs(table: Trajectory | None, rules: Mapping[str, Rule], known: Sequence[str]) -> None:

@@ -21,8 +21,8 @@ from ..numeric.tolerance import tolerance_problem
 from ..solver.advance import advance, looked_at
 from ..solver.observe import observe
 from ..solver.state import Event, Settings, State, restored, restored_settings
-from .facts import Facts, Variable
 from .rates import Past, estimated, half_connected
+from .script import Facts, Variable
 
 ROUNDING = 1e-6  # part of a step by which an importer's sums of times may differ from ours
 EVENT, WARNING = "event", "warning"

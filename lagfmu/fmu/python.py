@@ -20,7 +20,7 @@ from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
 from ..methods import IN_PYTHON, NUMBERS
 from ..prepare.prepare import Prepared
-from . import facts
+from . import script
 from .archive import pack, version
 from .description import model_description
 from .slave import LagfmuSlave
@@ -34,7 +34,7 @@ SHIPPED = (
     "solver",
     "runtime/base/thresholds.h",
     "fmu/entry.py",
-    "fmu/facts.py",
+    "fmu/script.py",
     "fmu/instance.py",
     "fmu/rates.py",
     "fmu/references.py",
@@ -150,11 +150,11 @@ def offered(prepared: Prepared) -> VariableTable:
 def slave_of(prepared: Prepared) -> Any:
     """What the FMU's script makes an instance of, for this process.  Raises BuildError."""
     table = offered(prepared)
-    rows = tuple(facts.Variable(*_row(v)) for v in table.variables)
+    rows = tuple(script.Variable(*_row(v)) for v in table.variables)
     return type(
         prepared.scene.name,
         (LagfmuSlave,),
-        {"facts": facts.Facts(prepared.system, rows, **_settings(prepared))},
+        {"facts": script.Facts(prepared.system, rows, **_settings(prepared))},
     )
 
 

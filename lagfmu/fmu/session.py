@@ -26,7 +26,9 @@ from ..model.rule import missing
 from ..prepare.prepare import Prepared
 from .archive import unpack
 from .binary import instantiated, listen
-from .described import (
+from .inprocess import CallError, SlaveInProcess
+from .python import offered
+from .read import (
     Experiment,
     Trajectory,
     described_rules,
@@ -34,8 +36,6 @@ from .described import (
     obstacle,
     read_description,
 )
-from .inprocess import CallError, SlaveInProcess
-from .python import offered
 
 STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 WARNING, DISCARD, ERROR = 1, 2, 3

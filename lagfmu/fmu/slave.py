@@ -21,10 +21,10 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from ..numeric.failure import StepFailureError
-from .facts import Facts
 from .instance import WARNING, Instance
 from .instance import Refused as Refused
 from .references import end_once, keep, keep_module_of
+from .script import Facts
 
 Call = TypeVar("Call", bound=Callable[..., Any])
 

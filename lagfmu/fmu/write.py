@@ -30,7 +30,7 @@ from . import native, python
 from .archive import pack
 from .closed_forms import pack_closed_forms
 from .compiler import HOST
-from .target import NATIVE, PYTHON, target_of
+from .target import NATIVE, target_of
 
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
 PAGE = "documentation/index.html"
@@ -73,7 +73,7 @@ def write(
             [c.name for c in prepared.equations.constraints if isinstance(c, Contact)],
         ),
     }
-    extra[LICENSE] = license_of(target).encode()
+    extra[LICENSE] = license_of(target, sources).encode()
     if live:
         extra[LIVE] = live.encode()
     if (picture := pictures.picture_of(prepared)) is not None:
@@ -142,12 +142,12 @@ def with_peaks(prepared: Prepared, wanted: Sequence[str]) -> Prepared:
     return prepare(model, asked, replace(prepared.derived, model=model))
 
 
-def license_of(target: str) -> str:
+def license_of(target: str, sources: bool) -> str:
     """Of what lagfmu itself puts into an FMU; the model is under the one that its author says, if any."""
-    what = {
-        NATIVE: "the compiled library, and sources/ but for model.c, optional.c, variables.c, identity.h",
-        PYTHON: "resources/ but for the generated script, its tables and what they describe",
-    }[target]
+    what = "resources/ but for the generated script, its tables and what they describe"
+    if target == NATIVE:
+        what = "the compiled library"
+        what += f", and sources/ but for {', '.join(native.GENERATED)}" * sources
     text = importlib.metadata.distribution("lagfmu").read_text("licenses/LICENSE")
     if text is None:
         raise BuildError(

@@ -13,7 +13,7 @@ import fmpy
 
 from .. import names
 from ..fmu.archive import pack
-from ..fmu.described import experiment_of
+from ..fmu.read import experiment_of
 from ..model.rule import MESSAGES
 from ..model.units import for_reading
 from ..page.preset import SETTABLE

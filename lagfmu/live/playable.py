@@ -9,8 +9,8 @@ from typing import Any
 
 from ..errors import BuildError
 from ..fmu.archive import opened
-from ..fmu.described import read_description
 from ..fmu.native import GENERATED, IDENTITY, sources_of
+from ..fmu.read import read_description
 from ..fmu.write import PAGE
 from ..page import preset as presets
 from ..page.documentation import mathml

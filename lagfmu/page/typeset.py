@@ -20,7 +20,7 @@ from sympy.printing.latex import LatexPrinter, tex_greek_dictionary
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 from sympy.printing.str import StrPrinter
 
-from ..mechanics import shorter
+from ..mechanics import simplification
 from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
@@ -252,8 +252,8 @@ def _tidy(expression: Expr) -> Expr:
     size = expression.count_ops()
     if size > LONGEST:
         return expression
-    flat = shorter.expanded(expression)
-    forms = [expression, flat, shorter.sums_of_angles(flat)]
+    flat = simplification.expanded(expression)
+    forms = [expression, flat, simplification.sums_of_angles(flat)]
     return min(forms, key=lambda e: e.count_ops())
 
 
@@ -261,7 +261,7 @@ def _factored(expression: Expr) -> Expr:
     """A short expression as a product, if that is shorter."""
     if expression.has(sp.Float):
         return _tidy(expression)
-    return min((_tidy(expression), shorter.product(expression)), key=lambda e: e.count_ops())
+    return min((_tidy(expression), simplification.product(expression)), key=lambda e: e.count_ops())
 
 
 # --------------------------------------------------------------------------------- sections
@@ -377,7 +377,7 @@ class _Typesetter:
         row = [(i, _tidy(eom.M[j, i])) for i in range(eom.n) if eom.M[j, i] != 0]
         inertia = self.notation.linear((mass, vdot[i]) for i, mass in row)
         rest = _tidy(given - eom.F[j])
-        short = shorter.gathered(rest, eom.p, eom.q)
+        short = simplification.gathered(rest, eom.p, eom.q)
         return _total(inertia + self.terms(min(short, rest, key=lambda e: e.count_ops())))
 
     def terms(self, expression: Expr) -> list[Printed]:

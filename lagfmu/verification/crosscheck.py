@@ -17,9 +17,9 @@ from xml.etree import ElementTree as ET
 
 from .. import names
 from ..errors import SimulationError
-from ..fmu.described import Trajectory, communication_points, experiment_of, read_description
+from ..fmu.read import Trajectory, communication_points, experiment_of, read_description
 from ..fmu.write import REFERENCES, write_whole
-from .pipeline import as_json
+from .junit import as_json
 from .report import report
 from .simulate import simulate
 from .verify import Verification

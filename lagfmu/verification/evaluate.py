@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import VerificationError
-from ..fmu.described import Trajectory
+from ..fmu.read import Trajectory
 from ..model.elements import Expr
 
 

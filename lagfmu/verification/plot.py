@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import names
 from ..errors import SettingError
-from ..fmu.described import Trajectory
+from ..fmu.read import Trajectory
 from ..model.units import for_reading
 
 COLOURS = (

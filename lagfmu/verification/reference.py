@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SettingError
-from ..fmu.described import Trajectory
+from ..fmu.read import Trajectory
 from .verify import Check
 
 TRUTH = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}

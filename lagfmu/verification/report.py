@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from .pipeline import Case, Report
+from .junit import Case, Report
 from .verify import Check, Verification
 
 

@@ -16,7 +16,9 @@ import numpy as np
 from .. import names
 from ..errors import SettingError, SimulationError
 from ..fmu import native
-from ..fmu.described import (
+from ..fmu.exchange import by_fmpy
+from ..fmu.inputs import check_inputs, columns_at, jumps
+from ..fmu.read import (
     Trajectory,
     communication_points,
     described_rules,
@@ -26,8 +28,6 @@ from ..fmu.described import (
     read_description,
     target_in,
 )
-from ..fmu.exchange import by_fmpy
-from ..fmu.inputs import check_inputs, columns_at, jumps
 from ..fmu.session import (
     DISCARD,
     WARNING,

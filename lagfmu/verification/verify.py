@@ -19,7 +19,7 @@ from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.archive import opened
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
-from ..fmu.described import Trajectory, experiment_of, numbers_of, read_description
+from ..fmu.read import Trajectory, experiment_of, numbers_of, read_description
 from .evaluate import evaluate
 from .simulate import simulate, steps_of
 

@@ -11,7 +11,7 @@ import typer
 from ...errors import UsageError, VerificationError
 from ...fmu.compiler import HOST, NAMES
 from ...fmu.target import NATIVE, PYTHON, target_of
-from ...verification.pipeline import FAILS
+from ...verification.exit_codes import FAILS
 from ..options import (
     NARROWING,
     OPTIONS,
@@ -122,7 +122,7 @@ def build(
 
 def _keep_the_full_one(path: Path, table: VariableTable) -> None:
     """Refuse to replace an FMU by one of the same name that shows less."""
-    from ...fmu.described import read_description
+    from ...fmu.read import read_description
 
     if not path.is_file():
         return

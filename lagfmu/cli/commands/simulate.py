@@ -60,7 +60,7 @@ def simulate(
     With a figure, a table or a film only multipliers, coordinates and times of events are printed; -v names
     others.
     """
-    from ...fmu.described import read_description, units_of
+    from ...fmu.read import read_description, units_of
     from ...live.playable import told_by
     from ...prepare.prepare import prepare
     from ...verification.reference import read_table

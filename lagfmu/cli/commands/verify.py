@@ -22,7 +22,7 @@ from ..options import (
 from ..terminal import plainly
 
 if TYPE_CHECKING:
-    from ...verification.pipeline import Report
+    from ...verification.junit import Report
 
 
 def verify(
@@ -74,7 +74,7 @@ def verify(
 
 def _units(fmus: Sequence[Path]) -> dict[str, str | None]:
     """The unit of each variable of these FMUs."""
-    from ...fmu.described import read_description, units_of
+    from ...fmu.read import read_description, units_of
 
     return {
         n: u for path in fmus for n, u in units_of(read_description(path).modelVariables).items()
@@ -111,7 +111,7 @@ def examine(
     atol: float,
 ) -> list[Report]:
     """Each FMU; one that cannot be run does not keep the others from it.  Raises UsageError."""
-    from ...verification.pipeline import refused
+    from ...verification.junit import refused
     from ...verification.reference import Reference, read_table
     from ...verification.report import report
     from ...verification.verify import verify as held

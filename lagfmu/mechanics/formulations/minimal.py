@@ -19,7 +19,7 @@ import sympy as sp
 from ...errors import DerivationError
 from ...model.elements import Expr
 from ...model.model import Constraint, Holonomic
-from .. import shorter
+from .. import simplification
 from ..equations import TIME, EquationsOfMotion
 
 SMALL = 400  # operations below which a reduced expression is worth simplifying
@@ -115,7 +115,7 @@ def _total(expression: Expr, rates: dict[Expr, Expr]) -> Expr:
 def _tidy(expression: Expr) -> Expr:
     if expression.count_ops() > SMALL:
         return expression
-    return sp.factor_terms(shorter.trigonometric(shorter.expanded(expression)))
+    return sp.factor_terms(simplification.trigonometric(simplification.expanded(expression)))
 
 
 def _relations(eom: EquationsOfMotion) -> tuple[dict[Expr, Expr], tuple[Expr, ...] | None]:

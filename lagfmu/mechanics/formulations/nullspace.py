@@ -18,7 +18,7 @@ import sympy as sp
 from sympy.polys.polyerrors import PolynomialError
 
 from ...model.elements import Expr
-from .. import shorter
+from .. import simplification
 from ..coupling import constrained_together
 from ..equations import EquationsOfMotion
 
@@ -88,20 +88,20 @@ def _group_columns(G: Expr, coordinates: list[int], rows: list[int]) -> list[dic
 
 def _determinant(A: Expr) -> Expr:
     d = A.det(method="berkowitz") if A.rows else sp.S.One
-    return shorter.simplified(d)
+    return simplification.simplified(d)
 
 
 def _primitive(column: list[Expr]) -> list[Expr]:
     """The column without a factor that all its entries share."""
     filled = [e for e in column if e != 0]
-    if any(e.has(sp.Float) for e in filled) or not shorter.bounded(sp.Add(*filled)):
+    if any(e.has(sp.Float) for e in filled) or not simplification.bounded(sp.Add(*filled)):
         return column
     try:
         factor = sp.gcd_list(filled)
         column = [sp.cancel(e / factor) for e in column]
     except PolynomialError:  # Piecewise and the like: keep the minors
         return column
-    return [shorter.simplified(e) for e in column]
+    return [simplification.simplified(e) for e in column]
 
 
 def _at_random(A: Expr) -> Expr:
@@ -138,13 +138,13 @@ def _pivots(A: Expr, numbers: Expr) -> Pivots:
 
 def _reduced(equation: Expr, eom: EquationsOfMotion) -> Expr:
     """An equation = 0 without denominators' and other common factors, in a short form."""
-    if shorter.terms(equation) > shorter.TERMS:
+    if simplification.terms(equation) > simplification.TERMS:
         return equation
     equation = sp.expand(equation)
     if equation.has(sp.Function):
-        equation = shorter.expanded(shorter.trigonometric(equation))
+        equation = simplification.expanded(simplification.trigonometric(equation))
     try:
-        factors = shorter.factors(equation)
+        factors = simplification.factors(equation)
     except PolynomialError:
         factors = [(e, 1) for e in sp.Mul.make_args(sp.factor_terms(equation))]
     for symbols in (set(eom.vdot), {*eom.q, *eom.v, *eom.u}):

@@ -21,7 +21,7 @@ from sympy.functions.elementary.trigonometric import TrigonometricFunction
 from sympy.simplify.fu import TR1, TR2
 
 from ...model.elements import Expr
-from ..shorter import simplified
+from ..simplification import simplified
 
 POINTS = 8  # enough to see either side of zero
 DIGITS = 20  # of a value that is not zero, at least

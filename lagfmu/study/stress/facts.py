@@ -10,7 +10,7 @@ from typing import Any
 from ... import names
 from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm, unpack_closed_forms
-from ...fmu.described import experiment_of, file_stem, read_description, target_in
+from ...fmu.read import experiment_of, file_stem, read_description, target_in
 from ...methods import integrators
 from ...verification.verify import closed_forms_in
 

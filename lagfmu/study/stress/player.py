@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ... import names
-from ...fmu.described import Trajectory
+from ...fmu.read import Trajectory
 from ...fmu.session import RefusalError, Session
 from .facts import Facts
 

@@ -20,7 +20,8 @@ from ... import names
 from ...errors import SettingError, SimulationError
 from ...fmu.archive import unpack, version
 from ...fmu.batch import Plan
-from ...fmu.described import (
+from ...fmu.inputs import check_inputs, columns_at
+from ...fmu.read import (
     Trajectory,
     communication_points,
     described_rules,
@@ -28,7 +29,6 @@ from ...fmu.described import (
     obstacle,
     read_description,
 )
-from ...fmu.inputs import check_inputs, columns_at
 from ...fmu.write import as_fmu
 from ...interface.rules import unsettable
 from ...model.model import Model

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.described import Trajectory
+from ...fmu.read import Trajectory
 from ...fmu.session import Session
 from .observe import observe
 from .reference import Reference, refer

@@ -16,7 +16,7 @@ from pathlib import Path
 from ... import names
 from ...errors import SimulationError, VerificationError
 from ...fmu.closed_forms import CarriedForm
-from ...fmu.described import file_stem, numbers_of, target_in
+from ...fmu.read import file_stem, numbers_of, target_in
 from ...fmu.session import Session
 from ...methods import FIXED_STEP, INTEGRATORS
 from ...verification.simulate import steps_of

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import SimulationError, VerificationError
-from ...fmu.described import Trajectory, communication_points
+from ...fmu.read import Trajectory, communication_points
 from ...fmu.session import RefusalError, Run, Session
 from ...names import TOLERANCE
 from .setting import Setting

@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.described import Trajectory
+from ...fmu.read import Trajectory
 
 MULTIPLIER, FORCE, MOTION, EVENT = "lambda", "Q", "coordinates", "event time"
 OWN = "outputs"

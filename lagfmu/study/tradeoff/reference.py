@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import names
-from ...fmu.described import Trajectory
+from ...fmu.read import Trajectory
 from ...fmu.session import Session
 from .observe import observe
 from .quantities import Quantity, magnitudes, quantities

@@ -9,7 +9,7 @@ from typing import Any
 from rich.table import Table
 
 from ...page.table import new_table
-from ...verification.pipeline import Case, Report
+from ...verification.junit import Case, Report
 from .measure import Tradeoff
 from .quantities import MULTIPLIER
 from .reference import FINER, REFERENCE

@@ -8,16 +8,16 @@ import pytest
 import sympy as sp
 from sympy.core.random import rng
 
-from lagfmu.testing import shorter
+from lagfmu.testing import simplification
 
 a, b, c = sp.symbols("a b c", real=True)
 ANGLES = sp.symbols("q0:20", real=True)
 WAYS = (
-    shorter.expanded,
-    shorter.sums_of_angles,
-    shorter.trigonometric,
-    shorter.simplified,
-    shorter.product,
+    simplification.expanded,
+    simplification.sums_of_angles,
+    simplification.trigonometric,
+    simplification.simplified,
+    simplification.product,
 )
 
 
@@ -40,9 +40,9 @@ def test_a_spatial_mechanism_is_shown_as_it_stands(way):
 
 def test_what_a_product_becomes_is_counted_before_it_is_multiplied_out():
     """(a + b)^2 (a + c) has at most 3 * 2 terms; a power of a sum, the combinations with repetition."""
-    assert shorter.terms((a + b) ** 2 * (a + c)) == 6
-    assert shorter.terms((a + b + c) ** 4) == 15 == len(sp.expand((a + b + c) ** 4).args)
-    assert shorter.terms(sp.sin(a + b) / (a + b)) == 1
+    assert simplification.terms((a + b) ** 2 * (a + c)) == 6
+    assert simplification.terms((a + b + c) ** 4) == 15 == len(sp.expand((a + b + c) ** 4).args)
+    assert simplification.terms(sp.sin(a + b) / (a + b)) == 1
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -63,16 +63,16 @@ def test_the_form_changes_and_the_value_does_not(way, e):
 
 def test_sines_and_cosines_cancel_where_that_is_cheap():
     """sin^2 + cos^2 = 1, and cos a cos b + sin a sin b = cos(a - b)."""
-    assert shorter.trigonometric(a * sp.sin(b) ** 2 + a * sp.cos(b) ** 2) == a
+    assert simplification.trigonometric(a * sp.sin(b) ** 2 + a * sp.cos(b) ** 2) == a
     product = sp.cos(a) * sp.cos(b) + sp.sin(a) * sp.sin(b)
-    assert shorter.sums_of_angles(product) == sp.cos(a - b)
-    assert dict(shorter.factors(sp.expand((a + b) ** 2 * (a - c)))) == {a + b: 2, a - c: 1}
+    assert simplification.sums_of_angles(product) == sp.cos(a - b)
+    assert dict(simplification.factors(sp.expand((a + b) ** 2 * (a - c)))) == {a + b: 2, a - c: 1}
 
 
 def test_a_users_random_numbers_are_left_alone():
     """SymPy draws random numbers while it factors: always the same ones here, and none of the user's."""
     before = rng.getstate()
-    shorter.product(sp.expand((a + b * c + 1) * (a - b + c**2 + 3)))
+    simplification.product(sp.expand((a + b * c + 1) * (a - b + c**2 + 3)))
     assert rng.getstate() == before
 
 
@@ -80,7 +80,7 @@ def test_terms_that_share_a_parameter_are_gathered() -> None:
     """The force of a spring reads k (x - y), however it was multiplied out, and whatever else acts."""
     k, m, g, x, y, w = sp.symbols("k m g x y w")
     known = (k, m, g), (x, y)
-    assert shorter.gathered(k * x - k * y + m * g, *known) == k * (x - y) + m * g
-    assert shorter.gathered(k * x + m * y, *known) == k * x + m * y
+    assert simplification.gathered(k * x - k * y + m * g, *known) == k * (x - y) + m * g
+    assert simplification.gathered(k * x + m * y, *known) == k * x + m * y
     fall = m * g * sp.cos(x) - m * y * w**2  # as textbooks have it
-    assert shorter.gathered(fall, *known) == fall
+    assert simplification.gathered(fall, *known) == fall
