@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from runs import simulate_fmu
 from scipy.special import ellipj, ellipk
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import simulate
+from lagfmu import Contact, Holonomic, Model, Parameter, simulate
 from lagfmu.errors import SimulationError
 from lagfmu.methods import NUMBERS
 
@@ -55,6 +57,67 @@ def test_rk4_has_order_four(native_fmu, name):
     errors = [error(run(native_fmu(name), solver_method="rk4", solver_step=h)) for h in steps]
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.abs(order - 4).max() < 0.15
+
+
+def test_rattle_has_order_six(native_fmu):
+    """The error of n equal steps falls as h^6."""
+    path, stop, counts = native_fmu("PendulumCartesian"), 1.9, np.array([30, 40, 60, 80])
+    settings = [{"solver_method": "rattle", "solver_step": stop / n} for n in counts]
+    errors = [error(run(path, stop, stop, **each)) for each in settings]
+    assert np.polyfit(np.log(1 / counts), np.log(errors), 1)[0] == pytest.approx(6, abs=0.15)
+
+
+def test_rattle_meets_an_event_within_its_step():
+    """A bob swings against a wall below its pivot, e = 1, and back, each time after a quarter of the period
+    more, K(k)/w: half the step divides the error of the times by nearly 2^6, as between events."""
+    x, y = dynamicsymbols("x y")
+    m, g, L = symbols("m g L", positive=True)
+    model = Model(
+        name="Knocker",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("rod", x**2 + y**2 - L**2), Contact("wall", x, restitution=1)],
+        parameters=[Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1, "m")],
+        start={x: math.sin(THETA0), y: -math.cos(THETA0)},
+    )
+    quarter = ellipk(math.sin(THETA0 / 2) ** 2) / math.sqrt(9.81)
+    wrong = []
+    for step in (0.04, 0.02):
+        start = {"solver.method": "rattle", "solver.step": step}
+        run = simulate(model, 6 * quarter, quarter / 2, start_values=start)
+        assert run["closing.wall.count"][-1] == 3
+        times = run["closing.wall.time"][[3, 7, 11]]
+        wrong.append(np.abs(times - quarter * np.array([1, 3, 5])).max())
+    assert wrong[0] < 1e-7
+    assert wrong[0] > 2**5 * wrong[1]
+
+
+def test_rattle_keeps_a_row_where_it_began_to_act():
+    """A disk falls in free flight, lands, and rolls from there: x - R phi stays what it was then."""
+    x, y, phi = dynamicsymbols("x y phi")
+    m, g, R = symbols("m g R", positive=True)
+    rolls = Holonomic("rolls", x - R * phi, while_closed="floor")
+    model = Model(
+        name="Lander",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + R**2 * phi.diff() ** 2 / 2) / 2 - m * g * y,
+        coordinates={x: "m", y: "m", phi: "rad"},
+        constraints=[Contact("floor", y), rolls],
+        parameters=[Parameter(m, 2, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(R, 0.2, "m")],
+        start={y: 1.0, x.diff(): 1.5, phi: 0.3},
+    )
+    run = simulate(model, 1.0, 0.1, start_values={"solver.method": "rattle"})
+    t, fall = run["time"], math.sqrt(2 / 9.81)
+    rolled = np.maximum(t - fall, 0)  # with 2/3 of the speed
+    np.testing.assert_allclose(run["y"], np.maximum(1 - 9.81 * t**2 / 2, 0), atol=1e-12)
+    np.testing.assert_allclose(run["x"], 1.5 * np.minimum(t, fall) + rolled, rtol=1e-11)
+    np.testing.assert_allclose(run["phi"], 0.3 + rolled / 0.2, rtol=1e-10)
+
+
+def test_rattle_says_when_a_step_is_too_large(native_fmu):
+    """A step in which the rod would turn several times is refused."""
+    values = {"solver.method": "rattle", "solver.step": 1.0, "der(x)": 16.0, "der(y)": 25.0}
+    with pytest.raises(SimulationError, match=r"cannot be met: reduce solver\.step"):
+        simulate(native_fmu("PendulumCartesian"), 1.0, 1.0, start_values=values)
 
 
 @pytest.mark.parametrize(

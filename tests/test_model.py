@@ -21,6 +21,7 @@ from sympy.physics.mechanics import (
 )
 
 from lagfmu import (
+    Contact,
     Embedding,
     Holonomic,
     Input,
@@ -492,3 +493,32 @@ def test_an_embedding_may_ride_on_a_prescribed_motion():
     angle = simulate(model, 0.5, 0.5, 1e-12, drive, scene=Scene("Moved", "minimal"))
     for name in ("x", "der(x)", "der(x,2)", "y", "lambda.rod", "energy.total"):
         np.testing.assert_allclose(angle[name], free[name], rtol=1e-9, err_msg=name)
+
+
+def test_a_departure_is_told_in_all_coordinates_of_an_embedding():
+    """A bead on the wire y = x/2 lies against a stop at x = L: lambda = m g/2, and Q.y = m g is the wire's
+    and the stop's together, until it is pushed away; of the place x and y are told, not s alone."""
+    s, push = dynamicsymbols("s F")
+    model = Model(
+        name="Slope",
+        lagrangian=K - m * g * y,
+        forces={x: push},
+        coordinates={x: "m", y: "m"},
+        constraints=[Holonomic("wire", y - x / 2), Contact("stop", x - L)],
+        parameters=CONSTANTS,
+        inputs=[Input(push, "N")],
+        embedding=Embedding(
+            {s: "m"}, {x: 2 * s / sp.sqrt(5), y: s / sp.sqrt(5)}, {s: 1.5 * math.sqrt(5) / 2}
+        ),
+    )
+    away = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 20.0), (1.0, 20.0)], "f8,f8")
+    away.dtype.names = ("time", "F")
+    run = simulate(model, 1.0, 0.25, 1e-10, inputs=away, scene=Scene("Slope", "minimal"))
+    assert run["lambda.stop"][0] == pytest.approx(2.0 * 9.81 / 2, rel=1e-14)
+    assert run["Q.y"][0] == pytest.approx(2.0 * 9.81, rel=1e-14)
+    assert run["departure.stop.x"][0] == 0
+    last = run[-1]
+    assert (last["departure.stop.count"], last["departure.stop.time"]) == (1, 0.5)
+    assert last["departure.stop.x"] == pytest.approx(1.5, rel=1e-12)
+    assert last["departure.stop.y"] == pytest.approx(0.75, rel=1e-12)
+    assert last["der(s,2)"] == pytest.approx((2 * 20 / 2 - 9.81) / math.sqrt(5), rel=1e-9)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import itertools
 import math
-import os
 from collections.abc import Sequence
 
 import mpmath
@@ -21,10 +20,8 @@ SOURCES = (
     "dop853.c",
     "rk4.c",
     "radau5.c",
-    "rattle.c",
     "lu.c",
     "digits.c",
-    "mechanism.c",
 )
 PROBLEMS = r"""
 #include <math.h>
@@ -79,19 +76,6 @@ static void robertson_J(const double *y, double *J) {
     J[6] = 0, J[7] = 6e7 * y[1], J[8] = 0;
     for (int k = 0; k < 3; k++) J[3 + k] = -J[k] - J[6 + k];
 }
-/* a slow oscillator that drags a mass on a stiff, damped spring: rates of 1e6 and 1 1/s */
-static void spring(const double *y, double *f) {
-    f[0] = y[2], f[1] = y[3];
-    f[2] = -y[0] + 1e-3 * (y[1] - y[0]);
-    f[3] = -1e10 * (y[1] - sin(y[0])) - 1e5 * (y[3] - cos(y[0]) * y[2]);
-}
-static void spring_J(const double *y, double *J) {
-    J[2] = 1, J[7] = 1;
-    J[8] = -1 - 1e-3, J[9] = 1e-3;
-    J[12] = 1e10 * cos(y[0]) - 1e5 * sin(y[0]) * y[2], J[13] = -1e10;
-    J[14] = 1e5 * cos(y[0]), J[15] = -1e5;
-}
-
 static Status rate(void *context, double t, const double *y, double *f) {
     Run *r = context;
     r->calls++;
@@ -101,12 +85,9 @@ static Status rate(void *context, double t, const double *y, double *f) {
     case 0: elliptic(t, y, f); break;
     case 1: van_der_pol(t, y, f); break;
     case 2: robertson(y, f); break;
-    case 3: spring(y, f); break;
-    case 4: f[0] = y[0] * y[0]; break;                       /* escapes: 1/(1 - t) */
-    case 5: f[0] = 0; break;                                 /* at rest */
-    case 6: f[0] = sqrt(1 - t); break;                       /* not a number beyond t = 1 */
-    case 7: f[0] = y[1], f[1] = -y[0]; break;
-    case 8: f[0] = -1e6 * (y[0] - cos(t)); break;            /* Prothero and Robinson */
+    case 3: f[0] = y[0] * y[0]; break;                       /* escapes: 1/(1 - t) */
+    case 4: f[0] = sqrt(1 - t); break;                       /* not a number beyond t = 1 */
+    case 5: f[0] = y[1], f[1] = -y[0]; break;
     default: for (int k = 0; k < 4; k++) f[k] = y[k]; break; /* next to no cost */
     }
     return OK;
@@ -121,10 +102,8 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
     case 0: elliptic_J(t, y, J); break;
     case 1: van_der_pol_J(y, J); break;
     case 2: robertson_J(y, J); break;
-    case 3: spring_J(y, J); break;
-    case 4: J[0] = 2 * y[0]; break;
-    case 7: J[1] = 1, J[2] = -1; break;
-    case 8: J[0] = -1e6; break;
+    case 3: J[0] = 2 * y[0]; break;
+    case 5: J[1] = 1, J[2] = -1; break;
     default: break;
     }
     return OK;
@@ -196,166 +175,17 @@ void run_restore(Run *r, const char *memory, const double *x) {
     memset(r->scratch.base, 0xa5, r->scratch.used);
 }
 """
-# RATTLE on a pendulum x^2 + y^2 = L^2, p = (m, g, L), with a plain LU of the KKT matrix for linear.c
-MECHANISM = r"""
-#include "lu.h"
-#include "rattle.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
-    const int size = s->n + s->m;
-    l->system = s;
-    l->why = why;
-    l->dense = arena_doubles(arena, size * size + size);
-    l->pivots = arena_ints(arena, size);
-}
-Status linear_factor(Linear *l, const double *M, const double *G, const int *active) {
-    const System *s = l->system;
-    const int n = s->n, size = n + s->m;
-    double *A = l->dense;
-    memset(A, 0, sizeof(double) * (size_t)(size * size));
-    for (int e = 0; e < s->masses; e++) A[s->mass_row[e] * size + s->mass_column[e]] = M[e];
-    for (int e = 0; e < s->entries; e++) {
-        if (!active[s->entry_row[e]]) continue;
-        A[(n + s->entry_row[e]) * size + s->entry_column[e]] = G[e];
-        A[s->entry_column[e] * size + n + s->entry_row[e]] = -G[e];
-    }
-    for (int k = 0; k < s->m; k++)
-        if (!active[k]) A[(n + k) * size + n + k] = 1;
-    l->active = active;
-    return lu_factor(size, A, l->pivots) ? fail(l->why, "the KKT matrix is singular") : OK;
-}
-Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
-    const System *s = l->system;
-    const int n = s->n, size = n + s->m;
-    double *r = l->dense + size * size;
-    for (int j = 0; j < n; j++) r[j] = b ? b[j] : 0;
-    for (int k = 0; k < s->m; k++) r[n + k] = l->active[k] ? c[k] : 0;
-    lu_solve(size, l->dense, l->pivots, r);
-    memcpy(x, r, sizeof(double) * (size_t)n);
-    if (lambda) memcpy(lambda, r + n, sizeof(double) * (size_t)s->m);
-    return OK;
-}
-Status linear_nearest(Linear *l, const double *c, double *x) {
-    return linear_solve(l, NULL, c, x, NULL);
-}
-
-static void dynamics(double t, const double *q, const double *v, const double *u, const double *p,
-                     double *M, double *F, double *G, double *nu, double *gamma) {
-    (void)t;
-    (void)u;
-    M[0] = M[1] = p[0];
-    F[0] = 0;
-    F[1] = -p[0] * p[1];
-    G[0] = 2 * q[0];
-    G[1] = 2 * q[1];
-    nu[0] = 0;
-    gamma[0] = -2 * (v[0] * v[0] + v[1] * v[1]);
-}
-static void residual(double t, const double *q, const double *u, const double *p, double *f) {
-    (void)t;
-    (void)u;
-    f[0] = q[0] * q[0] + q[1] * q[1] - p[2] * p[2];
-}
-static const int diagonal[] = {0, 1}, entry_row[] = {0, 0}, entry_column[] = {0, 1};
-static const int row_start[] = {0, 2};
-static const Row rows[] = {{"rod", HOLONOMIC, -1, 0}};
-static const System pendulum = {
-    .n = 2, .m = 1, .masses = 2, .entries = 2, .parameters = 3, .rows = rows,
-    .mass_row = diagonal, .mass_column = diagonal, .entry_row = entry_row,
-    .entry_column = entry_column, .row_start = row_start, .constant_mass = 1, .separable = 1,
-    .dynamics = dynamics, .residual = residual};
-
-typedef struct {
-    Mechanism b;
-    Integrator i;
-    Why why;
-    Arena saved, scratch;
-    double p[3], level, worst[4]; /* |f| / L^2, |G v|, |E - E0|, mean of E - E0 over the latest stretch */
-    double E0;
-} Swing;
-
-static double energy(const Swing *w) {
-    const double *y = w->i.y, *p = w->p;
-    return p[0] * ((y[2] * y[2] + y[3] * y[3]) / 2 + p[1] * y[1]);
-}
-static const Method *const METHODS_OF_SWING[] = {&rattle};
-
-Swing *swing_new(const double *y, const double *p) {
-    Swing *w = calloc(1, sizeof *w);
-    for (int pass = 0; pass < 2; pass++) {
-        mechanism_layout(&w->b, &w->scratch, &pendulum, &w->why, NULL);
-        integrator_layout(&w->i, &w->saved, &w->scratch, 4, METHODS_OF_SWING, 1);
-        if (pass == 1) break;
-        w->saved.base = calloc(1, w->saved.used);
-        w->scratch.base = calloc(1, w->scratch.used);
-        w->saved.used = w->scratch.used = 0;
-    }
-    memcpy(w->p, p, sizeof w->p);
-    integrator_start(&w->i, &rattle, 0, y, 0);
-    w->E0 = energy(w);
-    return w;
-}
-void swing_free(Swing *w) {
-    free(w->saved.base);
-    free(w->scratch.base);
-    free(w);
-}
-int swing_step(Swing *w, double fixed, double t_bound, int active) {
-    const Control control = {0, NULL, 0, fixed};
-    const double *level = w->level == 0 ? NULL : &w->level;
-    return (int)rattle_step(&w->i, &w->b, &active, level, NULL, w->p, &control, t_bound);
-}
-void swing_level(Swing *w, double level) { w->level = level; }
-int swing_to(Swing *w, double fixed, double t_bound) {
-    double sum = 0;
-    long count = 0;
-    memset(w->worst, 0, sizeof w->worst);
-    while (w->i.t != t_bound) {
-        if (swing_step(w, fixed, t_bound, 1) != OK) return 1;
-        const double *y = w->i.y, L = w->p[2];
-        w->worst[0] = fmax(w->worst[0], fabs(y[0] * y[0] + y[1] * y[1] - L * L) / (L * L));
-        w->worst[1] = fmax(w->worst[1], fabs(y[0] * y[2] + y[1] * y[3]));
-        w->worst[2] = fmax(w->worst[2], fabs(energy(w) - w->E0));
-        sum += energy(w) - w->E0;
-        count++;
-    }
-    w->worst[3] = sum / (double)count;
-    return 0;
-}
-void swing_state(const Swing *w, double *y, double *worst) {
-    memcpy(y, w->i.y, 4 * sizeof *y);
-    memcpy(worst, w->worst, sizeof w->worst);
-}
-static Status swing_rate(void *context, double t, const double *y, double *f) {
-    Swing *w = context;
-    const int active = 1;
-    f[0] = y[2], f[1] = y[3];
-    if (mechanism_motion(&w->b, (Instant){t, NULL, w->p}, y, y + 2, &active) != OK) return FAILED;
-    memcpy(f + 2, w->b.vdot, 2 * sizeof *f);
-    return OK;
-}
-int swing_dense(Swing *w, double t, double *y) {
-    const Ode ode = {w, swing_rate, NULL, &w->why};
-    Status status = rattle.prepare_dense(&w->i, &ode);
-    rattle.dense(&w->i, t, y);
-    return (int)status;
-}
-const char *swing_why(const Swing *w) { return w->why.text; }
-"""
 METHODS = ("dop853", "rk4", "radau5")
 ADAPTIVE = ("dop853", "radau5")
 ORDER = {"dop853": 8, "rk4": 4, "radau5": 5}
-SIZES = (4, 2, 3, 4, 1, 1, 1, 2, 1, 4)
-ELLIPTIC, VAN_DER_POL, ROBERTSON, SPRING, ESCAPE, REST, ROOT, CIRCLE, PROTHERO, CHEAP = range(10)
+SIZES = (4, 2, 3, 1, 1, 2, 4)
+ELLIPTIC, VAN_DER_POL, ROBERTSON, ESCAPE, ROOT, CIRCLE, CHEAP = range(7)
 POINTER, DOUBLE, INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    lib = compile_library(tmp_path_factory.mktemp("integrators"), SOURCES, PROBLEMS + MECHANISM)
+    lib = compile_library(tmp_path_factory.mktemp("integrators"), SOURCES, PROBLEMS)
     lib.run_new.restype = POINTER
     lib.run_new.argtypes = [INT, INT, INT, POINTER, DOUBLE, DOUBLE]
     lib.run_why.restype = ctypes.c_char_p
@@ -378,14 +208,6 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
         "restore": [POINTER, POINTER],
     }.items():
         getattr(lib, f"run_{name}").argtypes = [POINTER, *extra]
-    lib.swing_new.restype, lib.swing_new.argtypes = POINTER, [POINTER, POINTER]
-    lib.swing_why.restype, lib.swing_why.argtypes = ctypes.c_char_p, [POINTER]
-    lib.swing_free.argtypes = [POINTER]
-    lib.swing_level.argtypes = [POINTER, DOUBLE]
-    lib.swing_step.argtypes = [POINTER, DOUBLE, DOUBLE, INT]
-    lib.swing_to.argtypes = [POINTER, DOUBLE, DOUBLE]
-    lib.swing_state.argtypes = [POINTER, POINTER, POINTER]
-    lib.swing_dense.argtypes = [POINTER, DOUBLE, POINTER]
     return lib
 
 
@@ -460,70 +282,10 @@ class Run:
         self.lib.run_restore(self.run, saved[0], saved[1])
 
 
-class Swing:
-    """The pendulum x^2 + y^2 = L^2 by RATTLE, from theta0 to the vertical at speed v."""
-
-    def __init__(
-        self,
-        lib: ctypes.CDLL,
-        theta: float = 1.0,
-        speed: float = 0.0,
-        g: float = 1.0,
-        y: Sequence[float] | None = None,
-    ) -> None:
-        self.lib = lib
-        sin, cos = math.sin(theta), math.cos(theta)
-        start = np.array(y if y is not None else [sin, -cos, speed * cos, speed * sin])
-        self.swing = lib.swing_new(start.ctypes.data, np.array([1.0, g, 1.0]).ctypes.data)
-
-    def __del__(self) -> None:
-        self.lib.swing_free(self.swing)
-
-    def step(self, fixed: float, t_bound: float, active: int = 1) -> bool:
-        return bool(self.lib.swing_step(self.swing, fixed, t_bound, active) == 0)
-
-    def to(self, fixed: float, t_bound: float) -> None:
-        assert self.lib.swing_to(self.swing, fixed, t_bound) == 0, self.why
-
-    @property
-    def y(self) -> np.ndarray:
-        return self._read()[0]
-
-    @property
-    def worst(self) -> np.ndarray:
-        return self._read()[1]
-
-    def _read(self) -> tuple[np.ndarray, np.ndarray]:
-        y, worst = np.zeros(4), np.zeros(4)
-        self.lib.swing_state(self.swing, y.ctypes.data, worst.ctypes.data)
-        return y, worst
-
-    def dense(self, t: float) -> np.ndarray:
-        y = np.zeros(4)
-        assert self.lib.swing_dense(self.swing, t, y.ctypes.data) == 0
-        return y
-
-    @property
-    def why(self) -> str:
-        text: bytes = self.lib.swing_why(self.swing)
-        return text.decode()
-
-
 def elliptic(t: float) -> np.ndarray:
     """sn, cn, dn at k^2 = 1/2, and 1/(1 + t^2)."""
     functions = (float(mpmath.ellipfun(name, t, m=0.5)) for name in ("sn", "cn", "dn"))
     return np.array([*functions, 1 / (1 + t * t)])
-
-
-def pendulum(t: float, theta: float = 1.0, g: float = 1.0) -> np.ndarray:
-    """x, y, vx, vy of a pendulum of length 1 released from rest: sin(theta/2) = k sn(K - w t)."""
-    k = mpmath.sin(mpmath.mpf(theta) / 2)
-    w, m = mpmath.sqrt(g), k**2
-    phase = mpmath.ellipk(m) - w * t
-    sn, cn, dn = (mpmath.ellipfun(name, phase, m=m) for name in ("sn", "cn", "dn"))
-    angle, rate = 2 * mpmath.asin(k * sn), -2 * w * k * cn * dn / mpmath.sqrt(1 - m * sn**2)
-    sin, cos = mpmath.sin(angle), mpmath.cos(angle)
-    return np.array([float(x) for x in (sin, -cos, rate * cos, rate * sin)])
 
 
 def observed_order(steps: Sequence[float], errors: Sequence[float]) -> float:
@@ -595,37 +357,12 @@ def test_order_of_dense_output(
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)
-def test_error_follows_tolerance(library: ctypes.CDLL, method: str) -> None:
-    """From 1e-4 to 1e-12 the error falls with the tolerance, about as much, and stays below 100 times it."""
-    tolerances = [10.0**-k for k in range(4, 13)]
-    errors = []
-    for tolerance in tolerances:
-        r = Run(library, method, tolerance=tolerance)
-        assert r.to(5.0) > 0
-        errors.append(abs(r.y - elliptic(5.0)).max())
-    assert all(b < a for a, b in itertools.pairwise(errors))
-    assert all(e < 100 * tolerance for e, tolerance in zip(errors, tolerances, strict=True))
-    assert observed_order(tolerances, errors) == pytest.approx(1, abs=0.15)
-
-
-@pytest.mark.parametrize("method", ADAPTIVE)
 def test_accepted_error_is_below_tolerance(library: ctypes.CDLL, method: str) -> None:
     """The first step, of a size chosen by the method, has an error below the tolerance."""
     for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
         r = Run(library, method, tolerance=tolerance)
         assert r.step(5.0)
         assert abs(r.y - elliptic(r.t)).max() < tolerance
-
-
-def test_same_equations_in_other_units(library: ctypes.CDLL) -> None:
-    """y and its scale 2^30 times as large take the same steps, to the bit."""
-    steps = []
-    for unit in (1.0, 2.0**30):
-        r = Run(library, "dop853", CIRCLE, [unit, 0.0])
-        library.run_scale(r.run, unit)
-        assert r.to(10.0) > 0
-        steps.append((r.numbers().tolist(), (r.y / unit).tolist()))
-    assert steps[0] == steps[1]
 
 
 def test_dop853_takes_the_step_of_scipy(library: ctypes.CDLL) -> None:
@@ -674,17 +411,6 @@ def test_bound_just_beyond_a_step_is_reached_in_one(library: ctypes.CDLL, method
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)
-def test_no_bound(library: ctypes.CDLL, method: str) -> None:
-    """Towards an infinite bound the steps are those towards a far one."""
-    runs = [Run(library, method, CIRCLE, [1.0, 0.0]) for _ in range(2)]
-    for r, bound in zip(runs, (math.inf, 1e9), strict=True):
-        for _ in range(20):
-            assert r.step(bound)
-    assert runs[0].y.tolist() == runs[1].y.tolist()
-    assert runs[0].t == runs[1].t
-
-
-@pytest.mark.parametrize("method", ADAPTIVE)
 def test_step_cut_short_does_not_spoil_the_next(library: ctypes.CDLL, method: str) -> None:
     """The step tried after an arrival is not smaller than the one that was offered before it."""
     r = Run(library, method, CIRCLE, [1.0, 0.0])
@@ -696,34 +422,6 @@ def test_step_cut_short_does_not_spoil_the_next(library: ctypes.CDLL, method: st
         assert r.step(bound)
         assert r.t == bound
         assert r.h_next >= offered
-
-
-@pytest.mark.parametrize("method", ADAPTIVE)
-def test_maximum_step(library: ctypes.CDLL, method: str) -> None:
-    """No step is longer than the maximum, the last one included."""
-    r = Run(library, method, CIRCLE, [1.0, 0.0], maximum=0.01, tolerance=1e-4)
-    while r.t < 0.1005:
-        assert r.step(0.1005)
-        assert r.t - r.t_old <= 0.01 * (1 + 1e-14)
-
-
-def test_fixed_steps_divide_the_way_evenly(library: ctypes.CDLL) -> None:
-    """rk4 takes ceil(H / h) equal steps, also where H / h is a whole number but for rounding."""
-    for whole, fixed, count in (
-        (1.0, 0.1, 10),
-        (1.0, 0.3, 4),
-        (0.3, 0.1, 3),
-        (1.0, 5.0, 1),
-        (7.0, 0.001, 7000),
-    ):
-        r = Run(library, "rk4", CIRCLE, [1.0, 0.0], fixed=fixed)
-        steps = []
-        while r.t < whole:
-            assert r.step(whole)
-            steps.append(r.t - r.t_old)
-            assert int(r.numbers()[7]) == count - len(steps)
-        assert len(steps) == count
-        assert steps == pytest.approx([whole / count] * count, rel=1e-11)
 
 
 def test_time_is_what_was_travelled(library: ctypes.CDLL) -> None:
@@ -853,17 +551,6 @@ def test_failure_leaves_the_integrator_as_it_was(library: ctypes.CDLL, method: s
         assert "step size underflow" in r.why
 
 
-@pytest.mark.parametrize("method", ADAPTIVE)
-def test_a_wall_is_approached_to_rounding(library: ctypes.CDLL, method: str) -> None:
-    """f fails beyond t = 1: the integration stops within 1e-13 of it, with the closed form there."""
-    r = Run(library, method)
-    library.run_fail(r.run, 1.0, math.inf, 0)
-    assert r.to(2.0) == -1
-    assert r.t == pytest.approx(1.0, abs=1e-13)
-    assert r.t <= 1
-    assert abs(r.y - elliptic(r.t)).max() < 1e-6
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_not_finite_is_not_a_step(library: ctypes.CDLL, method: str) -> None:
     """y' = y^2 escapes at t = 1, y' = sqrt(1 - t) is not a number beyond: both stop there, finite."""
@@ -882,23 +569,6 @@ def test_failure_at_the_start_names_its_cause(library: ctypes.CDLL, method: str)
     library.run_fail(r.run, -1.0, 1e-300, 0)
     assert not r.step(1.0)
     assert r.why == "the mass matrix is singular"
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_bound_that_is_not_ahead_is_refused(library: ctypes.CDLL, method: str) -> None:
-    """t_bound = t and not a number are no steps."""
-    r = Run(library, method, CIRCLE, [1.0, 0.0], t=1.0)
-    for bound in (1.0, math.nan):
-        assert not r.step(bound)
-        assert r.t == 1.0
-
-
-@pytest.mark.parametrize("method", ADAPTIVE)
-def test_at_rest(library: ctypes.CDLL, method: str) -> None:
-    """y' = 0 stays where it is, in a few steps."""
-    r = Run(library, method, REST, [3.0])
-    assert 0 < r.to(1e6) < 10
-    assert r.y[0] == 3.0
 
 
 def test_van_der_pol(library: ctypes.CDLL) -> None:
@@ -925,106 +595,3 @@ def test_robertson(library: ctypes.CDLL) -> None:
         assert 0 < r.to(1e11) < 1000
         assert abs(r.y / exact - 1).max() < 10 * tolerance
         assert r.y.sum() == pytest.approx(1, abs=1e-12)
-
-
-def test_stiff_spring(library: ctypes.CDLL) -> None:
-    """A spring of 1e10 N/m that relaxes in 1e-5 s drags its mass along y1 = sin y0: 300 steps over 10 s,
-    where dop853 would be bound by stability to about 1e5."""
-    y = {}
-    for tolerance in (1e-7, 1e-9):
-        r = Run(library, "radau5", SPRING, [1.0, math.sin(1.0), 0.0, 0.0], tolerance=tolerance)
-        assert 0 < r.to(10.0) < 1000
-        y[tolerance] = r.y
-    assert y[1e-7] == pytest.approx(y[1e-9], abs=1e-6)
-    assert y[1e-9][1] == pytest.approx(math.sin(y[1e-9][0]), abs=1e-8)
-
-
-def test_prothero_and_robinson(library: ctypes.CDLL) -> None:
-    """y' = -1e6 (y - cos t): steps of seconds, and y = (1e12 cos t + 1e6 sin t)/(1e12 + 1)."""
-    r = Run(library, "radau5", PROTHERO, [1.0], tolerance=1e-9)
-    assert 0 < r.to(10.0) < 30
-    exact = (1e12 * math.cos(10) + 1e6 * math.sin(10)) / (1e12 + 1)
-    assert r.y[0] == pytest.approx(exact, abs=1e-9)
-
-
-def test_pendulum_by_rattle_is_of_order_six(library: ctypes.CDLL) -> None:
-    """The error of n equal steps falls as h^6, against the pendulum's elliptic functions."""
-    counts, errors = (30, 40, 60, 80), []
-    for n in counts:
-        swing = Swing(library)
-        swing.to(6 / n, 6.0)
-        errors.append(abs(swing.y - pendulum(6.0)).max())
-    assert observed_order([6 / n for n in counts], errors) == pytest.approx(6, abs=0.15)
-
-
-def test_rattle_is_symmetric(library: ctypes.CDLL) -> None:
-    """Ten steps forward and ten back return to the start, to rounding, at any step size."""
-    for h in (0.3, 0.1):
-        swing = Swing(library, speed=0.4)
-        start = swing.y
-        swing.to(h, 10 * h)
-        assert abs(swing.y - start).max() > 0.1
-        swing.to(h, 0.0)
-        assert swing.y == pytest.approx(start, abs=2e-14)
-
-
-def test_dense_output_of_rattle(library: ctypes.CDLL) -> None:
-    """Within a step q is a quintic: its error falls as h^6, that of v as h^5; the ends are met."""
-    parts, q_errors, v_errors = (0.05, 0.035, 0.025), [], []
-    for h in parts:
-        swing = Swing(library, y=pendulum(1.0))
-        assert swing.step(h, h)
-        inside = h * np.linspace(0.1, 0.9, 9)
-        gaps = np.array([abs(swing.dense(t) - pendulum(1.0 + t)) for t in inside])
-        q_errors.append(gaps[:, :2].max())
-        v_errors.append(gaps[:, 2:].max())
-        assert swing.dense(h) == pytest.approx(swing.y, abs=1e-14)
-        assert swing.dense(0.0) == pytest.approx(pendulum(1.0), abs=1e-15)
-    assert observed_order(parts, q_errors) == pytest.approx(6, abs=0.15)
-    assert observed_order(parts, v_errors) == pytest.approx(5, abs=0.15)
-
-
-@pytest.mark.thorough
-def test_energy_over_long_times(library: ctypes.CDLL) -> None:
-    """|f| <= 1e-15 L^2 throughout; |E - E0| <= 1e-8 m g L, of which rounding drifts by 1e-9 in 1e6 s.
-
-    1e5 s, or 1e6 s where LAGFMU_LONG is set (a minute)."""
-    horizon = 1e6 if os.environ.get("LAGFMU_LONG") else 1e5
-    swing, means, times = Swing(library), [], horizon * np.linspace(0.2, 1, 5)
-    for t in times:
-        swing.to(0.1, t)
-        f, slip, energy, mean = swing.worst
-        assert f <= 1e-15
-        assert slip <= 1e-15
-        assert energy <= 1e-8
-        means.append(mean)
-    assert abs(np.polyfit(times, means, 1)[0]) * 1e6 < 1e-8
-
-
-def test_rattle_keeps_a_level(library: ctypes.CDLL) -> None:
-    """On x^2 + y^2 - 1 = 0.21 it is the pendulum of length 1.1, at the same steps."""
-    swing, unit = Swing(library, y=1.1 * pendulum(0.5)), Swing(library, y=pendulum(0.5), g=1 / 1.1)
-    library.swing_level(swing.swing, 0.21)
-    swing.to(0.1, 3.0)
-    unit.to(0.1, 3.0)
-    assert swing.y / 1.1 == pytest.approx(unit.y, abs=2e-14)
-    assert swing.y[0] ** 2 + swing.y[1] ** 2 == pytest.approx(1.21, abs=1e-15)
-
-
-def test_rattle_without_its_constraint_is_a_free_fall(library: ctypes.CDLL) -> None:
-    """A row that does not act is not kept: the bob falls on a parabola, exactly."""
-    swing = Swing(library, theta=0.5, speed=0.3, g=2.0)
-    x, y, vx, vy = swing.y
-    assert swing.step(0.7, 0.7, active=0)
-    assert swing.y == pytest.approx(
-        [x + 0.7 * vx, y + 0.7 * vy - 0.49, vx, vy - 1.4], rel=1e-14, abs=1e-15
-    )
-
-
-def test_rattle_says_when_a_step_is_too_large(library: ctypes.CDLL) -> None:
-    """A step in which the rod would turn several times is refused, and nothing is moved."""
-    swing = Swing(library, speed=30.0)
-    start = swing.y
-    assert not swing.step(1.0, 1.0)
-    assert swing.y.tolist() == start.tolist()
-    assert "the constraints cannot be met: reduce solver.step" in swing.why

@@ -7,37 +7,30 @@ from __future__ import annotations
 import ctypes
 import itertools
 import re
-import subprocess
 from collections.abc import Sequence
-from ctypes import byref, c_char_p, c_double, c_int, c_longlong, c_void_p
+from ctypes import c_char_p, c_double, c_int, c_void_p
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import FILES
 from impact_models import cradle
-from linkages import FOUR_BAR, TIME, pinned_rod, rods
-from runtime import FLAGS, INCLUDES, RUNTIME_FILES, SANITIZE, compile_library, compiler, objects
-from sympy import Rational, sin, sqrt, symbols
+from linkages import FOUR_BAR, TIME, rods
+from runtime import RUNTIME_FILES, compile_library
+from sympy import Rational, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from test_euler_parameters import top
 
 from lagfmu import (
     Contact,
-    Embedding,
     Holonomic,
     Input,
     Model,
     Nonholonomic,
     Parameter,
-    Scene,
 )
-from lagfmu.errors import ModelError
 from lagfmu.testing import (
     GIVEN,
     OMITTED,
-    SET,
     Prepared,
     model_source,
     prepare,
@@ -64,12 +57,9 @@ class Bench:
         self.c, self.prepared, self.system = library, prepared, prepared.system
         self.c.bench_open.restype = c_void_p
         self.c.bench_array.restype = c_void_p
-        self.c.bench_solver.restype = c_void_p
         self.c.bench_why.restype = c_char_p
         self.c.bench_number.restype = c_double
         self.handle = c_void_p(self.c.bench_open(system))
-        embedding = self.system.embedding
-        self.full = self.system if embedding is None else embedding.full
         values = [v.start for v in prepared.table.variables if v.role == "parameter"]
         self.p = self.array("p", len(values))
         self.p[:] = values
@@ -92,75 +82,18 @@ class Bench:
     def drive(self, values: Sequence[float]) -> None:
         self.array("value", len(values))[:] = values
 
-    def start(
-        self, q: Sequence[float], v: Sequence[float], t: float = 0.0, tolerance: float = 1e-8
-    ) -> bool:
-        arrays = doubles(q), doubles(v), c_double(tolerance)
-        return int(self.c.bench_start(self.handle, c_double(t), *arrays)) == 0
-
-    def moved(self) -> list[tuple[str, float, float]]:
-        found = []
-        for i in itertools.count():
-            name, given, used = c_char_p(), c_double(), c_double()
-            where = byref(name), byref(given), byref(used)
-            velocity = self.c.bench_moved(self.handle, i, *where)
-            if velocity < 0:
-                return found
-            text = (name.value or b"").decode()
-            found.append((f"der({text})" if velocity else text, given.value, used.value))
+    def start(self, q: Sequence[float], v: Sequence[float], tolerance: float = 1e-8) -> bool:
+        return not self.c.bench_start(self.handle, doubles(q), doubles(v), c_double(tolerance))
 
     def state(self) -> dict[str, Any]:
-        n, m, c = self.system.n, self.system.m, len(self.system.contacts)
-        sizes = {"q": n, "v": n, "offset": m, "scale": 2 * n, "size": n, "gap": c}
-        found = {name: self.array(f"state.{name}", k).copy() for name, k in sizes.items()}
-        for name, kind in (("closed", c_int), ("armed", c_int), ("count", c_longlong)):
-            found[name] = self.array(f"state.{name}", c, kind).copy()
-        return found
+        n = self.system.n
+        return {name: self.array(f"state.{name}", n).copy() for name in ("q", "v", "size")}
 
-    def project(self, q: Any, v: Any, active: Sequence[int], t: float = 0.0) -> tuple[Any, Any]:
+    def project(self, q: Any, v: Any, active: Sequence[int]) -> tuple[Any, Any]:
         x, w = doubles(q), doubles(v)
-        if self.c.bench_project(self.handle, c_double(t), x, w, integers(active)):
+        if self.c.bench_project(self.handle, x, w, integers(active)):
             raise AssertionError(self.why())
         return np.array(x), np.array(w)
-
-    def observe(self) -> dict[str, Any]:
-        """The observed values by the names that the FMU gives them."""
-        if self.c.bench_observe(self.handle):
-            raise AssertionError(self.why())
-        full, system = self.full, self.system
-        contacts = [system.rows[k].name for k in system.contacts]
-        rows = [row.name for row in full.rows]
-        entries = [f"{rows[k]}.{full.coordinates[j]}" for k, j in zip(*full.jacobian, strict=True)]
-        each = [f"{c}.{x}" for c in contacts for x in full.coordinates]
-        rates = [f"{c}.velocity.{x}" for c in contacts for x in full.coordinates]
-        names = {
-            "lambda": [f"lambda.{r}" for r in rows],
-            "residual": [f"residual.{r}" for r in rows],
-            "force": [f"Q.{x}" for x in full.coordinates],
-            "share": [f"Q.{e}" for e in entries],
-            "departure_q": [f"departure.{e}" for e in each],
-            "departure_v": [f"departure.{e}" for e in rates],
-            "own": [own.name for own in full.outputs],
-        }
-        if self.system is not full:
-            names |= _motion_names(system.coordinates, "s", "sdot", "sddot")
-        names |= _motion_names(full.coordinates, "q", "v", "vdot")
-        values: dict[str, Any] = {}
-        for array, labels in names.items():
-            seen = self.array(f"seen.{array}", len(labels))
-            values |= dict(zip(labels, seen.tolist(), strict=True))
-        unique = self.array("seen.unique", len(rows), c_int).tolist()
-        values |= {f"unique.{r}": bool(x) for r, x in zip(rows, unique, strict=True)}
-        values["energy.kinetic"] = self.number("kinetic")
-        values["energy.potential"] = self.number("potential")
-        return values
-
-
-MOTION = ("{}", "der({})", "der({},2)")
-
-
-def _motion_names(coordinates: Sequence[str], *arrays: str) -> dict[str, list[str]]:
-    return {a: [p.format(x) for x in coordinates] for a, p in zip(arrays, MOTION, strict=True)}
 
 
 def doubles(values: Sequence[float]) -> Any:
@@ -187,13 +120,10 @@ def bench(runtime: ctypes.CDLL, folder: Path, prepared: Any) -> Any:
     made: list[Bench] = []
     keep: dict[str, tuple[ctypes.CDLL, Prepared]] = {}
 
-    def get(model: str | Model, formulation: str = "multipliers") -> Bench:
-        name = model if isinstance(model, str) else f"{model.name} {formulation}"
+    def get(model: str | Model) -> Bench:
+        name = model if isinstance(model, str) else model.name
         if name not in keep:
-            if isinstance(model, str):
-                one = prepared(model)
-            else:
-                one = prepare(model, Scene(model.name, formulation=formulation))
+            one = prepared(model) if isinstance(model, str) else prepare(model)
             text = model_source(one.form)
             keep[name] = compile_library(folder, ["interval.c"], text), one
         library, one = keep[name]
@@ -213,146 +143,34 @@ def defaults(system: Any, table: Any) -> tuple[list[float], list[float], list[fl
     return q, v, [x.start for x in table.variables if x.role == "input"]
 
 
-def check_start(
-    one: Bench,
-    q: Sequence[float],
-    v: Sequence[float],
-    u: Sequence[float],
-    priority: Sequence[int] | None = None,
-) -> Any:
-    """It starts, and what is observed then obeys M vdot = F + G^T lambda, Q = G^T lambda, and f = 0 and
-    G v = nu in the rows that act, to the rounding of their terms; M, F, G in NumPy."""
-    one.drive(u)
-    one.array("priority", 2 * one.system.n, c_int)[:] = (
-        [GIVEN] * (2 * one.system.n) if priority is None else priority
-    )
-    assert one.start(q, v), one.why()
-    seen, full = one.observe(), one.full
-    x, w, a = (np.array([seen[p.format(c)] for c in full.coordinates]) for p in MOTION)
-    lam = np.array([seen[f"lambda.{row.name}"] for row in full.rows])
-    M, F, G, _, _ = full.assemble(0.0, x, w, u, one.p.tolist())
-    size = np.abs(M) @ np.abs(a) + np.abs(F) + np.abs(G.T) @ np.abs(lam)
-    beside = full.assemble(0.0, x + 2 * EPS * (1 + np.abs(x)), w, u, one.p.tolist())[1]
-    rounding = np.abs(beside - F)  # a stiff spring (SliderCrank's has 1e6 N/m) makes newtons of it
-    assert (np.abs(M @ a - F - G.T @ lam) <= 1e-12 * size.max() + rounding).all()
-    force = [seen[f"Q.{c}"] for c in full.coordinates]
-    np.testing.assert_allclose(force, G.T @ lam, rtol=0, atol=1e-13 * size.max())
-    assert seen["energy.kinetic"] == pytest.approx(w @ M @ w / 2, rel=1e-13, abs=1e-300)
-    if full is one.system:
-        f, slip = shares(one, x, w)
-        acts = one.array("active", full.m, c_int).astype(bool)
-        assert (f[acts] <= 3 * EPS).all()
-        assert (slip[acts] <= 4 * EPS).all()
-    return seen
-
-
 # --------------------------------------------------------------------------- start and observation
-
-
-@pytest.mark.parametrize(
-    "name", [n for n in FILES if n != "SlippingSphere"]
-)  # of rows without friction
-def test_every_system_starts_in_its_own_equations(name, bench):
-    """Each scene's start is a state of M vdot = F + G^T lambda, G v = nu, f = 0."""
-    one = bench(name)
-    check_start(one, *defaults(one.system, one.prepared.table))
-
-
-@pytest.mark.parametrize(("x", "y"), [(3.0, 4.0), (-30.0, 40.0), (1e-3, -2e-3), (0.6, 0.8)])
-def test_a_pendulum_starts_at_the_nearest_point_of_its_circle(x, y, bench):
-    """All masses are equal, so the nearest point of the circle lies on the same ray; of the velocity
-    the part along the circle stays."""
-    one = bench("PendulumCartesian")
-    check_start(one, [x, y], [1.0, 0.25], [])
-    ray = np.array([x, y]) / np.hypot(x, y)
-    tangent = np.array([-ray[1], ray[0]])
-    np.testing.assert_allclose(one.state()["q"], ray, rtol=1e-15, atol=1e-16)
-    expected = tangent * (tangent @ [1.0, 0.25])
-    np.testing.assert_allclose(one.state()["v"], expected, rtol=1e-14, atol=1e-16)
 
 
 def test_a_four_bar_starts_from_any_velocities_of_its_crank(bench):
     """The pinned end rests whatever the crank does: its speed, rounding of the crank's, is no
     contradiction, in any of 20 starts."""
     one = bench(rods("FourBar", FOUR_BAR))
-    q, v, u = defaults(one.system, one.prepared.table)
+    q, v, _ = defaults(one.system, one.prepared.table)
     chance = np.random.default_rng(1)
     ends = [one.system.coordinates.index(name) for name in ("x3", "y3")]
     for _ in range(20):
         v = chance.uniform(-1, 1, len(q))
         v[ends] = 0
         near = np.array(q) + chance.uniform(-0.2, 0.2, len(q))
-        check_start(one, near.tolist(), v.tolist(), u)
+        assert one.start(near.tolist(), v.tolist()), one.why()
         assert np.abs(one.state()["v"][ends]).max() < 1e-14
         assert np.abs(one.state()["v"]).max() > 1e-3
-
-
-def test_what_nobody_said_moves_first_and_what_was_set_moves_last(bench):
-    """A rod pinned at its end, its middle at x, y: theta and theta' said are kept bit for bit, and
-    x = l/2 cos(theta), x' = -l/2 theta' sin(theta) follow; theta given in the model follows an x that was
-    set; velocities that were set move if nothing else can, least in the metric of M: what remains of
-    (x', y') is its part along the circle."""
-    one = bench(pinned_rod({theta: 0.3}))
-    at = {name: k for k, name in enumerate(one.system.coordinates)}
-    X, Y, T = at["x"], at["y"], at["theta"]
-
-    def begun(q: dict[int, float], v: dict[int, float], said: dict[int, int]) -> tuple[Any, Any]:
-        values = [[d.get(j, 0.0) for j in range(3)] for d in (q, v)]
-        check_start(one, *values, [], [said.get(j, OMITTED) for j in range(6)])
-        return one.state()["q"], one.state()["v"]
-
-    arm = one.p[2] / 2
-    q, v = begun({T: 0.3}, {T: 1.86}, {T: GIVEN, 3 + T: GIVEN})
-    assert (q[T], v[T]) == (0.3, 1.86)
-    assert q[X] == pytest.approx(arm * np.cos(0.3), rel=1e-15)
-    assert v[X] == pytest.approx(-arm * 1.86 * np.sin(0.3), rel=1e-14)
-    q, v = begun({T: 0.3, X: 0.2}, {T: 1.86, X: 1.0}, {T: GIVEN, X: SET, 3 + T: GIVEN, 3 + X: SET})
-    assert (q[X], v[X]) == (0.2, 1.0)
-    assert q[T] == pytest.approx(np.arccos(0.2 / arm), rel=1e-14)
-    assert v[T] == pytest.approx(-1 / arm / np.sin(q[T]), rel=1e-13)
-    said = {T: GIVEN, 3 + X: SET, 3 + Y: SET, 3 + T: GIVEN}
-    q, v = begun({T: 0.3}, {X: 0.5, Y: 1.0, T: 9.0}, said)
-    tangent = np.array([-np.sin(0.3), np.cos(0.3)])
-    np.testing.assert_allclose(v[[X, Y]], tangent * (tangent @ [0.5, 1.0]), rtol=1e-8)
 
 
 def test_an_omitted_value_whose_zero_is_singular_is_asked_for(bench):
     """x = 0.6 on a circle of 1 m and nothing said of y: at y = 0 the circle does not depend on y to first
     order, and which of +-0.8 is meant nobody can know."""
     one = bench("PendulumCartesian")
-    priority = [GIVEN, OMITTED, OMITTED, OMITTED]
-    one.array("priority", 4, c_int)[:] = priority
+    one.array("priority", 4, c_int)[:] = [GIVEN, OMITTED, OMITTED, OMITTED]
     assert not one.start([0.6, 0.0], [0.0, 0.0])
     assert "give y a start value" in one.why()
-    check_start(one, [0.6, -0.1], [0.0, 0.0], [], priority)
+    assert one.start([0.6, -0.1], [0.0, 0.0]), one.why()
     np.testing.assert_allclose(one.state()["q"], [0.6, -0.8], rtol=1e-15)
-
-
-def test_constraints_that_no_velocity_satisfies_are_still_refused():
-    """x = 0 at all times and x = rate t: at t = 0 both hold, their velocities do not."""
-    rate = symbols("rate", positive=True)
-    model = Model(
-        name="Contrary",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("rests", x), Holonomic("moves", x - rate * TIME)],
-        parameters=[MASS, Parameter(rate, 1e-3, "m/s")],
-        start={y.diff(): 1.0},
-    )
-    with pytest.raises(ModelError, match="contradict each other"):
-        prepare(model)
-
-
-def test_euler_parameters_take_the_sparse_path(bench):
-    """The mass matrix of a top is singular along p, which |p| = 1 holds: sparse Cholesky, the first rung,
-    solves it, and the multiplier is that of the dense one, p . (M p'' - F) / 2."""
-    one = bench(top(1e-3))
-    seen = check_start(one, *defaults(one.system, one.prepared.table))
-    assert one.number("rung") == 0
-    q, v = one.state()["q"], one.state()["v"]
-    M, F, _, _, _ = one.system.assemble(0.0, q, v, [], one.p.tolist())
-    vdot = np.array([seen[f"der(p{k},2)"] for k in range(4)])
-    assert seen["lambda.unit"] == pytest.approx(-q @ (F - M @ vdot) / 2, rel=1e-12)
 
 
 def test_where_curves_touch_a_projection_ends_at_rounding(bench):
@@ -377,46 +195,6 @@ def test_where_curves_touch_a_projection_ends_at_rounding(bench):
         one.project([1e-3, 0.0], [0.0, 0.0], [1, 1])
 
 
-def test_a_moving_start_is_exact_at_any_time_and_input(bench):
-    """phi = omega t holds at t = 0.75 s too; a cart's acceleration follows the input force."""
-    wire = bench("RotatingWire")
-    assert wire.start([0.1, 0.0], [0.0, 0.0], t=0.75)
-    assert wire.state()["q"][1] == 1.5
-    assert wire.state()["v"][1] == 2.0
-    assert wire.number("t") == 0.75
-    cart = bench("CartPendulum")
-    q, v, _ = defaults(cart.system, cart.prepared.table)
-    seen = check_start(cart, q, v, [25.0])
-    assert seen["der(s,2)"] * 2 + seen["der(x,2)"] == pytest.approx(25.0, rel=1e-14)
-
-
-def test_a_start_is_a_state_without_a_past(bench):
-    """Whatever the solver held before: no steps, no departures, nothing ahead, armed where open."""
-    one = bench("Hemisphere")
-    one.array("state.count", 1, c_longlong)[:] = 7
-    assert one.start([1.0, 0.3], [0.0, 0.0])
-    for number, value in {"steps": 0, "ahead": 0, "fresh": 1, "step": 0, "event_count": 0}.items():
-        assert one.number(number) == value
-    assert one.array("state.count", 1, c_longlong)[0] == 0
-    assert one.observe()["departure.surface.r"] == 0
-
-
-# --------------------------------------------------------------------------- refusals
-
-
-def refusal(one: Bench, q: Sequence[float], v: Sequence[float]) -> str:
-    """The reason of a refused start."""
-    assert not one.start(q, v)
-    return one.why()
-
-
-def test_a_start_without_a_way_to_the_constraints_is_refused_by_name(bench):
-    """At x = y = 0 the rod has no direction; the message says what is missed by how much."""
-    why = refusal(bench("PendulumCartesian"), [0.0, 0.0], [1.0, 0.1])
-    assert "x = 0.0, y = 0.0 cannot be projected" in why
-    assert "'rod' by -1" in why
-
-
 def test_velocities_that_contradict_each_other_are_refused(bench):
     """x' = 1 and x' = 0.5 cannot both hold."""
     fast, slow = symbols("a b", real=True)
@@ -432,35 +210,8 @@ def test_velocities_that_contradict_each_other_are_refused(bench):
     assert one.start([0.0, 0.0], [0.0, 0.0]), one.why()
     assert one.state()["v"].tolist() == [1.0, 0.0]
     one.p[2] = 0.5
-    assert "contradict" in refusal(one, [0.0, 0.0], [0.0, 0.0])
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_what_is_not_finite_never_passes(value, bench):
-    """One such number in q, v, u or p and the start, or the values to be read, are refused."""
-    for name in ("CartPendulum", "Hemisphere", "PendulumAngle", "PendulumNullspace", "KnifeEdge"):
-        one = bench(name)
-        q, v, u = defaults(one.system, one.prepared.table)
-        arrays = [np.array(q), np.array(v), np.array(u), one.p.copy()]
-        for which, array in enumerate(arrays):
-            for k in range(len(array)):
-                trial = [a.copy() for a in arrays]
-                trial[which][k] = value
-                one.drive(trial[2])
-                one.p[:] = trial[3]
-                passed = one.start(trial[0], trial[1])
-                if passed:  # a parameter that enters no equation of motion
-                    passed = one.c.bench_observe(one.handle) == 0
-                assert not passed or _all_finite(one), (name, which, k)
-                if not passed:
-                    assert "finite" in one.why() or "overflow" in one.why(), one.why()
-                assert not passed or which == 3
-
-
-def _all_finite(one: Bench) -> bool:
-    state = one.state()
-    values = [*one.observe().values(), *state["q"], *state["v"], *state["scale"], *state["size"]]
-    return bool(np.isfinite(values).all())
+    assert not one.start([0.0, 0.0], [0.0, 0.0])
+    assert "contradict" in one.why()
 
 
 def test_an_output_that_overflows_is_named(bench):
@@ -470,8 +221,8 @@ def test_an_output_that_overflows_is_named(bench):
     assert one.start(q, v)
     state = one.array("state.v", len(v))
     state[:] *= 1e200
-    with pytest.raises(AssertionError, match=r"not finite at t = 0\.0 s: .*energy\.kinetic"):
-        one.observe()
+    assert one.c.bench_observe(one.handle)
+    assert re.search(r"not finite at t = 0\.0 s: .*energy\.kinetic", one.why())
 
 
 # --------------------------------------------------------------------------- projection
@@ -487,13 +238,13 @@ def disturbed(one: Bench, size: float, rng: Any) -> tuple[Any, Any]:
     return state["q"] + move[:n] * scale, state["v"] + move[n:] * speed
 
 
-def shares(one: Bench, q: Any, v: Any, t: float = 0.0) -> tuple[Any, Any]:
+def shares(one: Bench, q: Any, v: Any) -> tuple[Any, Any]:
     """f and G v - nu of each row, as magnitudes relative to their terms."""
     system = one.system
     u = one.array("value", len(defaults(system, one.prepared.table)[2])).tolist()
-    _, _, G, nu, _ = system.assemble(t, q, v, u, one.p.tolist())
+    _, _, G, nu, _ = system.assemble(0.0, q, v, u, one.p.tolist())
     size = np.abs(G) @ np.array(one.state()["size"])
-    missed = np.array(system.residual(t, q.tolist(), u, one.p.tolist()))
+    missed = np.array(system.residual(0.0, q.tolist(), u, one.p.tolist()))
     f = missed / (np.abs(G) @ np.abs(q) + EPS * size + TINY)
     slip = (G @ v - nu) / (np.abs(G) @ np.abs(v) + np.abs(nu) + EPS * size + TINY)
     return np.abs(f), np.abs(slip)
@@ -520,30 +271,6 @@ def test_projection_leaves_rounding_only(name, size, bench):
         assert np.abs(w - v).max() <= 8 * EPS * np.abs(v).max()
 
 
-def test_projection_arrives_from_further_off(bench):
-    """A drift of a tenth of the rod's length is still Newton's method's, with new factors."""
-    one = bench("PendulumCartesian")
-    assert one.start([0.6, -0.8], [0.4, 0.3])
-    for length in (0.9, 1.1, 0.75):
-        q, v = one.project([0.6 * length, -0.8 * length], [0.4, 0.3], [1])
-        np.testing.assert_allclose(q, [0.6, -0.8], rtol=2 * EPS)
-        np.testing.assert_allclose(v, [0.4, 0.3], rtol=2 * EPS)
-
-
-@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
-def test_projection_does_not_depend_on_the_unit_of_length(unit, bench):
-    """A pendulum of 1 nm or 1e9 m is projected to the same roundings."""
-    one = bench("PendulumCartesian")
-    one.p[1:] = [9.81 * unit, unit]
-    assert one.start([0.6 * unit, -0.8 * unit], [0.4 * unit, 0.3 * unit])
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        q, v = one.project(*disturbed(one, 1e-7, rng), [1])
-        f, slip = shares(one, q, v)
-        assert f.max() <= 2 * EPS
-        assert slip.max() <= 3 * EPS
-
-
 def test_projection_goes_the_shortest_way_in_the_metric_of_the_mass(bench):
     """M dq is normal to the constraint: the heavy cart moves less than the light bob, and the total
     momentum M s' + m x' stays."""
@@ -560,25 +287,6 @@ def test_projection_goes_the_shortest_way_in_the_metric_of_the_mass(bench):
         along = normal * (change @ M @ normal) / (normal @ M @ normal)
         np.testing.assert_allclose(change, along, atol=3e-5 * np.abs(change).max())
         assert abs(2 * change[0] + change[1]) <= 4 * EPS
-
-
-def test_projection_leaves_what_no_row_holds(bench):
-    """With the contact open a state in flight is not touched, bit for bit."""
-    one = bench("Hemisphere")
-    assert one.start([1.5, 0.3], [0.1, 0.2])
-    q, v = one.project([1.1, 0.2], [0.3, 0.4], [0])
-    assert q.tolist() == [1.1, 0.2]
-    assert v.tolist() == [0.3, 0.4]
-
-
-def test_a_failed_projection_changes_nothing(bench):
-    """From the centre there is no way to the circle: refused, and q and v are what they were."""
-    one = bench("PendulumCartesian")
-    assert one.start([0.6, -0.8], [0.0, 0.0])
-    q, v = doubles([1e-300, 0.0]), doubles([1.0, 2.0])
-    assert one.c.bench_project(one.handle, c_double(0.5), q, v, integers([1]))
-    assert list(q) == [1e-300, 0.0]
-    assert list(v) == [1.0, 2.0]
 
 
 @pytest.mark.parametrize(("size", "evaluations", "residuals"), [(0, 1, 1), (1e-9, 2, 2)])
@@ -606,32 +314,6 @@ def test_an_event_costs_as_much_as_ten_steps(tolerance, bench):
         assert (one.array("state.v", 1)[0] > 0) == (end > turns)
         cost[end > turns] = one.number("evaluations")
     assert 12 < cost[True] - cost[False] <= 120
-
-
-def test_a_row_that_came_back_keeps_its_level(bench):
-    """With the offset 0.01 m^2 the pendulum is projected to x^2 + y^2 = L^2 + 0.01 m^2, and what is
-    reported as its residual is measured from there."""
-    one = bench("PendulumCartesian")
-    assert one.start([0.6, -0.8], [0.4, 0.3])
-    one.array("state.offset", 1)[:] = 0.01
-    q, v = one.project([0.6, -0.8], [0.4, 0.3], [1])
-    assert q @ q == pytest.approx(1.01, rel=2 * EPS)
-    assert abs(q @ v) <= 2 * EPS
-    one.array("state.q", 2)[:] = q
-    one.array("state.v", 2)[:] = v
-    assert abs(one.observe()["residual.rod"]) <= 4 * EPS
-
-
-def test_nonholonomic_rows_move_velocities_only(bench):
-    """The knife edge's blade stops the slip across it; where it stands stays bit for bit."""
-    one = bench("KnifeEdge")
-    q0, v0, _ = defaults(one.system, one.prepared.table)
-    assert one.start(q0, v0)
-    state = one.state()
-    active = one.array("active", one.system.m, c_int).tolist()
-    q, v = one.project(state["q"], state["v"] + 0.1, active)
-    assert (q == state["q"]).all()
-    assert shares(one, q, v)[1].max() <= 2 * EPS
 
 
 # --------------------------------------------------------------------------- contacts
@@ -684,7 +366,7 @@ def test_contact_modes_satisfy_signorinis_condition(count, sets, bench):
         assert not one.c.bench_modes(
             one.handle, still, still, closed, integers([1] * count), None
         ), one.why()
-        assert not one.c.bench_motion(one.handle, c_double(0), still, still, closed)
+        assert not one.c.bench_motion(one.handle, still, still, closed)
         lam, vdot = one.array("lambda", count), one.array("vdot", 2)
         for k in range(count):
             assert lam[k] > (-1e-12 if count == 3 else 0) if closed[k] else lam[k] == 0
@@ -716,7 +398,7 @@ def test_a_balance_is_no_motion(guess, bench):
     assert not one.c.bench_modes(one.handle, still, still, closed, integers([1, 1]), None), (
         one.why()
     )
-    assert not one.c.bench_motion(one.handle, c_double(0), still, still, closed)
+    assert not one.c.bench_motion(one.handle, still, still, closed)
     np.testing.assert_allclose(one.array("lambda", 2), [6, 0], atol=1e-14)
     np.testing.assert_allclose(one.array("vdot", 2), [0, 0], atol=1e-15)
 
@@ -774,7 +456,7 @@ def test_what_a_wall_does_depends_on_no_unit_and_no_side(unit, bench):
             one.why()
         )
         assert closed[0] != away
-        assert not one.c.bench_motion(one.handle, c_double(0), still, still, closed)
+        assert not one.c.bench_motion(one.handle, still, still, closed)
         assert one.array("lambda", 1)[0] == pytest.approx(0 if away else 1 / abs(unit))
 
 
@@ -818,7 +500,7 @@ def test_what_the_legs_of_a_table_carry_depends_on_no_order(case, bench):
         one.p[2:] = stand.T.ravel()
         closed = integers([1] * 5)
         assert not one.c.bench_modes(one.handle, still, still, closed, integers([1] * 5), None)
-        assert not one.c.bench_motion(one.handle, c_double(0), still, still, closed)
+        assert not one.c.bench_motion(one.handle, still, still, closed)
         carried, rising = np.zeros(5), one.array("vdot", 3)
         carried[list(order)] = one.array("lambda", 5)
         found.append(carried)
@@ -839,50 +521,6 @@ def test_a_contact_that_departs_is_not_closed_again(bench):
         closed = integers([0])
         assert not one.c.bench_modes(one.handle, still, still, closed, integers([1]), departing)
         assert closed[0] == expected
-
-
-def rod(restitution: Any) -> Model:
-    """A rod that falls with its tip, at a distance 1 from the centre of mass, above a floor."""
-    return Model(
-        name="Rod",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * theta.diff() ** 2 / 2 - m * g * y,
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[Contact("floor", y - arm * sin(theta), restitution=restitution)],
-        parameters=[
-            MASS,
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(J, 0.5, "kg.m^2"),
-            Parameter(arm, 1.0, "m"),
-            Parameter(e, 0.5, "1"),
-        ],
-        start={y: 1.0},
-    )
-
-
-@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
-def test_an_impact_loses_the_energy_that_newtons_law_says(restitution, bench):
-    """The energy lost is (1 - e^2) u^2 / (2 G M^-1 G^T) for the speed u of the tip against the floor;
-    the floor, being smooth, leaves x' alone."""
-    one = bench(rod(e))
-    one.p[4] = restitution
-    assert one.start([0.0, 1.0, 0.3], [0.0, 0.0, 0.0])
-    M, angle = np.diag([2.0, 2.0, 0.5]), 0.3
-    G = np.array([0.0, 1.0, -np.cos(angle)])
-    before = np.array([0.4, -1.5, 0.7])
-    q, v = doubles([0.0, np.sin(angle), angle]), doubles(before)
-    Lambda = doubles([0.0])
-    assert not one.c.bench_impact(one.handle, q, v, integers([1]), 0, Lambda), one.why()
-    after = np.array(v)
-    assert M @ (after - before) == pytest.approx(G * Lambda[0], abs=1e-14)
-    assert G @ after == pytest.approx(-restitution * (G @ before), abs=1e-15)
-    lost = (before @ M @ before - after @ M @ after) / 2
-    effective = G @ np.linalg.solve(M, G)
-    expected = (1 - restitution**2) * (G @ before) ** 2 / (2 * effective)
-    assert lost == pytest.approx(expected, abs=1e-14)
-    assert after[0] == before[0]
-    v = doubles(before)
-    assert not one.c.bench_impact(one.handle, q, v, integers([1]), 1, Lambda)
-    assert G @ np.array(v) == pytest.approx(0, abs=1e-15)  # plastic, whatever e is
 
 
 def struck(one: Bench, q: Sequence[float], before: Sequence[float]) -> Any:
@@ -920,27 +558,6 @@ def test_impacts_without_end_come_to_an_end(bench):
     after = struck(bench(model), [0, 0, 0], [1.0, 0.5, 0.6])
     assert (np.diff(after) >= -1e-12).all()
     assert after @ [1, 1e-3, 1] == pytest.approx(1.6005, rel=1e-14)
-
-
-def test_contacts_driven_against_each_other_are_refused_by_name(bench):
-    """Between two walls that close in with 1 m/s each there is no velocity for a particle."""
-    rate = symbols("rate", positive=True)
-    model = Model(
-        name="Press",
-        lagrangian=m * x.diff() ** 2 / 2,
-        coordinates={x: "m"},
-        constraints=[
-            Contact("low", x + arm - rate * TIME),
-            Contact("high", arm - x - rate * TIME),
-        ],
-        parameters=[MASS, Parameter(arm, 1.0, "m"), Parameter(rate, 1.0, "m/s")],
-        start={x: 0.0},
-    )
-    one = bench(model)
-    assert one.start([0.0], [0.0])
-    at = one.handle, doubles([0]), doubles([0]), integers([1, 1]), 0, doubles([0, 0])
-    assert one.c.bench_impact(*at)
-    assert re.search("'low', 'high' together: they are driven against", one.why())
 
 
 def jointed() -> Model:
@@ -1049,170 +666,4 @@ def test_rounding_of_a_fast_motion_does_not_jam_an_impact(bench):
 # --------------------------------------------------------------------------- inputs, embedding
 
 
-def test_inputs_go_on_as_polynomials(bench):
-    """u = 3 + 2 (t - 1) + 0.5 (t - 1)^2 for an input with two derivatives, 1 s after the start."""
-    one = bench(walls(1)[0])
-    one.start([0.0, 1.0], [0.0, 0.0], t=1.0)
-    one.array("value", 2)[:] = [3.0, -1.0]
-    one.array("first", 2)[:] = [2.0, 0.0]
-    one.array("second", 2)[:] = [1.0, 0.0]
-    for t in (1.0, 1.5, 3.0):
-        u = doubles([0, 0])
-        one.c.bench_drive(one.handle, c_double(t), u)
-        assert list(u) == [3 + 2 * (t - 1) + 0.5 * (t - 1) ** 2, -1.0]
-
-
-def table_model() -> Model:
-    return Model(
-        name="Table",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[
-            Contact("table", y - lift),
-            Nonholonomic("grip", x.diff(), while_closed="table"),
-        ],
-        parameters=[MASS, Parameter(g, 9.81, "m/s^2")],
-        inputs=[Input(lift, "m", 1.0)],
-        start={y: 1.0},
-    )
-
-
-def test_a_prescribed_motion_goes_on_by_its_derivatives(bench):
-    """Given u, u', u'' = 1, 2, 3, at 0.5 s u is 1 + 1 + 3/8 and u' 3.5."""
-    one = bench(table_model())
-    one.start([0.0, 1.0], [0.0, 0.0])
-    one.drive([1.0, 2.0, 3.0])
-    u = doubles([0, 0, 0])
-    one.c.bench_drive(one.handle, c_double(0.5), u)
-    assert list(u) == [2.375, 3.5, 3.0]
-
-
-def test_a_row_acts_while_its_contact_is_closed(bench):
-    """The grip holds x' = 0 only on the table; a table that moves carries the block: y' = u', and
-    lambda = m (g + u'')."""
-    one = bench(table_model())
-    seen = check_start(one, [0.0, 1.0], [0.3, 0.0], [1.0, 2.0, 3.0])
-    assert one.array("active", 2, c_int).tolist() == [1, 1]
-    assert seen["der(x)"] == 0
-    assert seen["der(y)"] == 2.0
-    assert seen["lambda.table"] == pytest.approx(2.0 * 12.81, rel=1e-15)
-    seen = check_start(one, [0.0, 1.5], [0.3, 0.0], [1.0, 0.0, 0.0])
-    assert one.array("active", 2, c_int).tolist() == [0, 0]
-    assert seen["der(x)"] == 0.3
-    seen = check_start(one, [0.0, 1.0], [0.3, 0.0], [1.0, 0.0, -10.0])  # falls faster than g
-    assert one.array("active", 2, c_int).tolist() == [0, 0]
-
-
-def slope_model() -> Model:
-    """A bead on an inclined wire y = x/2 with a stop at x = 0, stepped along the wire."""
-    return Model(
-        name="Slope",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("wire", y - x / 2), Contact("stop", x)],
-        parameters=[MASS, Parameter(g, 9.81, "m/s^2")],
-        embedding=Embedding({s: "m"}, {x: 2 * s / sqrt(5), y: s / sqrt(5)}, {s: 0.0}),
-    )
-
-
-def test_an_embedding_is_seen_in_its_full_coordinates(bench):
-    """At the stop the bead is held: Q.y = m g is the wire's and the stop's together; departures are
-    expanded to x and y, and only once there was one."""
-    one = bench(slope_model(), "minimal")
-    seen = check_start(one, [0.0], [0.0], [])
-    assert one.state()["closed"].tolist() == [1]
-    assert seen["Q.y"] == pytest.approx(2 * 9.81, rel=1e-15)
-    assert seen["lambda.stop"] == pytest.approx(2 * 9.81 / 2, rel=1e-14)
-    seen = check_start(one, [1.0], [0.5], [])
-    assert one.state()["closed"].tolist() == [0]
-    assert seen["s"] == 1.0
-    assert seen["x"] == pytest.approx(2 / np.sqrt(5), rel=1e-15)
-    assert seen["der(s,2)"] == pytest.approx(-9.81 / np.sqrt(5), rel=1e-15)
-    one.array("state.departure_q", 1)[:] = np.sqrt(5)
-    one.array("state.departure_v", 1)[:] = 2 * np.sqrt(5)
-    seen = one.observe()
-    assert seen["departure.stop.x"] == seen["departure.stop.velocity.y"] == 0
-    one.array("state.count", 1, c_longlong)[:] = 1
-    seen = one.observe()
-    assert seen["departure.stop.x"] == pytest.approx(2, rel=1e-15)
-    assert seen["departure.stop.velocity.y"] == pytest.approx(2, rel=1e-15)
-
-
-def test_inputs_that_change_drop_what_lies_ahead(bench):
-    """The integrator starts anew from the communication point; the next step's size stays."""
-    one = bench("CartPendulum")
-    q, v, _ = defaults(one.system, one.prepared.table)
-    assert one.start(q, v)
-    one.c.bench_ahead(one.handle)
-    assert one.number("ahead") == 1
-    one.c.solver_inputs_changed(c_void_p(one.c.bench_solver(one.handle)))
-    assert one.number("ahead") == one.number("event_count") == 0
-    assert one.number("fresh") == 1
-    assert one.number("step") == 0.125
-
-
 # --------------------------------------------------------------------------- memory
-
-DRIVER = """
-#include <stdio.h>
-
-#include "variables.h"
-
-/* Starts at the arguments q, v (n each) and p, also far off and at values that are not finite;
- * observes, projects, settles modes and strikes every contact in every mode. */
-int main(int count, char **values) {
-    const System *s = MODEL_SYSTEM;
-    Bench *b = bench_open(s);
-    double q[8], v[8], x[8], w[8], Lambda[8], slow[8] = {0};
-    int struck[8], active[8], modes[8] = {0}, touching[8] = {1, 1, 1, 1, 1, 1, 1, 1}, fine = 0;
-    if (b == NULL || count != 1 + 2 * s->n + s->parameters) return 2;
-    for (int j = 0; j < s->n; j++) {
-        q[j] = strtod(values[1 + j], NULL);
-        v[j] = strtod(values[1 + s->n + j], NULL);
-    }
-    for (int j = 0; j < s->parameters; j++)
-        b->solver.p[j] = strtod(values[1 + 2 * s->n + j], NULL);
-    const double scale[] = {1, 1 + 1e-9, 1.5, -3, 0, 1e300, HUGE_VAL, NAN};
-    for (int i = 0; i < 8; i++) {
-        for (int j = 0; j < s->n; j++) x[j] = q[j] * scale[i];
-        if (bench_start(b, 0.25, x, v, 1e-8) == OK && bench_observe(b) == OK) fine++;
-    }
-    if (bench_start(b, 0, q, v, 1e-8) != OK) return 3;
-    for (int code = 0; code < 1 << s->contacts; code++) {
-        for (int c = 0; c < s->contacts; c++) modes[c] = code >> c & 1;
-        system_active(s, modes, active);
-        for (int j = 0; j < s->n; j++) {
-            x[j] = b->solver.state.q[j] + 1e-6;
-            w[j] = b->solver.state.v[j] - 1e-6;
-        }
-        (void)bench_project(b, 0.5, x, w, active);
-        if (s->contacts == 0) continue;
-        (void)bench_impact(b, x, w, modes, 0, Lambda);
-        (void)bench_impacts(b, x, w, touching, slow, struck);
-        (void)bench_modes(b, x, w, modes, touching, NULL);
-    }
-    printf("%d", fine);
-    bench_close(b);
-    return 0;
-}
-"""
-
-
-@pytest.mark.parametrize("name", ["Hemisphere", "PendulumAngle", "Atwood", "KnifeEdge"])
-def test_no_byte_outside_the_arrays_is_touched(name, folder, prepared):
-    """Address and undefined-behaviour sanitizers find nothing from the start to the last mode."""
-    one = prepared(name)
-    q, v, _ = defaults(one.system, one.table)
-    p = [x.start for x in one.table.variables if x.role == "parameter"]
-    text = model_source(one.form)
-    (folder / f"{name}.c").write_text(text, encoding="utf-8")
-    (folder / f"{name}_main.c").write_text(BENCH.read_text("utf-8") + DRIVER, encoding="utf-8")
-    program = folder / name
-    parts = [str(folder / f"{name}.c"), str(folder / f"{name}_main.c")]
-    runtime = objects([RUNTIME_FILES[file] for file in SOURCES], SANITIZE)
-    command = [compiler(), *FLAGS, *SANITIZE, "-Werror", *INCLUDES, *parts, *runtime]
-    subprocess.run([*command, "-o", str(program), "-lm"], check=True, timeout=300)
-    arguments = [repr(float(a)) for a in (*q, *v, *p)]
-    done = subprocess.run([str(program), *arguments], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout) >= 2

@@ -96,6 +96,14 @@ def test_what_the_importer_sets_stays_and_the_given_values_follow(rod):
     assert any("start value theta = 0.3 misses" in t and repr(at["theta"])[:12] in t for t in told)
 
 
+def test_velocities_that_are_set_move_the_least_where_all_are(rod):
+    """x' and y' are set, theta = 0.3 is given: of (x', y') the part along the circle stays."""
+    at, _ = begun(rod, x_dot=0.5, y_dot=1.0)
+    along = -0.5 * np.sin(0.3) + np.cos(0.3)
+    assert at["der(x)"] == pytest.approx(-along * np.sin(0.3), rel=1e-8)
+    assert at["der(y)"] == pytest.approx(along * np.cos(0.3), rel=1e-8)
+
+
 def test_a_value_that_is_the_described_one_is_not_set(rod):
     """Importers write all start values back: theta = 0.3 set to what is described stays a given value."""
     at, _ = begun(rod, theta=0.3, x=0.6)
