@@ -1,7 +1,15 @@
 """The names of an FMU's variables: composed and read here, and nowhere else.  Imports nothing of lagfmu.
 
 A name says what its variable is of (FMI's structured naming): lambda.rod, Q.rod.x, departure.rod.velocity.x,
-der(x,2).  It travels inside python FMUs.
+der(x,2).  What a model names may have several words itself, as those of bodies and joints do:
+
+    crank.position.x, der(crank.position.x)   a coordinate: of three words, so that Q.crank.position.x is the
+                                              force of all constraints, and Q.rod.x the share of one
+    lambda.A.x, unique.A.x                    the constraint A.x
+    crank.mass, motor.torque, force.A.x       a parameter, an input, an output
+
+Shares of a force and the states at an event (departure.rod.x) are named between words alone: they are left
+out where the constraint or the coordinate has several.  It travels inside python FMUs.
 """
 
 from __future__ import annotations
@@ -11,10 +19,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
-VALUE = (
-    "value"  # of a coordinate, an input, a parameter or an output of one word; or its derivative
-)
-OWN = "own"  # an output that the model names itself, in several words: bob.height
+VALUE = "value"  # of a coordinate, an input, a parameter or an output that the model names; or its derivative
+OWN = "own"  # in the variable table: the outputs among these
 MULTIPLIER, UNIQUE, RESIDUAL = "lambda", "unique", "residual"  # of a constraint
 FORCE = "Q"  # on a coordinate: of all constraints, or the share of one
 CONTACT, DEPARTURE, CLOSING = "contact", "departure", "closing"
@@ -37,7 +43,7 @@ KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
 DISSIPATION = "der(energy.dissipated)"
 ENERGY, SOLVER = "energy", "solver"
-RATE = re.compile(r"der\((\w+)(?:,(\d+))?\)")
+RATE = re.compile(r"der\((?!energy\.)([\w.]+)(?:,(\d+))?\)")
 ERROR = "error"  # how far off another variable may be: error.lambda.rod
 STEPS = "solver.steps"
 FOLLOWS = "unless another start is set"  # ends the description of a start that is an expression
@@ -108,29 +114,36 @@ def motion(coordinates: Iterable[str]) -> list[str]:
 
 def read(text: str) -> Subject:
     """What a variable of that name is of."""
+    if found := RATE.fullmatch(text):
+        return Subject(VALUE, "", found[1], int(found[2] or 1))
     head, *rest = text.split(".")
     if text == DISSIPATION or (head in (ENERGY, SOLVER) and len(rest) == 1):
         return Subject(text)
     if head == ERROR and rest:
-        of_velocity = rest[0] == "velocity" and len(rest) == 2
-        return Subject(head, "", derivative(rest[1]) if of_velocity else ".".join(rest))
+        of_velocity = rest[0] == "velocity" and len(rest) > 1
+        return Subject(head, "", derivative(".".join(rest[1:])) if of_velocity else ".".join(rest))
     if f"{head}.{rest[-1] if rest else ''}" in PEAKS and len(rest) > 1:
-        order = RATES.index(rest[0]) if rest[0] in RATES and len(rest) == 3 else 0
-        of = derivative(rest[1], order) if order else ".".join(rest[:-1])
+        order = RATES.index(rest[0]) if rest[0] in RATES and len(rest) > 2 else 0
+        of = derivative(".".join(rest[1:-1]), order) if order else ".".join(rest[:-1])
         return Subject(f"{head}.{rest[-1]}", "", of)
-    if head in EVENTS and len(rest) in (2, 3):
-        constraint, last, rate = rest[0], rest[-1], len(rest) - 2
+    if head in EVENTS and len(rest) > 1:
+        *owner, last = rest
         if last in ("count", "time") or (head == CLOSING and last == "impulse"):
-            return Subject(f"{head}.{last}", constraint)
-        return Subject(head, constraint, last, rate)
-    if head == FORCE and len(rest) in (1, 2):
-        return Subject(head, "".join(rest[:-1]), rest[-1])
-    if head in OF_ONE and len(rest) == 1:
-        return Subject(head, rest[0])
-    if rest:
-        return Subject(OWN, coordinate=text)
-    found = RATE.fullmatch(text)
-    return Subject(VALUE, "", found[1], int(found[2] or 1)) if found else Subject(VALUE, "", text)
+            return Subject(f"{head}.{last}", ".".join(owner))
+        if len(rest) < 3 or (len(rest) == 3 and rest[1] == "velocity"):
+            return Subject(head, rest[0], last, len(rest) - 2)
+    if head == FORCE and len(rest) == 2:
+        return Subject(head, rest[0], rest[1])
+    if head == FORCE and rest:
+        return Subject(head, "", ".".join(rest))
+    if head in OF_ONE and rest:
+        return Subject(head, ".".join(rest))
+    return Subject(VALUE, "", text)
+
+
+def shared(constraint: str, coordinate: str) -> bool:
+    """Whether Q.CONSTRAINT.COORDINATE is a variable: only where both names are one word."""
+    return "." not in constraint + coordinate
 
 
 def bar(of: str) -> str:

@@ -503,6 +503,30 @@ def test_names_that_collide_are_refused():
     says(message, "two constraints are called 'rod'", "rename")
 
 
+@pytest.mark.parametrize(
+    ("coordinate", "parameter", "parts"),
+    [
+        ("angle.A", "m", ("'angle.A' has 2 words", "three", "'crank.position.x'")),
+        ("bob.position.x", "bob", ("'bob' is a parameter", "'bob.position.x'", "group", "rename")),
+        ("Q.position.x", "m", ("'Q.position.x' is reserved", "choose another")),
+        ("bob..x", "m", ("'bob..x' is not a name that FMI allows", "'crank.mass'")),
+    ],
+)
+def test_names_of_several_words_stay_of_one_meaning(coordinate, parameter, parts):
+    """Q.A.B is the share of a constraint A in the force on B, bob no variable beside bob.mass."""
+    c, mass = dynamicsymbols(coordinate), symbols(parameter, positive=True)
+    message = refusal(
+        lambda: Model(
+            name="P",
+            lagrangian=mass * c.diff() ** 2 / 2,
+            coordinates={c: "m"},
+            parameters=[Parameter(mass, 1.0, "kg")],
+        ),
+        ModelError,
+    )
+    says(message, *parts)
+
+
 @pytest.mark.parametrize("name", ["velocity", "time", "t", "der", "count", "solver", "lambda"])
 def test_names_of_the_fmus_own_variables_are_refused(name):
     """departure.surface.velocity.theta must stay one thing."""
@@ -520,7 +544,7 @@ def test_names_of_the_fmus_own_variables_are_refused(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["", "my model", 'the "rod"', "a<b", "θ", "1st", "a.b", "a\n", None]
+    "name", ["", "my model", 'the "rod"', "a<b", "θ", "1st", "a..b", "a\n", None]
 )
 def test_names_that_are_no_fmi_names_are_refused(name):
     """Of a model and of a constraint; the allowed characters are told."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import names
+from lagfmu import Contact, Holonomic, Model, Output, Parameter, Scene, multiplier, names, simulate
 from lagfmu.names import Subject
 
 
@@ -31,7 +33,18 @@ from lagfmu.names import Subject
         ("slipping.grip.time", Subject(names.SLIP_TIME, "grip")),
         ("solver.tolerance", Subject(names.TOLERANCE)),
         ("error.lambda.rod", Subject(names.ERROR, "", "lambda.rod")),
-        ("bob.height", Subject(names.OWN, "", "bob.height")),
+        ("bob.height", Subject(names.VALUE, "", "bob.height")),
+        ("crank.position.x", Subject(names.VALUE, "", "crank.position.x")),
+        ("der(crank.position.x,2)", Subject(names.VALUE, "", "crank.position.x", 2)),
+        ("lambda.A.x", Subject(names.MULTIPLIER, "A.x")),
+        ("unique.A.x", Subject(names.UNIQUE, "A.x")),
+        ("Q.crank.position.x", Subject(names.FORCE, "", "crank.position.x")),
+        ("departure.A.lower.count", Subject(names.DEPARTURES, "A.lower")),
+        ("closing.A.lower.impulse", Subject(names.IMPULSE, "A.lower")),
+        ("peak.velocity.crank.position.x.max", Subject("peak.max", "", "der(crank.position.x)")),
+        ("peak.crank.velocity.x.max", Subject("peak.max", "", "crank.velocity.x")),
+        ("error.velocity.crank.position.x", Subject(names.ERROR, "", "der(crank.position.x)")),
+        ("der(energy.dissipated)", Subject(names.DISSIPATION)),
     ],
 )
 def test_a_name_tells_of_which_constraint_and_coordinate_a_variable_is(
@@ -47,3 +60,44 @@ def test_a_bar_is_of_one_variable():
     assert names.bar("der(x)") == "error.velocity.x"
     assert names.bar("der(x,2)") not in (names.bar("der(x)"), names.bar("x"))
     assert names.barred(names.bar("der(x)")) == "der(x)"
+
+
+def pendulum_of_several_words() -> Model:
+    """A pendulum of 2 m and 3 kg, in names as bodies and joints have them; it may reach a wall."""
+    x, y = dynamicsymbols("bob.position.x bob.position.y")
+    m, L, g = symbols("bob.mass rod.length gravity", positive=True)
+    return Model(
+        name="Words",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+        coordinates={x: "m", y: "m"},
+        constraints=[
+            Holonomic("A.along", (x**2 + y**2 - L**2) / (2 * L)),
+            Contact("wall.left", x + 3 * L),
+        ],
+        parameters=[Parameter(m, 3.0, "kg"), Parameter(L, 2.0, "m"), Parameter(g, 9.81, "m/s^2")],
+        outputs=[
+            Output("rod.pull", -multiplier("A.along"), "N"),
+            Output("height.bob", y, "m"),
+            Output("der(height.bob)", y.diff(), "m/s"),
+            Output("der(height.bob,2)", y.diff().diff(), "m/s^2"),
+        ],
+        start={x: 0.0, y: -2.0, x.diff(): 1.5},
+    )
+
+
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_a_pendulum_in_names_of_several_words_pulls_as_any_other(target):
+    """m (g + v^2/L) [N] at its lowest point, and m (g cos + v^2/L) all along, by the energy."""
+    scene = Scene("Words", stop_time=1.0, tolerance=1e-10)
+    run = simulate(pendulum_of_several_words(), scene=scene, target=target)
+    m, L, g = 3.0, 2.0, 9.81
+    v2 = run["der(bob.position.x)"] ** 2 + run["der(bob.position.y)"] ** 2
+    assert run["rod.pull"] == pytest.approx(m * (-g * run["bob.position.y"] / L + v2 / L), rel=1e-8)
+    assert run["rod.pull"][0] == pytest.approx(m * (g + 1.5**2 / L), rel=1e-12)
+    assert run["lambda.A.along"] == pytest.approx(-run["rod.pull"], rel=1e-14)
+    assert run["Q.bob.position.y"] == pytest.approx(
+        m * (run["der(bob.position.y,2)"] + g), rel=1e-8
+    )
+    assert run["der(height.bob,2)"] == pytest.approx(run["der(bob.position.y,2)"], rel=1e-14)
+    assert not run["contact.wall.left"].any()
+    assert not {"Q.A.along.bob.position.x", "departure.wall.left.bob.position.x"} & {*run.units}

@@ -1,4 +1,4 @@
-"""Symbol -> identifier, in C as in Python: theta, der_theta, der2_theta, lambda_rod, level_2."""
+"""Symbol -> identifier, in C as in Python: theta, der_theta, der2_theta, lambda_rod, crank_mass, level_2."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ def identifier(symbol: Any) -> str:
         return f"switch_{text[len('switch(') : -1]}"
     of = read(text)
     if of.quantity == VALUE and of.order:
-        return f"der{of.order if of.order > 1 else ''}_{of.coordinate}"
+        text = f"der{of.order if of.order > 1 else ''}_{of.coordinate}"
     return text.replace(".", "_")

@@ -441,6 +441,8 @@ class _Builder:
             variables.append(self.output(Subject(names.FORCE, "", str(q)), text, unit, symbols))
             for k in touching:
                 of = Subject(names.FORCE, self.eom.constraints[k].name, str(q))
+                if not names.shared(of.constraint, of.coordinate):
+                    continue
                 text = f"generalized force of constraint {of.constraint} on {q}"
                 variables.append(self.output(of, text, unit, symbols))
         return variables
@@ -583,6 +585,8 @@ class _Builder:
             self.output(moment, f"time of {tail}", SECOND, (), discrete=True),
         ]
         for q, v in zip(self.eom.q, self.eom.v, strict=True):
+            if not names.shared(of, str(q)):
+                continue
             for order, s in enumerate((str(q), str(v))):
                 at = Subject(quantity, of, str(q), order)
                 found.append(self.output(at, f"{s} at {tail}", self.units[s], (), discrete=True))

@@ -35,7 +35,6 @@ GROUPS = {  # by the kind of what a variable is of
     names.ERROR: "Error bars",
     names.PEAK: "Extremes so far",
     names.SOLVER: "Solver",
-    names.OWN: "Outputs",
 }
 
 

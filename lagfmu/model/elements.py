@@ -204,6 +204,11 @@ def is_number(value: object) -> bool:
         return False
 
 
+def is_name(text: object) -> bool:
+    """True for a word, or words with a dot between each two: theta, crank.mass."""
+    return isinstance(text, str) and all(map(NAME.match, text.split(".")))
+
+
 def name_of(symbol: Expr) -> str:
     """A symbol's or dynamicsymbol's plain name."""
     return str(symbol.func) if isinstance(symbol, AppliedUndef) else str(symbol)

@@ -26,7 +26,7 @@ from .reactions import force_of_constraint, multiplier
 
 TEXT = re.compile(r"\s*([^=\s]+)\s*=(.*)\[([^\[\]]*)\]\s*\Z", re.S)
 NAMES = re.compile(
-    r"der\(\s*[A-Za-z_]\w*\s*(?:,\s*2\s*)?\)|(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*(?!\w|\s*\()"
+    r"der\(\s*[A-Za-z_][\w.]*\s*(?:,\s*2\s*)?\)|(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*(?!\w|\s*\()"
 )
 EXAMPLE = "'tension = -2*L*lambda.rod [N]'"
 OPERATORS: dict[type, Any] = {

@@ -13,10 +13,10 @@ MARGIN = 5.0  # the choice is this much better on the scene than what was asked
 HELD_OUT_MARGIN = 2.0  # and still this much on other start values and parameters
 LOOSEST, FINEST = 0.1, 1e-12
 GROUPS = {  # of quantities that an accuracy is asked of
-    "lambda": r"lambda\.\w+",
-    "Q": r"Q\.\w+",
-    "coordinates": r"[A-Za-z_]\w*",
-    "event time": r"departure\.\w+\.time",
+    "lambda": r"lambda\.[\w.]+",
+    "Q": r"Q\.\w+(\.\w+\.\w+)?",
+    "coordinates": r"(\w+\.(position|orientation)\.)?[A-Za-z_]\w*",
+    "event time": r"departure\.[\w.]+\.time",
 }
 USUAL = 10.0  # times the tolerance that a closed form may miss, unless it says otherwise
 

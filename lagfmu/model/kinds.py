@@ -8,6 +8,8 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate
+from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -15,7 +17,6 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..names import RESERVED
 from .elements import (
-    NAME,
     Contact,
     Embedding,
     Expr,
@@ -27,6 +28,7 @@ from .elements import (
     Output,
     Parameter,
     Peak,
+    is_name,
     name_of,
 )
 from .frictions import check_kinds
@@ -34,6 +36,7 @@ from .shapes import of_several_components, unusable
 from .units import plain
 
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0, sect. 2.2
+COORDINATE_WORDS = (1, 3)
 _NO_NUMBERS = (sp.I, sp.nan, sp.oo, -sp.oo, sp.zoo)
 
 
@@ -183,6 +186,12 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
                 f"the name {name!r} is used twice, by a {seen[name]} and a {kind}: rename one"
             )
         seen[name] = kind
+    problems += [
+        f"{short!r} is a {seen[short]} and, with the {seen[name]} {name!r}, a group of variables: rename one"
+        for name in seen
+        for short in accumulate(name.split("."), lambda a, b: f"{a}.{b}")
+        if short != name and short in seen
+    ]
     contacts = {c.name for c in model.constraints if isinstance(c, Contact)}
     if contacts and seen.get("impulse") == "coordinate":
         c = min(contacts)
@@ -210,15 +219,22 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
             )
 
 
-def check_name(kind: str, name: object, problems: list[str]) -> None:
-    if not isinstance(name, str) or not NAME.match(name):
+def check_name(kind: str, name: Any, problems: list[str]) -> None:
+    words = name.split(".") if is_name(name) else []
+    if not words or (kind == "model" and len(words) > 1):
         problems.append(
             f"{kind} name {name!r} is not a name that FMI allows: use letters a-z, A-Z, digits and _, "
             "not beginning with a digit"
+            + ("" if kind == "model" else ", in words with a dot between them, as 'crank.mass'")
+        )
+    elif kind == "coordinate" and len(words) not in COORDINATE_WORDS:
+        problems.append(
+            f"coordinate name {name!r} has {len(words)} words, expected one as 'theta' or three as "
+            "'crank.position.x': with others 'Q.A.B' could be the share of a constraint"
         )
     elif kind == "model" and keyword.iskeyword(name):
         problems.append(f"model name {name!r} is a word of the Python language: choose another")
-    elif kind != "model" and name in RESERVED:
+    elif kind != "model" and words[0] in RESERVED:
         problems.append(
             f"{kind} name {name!r} is reserved for the FMU's own variables "
             f"({', '.join(RESERVED)}): choose another"

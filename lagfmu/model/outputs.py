@@ -10,7 +10,7 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
 from ..names import MULTIPLIER, RESERVED, read
-from .elements import NAME, Contact, Expr, ModelFields, Nonholonomic, Peak, name_of
+from .elements import Contact, Expr, ModelFields, Nonholonomic, Peak, is_name, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
 from .units import Unit, check_dimension, parse_unit, plain
 
@@ -58,17 +58,21 @@ def _check_names(model: ModelFields, problems: list[str]) -> None:
     taken = {name_of(q): "a coordinate" for q in (*model.coordinates, *extra)}
     taken |= {name_of(p.symbol): "a parameter" for p in model.parameters}
     taken |= {name_of(i.symbol): "an input" for i in model.inputs}
+    own = {o.name for o in model.outputs if is_name(o.name)}
     for o in model.outputs:
-        parts = o.name.split(".") if isinstance(o.name, str) else [""]
-        if not all(NAME.match(part) for part in parts):
+        of = read(o.name).coordinate if isinstance(o.name, str) else ""
+        if of != o.name and of in own:
+            continue  # der(angle.A), of which angle.A is another
+        if not is_name(o.name):
             problems.append(
                 f"output name {o.name!r} is not a name that FMI allows: use letters a-z, A-Z, digits "
-                "and _, not beginning with a digit, in parts with a dot between them, as 'bob.height'"
+                "and _, not beginning with a digit, in parts with a dot between them, as 'bob.height'; "
+                "der(bob.height) beside bob.height"
             )
             continue
-        if parts[0] in RESERVED:
+        if (first := o.name.split(".")[0]) in RESERVED:
             problems.append(
-                f"output name {o.name!r} begins with {parts[0]!r}, which is reserved for the FMU's own "
+                f"output name {o.name!r} begins with {first!r}, which is reserved for the FMU's own "
                 f"variables ({', '.join(RESERVED)}): choose another"
             )
             continue

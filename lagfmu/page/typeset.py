@@ -36,6 +36,10 @@ MOST = 24  # equations of a kind that are printed
 LONGEST = 500  # operations beyond which an expression is not printed
 MINORS = 3  # constraints in one group beyond which lambda is not eliminated in symbols
 GREEK = {*greeks, *(name.capitalize() for name in greeks), "lambda", "Lambda"}
+OF_BODIES = {  # what the literature calls the quantities of a body
+    **{"position": "", "orientation": "phi", "velocity": "v", "omega": "omega"},
+    **{"mass": "m", "inertia": "J"},
+}
 PARTS = re.compile(r"([A-Za-z]+?)(\d*)((?:_[A-Za-z0-9]+)*)_?\Z")
 SUBSCRIPT = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 DOTS = ("", "\u0307", "\u0308", "\u20db")
@@ -102,7 +106,12 @@ def name_text(name: str, dots: int = 0) -> str:
 
 
 def _parts(name: str) -> tuple[str, tuple[str, ...]]:
-    """theta0 -> theta, (0,); mu_s -> mu, (s,); a name of another form is one word."""
+    """theta0 -> theta, (0,); mu_s -> mu, (s,); crank.position.x -> x, (crank,); crank.inertia.xx -> J,
+    (xx, crank); a name of another form is one word."""
+    body, *words = name.split(".")
+    if words and words[0] in OF_BODIES:
+        letters = [w for w in (OF_BODIES[words[0]], *words[1:]) if w]
+        return letters[0], (*letters[1:], body)
     match = PARTS.match(name)
     if match is None:
         return name, ()
@@ -495,7 +504,10 @@ class _Typesetter:
         """What the model reports of its own."""
         equations = []
         for o in self.eom.outputs[:MOST]:
-            left = ".".join(_letter(part) for part in o.name.split(".")), o.name
+            of = read(o.name)
+            left = ".".join(_letter(part) for part in of.coordinate.split(".")), o.name
+            if of.order:
+                left = f"\\{'d' * of.order}ot{{{left[0]}}}", o.name
             equations.append((o.name, [left, ("=", "="), self.notation.show(o.expression)]))
         remark = "Quantities that the model names itself, of values of the same instant."
         return self.section("Outputs of the model", remark, equations, len(self.eom.outputs))

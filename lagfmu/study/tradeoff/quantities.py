@@ -59,8 +59,8 @@ def _is_own(name: str, known: Collection[str]) -> bool:
     """
     of = names.read(name)
     if of.quantity != names.VALUE or of.order:
-        return of.head == names.OWN or of.head in names.OF_FRICTION
-    full = any(names.read(n).order for n in known)
+        return of.head in names.OF_FRICTION
+    full = "." in name or any(names.read(n).order for n in known)
     return full and names.derivative(name) not in known
 
 
