@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import fmpy
 from fmpy.fmi2 import FMU2Slave
+from runs import unpacked
 
 from lagfmu.testing import described_rules
 
@@ -18,8 +18,7 @@ class Instance:
     """An FMU by names: `get`, `set`, `step`; `log` holds (status, category, message)."""
 
     def __init__(self, path: Path | str, name: str = "instance") -> None:
-        self.folder = fmpy.extract(str(path))
-        self.description = fmpy.read_model_description(str(path))
+        folder, self.description = unpacked(path)
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.rules = described_rules(self.description)
         self.native = self.description.modelExchange is not None
@@ -28,7 +27,7 @@ class Instance:
         self.log: list[tuple[int, str, str]] = []
         self.fmu = FMU2Slave(
             guid=self.description.guid,
-            unzipDirectory=self.folder,
+            unzipDirectory=folder,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             instanceName=name,
         )
@@ -82,7 +81,6 @@ class Instance:
         with contextlib.suppress(Exception):
             self.fmu.terminate()
         self.fmu.freeInstance()
-        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""fmpy's simulate_fmu for FMUs that run many times: unpacked, and the description read and checked, once."""
+"""FMUs that run many times: unpacked, and the description read and checked, once."""
 
 from __future__ import annotations
 
@@ -14,9 +14,14 @@ FOLDERS: list[tempfile.TemporaryDirectory[str]] = []  # each goes with this proc
 
 def simulate_fmu(path: str | Path, **options: Any) -> Any:
     """fmpy.simulate_fmu(path, **options)."""
-    state = Path(path).stat()
-    folder, description = _unpacked(str(path), state.st_mtime_ns, state.st_size)
+    folder, description = unpacked(path)
     return fmpy.simulate_fmu(folder, model_description=description, **options)
+
+
+def unpacked(path: str | Path) -> tuple[str, Any]:
+    """The folder and the description of an FMU as it is now."""
+    state = Path(path).stat()
+    return _unpacked(str(path), state.st_mtime_ns, state.st_size)
 
 
 @cache
