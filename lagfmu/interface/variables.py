@@ -31,12 +31,12 @@ class Variable:
     """
 
     of: Subject
-    kind: str
     role: str  # or estimate: the FMU itself, from an input's values
     causality: str
-    variability: str
-    initial: str | None
     description: str
+    kind: str = "Real"
+    variability: str = "continuous"
+    initial: str | None = None
     start: Value | None = None
     unit: Unit | None = None
     display: DisplayUnit | None = None

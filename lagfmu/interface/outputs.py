@@ -1,0 +1,332 @@
+"""Variables that are calculated: motion, forces, energies, contacts, frictions, events, error bars, peaks.
+
+Each knows what it depends on (dependencies.py).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import sympy as sp
+
+from .. import names
+from ..mechanics.equations import symbols_of
+from ..model.elements import Expr
+from ..model.model import Contact, Nonholonomic, name_of
+from ..model.selection import select
+from ..model.units import (
+    ENERGY,
+    FORCE,
+    METRE,
+    ONE,
+    POWER,
+    SECOND,
+    Unit,
+    dimension_of,
+    generalized_force_unit,
+    multiplier_unit,
+    parse_unit,
+)
+from ..names import Subject
+from .dependencies import Dependencies
+from .variables import Variable
+
+SPEED = METRE / SECOND
+BARRED = (  # what has an error bar, besides coordinates, velocities and outputs of one word
+    *(names.MULTIPLIER, names.FORCE, names.OWN, *names.COUNT_OF),
+)
+
+
+class Outputs:
+    """The outputs of a form; `loses`: the energy dissipated is a state (of model exchange)."""
+
+    def __init__(self, behind: Dependencies, loses: bool) -> None:
+        self.behind, self.loses = behind, loses
+        self.eom, self.stepped = behind.eom, behind.stepped
+        self.model, self.units = self.eom.model, self.eom.units
+
+    def all(self) -> list[Variable]:
+        """In the order of the table."""
+        steps = self.output(
+            Subject(names.STEPS), "internal steps taken so far", None, (), "Integer"
+        )
+        return [
+            *self.motion(),
+            *self.constraints(),
+            *self.energies(),
+            *self.own(),
+            *self.contacts(),
+            *self.frictions(),
+            *self.losses(),
+            steps,
+        ]
+
+    def output(
+        self,
+        of: Subject,
+        description: str,
+        unit: Unit | None,
+        symbols: Iterable[str],
+        kind: str = "Real",
+        derivative_of: str | None = None,
+        discrete: bool = False,
+    ) -> Variable:
+        """One of them; `symbols`: the names of those behind its value."""
+        symbols = set(symbols)
+        return Variable(
+            of=of,
+            kind=kind,
+            role="output",
+            causality="output",
+            variability="discrete" if discrete or kind != "Real" else "continuous",
+            initial="calculated",
+            description=description,
+            unit=unit,
+            derivative_of=derivative_of,
+            depends=self.behind.at_points(symbols),
+            depends_initially=self.behind.at_start(symbols),
+        )
+
+    def motion(self) -> list[Variable]:
+        """Coordinates, velocities, accelerations: those of the model, then those of an embedding."""
+        variables = []
+        eom, of_stepped = self.eom, self.behind.of_stepped
+        for j, (q, v) in enumerate(zip(eom.q, eom.v, strict=True)):
+            symbols = of_stepped if eom.bare else self.behind.group(coordinate=j)
+            of_one = self._of_coordinate(q, v, symbols)
+            stepped = str(q) in self.behind.states
+            variables += of_one if stepped or not eom.bare else of_one[:2]
+        for q, v in zip(self.stepped.q, self.stepped.v, strict=True):
+            if q not in eom.q:
+                variables += self._of_coordinate(q, v, of_stepped)
+        return sorted(variables, key=self._place) if eom.bare else variables
+
+    def _of_coordinate(self, q: Expr, v: Expr, symbols: set[str]) -> list[Variable]:
+        """Itself, its velocity, and its acceleration, behind which are these `symbols`."""
+        name = str(q)
+        texts = {name_of(s): text for s, text in self.model.descriptions.items()}
+        text = texts.get(name, f"coordinate {name}")
+        of = Subject(names.VALUE, "", name, 2)
+        rate = f"acceleration of: {text}"
+        return [
+            self._moving(Subject(names.VALUE, "", name), text, q, None),
+            self._moving(Subject(names.VALUE, "", name, 1), f"velocity of: {text}", v, name),
+            self.output(of, rate, self.units[of.name], symbols, "Real", str(v)),
+        ]
+
+    def _moving(self, of: Subject, text: str, symbol: Expr, derivative_of: str | None) -> Variable:
+        """A coordinate or velocity: a state with its start, or what follows from states."""
+        name, unit = of.name, self.units[of.name]
+        if name not in self.behind.states:
+            symbols = self.behind.symbols(symbol)
+            return self.output(of, text, unit, symbols, "Real", derivative_of)
+        start = self.behind.starts[name]
+        approx = name in self.behind.movable or bool(start.free_symbols)
+        if start.free_symbols:
+            text += f"; starts at {start} {names.FOLLOWS}"
+        return Variable(
+            of=of,
+            role="start",
+            causality="output",
+            initial="approx" if approx else "exact",
+            description=text,
+            start=self.eom.at_parameters(start),
+            given=name in self.behind.given,
+            unit=unit,
+            derivative_of=derivative_of,
+            depends=(name,),
+            depends_initially=self.behind.at_start([name]) if approx else (),
+        )
+
+    def _place(self, v: Variable) -> int:
+        """Where the coordinate stands in the model; those of an embedding come last."""
+        order = [str(self.eom.symbols[c]) for c in self.model.coordinates]
+        q = v.of.coordinate
+        return order.index(q) if q in order else len(order)
+
+    def constraints(self) -> list[Variable]:
+        """Of each its multiplier, its residual, whether the multiplier is unique; generalized forces."""
+        variables = []
+        jacobian = self.eom.G.todok()
+        entries = self.behind.symbols(*jacobian.values())
+        for k, c in enumerate(self.eom.constraints):
+            what = f"constraint {c.name}" + (f": {c.description}" if c.description else "")
+            unit = dimension_of(sp.sympify(c.expression), self.model.units, c.name) or ONE
+            lam = multiplier_unit(unit, isinstance(c, Nonholonomic))
+            of = Subject(names.MULTIPLIER, c.name)
+            row = self.behind.group(row=k)
+            variables.append(self.output(of, f"multiplier of {what}", lam, row))
+            if isinstance(c, Nonholonomic) or c.name in self.eom.limited:
+                text, behind = f"velocity residual of {what}", self.behind.rates(k)
+                unit = unit if isinstance(c, Nonholonomic) else unit.per_second()
+            else:
+                kind = "gap, zero while closed," if isinstance(c, Contact) else "position residual"
+                text, behind = f"{kind} of {what}", self.behind.symbols(self.eom.f[k])
+            variables.append(self.output(Subject(names.RESIDUAL, c.name), text, unit, behind))
+            text = f"true where {of.name} is determined uniquely"
+            of = Subject(names.UNIQUE, c.name)
+            variables.append(self.output(of, text, None, entries, "Boolean"))
+        for j, q in enumerate(() if self.eom.bare else self.eom.q):
+            unit = generalized_force_unit(self.units[str(q)])
+            touching = [k for k in range(self.eom.m) if (k, j) in jacobian]
+            symbols = self.behind.group(coordinate=j) if touching else set()
+            text = f"generalized force of all constraints on {q}"
+            variables.append(self.output(Subject(names.FORCE, "", str(q)), text, unit, symbols))
+            for k in touching:
+                of = Subject(names.FORCE, self.eom.constraints[k].name, str(q))
+                if not names.shared(of.constraint, of.coordinate):
+                    continue
+                text = f"generalized force of constraint {of.constraint} on {q}"
+                variables.append(self.output(of, text, unit, symbols))
+        return variables
+
+    def energies(self) -> list[Variable]:
+        """Kinetic, potential and total energy, as far as the model has them."""
+        T, V = self.eom.kinetic, self.eom.potential
+        found = [(names.KINETIC, "kinetic energy", [T]), (names.POTENTIAL, "potential energy", [V])]
+        found.append((names.TOTAL, "kinetic plus potential energy", [T, V]))
+        return [
+            self.output(Subject(name), text, ENERGY, self.behind.symbols(*parts))
+            for name, text, parts in found
+            if None not in parts
+        ]
+
+    def own(self) -> list[Variable]:
+        """The model's own: their dependencies are those of all that stands in them."""
+        variables = []
+        for o in self.eom.outputs:
+            found = symbols_of(o)
+            symbols = self.behind.symbols(*found)
+            for j, (a, force) in enumerate(zip(self.eom.vdot, self.eom.Q, strict=True)):
+                if found & {a, force}:
+                    symbols |= self.behind.group(coordinate=j)
+            for k, lam in enumerate(self.eom.lam):
+                if lam in found:
+                    symbols |= self.behind.group(row=k)
+            text = o.description or f"output {o.name}"
+            unit = parse_unit(o.unit, o.name)
+            variables.append(self.output(Subject(names.OWN, "", o.name), text, unit, symbols))
+        return variables
+
+    # ------------------------------------------------------------------ contacts, frictions, events
+
+    def contacts(self) -> list[Variable]:
+        """Whether each is closed, its departures, its closings."""
+        variables = []
+        constraints = self.eom.constraints
+        if self.eom.bare and self.behind.reduction is not None:
+            constraints = self.behind.reduction.constraints
+        for k, c in enumerate(constraints):
+            if not isinstance(c, Contact):
+                continue
+            solved = self.behind.of_stepped if self.eom.bare else self.behind.group(row=k)
+            behind = self.behind.known | solved  # it opens and closes by f, its rate and lambda
+            of, text = Subject(names.CONTACT, c.name), f"true while {c.name} is closed"
+            variables.append(self.output(of, text, None, behind, "Boolean"))
+            what = f"departure{{}} from {c.name}"
+            variables += self._event(names.DEPARTURE, c.name, what)
+            variables += self._closing(c)
+        return variables
+
+    def frictions(self) -> list[Variable]:
+        """Of each whether it sticks, slip velocities, margin, power, when it slipped and stuck."""
+        variables = []
+        row = {c.name: k for k, c in enumerate(self.eom.constraints)}
+        for law in self.eom.frictions:
+            what = f"friction {law.name}" + (f": {law.description}" if law.description else "")
+            behind = self.behind.group(row=row[law.of[0]]) | self.behind.symbols(*law.expressions)
+            behind = self.behind.known | behind
+            text = f"true while {what} sticks (and its normal contact is closed)"
+            of = Subject(names.STICKS, law.name)
+            variables.append(self.output(of, text, None, behind, "Boolean"))
+            for name in law.of:
+                text, of = f"slip velocity G v - nu of {name}", Subject(names.SLIP, name)
+                variables.append(self.output(of, text, SPEED, self.behind.rates(row[name])))
+            text = f"static coefficient times normal force less |lambda| of {what}"
+            variables.append(self.output(Subject(names.MARGIN, law.name), text, FORCE, behind))
+            text = f"power of {what}, lambda times slip velocity, never positive"
+            variables.append(self.output(Subject(names.POWER, law.name), text, POWER, behind))
+            for events in (names.SLIPPING, names.STICKING):
+                what = f"start{{}} of {events} of {law.name}"
+                variables += self._event(events, law.name, what)
+        return variables
+
+    def losses(self) -> list[Variable]:
+        """What frictions and impacts dissipate; with frictions a continuous state of model exchange."""
+        slips, of = bool(self.eom.frictions), Subject(names.DISSIPATED)
+        if not slips and not any(isinstance(c, Contact) for c in self.stepped.constraints):
+            return []
+        both = "frictions and impacts" if slips else "impacts"
+        text = f"energy that {both} dissipated so far"
+        lost = self.output(of, text, ENERGY, (), discrete=not slips)
+        if not self.loses:
+            return [lost]
+        laws = (self.behind.symbols(*law.expressions) for law in self.eom.frictions)
+        solved = (symbols for *_, symbols in self.behind.groups)
+        what, text = Subject(names.DISSIPATION), "power that frictions dissipate"
+        behind = self.behind.known.union(*laws, *solved)
+        power = self.output(what, text, POWER, behind, derivative_of=lost.name)
+        return [
+            dataclasses.replace(lost, depends=(lost.name,)),
+            dataclasses.replace(power, causality="local"),
+        ]
+
+    def _closing(self, c: Contact) -> list[Variable]:
+        """Its impacts, those that bounce too, and where it closes without one; just before them."""
+        found = self._event(names.CLOSING, c.name, f"closing{{0}} or impact{{0}} of {c.name}")
+        unit = dimension_of(sp.sympify(c.expression), self.model.units, c.name) or ONE
+        blow = multiplier_unit(unit, False) * SECOND
+        text = f"impulse of {c.name} in its latest impact: the integral of its multiplier over time"
+        impulse = self.output(Subject(names.IMPULSE, c.name), text, blow, (), discrete=True)
+        return [*found[:2], impulse, *found[2:]]
+
+    def _event(self, quantity: str, of: str, what: str) -> list[Variable]:
+        """How often it happened; time, coordinates and velocities when it did so last."""
+        tail = f"the latest {what.format('')}, 0 before the first"
+        count, moment = Subject(f"{quantity}.count", of), Subject(f"{quantity}.time", of)
+        found = [
+            self.output(count, what.format("s"), None, (), "Integer"),
+            self.output(moment, f"time of {tail}", SECOND, (), discrete=True),
+        ]
+        for q, v in zip(self.eom.q, self.eom.v, strict=True):
+            if not names.shared(of, str(q)):
+                continue
+            for order, s in enumerate((str(q), str(v))):
+                at = Subject(quantity, of, str(q), order)
+                found.append(self.output(at, f"{s} at {tail}", self.units[s], (), discrete=True))
+        return found
+
+    # ------------------------------------------------------------------ of other variables
+
+    def error_bars(self, variables: Iterable[Variable]) -> list[Variable]:
+        """One for each lambda, Q, coordinate, velocity, own output, and time of an event."""
+        text = (
+            "error bar of {}: an estimate of how far it may be off, by a run at a coarser tolerance"
+        )
+        return [
+            self.output(
+                Subject(names.ERROR, "", v.name), text.format(v.name), v.unit, (), discrete=True
+            )
+            for v in variables
+            if v.of.quantity in BARRED
+            or (v.of.quantity == names.VALUE and v.of.order < 2 and v.role in ("output", "start"))
+        ]
+
+    def peaks(self, measurable: Iterable[Variable]) -> list[Variable]:
+        """The extremes that the model asks for, of what is there."""
+        known = {v.name: v for v in measurable}
+        chosen = select([peak.of for peak in self.model.peaks], list(known), "", [])
+        return [self._peak(known[name], quantity) for name in chosen for quantity in names.PEAKS]
+
+    def _peak(self, v: Variable, quantity: str) -> Variable:
+        extreme = "largest" if "max" in quantity else "smallest"
+        text = f"{extreme} {v.name} so far, between communication points too"
+        text += " (model exchange: passed by the latest event, as exact as the importer's steps)"
+        made = self.output(Subject(quantity, "", v.name), text, v.unit, (), discrete=True)
+        if quantity.endswith("_time"):
+            text = f"time of {made.name.removesuffix('_time')}"
+            made = dataclasses.replace(made, description=text, unit=SECOND)
+        else:
+            made = dataclasses.replace(made, display=v.display)
+        return dataclasses.replace(made, measured=v, depends_initially=v.depends_initially)
