@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import platform
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import fmpy
 import pytest
@@ -86,19 +84,6 @@ def test_the_state_of_another_fmu_is_refused(fmu):
         assert any("belongs to another FMU" in message for _, _, message in one.log)
 
 
-def test_instances_do_not_share_state(fmu):
-    """Two particles on two hemispheres: each keeps its own radius and its own departure."""
-    with instance(fmu("Hemisphere"), "a") as a, instance(fmu("Hemisphere"), "b") as b:
-        a.start({"theta": 0.1})
-        b.start({"theta": 0.4, "a": 2.0, "r": 2.0})
-        for _ in range(60):
-            a.step(STEP)
-            b.step(STEP)
-        left = a.get("departure.surface.theta"), b.get("departure.surface.theta")
-        assert left[0] == pytest.approx(0.8448, abs=1e-3)
-        assert left[1] == pytest.approx(0.9097, abs=1e-3)
-
-
 def particle(name: str, factor: float) -> Model:
     r, theta = dynamicsymbols("r theta")
     m, g, a = symbols("m g a", positive=True)
@@ -128,49 +113,6 @@ def test_two_versions_with_one_file_name_are_both_right(tmp_path):
         result = fmpy.simulate_fmu(str(path), stop_time=0.01, output_interval=0.01)
         weights.append(result["lambda.surface"][0])
     assert weights == pytest.approx([9.81 * 0.995004, 19.62 * 0.995004] * 2, rel=1e-6)
-
-
-def test_two_models_in_one_process_are_both_right(fmu):
-    """The string of Atwood's machine and the surface of the hemisphere, side by side."""
-    with instance(fmu("Hemisphere")) as one, instance(fmu("Atwood")) as other:
-        one.start({"theta": 0.0})
-        other.start()
-        one.step(STEP)
-        other.step(STEP)
-        m1, m2, g = (other.get(n) for n in ("m1", "m2", "g"))
-        assert other.get("lambda.string") == pytest.approx(-2 * m1 * m2 * g / (m1 + m2))
-        assert one.get("lambda.surface") == pytest.approx(9.81)
-
-
-BUILD = """
-import sys
-from pathlib import Path
-from lagfmu.testing import load, prepare, write
-file = load(sys.argv[1])
-for scene in file.scenes:
-    write(prepare(file.model, scene), sys.argv[2], file.closed_forms)
-"""
-
-
-@pytest.mark.thorough
-def test_two_builds_are_the_same_bytes(tmp_path):
-    """An FMU depends on its model alone: not on the process, the hash seed, the folder or the time."""
-    source = Path(__file__).parent.parent / "models" / "pendulum.py"
-    built = []
-    for seed in ("1", "2"):
-        folder = tmp_path / seed
-        (folder / "src").mkdir(parents=True)
-        copy = shutil.copy(source, folder / "src" / "pendulum.py")
-        environment = {**os.environ, "PYTHONHASHSEED": seed}
-        subprocess.run(
-            [sys.executable, "-c", BUILD, copy, folder / "out"],
-            env=environment,
-            cwd=folder,
-            check=True,
-        )
-        built.append({p.name: p.read_bytes() for p in (folder / "out").iterdir()})
-    assert len(built[0]) == 3
-    assert built[0] == built[1]
 
 
 BLOCKED = """

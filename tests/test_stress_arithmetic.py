@@ -6,22 +6,17 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
 
 import pytest
-from same_motion import another, differ
 
 from lagfmu.testing import (
     REFUSED,
     RIGHT,
     WRONG,
     Bench,
-    Check,
     Finding,
     Probe,
-    RefusalError,
     Run,
-    Session,
     attempt,
     clear,
     departures,
@@ -31,12 +26,10 @@ from lagfmu.testing import (
     started,
     verdict,
 )
-from lagfmu.testing import play_of as play
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 NAMES = ("Hemisphere", "PendulumCartesian", "KnifeEdge", "CartPendulum", "Bowling")
 ENDS = (5e-324, 1e-300, 1e300)
-UNITS = ("kg", "m", "s")
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -65,34 +58,6 @@ def test_no_parameter_or_start_is_too_small_or_too_large(bench):
                 found = attempt(Probe("", "", partial(started, {s.name: value})), bench)
                 assert not [c for c in found.checks if c.what.startswith("finite") and c.ratio > 1]
                 assert found.refusal is None or clear(found.refusal), f"{s.name} = {value}"
-
-
-def refused(ask: Callable[[Session], Any], bench: Bench) -> Finding:
-    """It must be refused, and what goes on is as if it had not been asked."""
-    h, refusal = bench.facts.step_size, None
-    with another(bench) as one, another(bench) as two:
-        for each in (one, two):
-            each.begin({}, None)
-            each.step(h)
-        two.step(h)
-        try:
-            ask(one)
-        except RefusalError as error:
-            refusal = error
-        checks = [Check("refused", 0.0 if refusal else 1.0, 0.5)]
-        if refusal is not None:
-            one.step(h)
-            checks.append(differ(two.read(), one.read(), "as if it had not been asked:"))
-    return Finding(tuple(checks), refusal)
-
-
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
-def test_what_is_no_number_is_refused_and_forgotten(bench, value):
-    """An input, a communication step: the FMU says so, and steps on as if it had not been asked."""
-    names = [i.name for i in bench.facts.inputs]
-    assert told(bench, partial(refused, lambda one: one.call("doStep", one.time, value))) == REFUSED
-    for name in names:
-        assert told(bench, partial(refused, lambda one, n=name: one.give({n: value}))) == REFUSED
 
 
 @pytest.mark.thorough
@@ -130,38 +95,6 @@ def scaled(axis: int | None, power: int, bench: Bench) -> Finding:
     checks += bench.agreement(base, back, growth, "same in the old units", facts.stop_time)
     checks += departures(bench, base, back, float(growth[-1]))
     return Finding(tuple(checks), run.refusal)
-
-
-@pytest.mark.parametrize("what", ["cut", "altered", "foreign"])
-def test_bytes_that_are_no_state_are_refused(bench, what):
-    """When they are read or when they are set, with the reason, and nothing changes."""
-    with another(bench) as one:
-        one.begin({}, None)
-        one.step(bench.facts.step_size)
-        before = one.read()
-        state = one.save()
-        data = bytearray(one.call("serializeFMUstate", state))
-        one.call("freeFMUstate", state)
-        if what == "cut":
-            data = data[: len(data) // 2]
-        elif what == "altered":
-            data[len(data) * 2 // 3] ^= 0x55
-        else:
-            data = bytearray(b"\x01" * len(data))
-        with pytest.raises(RefusalError) as refusal:
-            one.restore(one.call("deSerializeFMUstate", bytes(data)), one.time)
-        assert clear(refusal.value)
-        assert differ(before, one.read(), "").ratio == 0
-
-
-def test_a_reset_instance_is_as_new(bench):
-    """The same bits as at first, after another run with other parameters."""
-    times = bench.times(bench.facts.stop_time, 10)
-    other = {p.name: p.start * 1.1 for p in bench.facts.parameters if p.allows(p.start * 1.1)}
-    with another(bench) as one:
-        first = play(one, bench.facts, {}, times)
-        play(one, bench.facts, other, times[:6])
-        assert play(one, bench.facts, {}, times).rows.tobytes() == first.rows.tobytes()
 
 
 def test_twenty_instances_do_not_meet(bench):
