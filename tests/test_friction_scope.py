@@ -33,18 +33,17 @@ from lagfmu import (
     multiplier,
     simulate,
 )
-from lagfmu.errors import LagfmuError, ModelError
+from lagfmu.errors import ModelError
 from lagfmu.testing import app, find_compiler, load, prepare, write
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"
 g = 9.81  # m/s^2
-Build = Callable[..., Path]
 
 
 @pytest.fixture(scope="module")
-def belt(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(load(MODELS / "belt.py").model, "Belt", tmp_path_factory.mktemp("belt"))
+def belt(native_fmu: Callable[[str], Path]) -> Path:
+    return native_fmu("Belt")
 
 
 def build(model: Model, name: str, folder: Path, **scene: object) -> Path:
@@ -88,12 +87,6 @@ def test_an_embedding_is_refused_by_name() -> None:
             parameters=plain.parameters,
             embedding=Embedding({s: "m"}, {x: s, z: 0}),
         )
-
-
-def test_rattle_is_refused_by_name(tmp_path: Path) -> None:
-    """It steps forces of a potential; friction is none."""
-    with pytest.raises(LagfmuError, match=r"rattle cannot step these equations.*friction"):
-        build(load(MODELS / "belt.py").model, "Belt", tmp_path, method="rattle")
 
 
 def test_no_directional_derivatives_are_offered(belt: Path) -> None:
@@ -320,25 +313,3 @@ def test_a_journal_in_its_bearing_rubs_by_the_norm_of_its_force(tmp_path: Path) 
     N = run["lambda.pin"]
     slides = ~run["sticks.bearing"].astype(bool) & (np.abs(run["slip.rub"]) > 1e-3)
     assert np.abs(run["lambda.rub"][slides]) == pytest.approx(MU * N[slides], rel=1e-9)
-
-
-def test_the_norm_of_a_force_is_answered_with_the_journal() -> None:
-    """A norm of two multipliers is refused, and not with a friction for each component."""
-    x, y = dynamicsymbols("x y")
-    with pytest.raises(ModelError, match="journal in its bearing"):
-        Model(
-            name="Norm",
-            lagrangian=x.diff() ** 2 / 2 + y.diff() ** 2 / 2,
-            coordinates={x: "m", y: "m"},
-            constraints=[
-                Contact("one", x),
-                Contact("two", y),
-                Nonholonomic("rub", x.diff() - y.diff()),
-                Friction(
-                    "grip",
-                    ["rub"],
-                    sqrt(multiplier("one") ** 2 + multiplier("two") ** 2),
-                    static=0.3,
-                ),
-            ],
-        )
