@@ -74,11 +74,11 @@ Bench *bench(int n, int m, int masses, int entries, const int *mass_row, const i
              const char *const *names, const Row *rows, const int *plan_ints) {
     Bench *b = calloc(1, sizeof *b);
     if (b == NULL) return NULL;
-    b->system.n = n;
+    b->system.nq = b->system.nv = n;
     b->system.m = m;
     b->system.masses = masses;
     b->system.entries = entries;
-    b->system.coordinates = names;
+    b->system.coordinates = b->system.speeds = names;
     b->system.rows = rows;
     b->system.mass_row = ints(mass_row, masses);
     b->system.mass_column = ints(mass_column, masses);

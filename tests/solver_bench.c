@@ -62,9 +62,8 @@ void bench_close(Bench *b) {
 
 const char *bench_why(const Bench *b) { return b->solver.why.text; }
 
-static void moved(void *context, const char *coordinate, int is_velocity, double given,
-                  double used, Priority priority) {
-    (void)context, (void)coordinate, (void)is_velocity, (void)given, (void)used, (void)priority;
+static void moved(void *context, int j, double given, double used, Priority priority) {
+    (void)context, (void)j, (void)given, (void)used, (void)priority;
 }
 
 int bench_start(Bench *b, const double *q, const double *v, double tolerance) {

@@ -99,7 +99,7 @@ const int *table_of(int full, int which) {
 }
 int number_of(int full, int which) {
     const System *s = pick(full);
-    const int numbers[] = {s->n, s->m, s->contacts, s->inputs, s->parameters, s->masses, s->entries,
+    const int numbers[] = {s->nv, s->m, s->contacts, s->inputs, s->parameters, s->masses, s->entries,
                            s->prescribed_count, s->constant_mass, s->separable,
                            (int)s->formulation};
     return numbers[which];

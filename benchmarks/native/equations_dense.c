@@ -17,7 +17,7 @@ typedef struct {
 } Factors;
 
 int equations_create(Equations *e, const System *s, const double *p) {
-    const size_t n = (size_t)s->n, m = (size_t)s->m;
+    const size_t n = (size_t)s->nv, m = (size_t)s->m;
     const size_t values = (size_t)(s->masses + s->entries) + n + 2 * m;
     Factors *f = calloc(1, sizeof *f);
     double *block = calloc(values + n * n + 2 * m * n + m * m + 1, sizeof(double));
@@ -84,7 +84,7 @@ static void backward(int n, const double *L, double *b) {
 
 static int factor_mass(Equations *e, Factors *f) {
     const System *s = e->s;
-    const int n = s->n;
+    const int n = s->nv;
     if (f->diagonal) {
         for (int j = 0; j < n; j++)
             f->L[j] = 0;
@@ -102,7 +102,7 @@ static int factor_mass(Equations *e, Factors *f) {
 int equations_factor(Equations *e) {
     const System *s = e->s;
     Factors *f = e->factors;
-    const int n = s->n, m = s->m;
+    const int n = s->nv, m = s->m;
     if (factor_mass(e, f) != 0)
         return 1;
     for (int k = 0; k < m * n; k++)
@@ -148,16 +148,16 @@ int equations_solve(Equations *e, const double *b, const double *c, double *x, d
     for (int k = 0; k < s->m; k++)
         lambda[k] = c[k];
     if (b != NULL) {
-        for (int j = 0; j < s->n; j++)
+        for (int j = 0; j < s->nv; j++)
             x[j] = b[j];
-        solve_mass(f, s->n, x);
+        solve_mass(f, s->nv, x);
         rows_times(s, e->G, -1, x, lambda);
     }
     forward(s->m, f->S, lambda);
     backward(s->m, f->S, lambda);
-    for (int j = 0; j < s->n; j++)
+    for (int j = 0; j < s->nv; j++)
         x[j] = b == NULL ? 0 : b[j];
     columns_times(s, e->G, 1, lambda, x);
-    solve_mass(f, s->n, x);
+    solve_mass(f, s->nv, x);
     return 0;
 }

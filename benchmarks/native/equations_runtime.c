@@ -18,7 +18,7 @@ int equations_create(Equations *e, const System *s, const double *p) {
     for (int pass = 0; pass < 2; pass++) {
         Arena arena = {f->block, 0};
         e->M = arena_doubles(&arena, s->masses);
-        e->F = arena_doubles(&arena, s->n);
+        e->F = arena_doubles(&arena, s->nv);
         e->G = arena_doubles(&arena, s->entries);
         e->nu = arena_doubles(&arena, s->m);
         e->gamma = arena_doubles(&arena, s->m);

@@ -18,7 +18,7 @@ static int ascending(const void *a, const void *b) {
 /* One motion at a state to which the latest accelerations have added nothing. */
 static int follow(Equations *e, double *q, double *vdot, double *lambda) {
     const System *s = e->s;
-    for (int j = 0; j < s->n; j++)
+    for (int j = 0; j < s->nv; j++)
         q[j] = PROBLEM_Q[j] + 0 * vdot[j];
     if (s->accelerate != NULL)
         return !s->accelerate(0, q, PROBLEM_V, NULL, PROBLEM_P, vdot);
@@ -30,10 +30,10 @@ int main(int argc, char *argv[]) {
     Equations e;
     double ns[PARTS][BATCHES];
     int bad = argc != 2 || equations_create(&e, s, PROBLEM_P) != 0;
-    double *vdot = calloc((size_t)(2 * s->n + s->m), sizeof(double));
+    double *vdot = calloc((size_t)(2 * s->nv + s->m), sizeof(double));
     if (bad || vdot == NULL)
         return 1;
-    double *q = vdot + s->n, *lambda = q + s->n, begun = now_ns();
+    double *q = vdot + s->nv, *lambda = q + s->nv, begun = now_ns();
     long calls = 0;
     while (now_ns() - begun < 2e6) { /* how many calls fill 2 ms: also warms the caches */
         bad |= equations_motion(&e, 0, PROBLEM_Q, PROBLEM_V, vdot, lambda);

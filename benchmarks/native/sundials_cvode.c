@@ -32,7 +32,7 @@ typedef struct {
 
 static int rate(realtype t, N_Vector y, N_Vector ydot, void *data) {
     Peer *peer = data;
-    const int n = peer->e.s->n;
+    const int n = peer->e.s->nv;
     const double *q = N_VGetArrayPointer(y);
     double *dydt = N_VGetArrayPointer(ydot);
     memcpy(dydt, q + n, (size_t)n * sizeof(double));
@@ -45,7 +45,7 @@ static int jacobian(realtype t, N_Vector y, N_Vector ydot, SUNMatrix J, void *da
                     N_Vector w2, N_Vector w3) {
     Peer *peer = data;
     const System *s = peer->e.s;
-    const int n = s->n, m = s->m;
+    const int n = s->nv, m = s->m;
     const double *q = N_VGetArrayPointer(y), *v = q + n;
     double *lambda = peer->work, *vdot = lambda + m, *along = vdot + n, *b = along + 2 * n;
     double *dgamma = b + n, *dM = dgamma + m, *dG = dM + s->masses, *dnu = dG + s->entries;
@@ -79,7 +79,7 @@ static int strip(Peer *peer, double *x, double *c, double *dx, double *mu) {
     rows_times(s, peer->e.G, -1, x, c);
     if (equations_solve(&peer->e, NULL, c, dx, mu) != 0)
         return 1;
-    for (int j = 0; j < s->n; j++)
+    for (int j = 0; j < s->nv; j++)
         x[j] += dx[j];
     return 0;
 }
@@ -90,7 +90,7 @@ static int project(realtype t, N_Vector y, N_Vector correction, realtype epsilon
                    void *data) {
     Peer *peer = data;
     const System *s = peer->e.s;
-    const int n = s->n, m = s->m;
+    const int n = s->nv, m = s->m;
     const double *q = N_VGetArrayPointer(y), *v = q + n;
     double *dq = N_VGetArrayPointer(correction), *dv = dq + n;
     double *mu = peer->work, *dx = mu + m, *moved = dx + n, *c = moved + 2 * n;
@@ -131,7 +131,7 @@ static int project(realtype t, N_Vector y, N_Vector correction, realtype epsilon
 
 static int run(void *context, const Task *task, double *lambda, Cost *cost) {
     Peer *peer = context;
-    const int n = peer->e.s->n, m = peer->e.s->m;
+    const int n = peer->e.s->nv, m = peer->e.s->m;
     const double *q = N_VGetArrayPointer(peer->y);
     N_VScale(1, peer->start, peer->y);
     if (CVodeReInit(peer->cvode, 0, peer->start) != CV_SUCCESS)
@@ -154,7 +154,7 @@ static int run(void *context, const Task *task, double *lambda, Cost *cost) {
 
 int main(int argc, char *argv[]) {
     const System *s = MODEL_SYSTEM;
-    const int n = s->n;
+    const int n = s->nv;
     Peer peer;
     SUNContext sun;
     if (argc != 6)

@@ -34,7 +34,7 @@ static int residual(realtype t, N_Vector y_, N_Vector dydt_, N_Vector r_, void *
     Peer *peer = data;
     Equations *e = &peer->e;
     const System *s = e->s;
-    const int n = s->n, m = s->m;
+    const int n = s->nv, m = s->m;
     const double *q = N_VGetArrayPointer(y_), *v = q + n, *lambda = v + n, *mu = lambda + m;
     const double *qdot = N_VGetArrayPointer(dydt_), *vdot = qdot + n;
     double *r = N_VGetArrayPointer(r_), *r2 = r + n, *f = r2 + n, *r4 = f + m;
@@ -59,7 +59,7 @@ static int jacobian(realtype t, realtype cj, N_Vector y_, N_Vector dydt_, N_Vect
     Peer *peer = data;
     Equations *e = &peer->e;
     const System *s = e->s;
-    const int n = s->n, m = s->m;
+    const int n = s->nv, m = s->m;
     const double *q = N_VGetArrayPointer(y_), *v = q + n, *lambda = v + n, *mu = lambda + m;
     const double *vdot = N_VGetArrayPointer(dydt_) + n;
     double *along = peer->work, *dM = along + 2 * n, *dF = dM + s->masses, *dG = dF + n;
@@ -102,7 +102,7 @@ static int jacobian(realtype t, realtype cj, N_Vector y_, N_Vector dydt_, N_Vect
 
 static int run(void *context, const Task *task, double *lambda, Cost *cost) {
     Peer *peer = context;
-    const int n = peer->e.s->n, m = peer->e.s->m;
+    const int n = peer->e.s->nv, m = peer->e.s->m;
     const double *q = N_VGetArrayPointer(peer->y);
     N_VScale(1, peer->start, peer->y);
     N_VScale(1, peer->rate, peer->dydt);
@@ -126,7 +126,7 @@ static int run(void *context, const Task *task, double *lambda, Cost *cost) {
 
 int main(int argc, char *argv[]) {
     const System *s = MODEL_SYSTEM;
-    const int n = s->n, m = s->m, ny = 2 * (n + m);
+    const int n = s->nv, m = s->m, ny = 2 * (n + m);
     Peer peer;
     SUNContext sun;
     if (argc != 6)

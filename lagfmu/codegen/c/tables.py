@@ -26,7 +26,7 @@ class Tables:
         """A System of coordinates that are only read: names, and the energies if they are read."""
         names = self._array("const char *const", "coordinates", [f'"{s}"' for s in self.eom.q])
         own, more = self._outputs(functions)
-        fields = {"n": self.eom.n, "coordinates": f"{self.prefix}coordinates"}
+        fields = self._layout()
         fields |= {name: f"{self.prefix}{name}" for name in sorted(functions)} | more
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return f"{names}{own}static const System {self.prefix}equations = {{\n{lines}}};\n"
@@ -85,7 +85,7 @@ class Tables:
                 "starts": f"{p}starts",
             }
         fields = {
-            "n": eom.n,
+            **self._layout(),
             "m": eom.m,
             "contacts": len(contacts),
             "inputs": len(eom.u),
@@ -97,19 +97,22 @@ class Tables:
             **{
                 name: p + name
                 for name in (
-                    *("coordinates", "rows", "contact", "mass_row", "mass_column"),
+                    *("rows", "contact", "mass_row", "mass_column"),
                     *("entry_row", "entry_column", "row_start"),
                 )
             },
             "prescribed_count": len(prescribed),
             **{name: p + name for name in ("prescribed", "dimension", "extent_dimension")},
+            "speed_dimension": f"{p}dimension",
             **(
                 {"estimated_count": len(estimated), "estimated": f"{p}estimated"}
                 if estimated
                 else {}
             ),
             "angles": angles,
-            "folded": f"{p}folded" if any(folded) else "NULL",
+            **{
+                name: f"{p}folded" if any(folded) else "NULL" for name in ("folded", "speed_folded")
+            },
             "formulation": parts.formulation.upper(),
             "constant_mass": int(_constant_mass(eom)),
             "separable": int(not entanglements(eom, parts.formulation)),
@@ -139,6 +142,11 @@ class Tables:
             }
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return "".join(tables) + f"static const System {p}equations = {{\n{lines}}};\n"
+
+    def _layout(self) -> dict[str, Any]:
+        """How many coordinates and speeds there are, and their names."""
+        names = f"{self.prefix}coordinates"
+        return {"nq": self.eom.n, "nv": self.eom.n, "coordinates": names, "speeds": names}
 
     def _outputs(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
         """Tables of the model's own outputs, and the System's fields that hold them."""

@@ -22,8 +22,8 @@ typedef struct {
     int diagonal; /* 1: M is diagonal; then L = 1, W^T = G, and `mass` and `w` are empty */
     int massless; /* 1: a diagonal element of M is structurally zero; there is no elimination */
     Elimination mass;         /* of M */
-    const int *mass_diagonal; /* (n) where M's value of the p-th pivot stands in the list of M */
-    const int *mass_value;    /* (mass.start[n]) the same for the elements of L; -1: fill */
+    const int *mass_diagonal; /* (nv) where M's value of the p-th pivot stands in the list of M */
+    const int *mass_value;    /* (mass.start[nv]) the same for the elements of L; -1: fill */
     const int *w_start;       /* (m + 1) row k of W^T ... */
     const int *w_column;      /* (w_start[m]) ... its non-zeros, in M's order, ascending */
     const int *w_value;       /* (w_start[m]) where G's value stands in the list of G; -1: fill */

@@ -1,8 +1,17 @@
-/* system.c -- which constraint rows act while the contacts stand as in `closed`.
+/* system.c -- names of states, and which constraint rows act while the contacts stand as in `closed`.
  *
  * A contact acts while it is closed; a row that belongs to a contact acts while that one is closed;
  * every other row always acts. */
 #include "system.h"
+
+#include <stddef.h>
+
+StateName system_state_name(const System *s, int j) {
+    const int i = j - s->nq;
+    if (i < 0) return (StateName){"", s->coordinates[j], ""};
+    if (s->own_speed != NULL && s->own_speed[i]) return (StateName){"", s->speeds[i], ""};
+    return (StateName){"der(", s->speeds[i], ")"};
+}
 
 void system_active(const System *s, const int *closed, int *active) {
     for (int k = 0; k < s->m; k++)

@@ -2,7 +2,7 @@
  *
  *   M(q,t) vdot = F(q,v,t,u) + G^T lambda ,  G v = nu(q,t,u) ,  G vdot = gamma(q,v,t,u) ,  f(q,t) = 0
  *
- * n coordinates, m constraint rows.  M and G are passed as the lists of their structurally non-zero
+ * nq coordinates q, nv speeds v, m constraint rows.  M and G are passed as the lists of their structurally non-zero
  * values: M's lower triangle (row >= column), G row by row, both sorted by (row, column).  That
  * layout is decided by the code printer (codegen/c/) and described by the patterns below.  SI units.
  * model.c, which is generated, defines one `const System`. */
@@ -35,13 +35,15 @@ typedef struct {
 typedef struct System System;
 
 struct System {
-    int n, m;                 /* coordinates, constraint rows */
+    int nq, nv, m;            /* coordinates, speeds, constraint rows */
     int contacts;             /* how many rows are contacts */
     int inputs, parameters;   /* lengths of u, without the switch states behind it, and of p */
     int switches;             /* where forces jump: how many switch states stand behind the inputs in u */
     const int *at_integers;   /* (switches) 1: it switches wherever h is a whole number; 0: where h = 0 */
     int masses, entries;      /* structural non-zeros of M's lower triangle and of G */
-    const char *const *coordinates; /* (n) names */
+    const char *const *coordinates; /* (nq) names */
+    const char *const *speeds;  /* (nv) names; of a coordinate where the speed is its rate */
+    const int *own_speed;       /* (nv) 1: a speed of its own, and no coordinate's rate; NULL: none is */
     const Row *rows;          /* (m) */
     const int *contact;       /* (contacts) rows that are contacts, ascending */
     const int *mass_row, *mass_column;   /* (masses) */
@@ -51,20 +53,22 @@ struct System {
     const int *prescribed;    /* positions in u where a prescribed motion begins: u, der(u), der(u,2) */
     int estimated_count;
     const int *estimated;     /* positions of those that der(u,3) follows: their rates are estimated */
-    const int *dimension;        /* (n) coordinates of one physical dimension have one number */
-    const double *folded;        /* (n) the largest magnitude of the dimension among parameters that are
+    const int *dimension;        /* (nq) coordinates of one physical dimension have one number */
+    const double *folded;        /* (nq) the largest magnitude of the dimension among parameters that are
                                   * numbers in the code; NULL: there are none */
+    const int *speed_dimension;  /* (nv) the same of the speeds times a second, ... */
+    const double *speed_folded;  /* (nv) ... and of their displacements; NULL: there are none */
     const int *extent_dimension; /* (parameters) the number of those that it compares to; -1: none */
     int angles;                  /* the number of those without dimension; -1: none */
     Formulation formulation;
     int constant_mass;        /* M holds parameters and numbers only */
     int separable;            /* constant mass, forces without velocities, position constraints only */
     const Plan *plan;         /* sparse elimination, found when the FMU was built */
-    /* x (n) and lambda (m) of  M x = b + G^T lambda,  G x = c  with all rows acting, the plan written
+    /* x (nv) and lambda (m) of  M x = b + G^T lambda,  G x = c  with all rows acting, the plan written
      * out for a small system; 0 where that is not safe: then linear.h decides.  NULL: not there. */
     int (*solve)(const double *M, const double *b, const double *G, const double *c, double *x,
                  double *lambda);
-    /* Both in one, dynamics and solve, for a system without inputs: vdot (n) at a state. */
+    /* Both in one, dynamics and solve, for a system without inputs: vdot (nv) at a state. */
     int (*accelerate)(double t, const double *q, const double *v, const double *u, const double *p,
                       double *vdot);
 
@@ -89,7 +93,7 @@ struct System {
     const int *started;
     void (*starts)(const double *p, double *w);
     /* The derivative of all of these along the direction (dt, dq, dv, du): what changes in the values
-     * when the state moves that way.  dM (masses), dF (n), dG (entries), dnu, dgamma, df (m),
+     * when the state moves that way.  dM (masses), dF (nv), dG (entries), dnu, dgamma, df (m),
      * denergy (2).  NULL where nobody asks for derivatives. */
     void (*tangent)(double t, const double *q, const double *v, const double *u, const double *p,
                     double dt, const double *dq, const double *dv, const double *du, double *dM,
@@ -136,6 +140,16 @@ struct System {
     void (*coulomb)(double t, const double *q, const double *v, const double *u, const double *p,
                     double *coefficients, double *load, double *normal);
 };
+
+/* The state that is stepped: y = (q, v), v = y + nq. */
+static inline int system_states(const System *s) { return s->nq + s->nv; }
+
+/* The name of y[j], in three parts: x, der(x), or that of a speed of its own. */
+typedef struct {
+    const char *head, *name, *tail;
+} StateName;
+
+SHARED StateName system_state_name(const System *s, int j);
 
 /* 1 where a row acts while the contacts stand as in `closed` (one entry a contact); 0 for rows that hold by
  * friction alone, which sliding.c adds where they stick. */

@@ -41,9 +41,9 @@ static void layout_bars(Instance *x, Arena *saved, Arena *scratch) {
     b->solver.p = x->solver.p;
     b->solver.on_demand = 1;
     observed_layout(&b->seen, scratch, MODEL_SYSTEM);
-    b->state = arena_doubles(scratch, 2 * MODEL_SYSTEM->n);
-    b->scale = arena_doubles(scratch, 2 * MODEL_SYSTEM->n);
-    b->push = arena_doubles(scratch, (MODEL_SYSTEM->full != NULL ? MODEL_SYSTEM->full : MODEL_SYSTEM)->n);
+    b->state = arena_doubles(scratch, system_states(MODEL_SYSTEM));
+    b->scale = arena_doubles(scratch, system_states(MODEL_SYSTEM));
+    b->push = arena_doubles(scratch, (MODEL_SYSTEM->full != NULL ? MODEL_SYSTEM->full : MODEL_SYSTEM)->nv);
     b->kept = arena_take(saved, 1, sizeof *b->kept);
     b->worst = arena_doubles(saved, count);
     b->size = arena_doubles(saved, count);
@@ -159,16 +159,14 @@ static void measure_difference(Instance *x) {
     Bars *b = x->bars;
     const System *own = x->solver.system, *full = own->full != NULL ? own->full : own;
     const State *state = &x->solver.state, *other = &b->solver.state;
-    const size_t n = (size_t)own->n;
-    memcpy(b->state, state->q, n * sizeof *b->state);
-    memcpy(b->state + n, state->v, n * sizeof *b->state);
+    state_gather(own, state->q, state->v, b->state);
     nominals_shared(&x->solver, b->state, b->scale);
-    for (int j = 0; j < full->n; j++) b->push[j] = fabs(x->seen.applied[j]);
+    for (int j = 0; j < full->nv; j++) b->push[j] = fabs(x->seen.applied[j]);
     for (int e = 0; e < full->entries; e++) b->push[full->entry_column[e]] += fabs(x->seen.share[e]);
     b->paired = have_met_the_same(&x->solver, &b->solver);
     b->apart = ESTIMATE * state->now.estimated;
-    for (int j = 0; j < 2 * own->n && b->paired; j++) {
-        const double off = b->state[j] - (j < own->n ? other->q[j] : other->v[j - own->n]);
+    for (int j = 0; j < system_states(own) && b->paired; j++) {
+        const double off = b->state[j] - (j < own->nq ? other->q[j] : other->v[j - own->nq]);
         const double size = fmax(fabs(b->state[j]), b->scale[j]);
         if (off != 0) b->apart = fmax(b->apart, fmin(fabs(off) / size, 1));
     }
@@ -209,8 +207,7 @@ static double natural_size(const Instance *x, const Variable *of) {
 /* What a variable that is as large as `size` rounds: the place of a body has the digits of its surroundings. */
 static double rounding(const Instance *x, const Variable *of, double size) {
     const State *s = &x->solver.state;
-    const int n = x->solver.system->n;
-    if (of->state >= 0) size = fmax(size, s->size[of->state % n] * (of->state < n ? 1 : s->now.rate));
+    if (of->state >= 0) size = fmax(size, nominals_natural(&x->solver, of->state));
     return BAR_ROUNDING * DBL_EPSILON * sqrt(1 + (double)s->now.steps) * size;
 }
 

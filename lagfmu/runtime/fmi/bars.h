@@ -26,8 +26,8 @@ struct Instance;
 typedef struct {
     Solver solver;    /* the finer run; its inputs and parameters are the delivered run's own */
     Observed seen;    /* what can be read at its state, while `observed` is 1, and then: */
-    double *state, *scale; /* (2 n) q, v of the delivered run, and below which rounding of them is absolute */
-    double *push;     /* (n of the full system) of the magnitudes of all constraints' forces */
+    double *state, *scale; /* (states) q, v of the delivered run, and below which rounding of them is absolute */
+    double *push;     /* (nv of the full system) of the magnitudes of all constraints' forces */
     double apart;     /* the largest relative difference of the two states */
     int paired;       /* both runs have met the same events */
     int observed;

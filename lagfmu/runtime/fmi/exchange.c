@@ -39,22 +39,25 @@ void exchange_set_time(Instance *x, double t) {
     s->state.now.t = s->drive.since = t;
 }
 
+/* Where an importer has y[j]: each coordinate with its speed. */
+static int place_of(const System *s, int j) { return j < s->nq ? 2 * j : 2 * (j - s->nq) + 1; }
+
 Status exchange_get_states(Instance *x, double *states) {
+    const Solver *s = &x->solver;
+    const int nq = s->system->nq, nv = s->system->nv;
     if (instance_start(x) != OK) return FAILED;
-    for (int j = 0; j < x->solver.system->n; j++) {
-        states[2 * j] = x->solver.state.q[j];
-        states[2 * j + 1] = x->solver.state.v[j];
-    }
-    if (EXCHANGE_LOST) states[2 * x->solver.system->n] = x->solver.state.now.lost;
+    for (int j = 0; j < nq; j++) states[place_of(s->system, j)] = s->state.q[j];
+    for (int i = 0; i < nv; i++) states[place_of(s->system, nq + i)] = s->state.v[i];
+    if (EXCHANGE_LOST) states[nq + nv] = s->state.now.lost;
     return OK;
 }
 
 void exchange_set_states(Instance *x, const double *states) {
-    if (EXCHANGE_LOST) x->solver.state.now.lost = states[2 * x->solver.system->n];
-    for (int j = 0; j < x->solver.system->n; j++) {
-        x->solver.state.q[j] = states[2 * j];
-        x->solver.state.v[j] = states[2 * j + 1];
-    }
+    Solver *s = &x->solver;
+    const int nq = s->system->nq, nv = s->system->nv;
+    if (EXCHANGE_LOST) s->state.now.lost = states[nq + nv];
+    for (int j = 0; j < nq; j++) s->state.q[j] = states[place_of(s->system, j)];
+    for (int i = 0; i < nv; i++) s->state.v[i] = states[place_of(s->system, nq + i)];
     x->observed = x->evaluated = 0;
 }
 
@@ -71,17 +74,15 @@ static double nominal_energy(const Solver *s) {
 }
 
 Status exchange_nominals(Instance *x, double *nominals) {
-    const int n = x->solver.system->n;
+    const System *system = x->solver.system;
+    const int states = system_states(system);
     if (instance_start(x) != OK) return FAILED;
-    double *still = x->solver.work_advance, *scale = still + 2 * n;
-    memset(still, 0, 2 * (size_t)n * sizeof *still);
+    double *still = x->solver.work_advance, *scale = still + states;
+    memset(still, 0, (size_t)states * sizeof *still);
     nominals_shared(&x->solver, still, scale);
-    for (int j = 0; j < n; j++) {
-        nominals[2 * j] = scale[j];
-        nominals[2 * j + 1] = scale[n + j];
-    }
-    if (EXCHANGE_LOST) nominals[2 * n] = nominal_energy(&x->solver);
-    for (int j = 0; j < 2 * n + EXCHANGE_LOST; j++)
+    for (int j = 0; j < states; j++) nominals[place_of(system, j)] = scale[j];
+    if (EXCHANGE_LOST) nominals[states] = nominal_energy(&x->solver);
+    for (int j = 0; j < states + EXCHANGE_LOST; j++)
         if (!(nominals[j] > 0)) nominals[j] = 1;
     return OK;
 }
@@ -132,7 +133,7 @@ static Status stabilize(Instance *x, double *derivatives) {
                    ? -alpha * mechanism_slip(b, k, s->state.v)
                    : -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
     if (linear_nearest(&b->linear, c, a) != OK) return OK; /* rows contradict each other */
-    for (int j = 0; j < s->system->n; j++) derivatives[2 * j + 1] += a[j];
+    for (int i = 0; i < s->system->nv; i++) derivatives[place_of(s->system, s->system->nq + i)] += a[i];
     return OK;
 }
 
@@ -141,11 +142,9 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
     Mechanism *b = &s->stepped;
     const System *system = s->system;
     if (exchange_evaluate(x) != OK) return FAILED;
-    for (int j = 0; j < system->n; j++) {
-        derivatives[2 * j] = s->state.v[j];
-        derivatives[2 * j + 1] = b->vdot[j];
-    }
-    if (EXCHANGE_LOST) derivatives[2 * system->n] = friction_power(b);
+    for (int j = 0; j < system->nq; j++) derivatives[place_of(system, j)] = s->state.v[j];
+    for (int i = 0; i < system->nv; i++) derivatives[place_of(system, system->nq + i)] = b->vdot[i];
+    if (EXCHANGE_LOST) derivatives[system_states(system)] = friction_power(b);
     return stabilize(x, derivatives);
 }
 

@@ -106,8 +106,7 @@ static Status judge_step(Instance *x, int *event) {
     if (find_happened(x, &any) != OK) return FAILED;
     if (!any && s->system->frictions > 0) {
         double *y = s->work_advance;
-        memcpy(y, s->state.q, (size_t)s->system->n * sizeof *y);
-        memcpy(y + s->system->n, s->state.v, (size_t)s->system->n * sizeof *y);
+        state_gather(s->system, s->state.q, s->state.v, y);
         if (OPTIONAL.friction->turn(s, s->state.now.t, y) != OK) return FAILED;
     }
     *event = *event || any || worst > DRIFT_LIMIT;
@@ -182,15 +181,14 @@ static Status pass_event(Instance *x) {
 /* `act`, and whether it has changed the state. */
 static Status moving(Instance *x, Status (*act)(Instance *)) {
     Solver *s = &x->solver;
-    const size_t bytes = (size_t)s->system->n * sizeof(double);
-    double *q = s->work_advance, *v = q + s->system->n;
+    double *before = s->work_advance, *after = before + system_states(s->system);
     if (instance_start(x) != OK) return FAILED;
-    memcpy(q, s->state.q, bytes);
-    memcpy(v, s->state.v, bytes);
+    state_gather(s->system, s->state.q, s->state.v, before);
     const double lost = s->state.now.lost;
     x->observed = x->evaluated = 0;
     if (act(x) != OK) return FAILED;
-    x->moved |= memcmp(q, s->state.q, bytes) != 0 || memcmp(v, s->state.v, bytes) != 0;
+    state_gather(s->system, s->state.q, s->state.v, after);
+    x->moved |= memcmp(before, after, (size_t)system_states(s->system) * sizeof *after) != 0;
     x->moved |= EXCHANGE_LOST && s->state.now.lost != lost;
     return OK;
 }

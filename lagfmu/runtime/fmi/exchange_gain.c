@@ -25,49 +25,42 @@ static const double GAIN = 3; /* in units of the motion's own rate */
 enum { ROUNDS = 24, GAIN_SETTLED = 8 }; /* products, and how many of them only turn the vector */
 static const double PART = 0x1p-20; /* of the coordinates' sizes: how far they are displaced */
 
-/* The state that is displaced: sizes and direction (2 n), in which direction[j] = 1 is one size. */
+/* The state that is displaced: sizes and direction (states), in which direction[j] = 1 is one size. */
 typedef struct {
     Solver *s;
-    double *size, *direction, *vdot; /* vdot (n): where nothing is displaced */
+    double *size, *direction, *vdot; /* vdot (nv): where nothing is displaced */
 } Tried;
 
 static Status move(Solver *s, double *vdot) {
     s->stepped.stage = 1;
     const Status status = segment_motion(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v);
     s->stepped.stage = 0;
-    memcpy(vdot, s->stepped.vdot, (size_t)s->system->n * sizeof *vdot);
+    memcpy(vdot, s->stepped.vdot, (size_t)s->system->nv * sizeof *vdot);
     return status;
 }
 
 /* direction <- the linearization's product with it, and its length after one that was 1; 0 if it vanishes. */
 static Status multiply(const Tried *x, double *length) {
     Solver *s = x->s;
-    const int n = s->system->n;
-    double *q = s->work_advance, *v = q + n, *vdot = v + n;
-    memcpy(q, s->state.q, (size_t)n * sizeof *q);
-    memcpy(v, s->state.v, (size_t)n * sizeof *v);
-    for (int j = 0; j < n; j++) {
-        s->state.q[j] += PART * x->size[j] * x->direction[j];
-        s->state.v[j] += PART * x->size[n + j] * x->direction[n + j];
-    }
+    const int nq = s->system->nq, nv = s->system->nv;
+    double *y = s->work_advance, *vdot = y + nq + nv;
+    state_gather(s->system, s->state.q, s->state.v, y);
+    for (int j = 0; j < nq; j++) s->state.q[j] += PART * x->size[j] * x->direction[j];
+    for (int i = 0; i < nv; i++) s->state.v[i] += PART * x->size[nq + i] * x->direction[nq + i];
     const Status status = move(s, vdot);
-    memcpy(s->state.q, q, (size_t)n * sizeof *q);
-    memcpy(s->state.v, v, (size_t)n * sizeof *v);
+    state_scatter(s->system, y, s->state.q, s->state.v);
     if (status != OK) return FAILED;
-    for (int j = 0; j < n; j++) {
-        x->direction[j] = x->size[n + j] / x->size[j] * x->direction[n + j];
-        x->direction[n + j] = (vdot[j] - x->vdot[j]) / (PART * x->size[n + j]);
-    }
-    *length = largest(2 * n, x->direction);
-    for (int j = 0; j < 2 * n && *length > 0; j++) x->direction[j] /= *length;
+    for (int j = 0; j < nq; j++) x->direction[j] = x->size[nq + j] / x->size[j] * x->direction[nq + j];
+    for (int i = 0; i < nv; i++) x->direction[nq + i] = (vdot[i] - x->vdot[i]) / (PART * x->size[nq + i]);
+    *length = largest(nq + nv, x->direction);
+    for (int j = 0; j < nq + nv && *length > 0; j++) x->direction[j] /= *length;
     return OK;
 }
 
 /* rho; infinite where the motion is not defined beside the state. */
 static double own_rate(const Tried *x) {
-    const int n = x->s->system->n;
     double logarithm = 0, length;
-    for (int j = 0; j < 2 * n; j++) x->direction[j] = 1 - 1.618 * (j % 2) + 1 / (1.0 + j);
+    for (int j = 0; j < system_states(x->s->system); j++) x->direction[j] = 1 - 1.618 * (j % 2) + 1 / (1.0 + j);
     for (int round = 0; round < ROUNDS; round++) {
         if (multiply(x, &length) != OK) return HUGE_VAL;
         if (!(length > 0)) return 0;
@@ -81,7 +74,7 @@ static double sized_rate(Solver *s, const double *vdot) {
     const System *system = s->system;
     double *least = s->work_initial, rate = 0;
     nominals_extents(system, s->p, least);
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->nv; j++) {
         const double size = system->dimension[j] == system->angles ? 1 : least[j];
         if (size > 0) rate = fmax(rate, sqrt(fabs(vdot[j]) / size));
     }
@@ -96,7 +89,7 @@ static double turning_rate(Solver *s, const double *size) {
     const double ahead = PART / s->state.now.rate;
     const Instant at = segment_instant(s, s->state.now.t);
     memcpy(G, b->G, (size_t)system->entries * sizeof *G);
-    for (int j = 0; j < system->n; j++) q[j] = s->state.q[j] + ahead * s->state.v[j];
+    for (int j = 0; j < system->nq; j++) q[j] = s->state.q[j] + ahead * s->state.v[j];
     if (mechanism_evaluate(b, at, q, s->state.v) != OK) return 0;
     for (int k = 0; k < system->m; k++) {
         double turned = 0;
@@ -110,19 +103,17 @@ static double turning_rate(Solver *s, const double *size) {
 
 Status exchange_find_gain(Instance *x) {
     Solver *s = &x->solver;
-    const int n = s->system->n;
+    const int nq = s->system->nq, nv = s->system->nv;
     const double natural = s->state.now.rate;
     double *size = s->work_events;
-    const Tried tried = {s, size, size + 2 * n, size + 4 * n};
+    const Tried tried = {s, size, size + nq + nv, size + 2 * (nq + nv)};
     x->gain = 0;
     if (s->system->m == 0) return OK;
     segment_begin(s);
     x->evaluated = 0;
     if (move(s, tried.vdot) != OK) return FAILED;
-    for (int j = 0; j < n; j++) {
-        size[j] = s->state.size[j] > 0 ? s->state.size[j] : 1;
-        size[n + j] = size[j] * natural;
-    }
+    for (int j = 0; j < nq; j++) size[j] = s->state.size[j] > 0 ? s->state.size[j] : 1;
+    for (int i = 0; i < nv; i++) size[nq + i] = size[i] * natural;
     const double turning = turning_rate(s, size); /* of the G that was evaluated last */
     x->gain = GAIN * fmin(natural, fmax(turning, fmax(own_rate(&tried), sized_rate(s, tried.vdot))));
     return OK;

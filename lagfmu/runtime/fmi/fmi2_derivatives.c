@@ -9,13 +9,13 @@
 
 /* Adds a known variable's change to the direction; 0 if it is neither a state nor an input. */
 static int add_seed(Sensitivity *w, const Variable *v, double change) {
-    const int n = MODEL_SYSTEM->n;
+    const int nq = MODEL_SYSTEM->nq;
     if (v->place == AT_INPUT)
         w->du[v->index] += change;
-    else if (v->role == ROLE_START && v->state < n)
+    else if (v->role == ROLE_START && v->state < nq)
         w->dq[v->state] += change;
     else if (v->role == ROLE_START)
-        w->dv[v->state - n] += change;
+        w->dv[v->state - nq] += change;
     else
         return 0;
     return 1;
@@ -37,8 +37,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component,
         return component_missing(c, NAME);
     const System *s = MODEL_SYSTEM;
     Sensitivity *w = &c->instance.solver.sensitivity;
-    memset(w->dq, 0, (size_t)s->n * sizeof *w->dq);
-    memset(w->dv, 0, (size_t)s->n * sizeof *w->dv);
+    memset(w->dq, 0, (size_t)s->nq * sizeof *w->dq);
+    memset(w->dv, 0, (size_t)s->nv * sizeof *w->dv);
     memset(w->du, 0, (size_t)s->inputs * sizeof *w->du);
     for (size_t k = 0; k < nKnown; k++) {
         const Variable *v = component_variable(vKnown_ref[k], TYPE_REAL);

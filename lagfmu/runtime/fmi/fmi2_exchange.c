@@ -70,7 +70,7 @@ fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time) {
     return fmi2OK;
 }
 
-static int state_count(void) { return 2 * MODEL_SYSTEM->n + EXCHANGE_LOST; }
+static int state_count(void) { return system_states(MODEL_SYSTEM) + EXCHANGE_LOST; }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real x[], size_t nx) {
     Component *c = component;

@@ -35,13 +35,13 @@ void instance_layout(Instance *x, Arena *arena) {
     Arena saved = {NULL, 0}, scratch = {NULL, 0};
     for (int pass = 0; pass < 2; pass++) {
         solver_layout(&x->solver, &saved, &scratch, system);
-        x->q0 = arena_doubles(&saved, system->n);
-        x->v0 = arena_doubles(&saved, system->n);
+        x->q0 = arena_doubles(&saved, system->nq);
+        x->v0 = arena_doubles(&saved, system->nv);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
         x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
-        x->priority = arena_take(&scratch, 2 * (size_t)system->n, sizeof *x->priority);
-        x->begin = arena_doubles(&scratch, 2 * system->n);
+        x->priority = arena_take(&scratch, (size_t)system_states(system), sizeof *x->priority);
+        x->begin = arena_doubles(&scratch, system_states(system));
         x->formula = arena_doubles(&scratch, system->started_count);
         for (int k = 0; k < EVENT_KINDS; k++)
             x->before[k] = arena_take(&scratch, (size_t)event_count_of(system, (EventKind)k), sizeof(Count));
@@ -123,20 +123,21 @@ static Status follow(Instance *x) {
 /* What lies ready of an event; 0 if it is a state by the coordinates of an embedding. */
 static int ready_of_event(const Solver *s, const Variable *v, double *value) {
     const Latest *latest = &s->state.latest[event_kind(v->place)];
-    const int at = v->contact * s->system->n + v->index;
+    const int of_q = event_part(v->place) == AT_DEPARTURE_Q;
     switch (event_part(v->place)) {
         case AT_DEPARTURE_COUNT: *value = (double)latest->count[v->contact]; return 1;
         case AT_DEPARTURE_TIME: *value = latest->time[v->contact]; return 1;
         default: break;
     }
     if (s->system->full != NULL) return 0;
-    *value = event_part(v->place) == AT_DEPARTURE_Q ? latest->q[at] : latest->v[at];
+    const int at = v->contact * (of_q ? s->system->nq : s->system->nv) + v->index;
+    *value = (of_q ? latest->q : latest->v)[at];
     return 1;
 }
 
 /* The state at an event by the coordinates of an embedding. */
 static double of_event(const Solver *s, const Observed *o, const Variable *v) {
-    const int at = v->contact * s->system->full->n + v->index, of_q = event_part(v->place) == AT_DEPARTURE_Q;
+    const int at = v->contact * s->system->full->nq + v->index, of_q = event_part(v->place) == AT_DEPARTURE_Q;
     return (of_q ? o->latest_q : o->latest_v)[event_kind(v->place)][at];
 }
 
@@ -183,9 +184,9 @@ static int ready(const Solver *s, const Variable *v, double *value) {
 }
 
 double instance_setting(const Instance *x, const Variable *v) {
-    const int n = x->solver.system->n;
+    const int nq = x->solver.system->nq;
     double value = 0;
-    if (v->role == ROLE_START) return v->state < n ? x->q0[v->state] : x->v0[v->state - n];
+    if (v->role == ROLE_START) return v->state < nq ? x->q0[v->state] : x->v0[v->state - nq];
     (void)was_set(x, v, &value);
     return value;
 }
@@ -261,7 +262,7 @@ static void set_input(Instance *x, int k, double value) {
 
 void instance_set(Instance *x, const Variable *v, double value) {
     unfollow(x);
-    const int n = x->solver.system->n;
+    const int nq = x->solver.system->nq;
     if (v->place == AT_INPUT) {
         set_input(x, v->index, value);
         if (!x->running) x->started = x->observed = 0;
@@ -269,10 +270,10 @@ void instance_set(Instance *x, const Variable *v, double value) {
     }
     x->started = x->observed = x->evaluated = 0;
     if (v->role == ROLE_START) {
-        if (v->state < n)
+        if (v->state < nq)
             x->q0[v->state] = value;
         else
-            x->v0[v->state - n] = value;
+            x->v0[v->state - nq] = value;
         return;
     }
     switch (v->place) {
@@ -317,15 +318,14 @@ typedef struct {
 } Telling;
 
 /* Each value that was given and is moved; those that were left out are collected for one line. */
-static void tell_moved(void *context, const char *coordinate, int is_velocity, double given,
-                       double used, Priority priority) {
+static void tell_moved(void *context, int j, double given, double used, Priority priority) {
     Telling *told = context;
     Instance *x = told->x;
-    const char *head = is_velocity ? "der(" : "", *tail = is_velocity ? ")" : "";
+    const StateName of = system_state_name(x->solver.system, j);
     if (priority == OMITTED) {
         const int room = (int)sizeof told->line - told->length;
         const int needed = snprintf(told->line + told->length, (size_t)room, "%s%s%s%s = %s",
-                                    told->length > 0 ? ", " : "", head, coordinate, tail, digits(used).text);
+                                    told->length > 0 ? ", " : "", of.head, of.name, of.tail, digits(used).text);
         if (needed < room && told->more == 0)
             told->length += needed;
         else
@@ -334,8 +334,8 @@ static void tell_moved(void *context, const char *coordinate, int is_velocity, d
         return;
     }
     (void)snprintf(x->note, sizeof x->note,
-                   "start value %s%s%s = %s misses the constraints: projected to %s (moved by %.3g)", head,
-                   coordinate, tail, digits(given).text, digits(used).text, used - given);
+                   "start value %s%s%s = %s misses the constraints: projected to %s (moved by %.3g)",
+                   of.head, of.name, of.tail, digits(given).text, digits(used).text, used - given);
     x->tell(x->context, NOTE_WARNING, x->note);
 }
 
@@ -363,18 +363,17 @@ static void find_priorities(Instance *x) {
 static Status find_begin(Instance *x) {
     Solver *s = &x->solver;
     const System *system = s->system;
-    const int n = system->n;
-    memcpy(x->begin, x->q0, (size_t)n * sizeof *x->begin);
-    memcpy(x->begin + n, x->v0, (size_t)n * sizeof *x->begin);
+    state_gather(system, x->q0, x->v0, x->begin);
     if (system->started_count > 0) system->starts(s->p, x->formula);
     for (int i = 0; i < system->started_count; i++) {
         const int j = system->started[i];
         if (x->priority[j] == SET) continue;
+        const StateName of = system_state_name(system, j);
         if (!isfinite(x->formula[i]))
             return fail(&s->why,
                         "the start value of %s%s%s is an expression of parameters, which has no finite value "
                         "at those that are set: set other parameters, or this start",
-                        j < n ? "" : "der(", system->coordinates[j % n], j < n ? "" : ")");
+                        of.head, of.name, of.tail);
         x->begin[j] = x->formula[i];
     }
     return OK;
@@ -415,7 +414,7 @@ static void warn_of_shares(Instance *x) {
 static Status find_start(Instance *x) {
     Solver *s = &x->solver;
     if (find_begin(x) != OK) return FAILED;
-    const double *q0 = x->begin, *v0 = q0 + s->system->n;
+    const double *q0 = x->begin, *v0 = q0 + s->system->nq;
     Telling told = {.x = x};
     if (solver_start(s, x->start_time, q0, v0, x->priority, tell_moved, &told) != OK) return FAILED;
     tell_left_out(&told);
@@ -673,8 +672,8 @@ Status instance_rates(Instance *x, Direction *d) {
     Sensitivity *w = &s->sensitivity;
     if (instance_observe(x) != OK) return FAILED;
     const double *vdot = system->full == NULL ? x->seen.vdot : x->seen.sddot;
-    memcpy(w->dq, s->state.v, (size_t)system->n * sizeof *w->dq);
-    memcpy(w->dv, vdot, (size_t)system->n * sizeof *w->dv);
+    memcpy(w->dq, s->state.v, (size_t)system->nq * sizeof *w->dq);
+    memcpy(w->dv, vdot, (size_t)system->nv * sizeof *w->dv);
     for (int k = 0; k < system->inputs; k++) {
         const int order = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
         w->du[k] = order < 0 ? s->drive.first[k] : PRESCRIBED->rate(x, k, order);

@@ -35,9 +35,9 @@ typedef struct Instance {
     double *places;         /* (lookup_count) scratch */
     int observed, evaluated;
     int followed;           /* 1: the state goes with a motion that was set; as it was in `backup` */
-    double *q0, *v0;        /* (n) start values as they were set */
-    Priority *priority;     /* (2 n) who said them; found anew at each start */
-    double *begin;          /* (2 n) the start values then, with those that follow from parameters */
+    double *q0, *v0;        /* (nq), (nv) start values as they were set */
+    Priority *priority;     /* (states) who said them; found anew at each start */
+    double *begin;          /* (states) the start values then, with those that follow from parameters */
     double *formula;        /* (started_count of the system) these */
     double *expected;       /* (inputs) values at the end of the latest step */
     int *set;               /* (inputs) 1: set since the latest step */
@@ -104,7 +104,7 @@ SHARED Status instance_observe(Instance *x);
 /* To t_end [s].  FAILED: everything is as it was before. */
 SHARED Status instance_step(Instance *x, double t_end);
 
-/* How everything changes along a direction of time, stepped coordinates (n), velocities (n) and inputs;
+/* How everything changes along a direction of time, stepped coordinates (nq), speeds (nv) and inputs;
  * then how one variable changes with it.  FAILED: it cannot be said, the cause is in x->solver.why. */
 SHARED Status instance_differentiate(Instance *x, Direction d);
 SHARED Status instance_change(const Instance *x, const Variable *v, Direction d, double *change);

@@ -26,8 +26,8 @@ enum { FLAG, COUNT, TALLY, SIZE, LIMIT, FINITE };
 
 /* How many of them there are; more than ONE stand behind a pointer. */
 enum {
-    ONE, N, TWICE_N, ROWS, CONTACTS, CONTACTS_N, FRICTIONS, FRICTIONS_N, INPUTS, SWITCH_STATES, PARAMETERS,
-    PEAKS_KEPT, WATCHED, DENSE
+    ONE, COORDINATES, SPEEDS, STATES, ROWS, CONTACTS, CONTACTS_COORDINATES, CONTACTS_SPEEDS, FRICTIONS,
+    FRICTIONS_COORDINATES, FRICTIONS_SPEEDS, INPUTS, SWITCH_STATES, PARAMETERS, PEAKS_KEPT, WATCHED, DENSE
 };
 
 typedef struct {
@@ -40,7 +40,8 @@ typedef struct {
 #define SOLVER(name, member, sort, many) {name, offsetof(Solver, member), sort, many}
 #define LATEST(name, kind, many) \
     SOLVER(name, state.latest[kind].count, TALLY, many), SOLVER(name, state.latest[kind].time, FINITE, many), \
-        SOLVER(name, state.latest[kind].q, FINITE, many##_N), SOLVER(name, state.latest[kind].v, FINITE, many##_N)
+        SOLVER(name, state.latest[kind].q, FINITE, many##_COORDINATES), \
+        SOLVER(name, state.latest[kind].v, FINITE, many##_SPEEDS)
 #define INSTANCE(name, member, sort, many) {name, offsetof(Instance, member), sort, many}
 
 static const Saved OF_SOLVER[] = {
@@ -82,12 +83,12 @@ static const Saved OF_SOLVER[] = {
     NOW("energy dissipated", lost_old, FINITE),
     NOW("energy dissipated", lost_ahead, FINITE),
     NOW("estimated error", estimated, SIZE),
-    SOLVER("coordinates", state.q, FINITE, N),
-    SOLVER("velocities", state.v, FINITE, N),
+    SOLVER("coordinates", state.q, FINITE, COORDINATES),
+    SOLVER("velocities", state.v, FINITE, SPEEDS),
     SOLVER("switch states", state.switch_state, FINITE, SWITCH_STATES),
     SOLVER("offsets", state.offset, FINITE, ROWS),
-    SOLVER("scales", state.scale, SIZE, TWICE_N),
-    SOLVER("sizes", state.size, SIZE, N),
+    SOLVER("scales", state.scale, SIZE, STATES),
+    SOLVER("sizes", state.size, SIZE, COORDINATES),
     SOLVER("gaps", state.gap, SIZE, CONTACTS),
     SOLVER("rank of the constraints", state.basis, FLAG, ROWS),
     SOLVER("modes", state.closed, FLAG, CONTACTS),
@@ -98,10 +99,10 @@ static const Saved OF_SOLVER[] = {
     LATEST("starts of sticking", STICKING, FRICTIONS),
     SOLVER("impulses", state.impulse, SIZE, CONTACTS),
     SOLVER("indicators", state.indicator, FINITE, WATCHED),
-    SOLVER("step ahead", integrator.y, FINITE, TWICE_N),
-    SOLVER("step ahead", integrator.y_old, FINITE, TWICE_N),
-    SOLVER("step ahead", integrator.f, FINITE, TWICE_N),
-    SOLVER("step ahead", integrator.f_old, FINITE, TWICE_N),
+    SOLVER("step ahead", integrator.y, FINITE, STATES),
+    SOLVER("step ahead", integrator.y_old, FINITE, STATES),
+    SOLVER("step ahead", integrator.f, FINITE, STATES),
+    SOLVER("step ahead", integrator.f_old, FINITE, STATES),
     SOLVER("step ahead", integrator.dense, FINITE, DENSE),
     SOLVER("inputs", drive.value, FINITE, INPUTS),
     SOLVER("inputs", drive.first, FINITE, INPUTS),
@@ -129,8 +130,8 @@ static const Saved OF_INSTANCE[] = {
     INSTANCE("time of the inputs", solver.drive.since, FINITE, ONE),
     INSTANCE("inputs", set, FLAG, INPUTS),
     INSTANCE("inputs", expected, FINITE, INPUTS),
-    INSTANCE("start values", q0, FINITE, N),
-    INSTANCE("start values", v0, FINITE, N),
+    INSTANCE("start values", q0, FINITE, COORDINATES),
+    INSTANCE("start values", v0, FINITE, SPEEDS),
 };
 
 Status restored_none(Instance *x, const char *name, double value) {
@@ -150,21 +151,24 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
     const System *system = s->system;
     const Method *now = x->started ? OPTIONAL.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method]
                                    : NULL;
-    const int n = system->n, ny = 2 * n;
+    const int nq = system->nq, nv = system->nv;
     const int many[] = {[ONE] = 1,
-                        [N] = n,
-                        [TWICE_N] = ny,
+                        [COORDINATES] = nq,
+                        [SPEEDS] = nv,
+                        [STATES] = nq + nv,
                         [ROWS] = system->m,
                         [CONTACTS] = system->contacts,
-                        [CONTACTS_N] = system->contacts * n,
+                        [CONTACTS_COORDINATES] = system->contacts * nq,
+                        [CONTACTS_SPEEDS] = system->contacts * nv,
                         [FRICTIONS] = system->frictions,
-                        [FRICTIONS_N] = system->frictions * n,
+                        [FRICTIONS_COORDINATES] = system->frictions * nq,
+                        [FRICTIONS_SPEEDS] = system->frictions * nv,
                         [INPUTS] = system->inputs,
                         [SWITCH_STATES] = system->switches,
                         [PARAMETERS] = system->parameters,
                         [PEAKS_KEPT] = peaks_saved(s->peaks),
                         [WATCHED] = indicators_count(system),
-                        [DENSE] = now == NULL ? 0 : now->dense_arrays * ny};
+                        [DENSE] = now == NULL ? 0 : now->dense_arrays * (nq + nv)};
     for (const Saved *row = list; row < list + rows; row++) {
         const void *where = (const char *)base + row->at;
         if (row->many != ONE) memcpy(&where, where, sizeof where);

@@ -44,7 +44,7 @@ typedef struct {
     Role role;
     Place place;
     int index, contact;
-    int state;       /* role START: j for coordinate j of the stepped system, n + j for its velocity; -1 */
+    int state;       /* role START: j of y = (q, v) of the stepped system; -1 */
     double start;    /* of what can be set; of AT_METHOD a MethodName */
     double min, max; /* -HUGE_VAL, HUGE_VAL where there is none */
     int positive;    /* zero is refused */

@@ -30,7 +30,7 @@ static Status factor_rows(Linear *l) {
     l->rung = RUNG_ORTHOGONAL;
     if (orthogonal_factor(l, &doubtful)) {
         if (!doubtful) return OK;
-        const int rank = l->system->n + *l->pivots;
+        const int rank = l->system->nv + *l->pivots;
         for (int k = 0; k < l->system->m; k++) l->unique[k] = 1;
         l->rung = RUNG_LEAST_NORM;
         if (least_norm_factor(l) == OK && *l->pivots >= rank) return OK;
@@ -57,10 +57,10 @@ static int basis_unweighted(Linear *l, int *basis) {
     int acting = 0, *rows = l->pivots;
     for (int k = 0; k < s->m; k++)
         if (l->active[k]) rows[acting++] = k;
-    cod_place(&cod, s->n, acting, l->dense, rows + s->m);
+    cod_place(&cod, s->nv, acting, l->dense, rows + s->m);
     for (int j = 0; j < acting; j++) {
-        double *column = cod.A + j * s->n, sum = 0;
-        for (int i = 0; i < s->n; i++) column[i] = 0;
+        double *column = cod.A + j * s->nv, sum = 0;
+        for (int i = 0; i < s->nv; i++) column[i] = 0;
         for (int e = s->row_start[rows[j]]; e < s->row_start[rows[j] + 1]; e++)
             sum = fmax(sum, fabs(l->G[e]));
         for (int e = s->row_start[rows[j]]; e < s->row_start[rows[j] + 1]; e++)

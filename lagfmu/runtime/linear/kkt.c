@@ -36,7 +36,7 @@ size_t kkt_doubles(int n, int m) {
 int kkt_ints(int n, int m) { return n + 2 * m; }
 
 static Kkt view(const Linear *l) {
-    int n = l->system->n, m = l->system->m;
+    int n = l->system->nv, m = l->system->m;
     Kkt k;
     k.scale = l->dense;
     k.z = k.scale + n + m;
@@ -52,7 +52,7 @@ static Kkt view(const Linear *l) {
 
 int kkt_matrix(const Linear *l, const double *scale, const int *place, double *A) {
     const System *s = l->system;
-    int size = s->n;
+    int size = s->nv;
     for (int k = 0; k < s->m; k++) size += l->active[k] != 0;
     for (int i = 0; i < size * size; i++) A[i] = 0;
     for (int a = 0; a < s->masses; a++) {
@@ -73,7 +73,7 @@ static double power_of_two(double size) { return size > 0 ? ldexp(1, -(int)rint(
  * beside the constraints; then constraints to elements near 1. */
 static void scale_first(const Linear *l, const int *place, double *d, int size) {
     const System *s = l->system;
-    for (int i = 0; i < size; i++) d[i] = i < s->n ? 1 : 0;
+    for (int i = 0; i < size; i++) d[i] = i < s->nv ? 1 : 0;
     for (int a = 0; a < s->masses; a++)
         if (s->mass_row[a] == s->mass_column[a] && l->M[a] > 0)
             d[s->mass_row[a]] = power_of_two(sqrt(l->M[a]));
@@ -82,7 +82,7 @@ static void scale_first(const Linear *l, const int *place, double *d, int size) 
             double *largest = &d[place[s->entry_row[a]]];
             *largest = fmax(*largest, fabs(l->G[a]) * d[s->entry_column[a]]);
         }
-    for (int i = s->n; i < size; i++) d[i] = power_of_two(d[i]);
+    for (int i = s->nv; i < size; i++) d[i] = power_of_two(d[i]);
 }
 
 /* Powers of two that bring the largest element of every row near 1; 0 if a row is zero. */
@@ -147,7 +147,7 @@ int kkt_factor(Linear *l, double least) {
 
 static void substitute_scaled(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     Kkt k = view(l);
-    int n = l->system->n, m = l->system->m;
+    int n = l->system->nv, m = l->system->m;
     for (int i = 0; i < n; i++) k.z[i] = (b != NULL ? b[i] : 0) * k.scale[i];
     for (int i = 0; i < m; i++)
         if (l->active[i]) k.z[k.place[i]] = c[i] * k.scale[k.place[i]];

@@ -32,7 +32,7 @@ size_t least_norm_doubles(int n, int m) {
 int least_norm_ints(int n, int m) { return cod_ints(n + m, n + m) + m + 1; }
 
 static Whole whole_view(const Linear *l) {
-    int n = l->system->n, m = l->system->m, size = n;
+    int n = l->system->nv, m = l->system->m, size = n;
     Whole w;
     w.scale = l->dense;
     w.z = w.scale + n + m;
@@ -67,7 +67,7 @@ static void scale_rows(const Linear *l, const Whole *w) {
 Status least_norm_factor(Linear *l) {
     *l->pivots = 0;
     Whole w = whole_view(l);
-    int n = l->system->n;
+    int n = l->system->nv;
     scale_rows(l, &w);
     kkt_matrix(l, w.scale, w.place, w.cod.A);
     cod_factor(&w.cod, linear_rank_threshold(l));
@@ -82,7 +82,7 @@ Status least_norm_factor(Linear *l) {
                        "neither mass nor a constraint that determines its acceleration");
             for (int i = 0; i < n; i++) {
                 if (!(fabs(w.z[i]) > VANISHES)) continue;
-                why_append(l->why, "%s%s", comma, l->system->coordinates[i]);
+                why_append(l->why, "%s%s", comma, l->system->speeds[i]);
                 comma = ", ";
             }
             why_append(l->why, ")");
@@ -96,7 +96,7 @@ Status least_norm_factor(Linear *l) {
 
 /* z <- Q^T of the scaled right-hand sides; returns their largest element. */
 static double right(const Linear *l, const Whole *w, const double *b, const double *c) {
-    for (int i = 0; i < l->system->n; i++) w->z[i] = b != NULL ? b[i] * w->scale[i] : 0;
+    for (int i = 0; i < l->system->nv; i++) w->z[i] = b != NULL ? b[i] * w->scale[i] : 0;
     for (int k = 0; k < l->system->m; k++)
         if (l->active[k]) w->z[w->place[k]] = c[k] * w->scale[w->place[k]];
     double most = largest(w->cod.rows, w->z);
@@ -110,7 +110,7 @@ static void substitute_least(Linear *l, const double *b, const double *c, double
     cod_solve_transposed(&w.cod, w.z);
     for (int i = w.cod.rank; i < w.cod.columns; i++) w.z[i] = 0;
     cod_from_rows(&w.cod, w.z, w.spare);
-    for (int i = 0; i < l->system->n; i++) x[i] = w.z[i] * w.scale[i];
+    for (int i = 0; i < l->system->nv; i++) x[i] = w.z[i] * w.scale[i];
     for (int k = 0; k < l->system->m; k++)
         lambda[k] = l->active[k] ? -w.z[w.place[k]] * w.scale[w.place[k]] : 0;
 }

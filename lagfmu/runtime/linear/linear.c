@@ -27,7 +27,7 @@ static double loose(const Linear *l) {
 }
 
 void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
-    int n = s->n, m = s->m;
+    int n = s->nv, m = s->m;
     l->system = s;
     l->why = why;
     l->M = l->G = NULL;
@@ -78,7 +78,7 @@ static Status check_factored(const Linear *l) {
 }
 
 static Status check_right(const Linear *l, const double *b, const double *c) {
-    if (b != NULL && !all_finite(b, l->system->n))
+    if (b != NULL && !all_finite(b, l->system->nv))
         return fail(l->why, "a mass or a force is not finite at this state");
     if (!finite_rows(l, c, NULL))
         return fail(l->why, "a constraint or its derivative is not finite at this state");
@@ -95,7 +95,7 @@ static Status too_large(const Linear *l) {
                     "coordinates and %d constraints the model is too large (more than %d together) "
                     "for the solution that allows it: give every coordinate a mass of its own",
                     schur->doubtful_mass >= 0 ? ": coordinate " : "",
-                    schur->doubtful_mass >= 0 ? s->coordinates[schur->doubtful_mass] : "", s->n,
+                    schur->doubtful_mass >= 0 ? s->speeds[schur->doubtful_mass] : "", s->nv,
                     s->m, DENSE_MOST);
     return fail(l->why,
                 "the constraints depend on each other, or nearly so, or masses differ too much, at "
@@ -103,7 +103,7 @@ static Status too_large(const Linear *l) {
                 "(more than %d together) for the solution that allows it: remove redundant "
                 "constraints, or bring the masses closer together",
                 schur->doubtful_row >= 0 ? ": constraint " : "",
-                schur->doubtful_row >= 0 ? s->rows[schur->doubtful_row].name : "", s->n, s->m,
+                schur->doubtful_row >= 0 ? s->rows[schur->doubtful_row].name : "", s->nv, s->m,
                 DENSE_MOST);
 }
 
@@ -118,7 +118,7 @@ static Status climb(Linear *l) {
     if (DEPENDENT != NULL) return DEPENDENT->factor(l);
     (void)fail(l->why, "the mass matrix is singular at this state: a coordinate has no mass");
     if (schur_of(l)->doubtful_mass >= 0)
-        why_append(l->why, " (%s)", l->system->coordinates[schur_of(l)->doubtful_mass]);
+        why_append(l->why, " (%s)", l->system->speeds[schur_of(l)->doubtful_mass]);
     return FAILED;
 }
 
@@ -190,7 +190,7 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
         if (climb(l) != OK) return FAILED;
         status = solve_dense(l, forces, c, x, lambda);
     }
-    if (status == OK && !(all_finite(x, l->system->n) && all_finite(lambda, l->system->m)))
+    if (status == OK && !(all_finite(x, l->system->nv) && all_finite(lambda, l->system->m)))
         status = check_right(l, b, c) != OK
                      ? FAILED
                      : fail(l->why, "the accelerations overflow at this state");

@@ -19,7 +19,7 @@ typedef enum {
     RUNG_WRITTEN_OUT /* the first, as system->solve */
 } Rung;
 
-/* Of refinement.c: the low parts of x (n) and lambda (m); what both equations leave, r (n), with its low part,
+/* Of refinement.c: the low parts of x (nv) and lambda (m); what both equations leave, r (nv), with its low part,
  * and g (m); the corrections. */
 typedef struct {
     double *x_low, *lambda_low, *r, *r_low, *g, *dx, *dlambda;
@@ -32,14 +32,14 @@ typedef struct {
     Rung rung;
     int *unique;          /* (m) 1 where lambda is determined uniquely; 1 for rows that do not act */
     Why *why;
-    double *zero;         /* (n) for b = NULL */
+    double *zero;         /* (nv) for b = NULL */
     double *sparse;       /* workspace of schur.c */
     Refinement refinement;
     double *dense;        /* workspace of the dense rungs; NULL beyond DENSE_MOST */
     int *pivots;
     int stiffened;        /* 1: M holds more than masses (stiffened.h) */
     const double *bare;   /* then: M as it was given */
-    double *masses, *forces, *sigma; /* (masses), (n), (m) of stiffened.c */
+    double *masses, *forces, *sigma; /* (masses), (nv), (m) of stiffened.c */
     int *holds;           /* (m) */
     double off;           /* how far off the constraints the state is, relative to their size; 0: on them */
     int nearest;          /* 1 within linear_nearest() and linear_project() */
@@ -54,11 +54,11 @@ SHARED void linear_layout(Linear *l, Arena *arena, const System *s, Why *why);
  * mass matrix is singular on the constraint surface. */
 SHARED Status linear_factor(Linear *l, const double *M, const double *G, const int *active);
 
-/* x (n) and lambda (m; 0 where a row does not act).  c is read where rows act; b may be NULL (zero).
+/* x (nv) and lambda (m; 0 where a row does not act).  c is read where rows act; b may be NULL (zero).
  * lambda may be NULL.  FAILED: dependent rows contradict each other, or the result overflows. */
 SHARED Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
-/* x (n) of least size in the metric of M with G x = c, for a projection.  Where dependent rows
+/* x (nv) of least size in the metric of M with G x = c, for a projection.  Where dependent rows
  * contradict each other, as those of c do that is nothing but rounding, c is met as nearly as can be
  * (least squares in rows of comparable units). */
 SHARED Status linear_nearest(Linear *l, const double *c, double *x);

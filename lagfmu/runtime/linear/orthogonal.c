@@ -28,7 +28,7 @@ int orthogonal_factor(Linear *l, int *doubtful) {
 /* Whether the dependent rows agree, measured by the terms of W^T z = c: c, y and z. */
 static int consistent(const Linear *l, const double *b, const double *c) {
     Weighted w = weighted_view(l);
-    int n = l->system->n;
+    int n = l->system->nv;
     if (w.cod.rank == w.acting) return 1;
     double terms = 0;
     for (int j = 0; j < w.acting; j++) terms = fmax(terms, fabs(c[w.rows[j]] / w.size[j]));

@@ -1,4 +1,4 @@
-/* refinement.c -- r = b + G^T lambda - M x (n) and g = c - G x (m; 0 where a row does not act), in working and
+/* refinement.c -- r = b + G^T lambda - M x (nv) and g = c - G x (m; 0 where a row does not act), in working and
  * in doubled precision, and the corrections that follow from them (Higham, Accuracy and Stability of Numerical
  * Algorithms, sect. 12.1: with residuals in doubled precision x is right to working precision while
  * cond * eps < 1). */
@@ -7,7 +7,7 @@
 #include "doubled.h"
 
 void refinement_layout(Linear *l, Arena *arena) {
-    const int n = l->system->n, m = l->system->m;
+    const int n = l->system->nv, m = l->system->m;
     l->refinement.x_low = arena_doubles(arena, n);
     l->refinement.lambda_low = arena_doubles(arena, m);
     l->refinement.r = arena_doubles(arena, n);
@@ -21,7 +21,7 @@ static void working_residual(const Linear *l, const double *b, const double *c, 
                              const double *lambda) {
     const System *s = l->system;
     double *r = l->refinement.r, *g = l->refinement.g;
-    for (int i = 0; i < s->n; i++) r[i] = b != NULL ? b[i] : 0;
+    for (int i = 0; i < s->nv; i++) r[i] = b != NULL ? b[i] : 0;
     for (int a = 0; a < s->masses; a++) {
         int i = s->mass_row[a], j = s->mass_column[a];
         r[i] -= l->M[a] * x[j];
@@ -54,7 +54,7 @@ static void doubled_residual(const Linear *l, const double *b, const double *c, 
     const System *s = l->system;
     const double *x_low = l->refinement.x_low, *lambda_low = l->refinement.lambda_low;
     double *r = l->refinement.r, *r_low = l->refinement.r_low, *g = l->refinement.g;
-    for (int i = 0; i < s->n; i++) {
+    for (int i = 0; i < s->nv; i++) {
         r[i] = b != NULL ? b[i] : 0;
         r_low[i] = 0;
     }
@@ -76,7 +76,7 @@ static void doubled_residual(const Linear *l, const double *b, const double *c, 
         }
         g[k] = sum.high + sum.low;
     }
-    for (int i = 0; i < s->n; i++) r[i] += r_low[i];
+    for (int i = 0; i < s->nv; i++) r[i] += r_low[i];
 }
 
 /* z + z_low <- z + z_low + d */
@@ -90,7 +90,7 @@ static void move_doubled(int n, double *z, double *z_low, const double *d) {
 }
 
 void refine_begin(Linear *l) {
-    for (int i = 0; i < l->system->n; i++) l->refinement.x_low[i] = 0;
+    for (int i = 0; i < l->system->nv; i++) l->refinement.x_low[i] = 0;
     for (int k = 0; k < l->system->m; k++) l->refinement.lambda_low[k] = 0;
 }
 
@@ -101,10 +101,10 @@ void refine_once(Linear *l, Substitute substitute, int doubled, const double *b,
     (doubled ? doubled_residual : working_residual)(l, b, c, x, lambda);
     substitute(l, own->r, own->g, own->dx, own->dlambda);
     if (doubled) {
-        move_doubled(s->n, x, own->x_low, own->dx);
+        move_doubled(s->nv, x, own->x_low, own->dx);
         move_doubled(s->m, lambda, own->lambda_low, own->dlambda);
     } else {
-        for (int i = 0; i < s->n; i++) x[i] += own->dx[i];
+        for (int i = 0; i < s->nv; i++) x[i] += own->dx[i];
         for (int k = 0; k < s->m; k++) lambda[k] += own->dlambda[k];
     }
 }

@@ -33,10 +33,10 @@ void schur_layout(Linear *l, Arena *arena) {
     const Plan *plan = s->plan;
     Schur *own = arena_take(arena, 1, sizeof(Schur));
     int entries = plan->diagonal ? s->entries : plan->w_start[plan->massless ? 0 : s->m];
-    int full = s->n > s->m ? s->n : s->m;
+    int full = s->nv > s->m ? s->nv : s->m;
     Schur at = {0};
     at.mass_lower = arena_doubles(arena, plan->mass.start[plan->mass.size]);
-    at.inverse_mass = arena_doubles(arena, s->n);
+    at.inverse_mass = arena_doubles(arena, s->nv);
     at.w_own = arena_doubles(arena, plan->diagonal ? 0 : entries);
     at.w_start = plan->diagonal ? s->row_start : plan->w_start;
     at.w_column = plan->diagonal ? s->entry_column : plan->w_column;
@@ -46,7 +46,7 @@ void schur_layout(Linear *l, Arena *arena) {
     at.diagonal = arena_doubles(arena, s->m);
     at.row_size = arena_doubles(arena, full);
     at.row = arena_doubles(arena, full);
-    at.y = arena_doubles(arena, s->n);
+    at.y = arena_doubles(arena, s->nv);
     at.z = arena_doubles(arena, s->m);
     at.lambda = arena_doubles(arena, s->m);
     at.trust = SCHUR_UNSAFE;
@@ -114,7 +114,7 @@ int schur_masses(Linear *l, int zero_rows) {
     own->doubtful_mass = own->doubtful_row = -1;
     own->definite = 0;
     if (plan->massless) return 0;
-    if (!(plan->diagonal ? invert_diagonal(own, l->M, s->n) : factor_masses(plan, own, l->M)))
+    if (!(plan->diagonal ? invert_diagonal(own, l->M, s->nv) : factor_masses(plan, own, l->M)))
         return 0;
     own->definite = 1;
     own->w = plan->diagonal ? l->G : own->w_own;
@@ -181,19 +181,19 @@ void schur_half(const Linear *l, const double *b, double *y) {
     const System *s = l->system;
     const Schur *own = schur_of(l);
     if (s->plan->diagonal) {
-        for (int i = 0; i < s->n; i++) y[i] = b[i] * own->inverse_mass[i];
+        for (int i = 0; i < s->nv; i++) y[i] = b[i] * own->inverse_mass[i];
         return;
     }
     const Elimination *e = &s->plan->mass;
-    for (int p = 0; p < s->n; p++) y[p] = b[e->order[p]];
+    for (int p = 0; p < s->nv; p++) y[p] = b[e->order[p]];
     ldlt_forward(e, own->mass_lower, y);
-    for (int p = 0; p < s->n; p++) y[p] *= own->inverse_mass[p];
+    for (int p = 0; p < s->nv; p++) y[p] *= own->inverse_mass[p];
 }
 
 void schur_back(const Linear *l, double *y, double *x) {
     const Elimination *e = &l->system->plan->mass;
     if (l->system->plan->diagonal) {
-        for (int i = 0; i < l->system->n; i++) x[i] = y[i];
+        for (int i = 0; i < l->system->nv; i++) x[i] = y[i];
         return;
     }
     ldlt_backward(e, schur_of(l)->mass_lower, y);
@@ -232,7 +232,7 @@ static void substitute_schur(Linear *l, const double *b, const double *c, double
     if (b != NULL) {
         schur_half(l, b, y);
     } else {
-        for (int i = 0; i < l->system->n; i++) y[i] = 0;
+        for (int i = 0; i < l->system->nv; i++) y[i] = 0;
     }
     constrain(l, c, y, lambda);
     if (!diagonal) schur_back(l, y, x);

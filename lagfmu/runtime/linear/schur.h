@@ -16,15 +16,15 @@ typedef enum {
 /* Lives at the head of Linear.sparse.  Positions count in the order of elimination. */
 typedef struct {
     double *mass_lower;        /* M = L D L^T: L, empty if M is diagonal */
-    double *inverse_mass;      /* (n) 1 / D */
+    double *inverse_mass;      /* (nv) 1 / D */
     const int *w_start, *w_column;
     const double *w;           /* W = L^-1 P G^T by rows of G; if M is diagonal that is G itself */
     double *w_own;             /* the same where M is not diagonal */
     double *h;                 /* D^-1 W; 0 in rows that do not act */
     double *lower, *inverse;   /* S = L' D' L'^T: L' and 1 / D' (m) */
     double *diagonal;          /* (m) S_kk by rows of G; 1 where a row does not act */
-    double *row_size, *row;    /* (max(n, m)) scratch of ldlt.c; row is zero between calls */
-    double *y, *z;             /* (n), (m) scratch of schur_solve() */
+    double *row_size, *row;    /* (max(nv, m)) scratch of ldlt.c; row is zero between calls */
+    double *y, *z;             /* (nv), (m) scratch of schur_solve() */
     double *lambda;            /* (m) where the caller asks for none */
     double condition, growth;  /* of M and S, the worse of the two (ldlt.h) */
     double apart;              /* sine of the least angle between a row and those before it */
@@ -45,7 +45,7 @@ SHARED int schur_masses(Linear *l, int zero_rows);
 /* The same and S = L' D' L'^T, judged.  1 if it can be trusted. */
 SHARED int schur_factor(Linear *l);
 
-/* y (n) in the order of elimination: D^-1 L^-1 P b, and back: x = P^T L^-T y. */
+/* y (nv) in the order of elimination: D^-1 L^-1 P b, and back: x = P^T L^-T y. */
 SHARED void schur_half(const Linear *l, const double *b, double *y);
 SHARED void schur_back(const Linear *l, double *y, double *x);
 

@@ -41,7 +41,7 @@ static int is_coupled(const System *s, int k) {
 void stiffened_layout(Linear *l, Arena *arena) {
     const System *s = l->system;
     l->masses = arena_doubles(arena, s->masses);
-    l->forces = arena_doubles(arena, s->n);
+    l->forces = arena_doubles(arena, s->nv);
     l->sigma = arena_doubles(arena, s->m);
     l->holds = arena_ints(arena, s->m);
     l->stiffened = 0;
@@ -85,7 +85,7 @@ int stiffened_masses(Linear *l) {
 
 const double *stiffened_forces(const Linear *l, const double *b, const double *c) {
     const System *s = l->system;
-    for (int j = 0; j < s->n; j++) l->forces[j] = b != NULL ? b[j] : 0;
+    for (int j = 0; j < s->nv; j++) l->forces[j] = b != NULL ? b[j] : 0;
     for (int k = 0; k < s->m; k++)
         if (l->sigma[k] > 0)
             for (int a = s->row_start[k]; a < s->row_start[k + 1]; a++)

@@ -22,7 +22,7 @@ size_t weighted_doubles(int n, int m) {
 int weighted_ints(int n, int m) { return cod_ints(n, m) + m + 1; }
 
 Weighted weighted_view(const Linear *l) {
-    int n = l->system->n, m = l->system->m;
+    int n = l->system->nv, m = l->system->m;
     Weighted w;
     w.size = l->dense;
     w.y = w.size + m;
@@ -43,7 +43,7 @@ int weighted_factor(Linear *l, double threshold, Weighted *w) {
     *l->pivots = 0;
     *w = weighted_view(l);
     const Schur *own = schur_of(l);
-    int n = l->system->n;
+    int n = l->system->nv;
     w->hides = 0;
     for (int j = 0; j < w->acting; j++) {
         int k = w->rows[j];
@@ -65,7 +65,7 @@ int weighted_factor(Linear *l, double threshold, Weighted *w) {
 
 void weighted_to(const Linear *l, const Weighted *w, const double *b, double *y) {
     const Schur *own = schur_of(l);
-    int n = l->system->n;
+    int n = l->system->nv;
     for (int i = 0; i < n; i++) y[i] = 0;
     if (b == NULL) return;
     schur_half(l, b, y);
@@ -75,7 +75,7 @@ void weighted_to(const Linear *l, const Weighted *w, const double *b, double *y)
 
 void weighted_from(const Linear *l, const Weighted *w, double *y, double *x) {
     const Schur *own = schur_of(l);
-    int n = l->system->n;
+    int n = l->system->nv;
     cod_from_range(&w->cod, y);
     for (int i = 0; i < n; i++) y[i] *= sqrt(own->inverse_mass[i]);
     schur_back(l, y, x);

@@ -11,7 +11,7 @@
 typedef struct {
     Cod cod;
     double *size;          /* (m) norm that each column had */
-    double *y, *w, *spare; /* (n), (m), (m) */
+    double *y, *w, *spare; /* (nv), (m), (m) */
     int *rank;             /* of W */
     int *rows;             /* (acting) which rows act */
     int acting;
@@ -30,7 +30,7 @@ SHARED int weighted_factor(Linear *l, double threshold, Weighted *w);
 /* The decomposition that weighted_factor() left. */
 SHARED Weighted weighted_view(const Linear *l);
 
-/* y (n) <- Q^T D^-1/2 L^-1 P b ;  x <- P^T L^-T D^-1/2 Q y (y is lost) */
+/* y (nv) <- Q^T D^-1/2 L^-1 P b ;  x <- P^T L^-T D^-1/2 Q y (y is lost) */
 SHARED void weighted_to(const Linear *l, const Weighted *w, const double *b, double *y);
 SHARED void weighted_from(const Linear *l, const Weighted *w, double *y, double *x);
 

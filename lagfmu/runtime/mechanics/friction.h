@@ -35,8 +35,8 @@ struct FrictionForces {
     double *reserve;     /* (frictions) mu_s N - |lambda_t| over their sum, of the best lambda */
     /* scratch: */
     int *sliding;        /* (frictions) those that slip */
-    double *d, *zero, *first, *right; /* (n), (m), (m), (frictions) */
-    double *answer;      /* (frictions n) accelerations, to each d alone */
+    double *d, *zero, *first, *right; /* (nv), (m), (m), (frictions) */
+    double *answer;      /* (frictions nv) accelerations, to each d alone */
     double *pushed;      /* (frictions m) multipliers, to each d alone */
     double *A, *minor;   /* (frictions^2), and 1 + A of those that slip */
     double *nonunique;   /* of nonunique.c */

@@ -13,15 +13,15 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
     b->why = why;
     b->dependent = b->stage = 0;
     b->M = arena_doubles(arena, s->masses);
-    b->F = arena_doubles(arena, s->n);
+    b->F = arena_doubles(arena, s->nv);
     b->G = arena_doubles(arena, s->entries);
     b->nu = arena_doubles(arena, s->m);
     b->gamma = arena_doubles(arena, s->m);
-    b->vdot = arena_doubles(arena, s->n);
+    b->vdot = arena_doubles(arena, s->nv);
     b->lambda = arena_doubles(arena, s->m);
     b->f = arena_doubles(arena, s->m);
-    b->dq = arena_doubles(arena, s->n);
-    b->trial = arena_doubles(arena, s->n);
+    b->dq = arena_doubles(arena, s->nv);
+    b->trial = arena_doubles(arena, s->nq);
     b->fixed = arena_ints(arena, s->m);
     linear_layout(&b->linear, arena, s, why);
     b->sliding = s->frictions > 0 ? sliding : NULL;
@@ -46,11 +46,11 @@ static Status not_evaluated(Mechanism *b, Instant at, const char *what) {
 
 static Status check_values(Mechanism *b, Instant at) {
     const System *s = b->system;
-    if (zero(s->masses, b->M) + zero(s->n, b->F) + zero(s->entries, b->G) + zero(s->m, b->nu) +
+    if (zero(s->masses, b->M) + zero(s->nv, b->F) + zero(s->entries, b->G) + zero(s->m, b->nu) +
             zero(s->m, b->gamma) ==
         0)
         return OK;
-    if (!(holds_no_nan(s->masses, b->M) & holds_no_nan(s->n, b->F)))
+    if (!(holds_no_nan(s->masses, b->M) & holds_no_nan(s->nv, b->F)))
         return not_evaluated(b, at, "a mass or a force is");
     return not_evaluated(b, at, "a constraint or its derivative is");
 }
@@ -90,7 +90,7 @@ Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double 
 
 void mechanism_at_work(const Mechanism *b, double *forces, double *reach) {
     const System *s = b->system;
-    for (int j = 0; j < s->n; j++) {
+    for (int j = 0; j < s->nv; j++) {
         forces[j] = fabs(b->F[j]);
         reach[j] = fabs(b->vdot[j]);
     }

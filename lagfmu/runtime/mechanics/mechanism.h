@@ -35,9 +35,9 @@ struct Mechanism {
     const System *system;
     Linear linear;
     double *M, *F, *G, *nu, *gamma; /* values at the state that was evaluated last */
-    double *vdot, *lambda;          /* of the latest motion(): (n), (m) */
+    double *vdot, *lambda;          /* of the latest motion(): (nv), (m) */
     double *f;                      /* (m) scratch for residuals */
-    double *dq, *trial;             /* (n) scratch of project() */
+    double *dq, *trial;             /* (nv), (nq) scratch of project(): what moves, q where it is tried */
     int *fixed;                     /* (m) scratch of project(): position constraints that act */
     int dependent;                  /* 1: rows that act depend on each other, on the constraints */
     int stage;                      /* 1: of motion(), the accelerations alone are asked for */
@@ -79,22 +79,22 @@ SHARED Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, cons
 /* f (m).  FAILED if one is not finite. */
 SHARED Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
 
-/* evaluate, factor, solve: b->vdot (n) and b->lambda (m), 0 where a row does not act. */
+/* evaluate, factor, solve: b->vdot (nv) and b->lambda (m), 0 where a row does not act. */
 SHARED Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                                const int *active);
 
 /* The same for a state off the constraints: what depends on each other on them does so here, and is not
- * asked to agree.  `offset` (m), `size` (n) as below. */
+ * asked to agree.  `offset` (m), `size` (nq) as below. */
 SHARED Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
                                     const int *active, const double *offset, const double *size);
 
-/* Of the latest motion, for each coordinate all forces at work (n), those of constraint included, and its
+/* Of the latest motion, for each speed all forces at work (nv), those of constraint included, and its
  * acceleration, or the one that these could give it if they did not balance: what |vdot| is the rounding of. */
 SHARED void mechanism_at_work(const Mechanism *b, double *forces, double *reach);
 
 /* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
  * v are moved in place.  For states that are nearly consistent; initialization.c deals with the others.
- * `size` (n) are the coordinates' magnitudes, which say what rounding is.  On failure q and v are
+ * `size` (nq) are the coordinates' magnitudes, which say what rounding is.  On failure q and v are
  * untouched. */
 SHARED Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,
                                 const double *offset, const double *size);

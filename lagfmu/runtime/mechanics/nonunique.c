@@ -16,7 +16,7 @@ static const double NONUNIQUE_WIDE = 1e2;       /* times the forces at work: how
 enum { NONUNIQUE_ROUNDS = 60 };                 /* bisections, and ellipsoids for each pair of unknowns */
 
 size_t nonunique_doubles(const System *s) {
-    const size_t m = (size_t)s->m, n = (size_t)s->n;
+    const size_t m = (size_t)s->m, n = (size_t)s->nv;
     return m * n + 2 * m * m + 3 * m + n + m * m + 5 * m; /* basis, made, Z, there, y, best, P, ... */
 }
 
@@ -54,7 +54,7 @@ static void orthonormalize(Nonunique *x) {
 static void find_null_space(Nonunique *x, double *basis, double *made, double *rest) {
     const Mechanism *b = x->b;
     const System *s = b->system;
-    const int n = s->n, m = s->m;
+    const int n = s->nv, m = s->m;
     int kept = 0;
     x->count = 0;
     for (int k = 0; k < m; k++) {
@@ -183,7 +183,7 @@ static void shrink_ellipsoid(Nonunique *x, double wide) {
 /* With the null space of the rows that act. */
 static Nonunique nonunique_of(Mechanism *b) {
     const System *s = b->system;
-    const int n = s->n, m = s->m;
+    const int n = s->nv, m = s->m;
     double *place = b->friction->nonunique, *basis = place, *made = basis + m * n;
     Nonunique x = {b, 0, made + m * m, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     double *rest = x.Z + m * m;

@@ -92,7 +92,7 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
             linear_factor(&b->linear, b->M, b->G, b->fixed) == FAILED)
             return FAILED;
         if (linear_nearest(&b->linear, b->f, b->dq) == FAILED) return FAILED;
-        for (int j = 0; j < b->system->n; j++) q[j] += b->dq[j];
+        for (int j = 0; j < b->system->nv; j++) q[j] += b->dq[j];
         before = miss.error;
     }
 }
@@ -109,7 +109,7 @@ static Status project_velocities(Mechanism *b, double *v, const int *active) {
     if (rounding) return OK;
     if (linear_factor(&b->linear, b->M, b->G, active) == FAILED) return FAILED;
     if (linear_nearest(&b->linear, b->f, b->dq) == FAILED) return FAILED;
-    for (int j = 0; j < s->n; j++) v[j] += b->dq[j];
+    for (int j = 0; j < s->nv; j++) v[j] += b->dq[j];
     return OK;
 }
 
@@ -125,13 +125,13 @@ Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const i
     }
     if (!acting) return OK;
     if (mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
-    memcpy(b->trial, q, (size_t)s->n * sizeof *q);
+    memcpy(b->trial, q, (size_t)s->nq * sizeof *q);
     const Status status =
         fixed ? project_positions(b, at, b->trial, v, offset, size, &moved) : OK;
     b->linear.off = 0;
     if (status != OK) return FAILED;
     if (moved && mechanism_evaluate(b, at, b->trial, v) == FAILED) return FAILED;
     if (project_velocities(b, v, active) == FAILED) return FAILED;
-    memcpy(q, b->trial, (size_t)s->n * sizeof *q);
+    memcpy(q, b->trial, (size_t)s->nq * sizeof *q);
     return OK;
 }

@@ -49,7 +49,7 @@ static Status onto_constraints(Mechanism *b, Instant at, const int *active, cons
         if (largest == 0 || (largest > before / 2 && largest < SMALL)) return OK;
         if (!(largest < before)) break;
         if (linear_nearest(&b->linear, b->f, b->dq) != OK) return FAILED;
-        for (int j = 0; j < b->system->n; j++) {
+        for (int j = 0; j < b->system->nv; j++) {
             q1[j] += b->dq[j];
             step[j] += b->dq[j];
         }
@@ -68,7 +68,7 @@ static Status evaluate_forces(Mechanism *b, Instant at, const int *active, const
 /* One step of order 2 from `at`; b stands evaluated and factored at (q, v), before and after. */
 static Status basic_step(Mechanism *b, Instant *at, double t_new, double h, const int *active,
                          const double *offset, double *q, double *v, double *step) {
-    const int n = b->system->n, m = b->system->m;
+    const int n = b->system->nv, m = b->system->m;
     at->t = t_new;
     /* predicted with the acceleration at q, which meets the constraints but for h^3 */
     if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, NULL) != OK) return FAILED;
@@ -88,7 +88,7 @@ static Status basic_step(Mechanism *b, Instant *at, double t_new, double h, cons
 
 static Status composed_step(Mechanism *b, Instant at, double t_new, double h, const int *active,
                             const double *offset, double *y, double *step) {
-    const int n = b->system->n;
+    const int n = b->system->nv;
     const double t = at.t;
     double part = 0;
     if (evaluate_forces(b, at, active, y, y + n) != OK) return FAILED;

@@ -16,26 +16,26 @@
 
 void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dM = arena_doubles(arena, s->masses);
-    w->dF = arena_doubles(arena, s->n);
+    w->dF = arena_doubles(arena, s->nv);
     w->dG = arena_doubles(arena, s->entries);
     w->dnu = arena_doubles(arena, s->m);
     w->dgamma = arena_doubles(arena, s->m);
     w->df = arena_doubles(arena, s->m);
-    w->dvdot = arena_doubles(arena, s->n);
+    w->dvdot = arena_doubles(arena, s->nv);
     w->dlambda = arena_doubles(arena, s->m);
-    w->b = arena_doubles(arena, s->n);
+    w->b = arena_doubles(arena, s->nv);
     w->c = arena_doubles(arena, s->m);
-    w->dq = arena_doubles(arena, s->n);
-    w->dv = arena_doubles(arena, s->n);
+    w->dq = arena_doubles(arena, s->nq);
+    w->dv = arena_doubles(arena, s->nv);
     w->du = arena_doubles(arena, s->inputs);
-    w->dforce = arena_doubles(arena, s->output_count > 0 ? s->n : 0);
+    w->dforce = arena_doubles(arena, s->output_count > 0 ? s->nv : 0);
     w->down = arena_doubles(arena, s->output_count);
     w->dother = arena_doubles(arena, s->output_count);
 }
 
 static void right_sides(Sensitivity *w, const Mechanism *b) {
     const System *s = b->system;
-    memcpy(w->b, w->dF, (size_t)s->n * sizeof *w->b);
+    memcpy(w->b, w->dF, (size_t)s->nv * sizeof *w->b);
     memcpy(w->c, w->dgamma, (size_t)s->m * sizeof *w->c);
     for (int e = 0; e < s->masses; e++) {
         const int i = s->mass_row[e], j = s->mass_column[e];
@@ -55,10 +55,10 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
     s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dM, w->dF, w->dG, w->dnu,
                w->dgamma, w->df, w->denergy);
     right_sides(w, b);
-    for (int j = 0; j < s->n; j++)
+    for (int j = 0; j < s->nv; j++)
         if (!isfinite(w->b[j]))
             return fail(b->why, "the derivative of the force on %s is not finite at t = %.17g s",
-                        s->coordinates[j], at.t);
+                        s->speeds[j], at.t);
     for (int k = 0; k < s->m; k++)
         if (!isfinite(w->c[k]))
             return fail(b->why, "the derivative of constraint %s is not finite at t = %.17g s",
@@ -95,26 +95,26 @@ double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, con
 
 Status sensitivity_jacobian(Sensitivity *w, Mechanism *b, Instant at, const int *active,
                             const double *y, double *J, double *dfdt) {
-    const int n = b->system->n, ny = 2 * n;
-    const double *q = y, *v = y + n;
+    const int nq = b->system->nq, nv = b->system->nv, ny = system_states(b->system);
+    const double *q = y, *v = y + nq;
     Direction d = {0, w->dq, w->dv, w->du};
     if (mechanism_motion(b, at, q, v, active) != OK) return FAILED;
-    memset(w->dq, 0, (size_t)n * sizeof *w->dq);
-    memset(w->dv, 0, (size_t)n * sizeof *w->dv);
+    memset(w->dq, 0, (size_t)nq * sizeof *w->dq);
+    memset(w->dv, 0, (size_t)nv * sizeof *w->dv);
     memset(w->du, 0, (size_t)b->system->inputs * sizeof *w->du);
     memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
-    memset(dfdt, 0, (size_t)n * sizeof *dfdt);
+    memset(dfdt, 0, (size_t)nq * sizeof *dfdt);
     for (int j = 0; j < ny; j++) {
-        double *seed = j < n ? &w->dq[j] : &w->dv[j - n];
+        double *seed = j < nq ? &w->dq[j] : &w->dv[j - nq];
         *seed = 1;
         const Status status = sensitivity_along(w, b, at, q, v, d);
         *seed = 0;
         if (status != OK) return FAILED;
-        if (j >= n) J[(j - n) * ny + j] = 1;
-        for (int i = 0; i < n; i++) J[(n + i) * ny + j] = w->dvdot[i];
+        if (j >= nq) J[(j - nq) * ny + j] = 1;
+        for (int i = 0; i < nv; i++) J[(nq + i) * ny + j] = w->dvdot[i];
     }
     d.dt = 1;
     if (sensitivity_along(w, b, at, q, v, d) != OK) return FAILED;
-    memcpy(dfdt + n, w->dvdot, (size_t)n * sizeof *dfdt);
+    memcpy(dfdt + nq, w->dvdot, (size_t)nv * sizeof *dfdt);
     return OK;
 }

@@ -6,7 +6,7 @@
 #include "linkage.h"
 #include "mechanism.h"
 
-/* A direction: the change of time, coordinates (n), velocities (n) and inputs. */
+/* A direction: the change of time, coordinates (nq), speeds (nv) and inputs. */
 typedef struct {
     double dt;
     const double *dq, *dv, *du;
@@ -15,10 +15,10 @@ typedef struct {
 /* The changes along it, and the memory that is needed to find them. */
 typedef struct {
     double *dM, *dF, *dG, *dnu, *dgamma, *df, denergy[2];
-    double *dvdot, *dlambda; /* (n), (m) */
-    double *b, *c;           /* (n), (m) right sides */
-    double *dq, *dv, *du;    /* (n), (n), (inputs): a direction, for whoever asks */
-    double *dforce;          /* (n) change of Q, where there are outputs of the model's own */
+    double *dvdot, *dlambda; /* (nv), (m) */
+    double *b, *c;           /* (nv), (m) right sides */
+    double *dq, *dv, *du;    /* (nq), (nv), (inputs): a direction, for whoever asks */
+    double *dforce;          /* (nv) change of Q, where there are outputs of the model's own */
     double *down, *dother;   /* (output_count) changes of these */
 } Sensitivity;
 
@@ -37,7 +37,7 @@ SHARED void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at,
 SHARED double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,
                                    const double *dv);
 
-/* J = d(y')/dy (2n * 2n, row by row) and d(y')/dt (2n) for y = [q; v], y' = [v; vdot], with the inputs
+/* J = d(y')/dy (ny * ny, row by row) and d(y')/dt (ny) for y = [q; v], y' = [v; vdot], with the inputs
  * held and the rows in `active` acting. */
 SHARED Status sensitivity_jacobian(Sensitivity *w, Mechanism *b, Instant at, const int *active,
                                    const double *y, double *J, double *dfdt);

@@ -17,7 +17,7 @@
 
 static void layout_sliding(Mechanism *b, Arena *arena) {
     const System *s = b->system;
-    const int n = s->n, m = s->m, count = s->frictions;
+    const int n = s->nv, m = s->m, count = s->frictions;
     struct FrictionForces *f = arena_take(arena, 1, sizeof *f), counted;
     if (f == NULL) f = &counted; /* the pass that only counts */
     f->stick_slip = NULL;
@@ -88,7 +88,7 @@ static Status find_coefficients(Mechanism *b, Instant at, const double *q, const
 static void find_push(Mechanism *b, int i) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
-    for (int j = 0; j < s->n; j++) f->d[j] = 0;
+    for (int j = 0; j < s->nv; j++) f->d[j] = 0;
     for (int r = 0; r < s->friction[i].rows; r++) {
         const int k = s->friction[i].row[r];
         for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
@@ -100,7 +100,7 @@ static void find_push(Mechanism *b, int i) {
 static Status solve_sliding(Mechanism *b, double t, int count) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
-    const int n = s->n, m = s->m;
+    const int n = s->nv, m = s->m;
     for (int g = 0; g < count; g++) {
         find_push(b, f->sliding[g]);
         if (linear_solve(&b->linear, f->d, f->zero, f->answer + g * n, f->pushed + g * m) != OK)

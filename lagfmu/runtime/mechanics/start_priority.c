@@ -13,7 +13,7 @@ static const double LITTLE_EASE = 0x1p-5; /* ... and where there is no solution 
 
 int priority_stage(const System *s, const Priority *priority, int stage) {
     for (; stage < PRIORITIES; stage++)
-        for (int j = 0; j < s->n; j++)
+        for (int j = 0; j < s->nv; j++)
             if ((int)priority[j] == stage) return stage;
     return PRIORITIES;
 }

@@ -11,13 +11,13 @@
 typedef enum { OMITTED, GIVEN, SET } Priority;
 enum { PRIORITIES = 3 };
 
-/* The first priority from `stage` on that a coordinate has, of `priority` (n); PRIORITIES if there is none. */
+/* The first priority from `stage` on that a coordinate has, of `priority` (nv); PRIORITIES if there is none. */
 SHARED int priority_stage(const System *s, const Priority *priority, int stage);
 
 /* own (m): of `rows` those that hold a coordinate that is free in this stage; returns whether all do. */
 SHARED int priority_rows(const System *s, const Priority *priority, int stage, const int *rows, int *own);
 
-/* b->dq (n), zero where nothing is free, with G dq = c (m) as nearly as can be on the rows `own`.  M and G
+/* b->dq (nv), zero where nothing is free, with G dq = c (m) as nearly as can be on the rows `own`.  M and G
  * of the mechanism are lost: they are to be evaluated again. */
 SHARED Status priority_nearest(Mechanism *b, const Priority *priority, int stage, const int *own, const double *c);
 

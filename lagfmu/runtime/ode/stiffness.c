@@ -48,13 +48,13 @@ static double square(double y0, double y1, double size, double rounding) {
     return change > rounding * fabs(y1) ? change / size * (change / size) : 0;
 }
 
-static Rates rates(int n, const double *size, const double *y0, const double *f0, const double *y1,
-                   const double *f1) {
+static Rates rates(Magnitudes of, const double *y0, const double *f0, const double *y1, const double *f1) {
+    const double *v0 = y0 + of.nq, *v1 = y1 + of.nq, *a0 = f0 + of.nq, *a1 = f1 + of.nq;
     double dq = 0, dv = 0, da = 0;
-    for (int j = 0; j < n; j++) {
-        dq += square(y0[j], y1[j], size[j], STIFF_ROUNDING);
-        dv += square(y0[n + j], y1[n + j], size[j], STIFF_ROUNDING);
-        da += square(f0[n + j], f1[n + j], size[j], STIFF_ROUNDING_FORCE);
+    for (int j = 0; j < of.nq; j++) dq += square(y0[j], y1[j], of.size[j], STIFF_ROUNDING);
+    for (int i = 0; i < of.nv; i++) {
+        dv += square(v0[i], v1[i], of.span[i], STIFF_ROUNDING);
+        da += square(a0[i], a1[i], of.span[i], STIFF_ROUNDING_FORCE);
     }
     if (!(dv > 0 && da > 0)) return (Rates){0, 0};
     return (Rates){sqrt(da / dv), dq > 0 ? sqrt(sqrt(da / dq)) : HUGE_VAL};
@@ -67,12 +67,11 @@ int stiffness_due(Choice *c) {
     return 1;
 }
 
-void stiffness_explicit_step(Choice *c, const Integrator *i, const double *size) {
-    const int n = i->ny / 2;
+void stiffness_explicit_step(Choice *c, const Integrator *i, Magnitudes of) {
     const double *argument = i->dense + i->method->last_stage * i->ny, *rate = argument + i->ny;
-    const Rates stages = rates(n, size, argument, rate, i->y, i->f);
+    const Rates stages = rates(of, argument, rate, i->y, i->f);
     const double rho = stages.whole < stages.damped ? stages.whole : stages.damped;
-    const double sigma = rates(n, size, i->y_old, i->f_old, i->y, i->f).whole;
+    const double sigma = rates(of, i->y_old, i->f_old, i->y, i->f).whole;
     const double h = i->t - i->t_old;
     const int enough = STIFF_STEPS << 2 * c->failures;
     const int slow = sigma > 0 && rho > SLOWER * price(i->ny) * sigma;

@@ -29,9 +29,14 @@ typedef struct {
 /* 1 if the step that dop853 has just taken is to be judged: one in three, each from a stiff one on. */
 SHARED int stiffness_due(Choice *c);
 
-/* Judges the step that dop853 has just taken; f at its end is known.  `size`: (ny / 2) magnitudes of
- * the coordinates. */
-SHARED void stiffness_explicit_step(Choice *c, const Integrator *i, const double *size);
+/* Of y = (q, v): magnitudes of the coordinates (nq), and of what each speed moves (nv). */
+typedef struct {
+    int nq, nv;
+    const double *size, *span;
+} Magnitudes;
+
+/* Judges the step that dop853 has just taken; f at its end is known. */
+SHARED void stiffness_explicit_step(Choice *c, const Integrator *i, Magnitudes of);
 
 /* Judges the step that radau5 has just taken. */
 SHARED void stiffness_implicit_step(Choice *c, const Integrator *i);

@@ -62,10 +62,8 @@ static void keep(Solver *s) {
 /* Puts the integrator at the state; the indicators there. */
 static Status set_out(Solver *s) {
     State *x = &s->state;
-    const size_t n = (size_t)s->system->n;
     double *y = s->work_advance;
-    memcpy(y, x->q, n * sizeof *y);
-    memcpy(y + n, x->v, n * sizeof *y);
+    state_gather(s->system, x->q, x->v, y);
     if (stiffness_turn(&x->now.choice)) x->now.step = x->now.choice.longest;
     restart(s, x->now.t, y, x->now.step);
     x->now.ahead = 1;
@@ -141,12 +139,16 @@ static Status try_step(Solver *s, double t_end) {
     return step_towards(s, t_end, t_end, HUGE_VAL);
 }
 
+static Magnitudes magnitudes(const Solver *s) {
+    return (Magnitudes){s->system->nq, s->system->nv, s->state.size, s->state.span};
+}
+
 /* Of `auto`: the step that dop853 took is judged, and the other method takes over if it is due. */
 static void choose_method(Solver *s) {
     Integrator *i = &s->integrator;
     Choice *choice = &s->state.now.choice;
     if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && segment_rate(s, i) == OK)
-        stiffness_explicit_step(choice, i, s->state.size);
+        stiffness_explicit_step(choice, i, magnitudes(s));
     if (!stiffness_turn(choice)) return;
     double *y = s->work_advance;
     memcpy(y, i->y, (size_t)i->ny * sizeof *y);
@@ -165,9 +167,7 @@ static Status take_step(Solver *s, double t_end) {
 }
 
 static void put(Solver *s, double t, const double *y) {
-    const size_t n = (size_t)s->system->n;
-    memcpy(s->state.q, y, n * sizeof *y);
-    memcpy(s->state.v, y + n, n * sizeof *y);
+    state_scatter(s->system, y, s->state.q, s->state.v);
     s->state.now.t = t;
     s->state.now.between = 0;
 }

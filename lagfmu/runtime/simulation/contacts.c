@@ -38,7 +38,7 @@ static Status find_force_scale(Solver *solver, int k, const double *forces, doub
 static Status most_wrong(Solver *s, Instant at, const double *q, const double *v, const int *modes,
                          const int *touching, const int *departing, int *found) {
     Mechanism *b = &s->stepped;
-    double *forces = s->work_contacts, *reach = forces + s->system->n, worst = 0;
+    double *forces = s->work_contacts, *reach = forces + s->system->nv, worst = 0;
     int *active = s->iwork_contacts;
     *found = NONE;
     system_active(s->system, modes, active);

@@ -25,13 +25,13 @@ static Status top_of_rebound(Solver *s, double t, const double *y, const double 
     for (int c = 0; c < system->contacts; c++)
         departed |= !s->state.closed[c] && values[c] <= s->state.gap[c];
     if (!departed) return OK;
-    if (mechanism_motion_near(b, segment_instant(s, t), y, y + system->n, s->active, s->state.offset,
+    if (mechanism_motion_near(b, segment_instant(s, t), y, y + system->nq, s->active, s->state.offset,
                               s->state.size) != OK)
         return FAILED;
     for (int c = 0; c < system->contacts; c++) {
         const int k = system->contact[c];
         if (s->state.closed[c] || !(values[c] <= s->state.gap[c])) continue;
-        const double speed = mechanism_slip(b, k, y + system->n);
+        const double speed = mechanism_slip(b, k, y + system->nq);
         const double pull = b->gamma[k] - mechanism_row(b, k, b->vdot);
         if (speed > 0 && pull > 0 && speed * speed > 2 * pull * (s->state.gap[c] - values[c]))
             *top = fmin(*top, speed / pull);

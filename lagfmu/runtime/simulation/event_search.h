@@ -19,7 +19,7 @@ static inline int event_search_doubles(int indicators) {
 }
 
 /* Fills `samples` for the step of s->integrator (dense output prepared), from state.indicator at its start
- * to the projected y1 at its end.  y (6 n): scratch. */
+ * to the projected y1 at its end.  y (3 states): scratch. */
 SHARED Status event_search(Solver *s, const double *y1, double *y, Samples *samples);
 
 #endif

@@ -14,10 +14,9 @@ static const double UNDONE = 10; /* times what accelerations did since a slip wa
 static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
-    const int n = system->n;
     double *speed = s->work_contacts;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
-    for (int j = 0; j < n; j++) speed[j] = fabs(s->state.v[j]);
+    for (int j = 0; j < system->nv; j++) speed[j] = fabs(s->state.v[j]);
     for (int e = 0; e < system->masses; e++) {
         const int j = system->mass_row[e];
         if (system->mass_column[e] == j && b->M[e] > 0)
@@ -36,7 +35,7 @@ static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
 }
 
 static void note_change(Solver *s, EventKind kind, int i) {
-    state_note(&s->state, kind, i, s->system->n, s->state.q, s->state.v);
+    state_note(&s->state, s->system, kind, i, s->state.q, s->state.v);
 }
 
 static Status change(Solver *s, Instant at, const int *left, int *closed, const int *touching,
@@ -94,10 +93,10 @@ static double overshot(const Solver *s, const Friction *law) {
  * there nothing holds the slip at 0, and it has turned round. */
 static Status stop(Solver *s, Instant at, const int *left) {
     const System *system = s->system;
-    const int n = system->n;
+    const int nv = system->nv;
     Mechanism *b = &s->stepped;
     StickSlip *held = s->trial_modes;
-    double *q = s->work_friction + 2 * system->frictions, *v = q + n, *change = v + n;
+    double *y = s->work_friction + 2 * system->frictions, *v = y + system->nq, *change = v + nv;
     const double lost = s->state.now.lost, pull = squared(b, b->vdot);
     double since = 0;
     int any = 0;
@@ -111,15 +110,13 @@ static Status stop(Solver *s, Instant at, const int *left) {
         for (int r = 0; r < law->rows; r++) s->state.offset[law->row[r]] = b->f[law->row[r]];
     }
     if (!any) return OK;
-    memcpy(q, s->state.q, (size_t)n * sizeof *q);
-    memcpy(v, s->state.v, (size_t)n * sizeof *v);
+    state_gather(system, s->state.q, s->state.v, y);
     b->friction->stick_slip = held;
     const Status stopped = losses_project(s, at, 1);
     b->friction->stick_slip = s->state.stick_slip;
-    for (int j = 0; j < n; j++) change[j] = s->state.v[j] - v[j];
+    for (int j = 0; j < nv; j++) change[j] = s->state.v[j] - v[j];
     if (stopped == OK && squared(b, change) <= UNDONE * UNDONE * since * since * pull) return OK;
-    memcpy(s->state.q, q, (size_t)n * sizeof *q);
-    memcpy(s->state.v, v, (size_t)n * sizeof *v);
+    state_scatter(system, y, s->state.q, s->state.v);
     s->state.now.lost = lost;
     return OK;
 }

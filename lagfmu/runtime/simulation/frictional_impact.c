@@ -24,11 +24,11 @@ typedef struct {
     int *loaded;                /* (frictions) */
     double *A, *free, *z, *before; /* (count^2), (count): s- as the base rows leave it, impulses */
     double *slip, *zero, *right;   /* (m) */
-    double *force, *dv;            /* (n) */
+    double *force, *dv;            /* (nv) */
 } FrictionalImpact;
 
 size_t frictional_impact_doubles(const System *s) {
-    const size_t rows = (size_t)(s->contacts + 2 * s->frictions), m = (size_t)s->m, n = (size_t)s->n;
+    const size_t rows = (size_t)(s->contacts + 2 * s->frictions), m = (size_t)s->m, n = (size_t)s->nv;
     return rows * rows + 3 * rows + 4 * m + 3 * n;
 }
 
@@ -75,7 +75,7 @@ static Status reduce_frictional(FrictionalImpact *x, const int *entering, int *a
     for (int i = 0; i < x->count; i++)
         x->free[i] = x->slip[x->rows[i]] + mechanism_row(x->b, x->rows[i], x->dv);
     for (int i = 0; i < x->count; i++) {
-        memset(x->force, 0, (size_t)s->n * sizeof *x->force);
+        memset(x->force, 0, (size_t)s->nv * sizeof *x->force);
         add_row(x, x->rows[i], 1);
         if (linear_solve(l, x->force, x->zero, x->dv, Lambda) != OK) return FAILED;
         for (int j = 0; j < x->count; j++)
@@ -143,7 +143,7 @@ static int sweep(FrictionalImpact *x, const double *e) {
 /* Velocities and all impulses that go with z. */
 static Status finish_frictional(FrictionalImpact *x, double *dv, double *Lambda) {
     const System *s = x->s->system;
-    memset(x->force, 0, (size_t)s->n * sizeof *x->force);
+    memset(x->force, 0, (size_t)s->nv * sizeof *x->force);
     for (int i = 0; i < x->count; i++) add_row(x, x->rows[i], x->z[i]);
     for (int k = 0; k < s->m; k++) x->right[k] = -x->slip[k];
     x->b->linear.nearest = 1;
@@ -168,7 +168,7 @@ Status frictional_impact(Solver *s, Instant at, const double *q, const double *v
     x.zero = x.slip + m;
     x.right = x.zero + m;
     x.force = x.right + m;
-    x.dv = x.force + system->n;
+    x.dv = x.force + system->nv;
     memcpy(x.slip, slip, (size_t)m * sizeof *slip);
     *done = 0;
     if (!find_struck_rows(&x, entering)) return OK;

@@ -25,7 +25,7 @@ typedef struct {
     Solver *s;
     Mechanism *b;
     double *slip, *e, *zero, *right; /* (m) s-, e; 0; right-hand sides */
-    double *x;                       /* (n) */
+    double *x;                       /* (nv) */
     double *A, *c, *z, *w, *work;    /* of complementarity.h */
     int k, *contact, *holding;       /* (contacts) those that enter; 1: rows that act with it do */
     int *active;                     /* (m) */
@@ -70,7 +70,7 @@ static Status reduce_impact(Struck *x, const Impulse *scratch) {
     }
     for (int i = 0; i < x->k; i++) {
         const int row = row_of(x, i);
-        memset(x->x, 0, (size_t)system->n * sizeof *x->x);
+        memset(x->x, 0, (size_t)system->nv * sizeof *x->x);
         for (int e = system->row_start[row]; e < system->row_start[row + 1]; e++)
             x->x[system->entry_column[e]] = b->G[e];
         if (linear_solve(&b->linear, x->x, x->zero, scratch->dv, scratch->Lambda) != OK)
@@ -176,7 +176,7 @@ static void blend(const Struck *x, const Impulse *found, const Impulse *plastic)
         part = slope < 0 ? (root - slope) / (2 * bend) : 2 * lost / (slope + root);
         part = fmin(fmax(part, 0), 1);
     }
-    for (int j = 0; j < system->n; j++)
+    for (int j = 0; j < system->nv; j++)
         found->dv[j] = plastic->dv[j] + part * (found->dv[j] - plastic->dv[j]);
     for (int j = 0; j < system->m; j++)
         found->Lambda[j] = plastic->Lambda[j] + part * (found->Lambda[j] - plastic->Lambda[j]);
@@ -219,13 +219,13 @@ static Status strike_together(Struck *x, Instant at, const double *q, const doub
 Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
               double *Lambda) {
     const System *system = s->system;
-    const int n = system->n, m = system->m, contacts = system->contacts;
+    const int nv = system->nv, m = system->m, contacts = system->contacts;
     Struck x = {.s = s, .b = &s->stepped, .slip = s->work_impact, .contact = s->iwork_impact};
     x.e = x.slip + m;
     x.zero = x.e + m;
     x.right = x.zero + m;
     x.x = x.right + m;
-    const Impulse found = {x.x + n, Lambda}, soft = {found.dv + n, found.dv + 2 * n};
+    const Impulse found = {x.x + nv, Lambda}, soft = {found.dv + nv, found.dv + 2 * nv};
     x.A = soft.Lambda + m;
     x.c = x.A + contacts * contacts;
     x.z = x.c + contacts;
@@ -245,7 +245,7 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
     }
     if (strike_together(&x, at, q, v, entering, plastic, &found, &soft) != OK) return FAILED;
     s->state.now.lost -= gain(&x, &found, &found, 1);
-    for (int j = 0; j < n; j++) v[j] += found.dv[j];
+    for (int j = 0; j < nv; j++) v[j] += found.dv[j];
     return OK;
 }
 
@@ -269,7 +269,7 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
     const System *system = s->system;
     const int contacts = system->contacts;
     int *entering = s->iwork_impact + impact_ints(system->m, contacts) - contacts;
-    double *Lambda = s->work_impact + impact_doubles(system->n, system->m, contacts) - system->m;
+    double *Lambda = s->work_impact + impact_doubles(system->nv, system->m, contacts) - system->m;
     memset(struck, 0, (size_t)contacts * sizeof *struck);
     memset(s->push, 0, (size_t)contacts * sizeof *s->push);
     for (int round = 1; round <= IMPACT_ROUNDS; round++) {

@@ -16,12 +16,12 @@ static inline int impact_ints(int m, int contacts) {
     return m + 3 * contacts + complementarity_ints(contacts);
 }
 
-/* The velocities' change (n) and the impulses (m). */
+/* The velocities' change (nv) and the impulses (m). */
 typedef struct {
     double *dv, *Lambda;
 } Impulse;
 
-/* All impacts of an instant; v (n) is replaced by the velocities after them.  `touching`: flags, the
+/* All impacts of an instant; v (nv) is replaced by the velocities after them.  `touching`: flags, the
  * contacts that an impact can reach; `slow` (m): speeds that count as none; `struck`: flags, set for the
  * contacts that took an impulse, which is in s->push.  FAILED: no velocities satisfy the contacts. */
 SHARED Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching,

@@ -25,7 +25,7 @@ Status initial_refused(Solver *s) {
 static void find_allowed(const Start *x, const double *q, const double *least, double factor,
                          double *reach, double *allowed) {
     const System *s = x->s->system;
-    for (int j = 0; j < s->n; j++) reach[j] = fmax(fabs(q[j]), least[j]);
+    for (int j = 0; j < s->nv; j++) reach[j] = fmax(fabs(q[j]), least[j]);
     for (int k = 0; k < s->m; k++)
         allowed[k] = factor * DBL_EPSILON * mechanism_row_size(&x->s->stepped, k, reach);
 }
@@ -61,7 +61,7 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
     Why *why = &x->s->why;
     const char *comma = "";
     fail(why, "the start values ");
-    for (int j = 0; j < s->n; j++) {
+    for (int j = 0; j < s->nq; j++) {
         Digits given = digits(x->q0[j]);
         why_append(why, "%s%s = %s", j > 0 ? ", " : "", s->coordinates[j], given.text);
     }
@@ -84,7 +84,7 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
 static Status newton_at_start(const Start *x, int stage, double *q, const int *rows) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
-    double *trial = x->s->work_initial, *least = trial + s->n, *f = least + s->n;
+    double *trial = x->s->work_initial, *least = trial + s->nq, *f = least + s->nq;
     double *f_trial = f + s->m, *allowed = f_trial + s->m;
     int *own = x->s->iwork_initial + s->m;
     const int all = priority_rows(s, x->priority_q, stage, rows, own);
@@ -105,14 +105,14 @@ static Status newton_at_start(const Start *x, int stage, double *q, const int *r
         double damping = 1;
         int halvings = 0;
         for (; halvings < STEP_HALVINGS; halvings++, damping /= 2) {
-            for (int j = 0; j < s->n; j++) trial[j] = q[j] + damping * b->dq[j];
+            for (int j = 0; j < s->nv; j++) trial[j] = q[j] + damping * b->dq[j];
             if (mechanism_residual(b, x->at, trial, f_trial) == FAILED) continue;
             if (norm_of_misses(s, own, f_trial, allowed, f) <
                 (1 - 0.1 * damping) * norm_of_misses(s, own, f, allowed, f))
                 break;
         }
         if (halvings == STEP_HALVINGS) break;
-        memcpy(q, trial, (size_t)s->n * sizeof *q);
+        memcpy(q, trial, (size_t)s->nq * sizeof *q);
         memcpy(f, f_trial, (size_t)s->m * sizeof *f);
     }
     return arrived(s, rows, f, allowed) ? OK : cannot_be_projected(x, rows, f, allowed);
@@ -123,7 +123,7 @@ static int depends_elsewhere(const Start *x, const double *q, int entry, double 
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
     double *elsewhere = x->s->work_initial;
-    memcpy(elsewhere, q, (size_t)s->n * sizeof *q);
+    memcpy(elsewhere, q, (size_t)s->nq * sizeof *q);
     elsewhere[s->entry_column[entry]] += aside;
     return mechanism_evaluate(b, x->at, elsewhere, x->v0) == OK && b->G[entry] != 0;
 }
@@ -135,7 +135,7 @@ static Status check_omissions(const Start *x, const double *q, int k, double f) 
     Mechanism *b = &x->s->stepped;
     double aside = 0;
     if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return initial_refused(x->s);
-    for (int j = 0; j < s->n; j++) aside = fmax(aside, fabs(q[j]));
+    for (int j = 0; j < s->nq; j++) aside = fmax(aside, fabs(q[j]));
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
         if (x->priority_q[s->entry_column[e]] == OMITTED && b->G[e] != 0) return OK;
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
@@ -152,7 +152,7 @@ static Status check_omissions(const Start *x, const double *q, int k, double f) 
 
 static Status check_all_omissions(const Start *x, const double *q, const int *rows) {
     const System *s = x->s->system;
-    double *f = x->s->work_initial + 2 * s->n;
+    double *f = x->s->work_initial + 2 * s->nq;
     if (mechanism_residual(&x->s->stepped, x->at, q, f) == FAILED) return initial_refused(x->s);
     for (int k = 0; k < s->m; k++)
         if (rows[k] && f[k] != 0 && check_omissions(x, q, k, f[k]) == FAILED) return FAILED;
@@ -161,8 +161,8 @@ static Status check_all_omissions(const Start *x, const double *q, const int *ro
 
 Status initial_positions(const Start *x, double *q, int *rows) {
     const System *s = x->s->system;
-    const size_t bytes = (size_t)s->n * sizeof *q;
-    double *given = x->s->work_initial + 5 * s->n + 3 * s->m;
+    const size_t bytes = (size_t)s->nq * sizeof *q;
+    double *given = x->s->work_initial + 5 * s->nq + 3 * s->m;
     int any = 0;
     for (int k = 0; k < s->m; k++) {
         if (s->rows[k].kind == NONHOLONOMIC) rows[k] = 0;
@@ -183,9 +183,9 @@ static int on_velocities(const Start *x, const double *least, const double *v, c
                          double *speed, double *slip) {
     const System *s = x->s->system;
     const Mechanism *b = &x->s->stepped;
-    double *shared = speed + s->n;
+    double *shared = speed + s->nv;
     int on = 1;
-    for (int j = 0; j < s->n; j++) speed[j] = fmax(fmax(fabs(v[j]), fabs(x->v0[j])), least[j]);
+    for (int j = 0; j < s->nv; j++) speed[j] = fmax(fmax(fabs(v[j]), fabs(x->v0[j])), least[j]);
     nominals_motion_speeds(b, speed, shared);
     for (int k = 0; k < s->m; k++) {
         slip[k] = -mechanism_slip(b, k, v);
@@ -198,18 +198,18 @@ static int on_velocities(const Start *x, const double *least, const double *v, c
 Status initial_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
-    double *slip = x->s->work_initial + 3 * s->n, *speed = slip + s->m;
+    double *slip = x->s->work_initial + 3 * s->nq, *speed = slip + s->m;
     int *own = x->s->iwork_initial + s->m;
-    memcpy(v, x->v0, (size_t)s->n * sizeof *v);
+    memcpy(v, x->v0, (size_t)s->nv * sizeof *v);
     for (int stage = 0; (stage = priority_stage(s, x->priority_v, stage)) < PRIORITIES; stage++) {
-        memcpy(v, x->v0, (size_t)s->n * sizeof *v);
+        memcpy(v, x->v0, (size_t)s->nv * sizeof *v);
         priority_rows(s, x->priority_v, stage, rows, own);
         for (int sweep = 0; sweep < INITIAL_SWEEPS; sweep++) {
             if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return FAILED;
             if (on_velocities(x, least, v, rows, speed, slip)) return OK;
             if (on_velocities(x, least, v, own, speed, slip)) break;
             if (priority_nearest(b, x->priority_v, stage, own, slip) == FAILED) break;
-            for (int j = 0; j < s->n; j++) v[j] += b->dq[j];
+            for (int j = 0; j < s->nv; j++) v[j] += b->dq[j];
         }
     }
     return OK;

@@ -10,16 +10,16 @@ typedef struct {
     Solver *s;
     Instant at;
     const double *q0, *v0;
-    const Priority *priority_q, *priority_v; /* (n) */
+    const Priority *priority_q, *priority_v; /* (nq), (nv) */
 } Start;
 
 /* "the start is refused: " before the cause. */
 SHARED Status initial_refused(Solver *s);
 
-/* f = 0 on the rows: q (n) is moved.  `rows` (m) loses those that are nonholonomic. */
+/* f = 0 on the rows: q (nq) is moved.  `rows` (m) loses those that are nonholonomic. */
 SHARED Status initial_positions(const Start *x, double *q, int *rows);
 
-/* G v = nu at q on the rows: v (n), from x->v0, as near as can be.  least (n) >= 0: speeds below which
+/* G v = nu at q on the rows: v (nv), from x->v0, as near as can be.  least (nv) >= 0: speeds below which
  * nothing counts. */
 SHARED Status initial_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v);
 

@@ -18,7 +18,7 @@
 static Status check_angles(const Start *x) {
     const System *s = x->s->system;
     const double *q = x->s->state.q;
-    for (int j = 0; j < s->n; j++) {
+    for (int j = 0; j < s->nq; j++) {
         if (s->dimension[j] != s->angles || fabs(q[j]) <= LARGEST_ANGLE) continue;
         return fail(&x->s->why,
                     "the start is refused: the angle %s = %s rad has no digits left for a "
@@ -38,7 +38,7 @@ static Status check_masses(const Start *x) {
         return fail(&x->s->why,
                     "the start is refused: the mass of %s is %s, expected 0 or at least %.3g (in SI "
                     "units), below which numbers lose their digits: choose larger units of mass",
-                    s->coordinates[s->mass_row[e]], digits(b->M[e]).text, DBL_MIN);
+                    s->speeds[s->mass_row[e]], digits(b->M[e]).text, DBL_MIN);
     }
     return OK;
 }
@@ -48,40 +48,40 @@ static Status find_positions(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
-    double *moved = x->s->work_initial + 3 * s->n + 3 * s->m, *unit = moved + s->n;
+    double *moved = x->s->work_initial + 3 * s->nq + 3 * s->m, *unit = moved + s->nq;
     int *rows = x->s->iwork_initial;
-    memcpy(state->q, x->q0, (size_t)s->n * sizeof *state->q);
+    memcpy(state->q, x->q0, (size_t)s->nq * sizeof *state->q);
     memset(state->closed, 0, (size_t)s->contacts * sizeof *state->closed);
     system_active(s, state->closed, rows);
     if (initial_positions(x, state->q, rows) == FAILED) return FAILED;
     for (int count = 0; count <= s->contacts; count++) {
         if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return initial_refused(x->s);
         if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return initial_refused(x->s);
-        for (int j = 0; j < s->n; j++) unit[j] = fmax(fabs(state->q[j]), state->size[j]);
+        for (int j = 0; j < s->nq; j++) unit[j] = fmax(fabs(state->q[j]), state->size[j]);
         for (int c = 0; c < s->contacts; c++) {
             int k = s->contact[c];
             state->gap[c] = TOUCH * mechanism_row_size(b, k, unit);
             state->closed[c] = b->f[k] <= state->gap[c];
         }
         system_active(s, state->closed, rows);
-        memcpy(moved, state->q, (size_t)s->n * sizeof *moved);
+        memcpy(moved, state->q, (size_t)s->nq * sizeof *moved);
         if (initial_positions(x, moved, rows) == FAILED) return FAILED;
         int still = 1;
-        for (int j = 0; j < s->n; j++)
+        for (int j = 0; j < s->nq; j++)
             still &= fabs(moved[j] - state->q[j]) <= 4 * DBL_EPSILON * state->size[j];
         if (still) break;
-        memcpy(state->q, moved, (size_t)s->n * sizeof *moved);
+        memcpy(state->q, moved, (size_t)s->nq * sizeof *moved);
     }
     if (check_angles(x) == FAILED) return FAILED;
     nominals_sizes(x->s, state->q);
     return OK;
 }
 
-/* natural (n): the speeds that the forces give within the coordinates' size, sqrt(size |F| / M). */
+/* natural (nv): the speeds that the forces give within the coordinates' size, sqrt(size |F| / M). */
 static void natural_speeds(const Start *x, double *natural) {
     const Mechanism *b = &x->s->stepped;
     const System *s = b->system;
-    for (int j = 0; j < s->n; j++) natural[j] = 0;
+    for (int j = 0; j < s->nv; j++) natural[j] = 0;
     for (int e = 0; e < s->masses; e++) {
         int j = s->mass_row[e];
         if (s->mass_column[e] == j && b->M[e] > 0)
@@ -96,7 +96,7 @@ static Status check_velocities(const Start *x, const int *active, double *fastes
     const System *s = b->system;
     const double *v = solver->state.v;
     int missed = 0;
-    for (int j = 0; j < s->n; j++)
+    for (int j = 0; j < s->nv; j++)
         fastest[j] = fmax(fmax(fabs(x->v0[j]), fabs(v[j])), fastest[j]);
     nominals_motion_speeds(b, fastest, shared);
     for (int k = 0; k < s->m; k++) {
@@ -152,12 +152,12 @@ static Status find_velocities(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
-    double *natural = x->s->work_initial, *fastest = natural + s->n, *shared = fastest + s->n;
+    double *natural = x->s->work_initial, *fastest = natural + s->nv, *shared = fastest + s->nv;
     int *active = x->s->iwork_initial, low = 1;
     if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return initial_refused(x->s);
     if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
-    for (int j = 0; j < s->n; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
+    for (int j = 0; j < s->nv; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
     nominals_motion_speeds(b, fastest, shared);
     for (int c = 0; c < s->contacts; c++) {
         int k = s->contact[c];
@@ -198,38 +198,36 @@ static Status find_modes(const Start *x) {
 /* A start value is its own scale, so that a start at theta0 = 1e-6 is resolved. */
 static Status find_nominals(const Start *x) {
     Solver *s = x->s;
-    const int n = s->system->n;
-    for (int j = 0; j < n; j++) {
-        s->state.scale[j] = fabs(s->state.q[j]);
-        s->state.scale[n + j] = fabs(s->state.v[j]);
-    }
+    const int nq = s->system->nq, nv = s->system->nv;
+    for (int j = 0; j < nq; j++) s->state.scale[j] = fabs(s->state.q[j]);
+    for (int i = 0; i < nv; i++) s->state.scale[nq + i] = fabs(s->state.v[i]);
     return nominals_complete(s, x->at, 0);
 }
 
 static void tell_each_moved(const Start *x, Moved moved, void *context) {
     const State *state = &x->s->state;
-    const int n = x->s->system->n;
-    for (int i = 0; i < 2 * n; i++) {
-        int is_velocity = i >= n, j = i % n;
+    const int nq = x->s->system->nq;
+    for (int i = 0; i < system_states(x->s->system); i++) {
+        int is_velocity = i >= nq, j = is_velocity ? i - nq : i;
         double given = is_velocity ? x->v0[j] : x->q0[j];
         double used = is_velocity ? state->v[j] : state->q[j];
         double unit = fmax(is_velocity ? state->scale[i] : state->size[j], fabs(given));
         /* a velocity that is rounding of the motion's own has not moved */
-        double rounding = 4 * DBL_EPSILON * state->size[j] * (is_velocity ? state->now.rate : 1);
+        double rounding = 4 * DBL_EPSILON * nominals_natural(x->s, i);
         if (fabs(given - used) > fmax(1e-12 * unit, rounding))
-            moved(context, x->s->system->coordinates[j], is_velocity, given, used,
-                  is_velocity ? x->priority_v[j] : x->priority_q[j]);
+            moved(context, i, given, used, is_velocity ? x->priority_v[j] : x->priority_q[j]);
     }
 }
 
 static Status check_start_finite(Solver *s, const double *q0, const double *v0) {
-    for (int j = 0; j < s->system->n; j++) {
-        int is_velocity = fabs(q0[j]) <= DBL_MAX;
-        if (is_velocity && fabs(v0[j]) <= DBL_MAX) continue;
-        Digits given = digits(is_velocity ? v0[j] : q0[j]);
-        return fail(&s->why, "the start is refused: %s%s%s = %s is not finite",
-                    is_velocity ? "der(" : "", s->system->coordinates[j], is_velocity ? ")" : "",
-                    given.text);
+    const System *system = s->system;
+    for (int j = 0; j < system_states(system); j++) {
+        const int is_velocity = j >= system->nq;
+        const double given = is_velocity ? v0[j - system->nq] : q0[j];
+        if (fabs(given) <= DBL_MAX) continue;
+        const StateName of = system_state_name(system, j);
+        return fail(&s->why, "the start is refused: %s%s%s = %s is not finite", of.head, of.name, of.tail,
+                    digits(given).text);
     }
     return OK;
 }
@@ -248,7 +246,7 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
                     Moved moved, void *context) {
     if (check_start_finite(s, q0, v0) == FAILED) return FAILED;
     solver_clear(s, t);
-    const Start x = {s, segment_instant(s, t), q0, v0, priority, priority + s->system->n};
+    const Start x = {s, segment_instant(s, t), q0, v0, priority, priority + s->system->nq};
     if (s->system->switches > 0) OPTIONAL.switches->settle(s, x.at, q0, v0, NULL, NULL);
     if (s->system->contacts > 0 && OPTIONAL.impact_check(s) != OK) return FAILED;
     s->stepped.dependent = 1; /* it is not known yet */

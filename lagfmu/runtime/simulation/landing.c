@@ -33,7 +33,7 @@ Status landing_bring_back(Solver *s, const int *happened, const double *pull) {
     const Instant at = segment_instant(s, s->state.now.t);
     Mechanism *b = &s->stepped;
     int *acting = s->iwork_initial, any = 0;
-    double *v = s->work_initial, *dv = v + system->n, *depth = dv + system->n;
+    double *v = s->work_initial, *dv = v + system->nv, *depth = dv + system->nv;
     double *change = depth + system->m;
     system_active(system, s->state.closed, acting);
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
@@ -44,13 +44,13 @@ Status landing_bring_back(Solver *s, const int *happened, const double *pull) {
         any |= acting[k] && (happened[c] || !s->state.closed[c]);
     }
     if (!any) return OK;
-    memcpy(v, s->state.v, (size_t)system->n * sizeof *v);
+    memcpy(v, s->state.v, (size_t)system->nv * sizeof *v);
     if (mechanism_project(b, at, s->state.q, v, acting, s->state.offset, s->state.size) != OK)
         return FAILED; /* the positions; velocities may change only in an impact */
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     set_changes(s, happened, pull, depth, change);
     if (linear_factor(&b->linear, b->M, b->G, acting) != OK) return FAILED;
     if (linear_nearest(&b->linear, change, dv) != OK) return FAILED;
-    for (int j = 0; j < system->n; j++) s->state.v[j] += dv[j];
+    for (int j = 0; j < system->nv; j++) s->state.v[j] += dv[j];
     return OK;
 }

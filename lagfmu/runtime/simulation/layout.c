@@ -8,15 +8,16 @@
 #include "optional.h"
 
 static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
-    const int n = s->n, contacts = s->contacts, indicators = indicators_count(s);
+    const int nq = s->nq, nv = s->nv, contacts = s->contacts, indicators = indicators_count(s);
     const size_t begin = saved->used;
     x->block = saved->base == NULL ? NULL : saved->base + begin;
-    x->q = arena_doubles(saved, n);
-    x->v = arena_doubles(saved, n);
+    x->q = arena_doubles(saved, nq);
+    x->v = arena_doubles(saved, nv);
     x->switch_state = arena_doubles(saved, s->switches);
     x->offset = arena_doubles(saved, s->m);
-    x->scale = arena_doubles(saved, 2 * n);
-    x->size = arena_doubles(saved, n);
+    x->scale = arena_doubles(saved, nq + nv);
+    x->size = arena_doubles(saved, nq);
+    x->span = x->size;
     x->gap = arena_doubles(saved, contacts);
     x->basis = arena_ints(saved, s->m);
     x->closed = arena_ints(saved, contacts);
@@ -26,13 +27,13 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
         const int count = event_count_of(s, (EventKind)k);
         x->latest[k].count = arena_take(saved, (size_t)count, sizeof(Count));
         x->latest[k].time = arena_doubles(saved, count);
-        x->latest[k].q = arena_doubles(saved, count * n);
-        x->latest[k].v = arena_doubles(saved, count * n);
+        x->latest[k].q = arena_doubles(saved, count * nq);
+        x->latest[k].v = arena_doubles(saved, count * nv);
     }
     x->impulse = arena_doubles(saved, contacts);
     x->stick_slip = arena_take(saved, (size_t)s->frictions, sizeof *x->stick_slip);
     x->indicator = arena_doubles(saved, indicators);
-    integrator_layout(i, saved, scratch, 2 * n, OPTIONAL.methods, METHOD_COUNT);
+    integrator_layout(i, saved, scratch, nq + nv, OPTIONAL.methods, METHOD_COUNT);
     x->y = i->y;
     x->f = i->f;
     x->y_old = i->y_old;
@@ -42,7 +43,8 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
 }
 
 void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system) {
-    const int n = system->n, m = system->m, contacts = system->contacts;
+    const int nq = system->nq, nv = system->nv, states = system_states(system);
+    const int m = system->m, contacts = system->contacts;
     const int indicators = indicators_count(system);
     s->system = system;
     state_layout(&s->state, &s->integrator, saved, scratch, system);
@@ -51,7 +53,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
     s->peak = arena_doubles(saved, peaks_saved(s->peaks));
-    integrator_layout(&s->probe, scratch, scratch, 2 * n, OPTIONAL.methods, METHOD_COUNT);
+    integrator_layout(&s->probe, scratch, scratch, states, OPTIONAL.methods, METHOD_COUNT);
     mechanism_layout(&s->stepped, scratch, system, &s->why,
                      OPTIONAL.friction != NULL ? OPTIONAL.friction->sliding : NULL);
     if (s->stepped.friction != NULL) s->stepped.friction->stick_slip = s->state.stick_slip;
@@ -62,55 +64,55 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
         s->active_full = arena_ints(scratch, system->full->m);
     }
     s->active = arena_ints(scratch, m);
-    s->scale = arena_doubles(scratch, 2 * n);
+    s->scale = arena_doubles(scratch, states);
     s->push = arena_doubles(scratch, contacts);
     s->u = arena_doubles(scratch, system->inputs + system->switches);
-    s->work_switches = arena_doubles(scratch, system->switches > 0 ? 2 * system->switches + n : 0);
-    s->work_initial = arena_doubles(scratch, 6 * n + 3 * m);
+    s->work_switches = arena_doubles(scratch, system->switches > 0 ? 2 * system->switches + nq : 0);
+    s->work_initial = arena_doubles(scratch, 6 * nq + 3 * m);
     s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
-    s->work_contacts = arena_doubles(scratch, 2 * n + 3 * m);
+    s->work_contacts = arena_doubles(scratch, 2 * nv + 3 * m);
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
-    s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? 2 * n : 0);
-    s->work_advance = arena_doubles(scratch, 4 * n);
-    s->work_events =
-        arena_doubles(scratch, indicators == 0 ? 0 : 6 * n + indicators + event_search_doubles(indicators));
+    s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? states : 0);
+    s->work_advance = arena_doubles(scratch, 2 * states);
+    s->work_events = arena_doubles(scratch, 3 * states + indicators +
+                                                (indicators == 0 ? 0 : event_search_doubles(indicators)));
     if (s->peaks > 0) {
         observed_layout(&s->peak_seen, scratch, system);
-        s->work_peaks = arena_doubles(scratch, OPTIONAL.peaks->doubles(s->peaks, n));
+        s->work_peaks = arena_doubles(scratch, OPTIONAL.peaks->doubles(s->peaks, states));
     }
     s->work_gap = arena_doubles(scratch, minimum_gap_doubles(system));
     const int frictions = system->frictions, some = frictions > 0;
     s->work_frictional = arena_take(scratch, some ? OPTIONAL.friction->doubles(system) : 0, sizeof(double));
     s->iwork_frictional = arena_take(scratch, some ? OPTIONAL.friction->ints(system) : 0, sizeof(int));
     s->trial_modes = arena_take(scratch, (size_t)frictions, sizeof *s->trial_modes);
-    s->work_friction = arena_doubles(scratch, some * (2 * frictions + 4 * n));
+    s->work_friction = arena_doubles(scratch, some * (2 * frictions + 2 * states));
     s->iwork_friction = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
     s->iwork_events = arena_ints(scratch, 6 * contacts);
-    s->work_modes = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + n);
-    s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(n, m, contacts));
+    s->work_modes = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + nv);
+    s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(nv, m, contacts));
     s->iwork_impact = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));
 }
 
 void observed_layout(Observed *o, Arena *arena, const System *system) {
     const System *full = system->embed != NULL ? system->full : system;
-    const int n = full->n, m = full->m, stepped = system->embed != NULL ? system->n : 0;
-    o->q = arena_doubles(arena, n);
-    o->v = arena_doubles(arena, n);
-    o->vdot = arena_doubles(arena, n);
+    const int nq = full->nq, nv = full->nv, m = full->m, stepped = system->embed != NULL ? system->nq : 0;
+    o->q = arena_doubles(arena, nq);
+    o->v = arena_doubles(arena, nv);
+    o->vdot = arena_doubles(arena, nv);
     o->lambda = arena_doubles(arena, m);
     o->residual = arena_doubles(arena, m);
     o->unique = arena_ints(arena, m);
-    o->force = arena_doubles(arena, n);
+    o->force = arena_doubles(arena, nv);
     o->share = arena_doubles(arena, full->entries);
-    o->applied = arena_doubles(arena, n);
+    o->applied = arena_doubles(arena, nv);
     o->own = arena_doubles(arena, full->output_count);
     o->other = arena_doubles(arena, full->output_count);
     o->s = arena_doubles(arena, stepped);
     o->sdot = arena_doubles(arena, stepped);
     o->sddot = arena_doubles(arena, stepped);
     for (int k = 0; k < EVENT_KINDS && stepped > 0; k++) {
-        o->latest_q[k] = arena_doubles(arena, event_count_of(system, (EventKind)k) * n);
-        o->latest_v[k] = arena_doubles(arena, event_count_of(system, (EventKind)k) * n);
+        o->latest_q[k] = arena_doubles(arena, event_count_of(system, (EventKind)k) * nq);
+        o->latest_v[k] = arena_doubles(arena, event_count_of(system, (EventKind)k) * nv);
     }
     o->slip = arena_doubles(arena, 2 * system->frictions);
     o->margin = arena_doubles(arena, system->frictions);

@@ -17,8 +17,8 @@ double losses_energy(const Solver *s, Instant at) {
 Status losses_project(Solver *s, Instant at, int drifted) {
     const System *system = s->system;
     const Mechanism *b = &s->stepped;
-    const size_t bytes = (size_t)system->n * sizeof(double);
-    double *before = s->work_contacts, *after = before + system->n;
+    const size_t bytes = (size_t)system->nv * sizeof(double);
+    double *before = s->work_contacts, *after = before + system->nv;
     double lost = drifted ? losses_energy(s, at) : 0;
     memcpy(before, s->state.v, bytes);
     if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,

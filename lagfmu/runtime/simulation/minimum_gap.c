@@ -27,18 +27,18 @@ static Interval box(double a, double middle, double b) {
 static const Interval *bound_rates(Solver *s, double a, double b, double *y) {
     const System *system = s->system;
     const Integrator *i = &s->integrator;
-    const int n = system->n, inputs = system->inputs, driven = inputs + system->switches;
+    const int nq = system->nq, states = system_states(system), inputs = system->inputs, driven = inputs + system->switches;
     const double t[3] = {a, a + (b - a) / 2, b};
     double *u = s->work_gap;
-    Interval *q = (Interval *)(void *)(u + 3 * driven), *w = q + 2 * n, *rate = w + driven;
+    Interval *q = (Interval *)(void *)(u + 3 * driven), *w = q + states, *rate = w + driven;
     for (int k = 0; k < 3; k++) {
-        i->method->dense(i, t[k], y + k * 2 * n);
+        i->method->dense(i, t[k], y + k * states);
         if (inputs > 0) drive_at(system, &s->drive, t[k], u + k * driven);
     }
-    for (int j = 0; j < 2 * n; j++) q[j] = box(y[j], y[2 * n + j], y[4 * n + j]);
+    for (int j = 0; j < states; j++) q[j] = box(y[j], y[states + j], y[2 * states + j]);
     for (int j = 0; j < inputs; j++) w[j] = box(u[j], u[driven + j], u[2 * driven + j]);
     for (int j = inputs; j < driven; j++) w[j] = interval_of(s->state.switch_state[j - inputs]);
-    system->bounds((Interval){a, b}, q, q + n, w, s->p, rate);
+    system->bounds((Interval){a, b}, q, q + nq, w, s->p, rate);
     return rate;
 }
 

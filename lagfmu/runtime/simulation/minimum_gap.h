@@ -12,12 +12,12 @@ typedef enum {
     UNKNOWN   /* more has to be looked at */
 } MinimumGap;
 
-/* y (3 * 2 n): scratch. */
+/* y (3 states): scratch. */
 SHARED MinimumGap minimum_gap(Solver *s, const Samples *samples, int k, double *y);
 
 /* Doubles of its boxes. */
 static inline int minimum_gap_doubles(const System *s) {
-    return s->bounds == NULL ? 0 : 4 * s->n + 5 * (s->inputs + s->switches) + 2 * (s->contacts + s->switches);
+    return s->bounds == NULL ? 0 : 2 * system_states(s) + 5 * (s->inputs + s->switches) + 2 * (s->contacts + s->switches);
 }
 
 #endif

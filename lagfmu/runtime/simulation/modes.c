@@ -30,7 +30,7 @@ static void find_slow(const Solver *s, double *slow) {
     const System *system = s->system;
     for (int k = 0; k < system->m; k++)
         slow[k] = SLOW * fmax(s->state.now.rate * mechanism_row_size(&s->stepped, k, s->state.size),
-                              mechanism_row_size(&s->stepped, k, s->state.scale + system->n));
+                              mechanism_row_size(&s->stepped, k, s->state.scale + system->nq));
 }
 
 static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
@@ -123,18 +123,18 @@ static Status set_offsets(Solver *s, Instant at, const int *closed) {
 }
 
 static void note_departure(Solver *s, int c) {
-    state_note(&s->state, DEPARTURE, c, s->system->n, s->state.q, s->state.v);
+    state_note(&s->state, s->system, DEPARTURE, c, s->state.q, s->state.v);
 }
 
 /* A contact that landed or closes, or took an impulse that is not rounding of the others': its closing, at the
- * velocities `arriving` (n) before any impact. */
+ * velocities `arriving` (nv) before any impact. */
 static void note_closings(Solver *s, const int *happened, const int *closed, const double *arriving) {
     double most = 0;
     for (int c = 0; c < s->system->contacts; c++) most = fmax(most, s->push[c]);
     for (int c = 0; c < s->system->contacts; c++) {
         const int landed = !s->state.closed[c] && (happened[c] || closed[c]);
         if (!landed && !(s->push[c] > IMPACT_PULL * most)) continue;
-        state_note(&s->state, CLOSING, c, s->system->n, s->state.q, arriving);
+        state_note(&s->state, s->system, CLOSING, c, s->state.q, arriving);
         if (!s->state.looking) s->state.impulse[c] = s->push[c];
     }
 }
@@ -145,7 +145,7 @@ Status modes_switch(Solver *s, const int *happened) {
     const Instant at = segment_instant(s, s->state.now.t);
     const int rubs = system->frictions > 0;
     double *arriving = s->work_modes + system->m;
-    memcpy(arriving, s->state.v, (size_t)system->n * sizeof *arriving);
+    memcpy(arriving, s->state.v, (size_t)system->nv * sizeof *arriving);
     memset(s->push, 0, (size_t)contacts * sizeof *s->push);
     int *flags = s->iwork_events;
     Flags x = {flags, flags + contacts, flags + 2 * contacts, flags + 3 * contacts,

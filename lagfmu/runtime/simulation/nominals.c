@@ -39,7 +39,7 @@ static const double FASTEST = 1e150; /* [1/s] of a motion */
 static double positive(double x) { return x > 0 ? x : STILL; }
 
 void nominals_extents(const System *s, const double *p, double *least) {
-    for (int j = 0; j < s->n; j++) {
+    for (int j = 0; j < s->nq; j++) {
         least[j] = s->folded != NULL ? s->folded[j] : 0;
         for (int i = 0; i < s->parameters; i++)
             if (s->extent_dimension[i] == s->dimension[j]) least[j] = larger(least[j], fabs(p[i]));
@@ -51,13 +51,13 @@ void nominals_sizes(Solver *s, const double *q) {
     double *size = s->state.size, *least = s->work_initial;
     double turn = 0;
     nominals_extents(system, s->p, least);
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->nq; j++) {
         const double place = fabs(q[j]) > LOST * size[j] ? fabs(q[j]) : 0;
         size[j] = larger(place, least[j]);
         if (system->dimension[j] == system->angles) turn = larger(turn, place);
     }
     if (!(turn > 0 && turn < 1)) turn = 1;
-    for (int j = 0; j < system->n; j++)
+    for (int j = 0; j < system->nq; j++)
         if (system->dimension[j] == system->angles) size[j] = turn;
 }
 
@@ -71,7 +71,7 @@ static double own_nominal(const Solver *s, const double *y, int i) {
 /* Among the coordinates of row k that have the dimension of its entry e: each gets the largest. */
 static void share_row(const Solver *s, const double *y, int k, int e, double *shared) {
     const System *system = s->system;
-    const int n = system->n, first = system->entry_column[e];
+    const int n = system->nq, first = system->entry_column[e];
     double q = 0, v = 0;
     for (int d = system->row_start[k]; d < system->row_start[k + 1]; d++) {
         const int i = system->entry_column[d];
@@ -90,8 +90,8 @@ static void share_row(const Solver *s, const double *y, int k, int e, double *sh
 
 void nominals_shared(const Solver *s, const double *y, double *shared) {
     const System *system = s->system;
-    const int n = system->n;
-    memcpy(shared, s->state.scale, 2 * (size_t)n * sizeof *shared);
+    const int n = system->nq;
+    memcpy(shared, s->state.scale, (size_t)system_states(system) * sizeof *shared);
     for (int k = 0; k < system->m; k++)
         for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++)
             share_row(s, y, k, e, shared);
@@ -106,9 +106,14 @@ void nominals_shared(const Solver *s, const double *y, double *shared) {
     }
 }
 
+double nominals_natural(const Solver *s, int j) {
+    const int nq = s->system->nq;
+    return j < nq ? s->state.size[j] : s->state.span[j - nq] * s->state.now.rate;
+}
+
 int nominals_incomplete(const Solver *s) {
     int incomplete = !(s->state.now.rate > 0);
-    for (int j = 0; j < s->system->n; j++) incomplete |= !(s->state.size[j] > 0);
+    for (int j = 0; j < s->system->nq; j++) incomplete |= !(s->state.size[j] > 0);
     return incomplete;
 }
 
@@ -122,10 +127,10 @@ static double mass_of(const Mechanism *b, int j) {
 /* Accelerations (n) before forces cancel: at least what each coordinate's forces give it alone. */
 static void find_felt(const Mechanism *b, double *felt) {
     const System *s = b->system;
-    for (int j = 0; j < s->n; j++) felt[j] = fabs(b->F[j]);
+    for (int j = 0; j < s->nv; j++) felt[j] = fabs(b->F[j]);
     for (int e = 0; e < s->entries; e++)
         felt[s->entry_column[e]] += fabs(b->G[e]) * fabs(b->lambda[s->entry_row[e]]);
-    for (int j = 0; j < s->n; j++) {
+    for (int j = 0; j < s->nv; j++) {
         const double mass = mass_of(b, j);
         felt[j] = larger(mass > 0 ? felt[j] / mass : 0, fabs(b->vdot[j]));
     }
@@ -143,7 +148,7 @@ static double rate_of_coordinate(const Solver *s, int j, double v, double pull) 
 
 double nominals_pace(const Solver *s) {
     const Integrator *i = &s->integrator;
-    const int n = s->system->n;
+    const int n = s->system->nq;
     const double *v = i->y + n, *before = i->y_old + n;
     double pace = s->state.now.rate;
     for (int j = 0; j < n; j++)
@@ -154,7 +159,7 @@ double nominals_pace(const Solver *s) {
 /* The largest magnitude of x (n) among the coordinates of the dimension of j. */
 static double largest_alike(const System *s, int j, const double *x) {
     double largest = 0;
-    for (int i = 0; i < s->n; i++)
+    for (int i = 0; i < s->nv; i++)
         if (s->dimension[i] == s->dimension[j]) largest = larger(largest, fabs(x[i]));
     return largest;
 }
@@ -165,13 +170,13 @@ void nominals_motion_speeds(const Mechanism *b, const double *speed, double *sha
     for (int e = 0; e < s->masses; e++)
         if (s->mass_row[e] == s->mass_column[e] && b->M[e] > 0)
             momentum = larger(momentum, sqrt(b->M[e]) * speed[s->mass_row[e]]);
-    for (int j = 0; j < s->n; j++) shared[j] = 0;
+    for (int j = 0; j < s->nv; j++) shared[j] = 0;
     for (int e = 0; e < s->masses; e++) /* the heaviest of each coordinate's dimension */
         if (s->mass_row[e] == s->mass_column[e])
-            for (int j = 0; j < s->n; j++)
+            for (int j = 0; j < s->nv; j++)
                 if (s->dimension[j] == s->dimension[s->mass_row[e]])
                     shared[j] = larger(shared[j], b->M[e]);
-    for (int j = 0; j < s->n; j++) {
+    for (int j = 0; j < s->nv; j++) {
         const double own = shared[j] > 0 ? momentum / sqrt(shared[j]) : 0;
         shared[j] = larger(own, largest_alike(s, j, speed));
     }
@@ -180,7 +185,7 @@ void nominals_motion_speeds(const Mechanism *b, const double *speed, double *sha
 /* The least rate at which a coordinate that has a size moves through it; 0 if none does. */
 static double slowest_rate(const Solver *s) {
     double slowest = 0;
-    for (int j = 0; j < s->system->n; j++) {
+    for (int j = 0; j < s->system->nv; j++) {
         const double rate = rate_of_coordinate(s, j, s->state.v[j], 0);
         if (rate > 0 && !(slowest > 0 && slowest <= rate)) slowest = rate;
     }
@@ -194,10 +199,10 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
     const System *system = s->system;
     double *least = s->work_initial, steady = 0, natural = 0;
     nominals_extents(system, s->p, least);
-    for (int j = 0; j < system->n; j++)
+    for (int j = 0; j < system->nv; j++)
         if (least[j] > 0 || system->dimension[j] == system->angles)
             steady = larger(steady, rate_of_coordinate(s, j, s->state.v[j], felt[j]));
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->nv; j++) {
         own[j] = 0;
         if (s->state.size[j] > 0) continue;
         const double speed = largest_alike(system, j, s->state.v);
@@ -214,7 +219,7 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
  * its size, linearly; shaken (n): the speeds by which rounding of the coordinates shakes it.  Both 0 at
  * the edge of what the equations describe.  `stepped` is at the state before and after. */
 static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
-    const int n = s->system->n;
+    const int n = s->system->nq;
     State *state = &s->state;
     Mechanism *b = &s->stepped;
     double *vdot = s->work_initial, omega = 0;
@@ -244,7 +249,7 @@ static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
 
 /* 1 if nothing moves and the accelerations are what rounding leaves of forces that cancel. */
 static int is_resting(const Solver *s, const double *felt, const double *back) {
-    for (int j = 0; j < s->system->n; j++)
+    for (int j = 0; j < s->system->nv; j++)
         if (s->state.v[j] != 0 || !(fabs(s->stepped.vdot[j]) <= LOST * larger(felt[j], back[j])))
             return 0;
     return 1;
@@ -255,7 +260,7 @@ static double find_natural_rate(const Solver *s, double span, const double *felt
                                 double natural) {
     const int resting = is_resting(s, felt, back);
     double rate = natural, forced = 0;
-    for (int j = 0; j < s->system->n; j++) {
+    for (int j = 0; j < s->system->nv; j++) {
         const double returns = back[j] > LOST / DISPLACED * felt[j] ? back[j] : 0;
         rate = larger(rate, rate_of_coordinate(s, j, s->state.v[j], resting ? returns : s->stepped.vdot[j]));
         forced = larger(forced, rate_of_coordinate(s, j, s->state.v[j], felt[j]));
@@ -270,7 +275,7 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
     const Mechanism *b = &s->stepped;
     double *reach = s->work_initial;
     int taken = 0;
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->nv; j++) {
         if (!(own[j] > 0)) continue;
         const double speed = largest_alike(system, j, s->state.v);
         double acceleration = largest_alike(system, j, b->vdot);
@@ -280,7 +285,7 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
         taken = 1;
     }
     if (!taken) return;
-    for (int j = 0; j < system->n; j++) reach[j] = larger(fabs(s->state.q[j]), s->state.size[j]);
+    for (int j = 0; j < system->nq; j++) reach[j] = larger(fabs(s->state.q[j]), s->state.size[j]);
     for (int c = 0; c < system->contacts; c++)
         s->state.gap[c] =
             larger(s->state.gap[c], TOUCH * mechanism_row_size(b, system->contact[c], reach));
@@ -288,7 +293,7 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
 
 /* No smaller than what rounding in values of the coordinate's size allows at this tolerance. */
 static Status find_scales(Solver *s, const double *own, const double *shaken) {
-    const int n = s->system->n;
+    const int n = s->system->nq;
     State *state = &s->state;
     const double floor = larger(1e-8, 10 * DBL_EPSILON / s->settings.tolerance);
     const double roundings = fmin(larger(SHAKEN * s->settings.tolerance, 0.01), 10);
@@ -306,7 +311,7 @@ static Status find_scales(Solver *s, const double *own, const double *shaken) {
 }
 
 Status nominals_complete(Solver *s, Instant at, double span) {
-    const int n = s->system->n;
+    const int n = s->system->nq;
     double *felt = s->work_initial + n, *own = felt + n, *back = own + n, *shaken = back + n;
     find_felt(&s->stepped, felt);
     const double natural = find_own(s, span, felt, own);

@@ -5,22 +5,25 @@
 #include "linkage.h"
 #include "solver.h"
 
-/* least (n): for each coordinate the largest parameter of its dimension; 0 for an angle. */
+/* least (nq): for each coordinate the largest parameter of its dimension; 0 for an angle. */
 SHARED void nominals_extents(const System *s, const double *p, double *least);
 
 /* state.size at q; 0 where there is none.  Before: the sizes before q was projected, or 0. */
 SHARED void nominals_sizes(Solver *s, const double *q);
 
-/* shared (n): what speeds a whole motion has that moves each coordinate at `speed` (n) >= 0: the largest of
+/* shared (nv): what speeds a whole motion has that moves each coordinate at `speed` (nv) >= 0: the largest of
  * its dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its
  * own.  A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed
  * is rounding of theirs.  Of the masses that were evaluated last. */
 SHARED void nominals_motion_speeds(const Mechanism *b, const double *speed, double *shared);
 
-/* shared (2 n): state.scale, no smaller than the scales and magnitudes in y (2 n) of the coordinates that each
+/* shared (states): state.scale, no smaller than the scales and magnitudes in y of the coordinates that each
  * one can turn into by another choice of axes: those of its dimension with which a constraint or the mass
  * matrix ties it; angles with which a constraint does.  So the steps are the same in whatever frame. */
 SHARED void nominals_shared(const Solver *s, const double *y, double *shared);
+
+/* What y[j] is as large as: the size of a coordinate; of a speed that which the natural rate gives it. */
+SHARED double nominals_natural(const Solver *s, int j);
 
 /* 1 while a size, or the rate, is not known. */
 SHARED int nominals_incomplete(const Solver *s);

@@ -42,19 +42,19 @@ static double offset_of(const Solver *s, int k) {
 /* Coordinates and velocities of the full system. */
 static void expand(const Solver *s, double t, const double *q, const double *v, double *full_q,
                    double *full_v) {
-    const size_t bytes = (size_t)s->system->n * sizeof *q;
-    if (s->system->embed != NULL) {
-        s->system->embed(t, q, v, s->u, s->p, full_q, full_v);
+    const System *system = s->system;
+    if (system->embed != NULL) {
+        system->embed(t, q, v, s->u, s->p, full_q, full_v);
         return;
     }
-    memcpy(full_q, q, bytes);
-    memcpy(full_v, v, bytes);
+    memcpy(full_q, q, (size_t)system->nq * sizeof *q);
+    memcpy(full_v, v, (size_t)system->nv * sizeof *v);
 }
 
 /* The coordinates that are stepped, where there are others. */
 static Status observe_stepped(Solver *s, Instant at, Observed *o) {
     const State *state = &s->state;
-    const size_t n = (size_t)s->system->n * sizeof(double);
+    const size_t n = (size_t)s->system->nv * sizeof(double);
     if (mechanism_motion(&s->stepped, at, state->q, state->v, s->active) == FAILED) return FAILED;
     memcpy(o->s, state->q, n);
     memcpy(o->sdot, state->v, n);
@@ -65,11 +65,11 @@ static Status observe_stepped(Solver *s, Instant at, Observed *o) {
 /* lambda, whether it is unique, Q and each constraint's share in it. */
 static void observe_forces(const Mechanism *b, Observed *o) {
     const System *s = b->system;
-    memcpy(o->vdot, b->vdot, (size_t)s->n * sizeof *o->vdot);
+    memcpy(o->vdot, b->vdot, (size_t)s->nv * sizeof *o->vdot);
     memcpy(o->lambda, b->lambda, (size_t)s->m * sizeof *o->lambda);
     memcpy(o->unique, b->linear.unique, (size_t)s->m * sizeof *o->unique);
-    memcpy(o->applied, b->F, (size_t)s->n * sizeof *o->applied);
-    for (int j = 0; j < s->n; j++) o->force[j] = 0;
+    memcpy(o->applied, b->F, (size_t)s->nv * sizeof *o->applied);
+    for (int j = 0; j < s->nv; j++) o->force[j] = 0;
     for (int e = 0; e < s->entries; e++) {
         o->share[e] = b->G[e] * b->lambda[s->entry_row[e]];
         o->force[s->entry_column[e]] += o->share[e];
@@ -120,7 +120,7 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
 
 /* The states of the latest events, by the full coordinates. */
 static void observe_events(const Solver *s, EventKind kind, Observed *o) {
-    const int own = s->system->n, full = s->system->full->n;
+    const int own = s->system->nq, full = s->system->full->nq; /* of an embedding: as many speeds */
     const Latest *latest = &s->state.latest[kind];
     for (int i = 0; i < event_count_of(s->system, kind); i++) {
         double *q = o->latest_q[kind] + i * full, *v = o->latest_v[kind] + i * full;
@@ -148,8 +148,8 @@ static void names(const Solver *s, const System *full, Owner of, int i, const ch
             name[1] = full->coordinates[full->entry_column[i]];
             break;
         case OF_CONTACT:
-            name[0] = own->rows[own->contact[i / full->n]].name;
-            name[1] = full->coordinates[i % full->n];
+            name[0] = own->rows[own->contact[i / full->nq]].name;
+            name[1] = full->coordinates[i % full->nq];
             break;
         case OF_SLIP: name[0] = own->rows[own->friction[i / 2].row[i % 2]].name; break;
         case OF_FRICTION: name[0] = own->friction[i].name; break;
@@ -159,7 +159,7 @@ static void names(const Solver *s, const System *full, Owner of, int i, const ch
 /* FAILED if a value is not finite; the cause names them as the FMU's variables are named. */
 static Status check_observed_finite(Solver *s, const System *full, const Observed *o) {
     const System *own = s->system;
-    const int n = full->n, stepped = own->embed != NULL ? own->n : 0;
+    const int n = full->nq, stepped = own->embed != NULL ? own->nq : 0;
     const int kept = stepped > 0 ? own->contacts * n : 0; /* with an embedding there are no frictions */
     const double total = o->energy[0] + o->energy[1];
     const struct {

@@ -25,7 +25,7 @@ Status outputs_observe(const System *s, Instant at, Observed *o, Why *why) {
 /* dQ = d(G^T lambda), entry by entry of G. */
 static void change_of_forces(Sensitivity *w, const Mechanism *b) {
     const System *s = b->system;
-    for (int j = 0; j < s->n; j++) w->dforce[j] = 0;
+    for (int j = 0; j < s->nv; j++) w->dforce[j] = 0;
     for (int e = 0; e < s->entries; e++) {
         const int k = s->entry_row[e];
         w->dforce[s->entry_column[e]] += w->dG[e] * b->lambda[k] + b->G[e] * w->dlambda[k];

@@ -35,7 +35,7 @@ static const double NAMING = 1e-5;   /* how far off the constraints a state is t
 /* Factors the rows at (t, y), taken to be off the constraints by that much. */
 static Status factor_there(Solver *s, double t, const double *y, double off) {
     Mechanism *b = &s->stepped;
-    if (mechanism_evaluate(b, segment_instant(s, t), y, y + s->system->n) != OK) return FAILED;
+    if (mechanism_evaluate(b, segment_instant(s, t), y, y + s->system->nq) != OK) return FAILED;
     b->linear.off = off;
     const Status status = linear_factor(&b->linear, b->M, b->G, s->active);
     b->linear.off = 0;
@@ -44,13 +44,11 @@ static Status factor_there(Solver *s, double t, const double *y, double off) {
 
 /* How fast the angle falls [1/s] at the state where a step begins; y is left to the scratch. */
 static double falling(Solver *s, double t, const double *y, double apart) {
-    const int n = s->system->n;
+    const int nq = s->system->nq, nv = s->system->nv;
     const double ahead = LOOK_AHEAD / s->state.now.rate;
     double *there = s->work_passage;
-    for (int j = 0; j < n; j++) {
-        there[j] = y[j] + ahead * y[n + j];
-        there[n + j] = y[n + j];
-    }
+    for (int j = 0; j < nq; j++) there[j] = y[j] + ahead * y[nq + j];
+    memcpy(there + nq, y + nq, (size_t)nv * sizeof *y);
     if (factor_there(s, t + ahead, there, DBL_MIN) != OK) return 0;
     return (apart - linear_apart(&s->stepped.linear)) / ahead;
 }
@@ -84,7 +82,7 @@ static int landed(const Solver *s, double *h) {
 }
 
 static const double *stage(Solver *s, double t, const double *y) {
-    memcpy(s->work_passage, y, 2 * (size_t)s->system->n * sizeof *y);
+    memcpy(s->work_passage, y, (size_t)system_states(s->system) * sizeof *y);
     return segment_project(s, t, s->work_passage) == OK ? s->work_passage : NULL;
 }
 

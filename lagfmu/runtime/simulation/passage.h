@@ -7,12 +7,12 @@
 
 /* All of it is reached by one pointer (optional.h), NULL in an FMU with less than two rows, or with frictions. */
 typedef struct {
-    /* At the state y (2 n) on the constraints where a step begins, whose rows were just factored: is such a
+    /* At the state y (states) on the constraints where a step begins, whose rows were just factored: is such a
      * configuration near?  s->state.now.approach says so from here on. */
     void (*look)(Solver *s, double t, const double *y);
     /* The longest step [s] from there that ends clear of it; `next`: the step that is about to be tried. */
     double (*longest)(const Solver *s, double next);
-    /* y (2 n) of a stage, on the constraints: kept in scratch.  NULL: there is no such state. */
+    /* y (states) of a stage, on the constraints: kept in scratch.  NULL: there is no such state. */
     const double *(*stage)(Solver *s, double t, const double *y);
     /* Is such a configuration near the step just taken, or in it? */
     int (*suspected)(const Solver *s);

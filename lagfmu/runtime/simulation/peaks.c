@@ -25,17 +25,17 @@ static const double PEAK_ROUNDING = 1e-13; /* of a quantity's values */
 typedef struct {
     Solver *s;
     int count;                /* of times */
-    const double *end;        /* (2 n) state at the last of them, or NULL */
+    const double *end;        /* (states) at the last of them, or NULL */
     double *t;                /* (PIECES + 1) */
     double *values, *value;   /* a row of quantities for each time; one row more */
-    double *y;                /* (2 n) */
+    double *y;                /* (states) */
     void (*dense)(const Integrator *i, double t, double *y);
     int exchange, passed;     /* 1: of an importer's step; a record was passed in it */
     int quantity;             /* whose extreme is sought, ... */
     double sense, from;       /* ... 1: largest, -1: smallest; [s] from which elapsed time counts */
 } Stretch;
 
-static int doubles_of_peaks(int peaks, int n) { return (PIECES + 2) * (1 + peaks) + 4 * n; }
+static int doubles_of_peaks(int peaks, int states) { return (PIECES + 2) * (1 + peaks) + 2 * states; }
 
 static double *reached(const Solver *s) { return s->peak + PEAK_PARTS * s->peaks; }
 
@@ -47,9 +47,7 @@ static Status measure_peak(Solver *s, double *values) {
 
 /* The same at (t, y); the state of now is lost. */
 static Status measure_there(Solver *s, double t, const double *y, double *values) {
-    const size_t n = (size_t)s->system->n;
-    memcpy(s->state.q, y, n * sizeof *y);
-    memcpy(s->state.v, y + n, n * sizeof *y);
+    state_scatter(s->system, y, s->state.q, s->state.v);
     s->state.now.t = t;
     return measure_peak(s, values);
 }
@@ -171,18 +169,15 @@ static Status look_at_all(Stretch *x, double t) {
 /* The same with memory, and with the state of now put back. */
 static Status look_at_time(Stretch *x, double t) {
     Solver *s = x->s;
-    const size_t n = (size_t)s->system->n, bytes = n * sizeof(double);
     const double now = s->state.now.t;
     x->t = s->work_peaks;
     x->values = x->t + PIECES + 1;
     x->value = x->values + (PIECES + 1) * s->peaks;
     x->y = x->value + s->peaks;
-    double *held = x->y + 2 * n;
-    memcpy(held, s->state.q, bytes);
-    memcpy(held + n, s->state.v, bytes);
+    double *held = x->y + s->integrator.ny;
+    state_gather(s->system, s->state.q, s->state.v, held);
     const Status status = look_at_all(x, t);
-    memcpy(s->state.q, held, bytes);
-    memcpy(s->state.v, held + n, bytes);
+    state_scatter(s->system, held, s->state.q, s->state.v);
     s->state.now.t = now;
     return status;
 }
@@ -205,11 +200,8 @@ static void cubic(const Integrator *i, double t, double *y) {
 /* Where an importer's next step begins: here, where the motion has just been measured. */
 static void begin_step(Solver *s) {
     Integrator *i = &s->integrator;
-    const size_t n = (size_t)s->system->n, bytes = n * sizeof(double);
-    memcpy(i->y, s->state.q, bytes);
-    memcpy(i->y + n, s->state.v, bytes);
-    memcpy(i->f, s->state.v, bytes);
-    memcpy(i->f + n, s->stepped.vdot, bytes);
+    state_gather(s->system, s->state.q, s->state.v, i->y);
+    state_gather(s->system, s->state.v, s->stepped.vdot, i->f);
     i->t = s->state.now.t_integrator = s->state.now.t;
 }
 

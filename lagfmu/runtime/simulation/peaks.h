@@ -8,10 +8,10 @@
 /* Of s->peaks quantities, which s->measure knows.  All of it is reached by one pointer (optional.h), NULL in an
  * FMU without any. */
 typedef struct {
-    int (*doubles)(int peaks, int n); /* of scratch */
+    int (*doubles)(int peaks, int states); /* of scratch */
     /* The values at the state of now count; `first`: nothing has before. */
     Status (*here)(Solver *s, int first);
-    /* The step just taken counts from where it has done so as far as t; y (2 n): the state there, NULL where the
+    /* The step just taken counts from where it has done so as far as t; y: the state there, NULL where the
      * integrator says it.  The state of now stays. */
     Status (*pass)(Solver *s, double t, const double *y);
     /* Model exchange: a step from where this was called last, or `here`, to the state of now.  Only extremes on the

@@ -46,27 +46,25 @@ Status segment_motion(Solver *s, Instant at, const double *q, const double *v) {
 
 static Status rate_of_state(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
-    const int n = s->system->n;
+    const int nq = s->system->nq, nv = s->system->nv;
     if (s->state.now.approach.near && (y = OPTIONAL.passage->stage(s, t, y)) == NULL) return FAILED;
     s->stepped.stage = 1;
-    const Status status = segment_motion(s, segment_instant(s, t), y, y + n);
+    const Status status = segment_motion(s, segment_instant(s, t), y, y + nq);
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
     if (OPTIONAL.passage != NULL) s->narrowest = fmin(s->narrowest, s->apart = linear_apart(&s->stepped.linear));
-    for (int j = 0; j < n; j++) { /* quicker than memcpy for a few coordinates */
-        dydt[j] = y[n + j];
-        dydt[n + j] = s->stepped.vdot[j];
-    }
+    for (int j = 0; j < nq; j++) dydt[j] = y[nq + j]; /* quicker than memcpy for a few coordinates */
+    for (int i = 0; i < nv; i++) dydt[nq + i] = s->stepped.vdot[i];
     return OK;
 }
 
 /* The same where every row acts and is solved by code written out: nine in ten of all evaluations. */
 static Status plain_rate(void *context, double t, const double *y, double *dydt) {
     Solver *s = context;
-    const int n = s->system->n;
-    if (!s->system->accelerate(t, y, y + n, s->u, s->p, dydt + n)) return rate_of_state(context, t, y, dydt);
+    const int nq = s->system->nq;
+    if (!s->system->accelerate(t, y, y + nq, s->u, s->p, dydt + nq)) return rate_of_state(context, t, y, dydt);
     s->apart = 1;
-    for (int j = 0; j < n; j++) dydt[j] = y[n + j];
+    for (int j = 0; j < nq; j++) dydt[j] = y[nq + j];
     return OK;
 }
 
@@ -117,9 +115,8 @@ static Control control(const Solver *s, const Integrator *i, double longest) {
 
 /* rk4 controls no error; a step whose error is as large as the state itself is refused. */
 static Status check_fixed_step(Solver *s, const Integrator *i) {
-    const int n = s->system->n;
-    for (int j = 0; j < 2 * n; j++) {
-        const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
+    for (int j = 0; j < system_states(s->system); j++) {
+        const double size = nominals_natural(s, j);
         if (!(fabs(OPTIONAL.rk4_error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
             return fail(&s->why,
                         "the integration stops at t = %.17g s, rk4's step of %.3g s is far too "
@@ -132,15 +129,15 @@ static Status check_fixed_step(Solver *s, const Integrator *i) {
 /* The accelerations at the state on the constraints where a step begins: by all rows, of which those that
  * depend on others are then left out in the step's stages, which lie off the constraints. */
 static Status accept(Solver *s, Integrator *i) {
-    const int n = s->system->n;
+    const int nq = s->system->nq, nv = s->system->nv;
     if (i != &s->integrator || !i->fresh || s->system->m < 2) return OK;
     const double *y = i->y;
-    if (mechanism_motion(&s->stepped, segment_instant(s, i->t), y, y + n, s->active) != OK)
+    if (mechanism_motion(&s->stepped, segment_instant(s, i->t), y, y + nq, s->active) != OK)
         return FAILED;
     segment_choose_rows(s);
     if (OPTIONAL.passage != NULL) OPTIONAL.passage->look(s, i->t, y);
-    memcpy(i->f, y + n, (size_t)n * sizeof *y);
-    memcpy(i->f + n, s->stepped.vdot, (size_t)n * sizeof *y);
+    memcpy(i->f, y + nq, (size_t)nq * sizeof *y);
+    memcpy(i->f + nq, s->stepped.vdot, (size_t)nv * sizeof *y);
     i->fresh = 0;
     return OK;
 }
@@ -170,49 +167,49 @@ Status segment_prepare_dense(Solver *s, Integrator *i) {
 }
 
 Status segment_project(Solver *s, double t, double *y) {
-    return mechanism_project(&s->stepped, segment_instant(s, t), y, y + s->system->n, s->active,
+    return mechanism_project(&s->stepped, segment_instant(s, t), y, y + s->system->nq, s->active,
                              s->state.offset, s->state.size);
 }
 
 /* Is that much of a step rounding of the forces, which others balance? */
 static int is_balanced(const Solver *s, int j, double moved) {
     const System *system = s->system;
-    const int n = system->n;
+    const int nq = system->nq, i = j < nq ? j : j - nq;
     const double h = s->integrator.t - s->integrator.t_old;
     for (int e = 0; e < system->masses; e++) {
-        if (system->mass_row[e] != j % n || system->mass_column[e] != j % n) continue;
-        const double mass = s->stepped.M[e], force = fabs(s->stepped.F[j % n]);
-        return mass > 0 && moved <= BALANCED * force / mass * h * (j < n ? h : 1);
+        if (system->mass_row[e] != i || system->mass_column[e] != i) continue;
+        const double mass = s->stepped.M[e], force = fabs(s->stepped.F[i]);
+        return mass > 0 && moved <= BALANCED * force / mass * h * (j < nq ? h : 1);
     }
     return 0;
 }
 
 Status segment_check_projection(Solver *s, double t, const double *y, const double *projected) {
-    const int n = s->system->n;
     const double far = fmax(FAR * s->settings.tolerance, LEAST_FAR);
     if (s->integrator.method->fixed) return OK;
     if (s->system->prescribed_count > 0 && s->integrator.t_old == s->drive.since)
         return OK; /* a prescribed motion may have jumped when it was set */
-    for (int j = 0; j < 2 * n; j++) {
-        const double size = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
+    for (int j = 0; j < system_states(s->system); j++) {
+        const double size = nominals_natural(s, j);
         const double moved = fabs(projected[j] - y[j]);
         const double known = fmax(fmax(fabs(y[j]), size), s->scale[j]); /* as the step's error */
+        const StateName of = system_state_name(s->system, j);
         if (!(moved <= far * known) && !is_balanced(s, j, moved))
             return fail(&s->why,
                         "the integration stops at t = %.17g s, the projection onto the constraints "
-                        "moves %s by %.3g: the configuration is singular, or nearly so",
-                        t, s->system->coordinates[j % n], projected[j] - y[j]);
+                        "moves %s%s%s by %.3g: the configuration is singular, or nearly so",
+                        t, of.head, of.name, of.tail, projected[j] - y[j]);
     }
     return OK;
 }
 
 Status segment_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
     Integrator *i = &s->probe;
-    memcpy(y, y0, 2 * (size_t)s->system->n * sizeof *y);
+    memcpy(y, y0, (size_t)system_states(s->system) * sizeof *y);
     if (!(t1 > t0)) return OK;
     integrator_start(i, s->integrator.method, t0, y0, t1 - t0);
     while (i->t < t1)
         if (segment_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
-    memcpy(y, i->y, 2 * (size_t)s->system->n * sizeof *y);
+    memcpy(y, i->y, (size_t)system_states(s->system) * sizeof *y);
     return segment_project(s, t1, y);
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "friction.h"
+#include "nominals.h"
 #include "segment.h"
 #include "thresholds.h"
 
@@ -36,7 +37,7 @@ int slip_turns(const Solver *s) {
 Status slip_turn(Solver *s, double t, const double *y) {
     Mechanism *b = &s->stepped;
     if (!slip_turns(s)) return OK;
-    const double *v = y + s->system->n;
+    const double *v = y + s->system->nq;
     if (mechanism_evaluate(b, segment_instant(s, t), y, v) != OK) return FAILED;
     for (int i = 0; i < s->system->frictions; i++) {
         double slip[2], e[2];
@@ -56,7 +57,7 @@ static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.56888
 
 /* The motion at a state that may lie off the constraints. */
 static Status move_near(Solver *s, double t, const double *y) {
-    return mechanism_motion_near(&s->stepped, segment_instant(s, t), y, y + s->system->n, s->active,
+    return mechanism_motion_near(&s->stepped, segment_instant(s, t), y, y + s->system->nq, s->active,
                                  s->state.offset, s->state.size);
 }
 
@@ -80,7 +81,7 @@ Status slip_work(Solver *s, double t0, double t1, double *lost) {
 }
 
 static Status rate(Solver *s, double t, const double *y, double *vdot) {
-    const size_t bytes = (size_t)s->system->n * sizeof *vdot;
+    const size_t bytes = (size_t)s->system->nv * sizeof *vdot;
     if (move_near(s, t, y) != OK) return FAILED;
     memcpy(vdot, s->stepped.vdot, bytes);
     return OK;
@@ -88,24 +89,23 @@ static Status rate(Solver *s, double t, const double *y, double *vdot) {
 
 Status slip_jacobian(Solver *s, double t, const double *y, double *J, double *dfdt) {
     const double part = 1.4901161193847656e-8; /* 2^-26: half of a double's digits */
-    const int n = s->system->n, ny = 2 * n;
-    double *moved = s->work_friction + 2 * s->system->frictions, *at = moved + ny, *there = at + n;
+    const int nq = s->system->nq, nv = s->system->nv, ny = nq + nv;
+    double *moved = s->work_friction + 2 * s->system->frictions, *at = moved + ny, *there = at + nv;
     if (rate(s, t, y, at) != OK) return FAILED;
     memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
-    memset(dfdt, 0, (size_t)n * sizeof *dfdt);
+    memset(dfdt, 0, (size_t)nq * sizeof *dfdt);
     memcpy(moved, y, (size_t)ny * sizeof *y);
     for (int j = 0; j < ny; j++) {
-        const double natural = s->state.size[j % n] * (j < n ? 1 : s->state.now.rate);
-        const double step = part * fmax(fabs(y[j]), natural);
-        if (j >= n) J[(j - n) * ny + j] = 1;
+        const double step = part * fmax(fabs(y[j]), nominals_natural(s, j));
+        if (j >= nq) J[(j - nq) * ny + j] = 1;
         if (!(step > 0)) continue;
         moved[j] = y[j] + step;
         if (rate(s, t, moved, there) != OK) return FAILED;
-        for (int i = 0; i < n; i++) J[(n + i) * ny + j] = (there[i] - at[i]) / (moved[j] - y[j]);
+        for (int i = 0; i < nv; i++) J[(nq + i) * ny + j] = (there[i] - at[i]) / (moved[j] - y[j]);
         moved[j] = y[j];
     }
     const double step = part / s->state.now.rate;
     if (rate(s, t + step, y, there) != OK) return FAILED;
-    for (int i = 0; i < n; i++) dfdt[n + i] = (there[i] - at[i]) / step;
+    for (int i = 0; i < nv; i++) dfdt[nq + i] = (there[i] - at[i]) / step;
     return OK;
 }

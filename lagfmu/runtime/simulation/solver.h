@@ -8,16 +8,16 @@
 #include "sensitivity.h"
 #include "state.h"
 
-/* What an importer can read at a state; arrays of the full system (n, m, entries). */
+/* What an importer can read at a state; arrays of the full system (nq, nv, m, entries). */
 typedef struct {
-    double *q, *v, *vdot;          /* (n) of the full system */
+    double *q, *v, *vdot;          /* (nq), (nv), (nv) of the full system */
     double *lambda, *residual;     /* (m) */
     int *unique;                   /* (m) */
-    double *force, *share;         /* Q (n); one constraint's part of it (entries) */
-    double *applied;               /* F (n), of the unconstrained motion */
+    double *force, *share;         /* Q (nv); one constraint's part of it (entries) */
+    double *applied;               /* F (nv), of the unconstrained motion */
     double energy[2];              /* kinetic, potential */
     double *own, *other;           /* (output_count) the model's own; where these are not finite */
-    double *s, *sdot, *sddot;      /* (n of the stepped system) of an embedding */
+    double *s, *sdot, *sddot;      /* (nq of the stepped system) of an embedding */
     double *latest_q[EVENT_KINDS], *latest_v[EVENT_KINDS]; /* of an embedding: state.latest in full coordinates */
     double *slip, *margin, *power; /* (2 frictions), (frictions), (frictions) */
     int *sticks;                   /* (frictions) */
@@ -36,7 +36,7 @@ typedef struct Solver {
     Mechanism stepped, full;   /* full: of an embedding; otherwise unused */
     Integrator integrator, probe; /* probe: integrates again from the last accepted point */
     int *active;               /* (m) rows that act in the present modes */
-    double *scale;             /* (2 n) of errors, in the present step */
+    double *scale;             /* (states) of errors, in the present step */
     double *u;                 /* (inputs, then switches) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
     int peaks;                 /* how many quantities' extremes are kept (peaks.h); set before the layout */
@@ -45,25 +45,25 @@ typedef struct Solver {
     double *push;              /* (contacts) impulse of the impacts of the present instant [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
-    double *work_initial;      /* (6 n + 3 m) of initialization.c, initial_projection.c and nominals.c */
+    double *work_initial;      /* (6 nq + 3 m) of initialization.c, initial_projection.c and nominals.c */
     int *iwork_initial;        /* (2 m + contacts) */
-    double *work_contacts;     /* (2 n + 3 m) of contacts.c */
+    double *work_contacts;     /* (2 nv + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */
-    double *work_switches;     /* (2 switches + n) of switches.c */
+    double *work_switches;     /* (2 switches + nq) of switches.c */
     double apart, narrowest;   /* linear_apart() at the latest stage, and the least of a step */
-    double *work_passage;      /* (2 n) of passage.c */
-    double *work_advance;      /* (4 n) of advance.c */
-    double *work_events;       /* (6 n + indicators and all samples) of events.c */
+    double *work_passage;      /* (states) of passage.c */
+    double *work_advance;      /* (2 states) of advance.c and exchange.c */
+    double *work_events;       /* (3 states + indicators and all samples) of events.c and exchange_gain.c */
     double *work_gap;    /* of minimum_gap.c */
     Observed peak_seen;        /* of peaks.c, with */
     double *work_peaks;
     double *work_frictional;   /* of frictional_impact.c */
     int *iwork_frictional;
     StickSlip *trial_modes;    /* (frictions) of stick_slip.c, with */
-    double *work_friction;     /* (2 frictions + 4 n) */
+    double *work_friction;     /* (2 frictions + 2 states) */
     int *iwork_friction;       /* (4 frictions + 2 contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and modes.c */
-    double *work_modes;        /* (m + n) of modes.c */
+    double *work_modes;        /* (m + nv) of modes.c */
     double *work_impact;       /* of impact.c, see there */
     int *iwork_impact;
     Why passed;                /* singular configurations passed since the caller emptied it, as a sentence */
@@ -80,12 +80,11 @@ static inline const int *solver_rows(const Solver *s) {
  * called once with arenas that count (base = NULL) and once with memory. */
 SHARED void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system);
 
-/* One start value that had to be moved onto the constraints. */
-typedef void (*Moved)(void *context, const char *coordinate, int is_velocity, double given,
-                      double used, Priority priority);
+/* One start value, of state j, that had to be moved onto the constraints. */
+typedef void (*Moved)(void *context, int j, double given, double used, Priority priority);
 
-/* initialization.c -- the consistent state at t nearest to the start values q0, v0 (n, not in s->state) of
- * priority (2 n, of the coordinates and then of the velocities: which of them move first), for the drive and
+/* initialization.c -- the consistent state at t nearest to the start values q0 (nq), v0 (nv, not in s->state) of
+ * priority (states, of the coordinates and then of the speeds: which of them move first), for the drive and
  * p that the caller has set; `moved` (may be NULL) is called for each value that
  * was moved.  FAILED: the start is refused, the cause is in s->why; the state is in disorder. */
 SHARED Status solver_start(Solver *s, double t, const double *q0, const double *v0, const Priority *priority,

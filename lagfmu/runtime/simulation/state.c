@@ -30,12 +30,22 @@ void drive_at(const System *s, const Drive *drive, double t, double *u) {
     }
 }
 
-void state_note(State *x, EventKind kind, int i, int n, const double *q, const double *v) {
+void state_gather(const System *s, const double *q, const double *v, double *y) {
+    memcpy(y, q, (size_t)s->nq * sizeof *y);
+    memcpy(y + s->nq, v, (size_t)s->nv * sizeof *y);
+}
+
+void state_scatter(const System *s, const double *y, double *q, double *v) {
+    memcpy(q, y, (size_t)s->nq * sizeof *y);
+    memcpy(v, y + s->nq, (size_t)s->nv * sizeof *y);
+}
+
+void state_note(State *x, const System *s, EventKind kind, int i, const double *q, const double *v) {
     Latest *latest = &x->latest[kind];
-    const size_t bytes = (size_t)n * sizeof *q;
+    const size_t nq = (size_t)s->nq, nv = (size_t)s->nv, at = (size_t)i;
     if (x->looking) return;
     latest->count[i] += 1;
     latest->time[i] = x->now.t;
-    memcpy(latest->q + (size_t)i * (size_t)n, q, bytes);
-    memcpy(latest->v + (size_t)i * (size_t)n, v, bytes);
+    memcpy(latest->q + at * nq, q, nq * sizeof *q);
+    memcpy(latest->v + at * nv, v, nv * sizeof *v);
 }

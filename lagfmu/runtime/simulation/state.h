@@ -74,18 +74,19 @@ typedef enum { DEPARTURE, CLOSING, SLIPPING, STICKING, EVENT_KINDS } EventKind;
 typedef struct {
     Count *count;
     double *time;   /* [s] */
-    double *q, *v;  /* (n of each) */
+    double *q, *v;  /* (nq), (nv) of each */
 } Latest;
 
 /* ... and its arrays, which lie in one block. */
 typedef struct {
     Numbers now;
     int looking;              /* 1: events are not counted: solver_look(), after which a saved state is put back */
-    double *q, *v;            /* (n) at t, on the constraints */
+    double *q, *v;            /* (nq), (nv) at t, on the constraints */
     double *switch_state;     /* (switches) on which side of its surface each force that jumps is evaluated */
     double *offset;           /* (m) f = offset of a row which came back with its contact */
-    double *scale;            /* (2 n) magnitudes below which errors in q and v are measured absolutely */
-    double *size;             /* (n) the coordinates' magnitudes, for rounding */
+    double *scale;            /* (states) magnitudes below which errors in q and v are measured absolutely */
+    double *size;             /* (nq) the coordinates' magnitudes, for rounding */
+    double *span;             /* (nv) those of what each speed moves */
     double *gap;              /* (contacts) |f| below which a contact touches */
     int *basis;               /* (m) rows that act, as many of them as were independent there */
     int *closed, *armed;      /* (contacts) */
@@ -104,7 +105,12 @@ static inline int event_count_of(const System *s, EventKind kind) {
     return kind <= CLOSING ? s->contacts : s->frictions;
 }
 
-/* An event of contact, or friction, i, now and at the state q, v (n), unless this is a look. */
-SHARED void state_note(State *x, EventKind kind, int i, int n, const double *q, const double *v);
+/* y (states) of q and v, and back. */
+SHARED void state_gather(const System *s, const double *q, const double *v, double *y);
+SHARED void state_scatter(const System *s, const double *y, double *q, double *v);
+
+/* An event of contact, or friction, i, now and at the state q, v, unless this is a look. */
+SHARED void state_note(State *x, const System *s, EventKind kind, int i, const double *q,
+                       const double *v);
 
 #endif

@@ -35,9 +35,9 @@ void stick_slip_set_noise(Solver *s, const double *speed, StickSlip *modes) {
 
 /* Of the G that was evaluated last.  Where a slip ends, it is rounding of the speed at which the step began. */
 void stick_slip_renew_noise(Solver *s, StickSlip *modes) {
-    const double *before = s->integrator.y_old + s->system->n;
+    const double *before = s->integrator.y_old + s->system->nq;
     double *speed = s->work_contacts;
-    for (int j = 0; j < s->system->n; j++)
+    for (int j = 0; j < s->system->nv; j++)
         speed[j] = fmax(fmax(fabs(s->state.v[j]), fabs(before[j])),
                         fmin(s->state.size[j] * s->state.now.rate, DBL_MAX));
     stick_slip_set_noise(s, speed, modes);
@@ -97,7 +97,7 @@ static double rate_of_row(const Mechanism *b, int k, const double *reach, double
 static Status find_slip_rate(Settling *x, int i, double rate[2], double *floor) {
     const Friction *law = &x->s->system->friction[i];
     if (motion_of_modes(x) != OK) return FAILED;
-    double *forces = x->s->work_contacts, *reach = forces + x->s->system->n;
+    double *forces = x->s->work_contacts, *reach = forces + x->s->system->nv;
     mechanism_at_work(&x->s->stepped, forces, reach);
     rate[1] = *floor = 0;
     for (int r = 0; r < law->rows; r++) {
@@ -350,7 +350,7 @@ static int turn_contacts(const System *s, int i, int shut, int *closed, const in
 static int departs(const Settling *x, int i, const int *touching) {
     const System *s = x->s->system;
     const Friction *law = &s->friction[i];
-    double *forces = x->s->work_contacts, *reach = forces + x->s->system->n;
+    double *forces = x->s->work_contacts, *reach = forces + x->s->system->nv;
     mechanism_at_work(&x->s->stepped, forces, reach);
     for (int c = 0; c < s->contacts; c++)
         for (int k = law->first; k < law->first + law->normals; k++) {

@@ -32,7 +32,7 @@ SHARED Status stick_slip_agrees(Settling *x, int i, int *agrees);
 /* Back to the state's own modes, which are now those of x if `settled`. */
 SHARED Status stick_slip_finish(Settling *x, Status settled);
 
-/* What of each slip velocity is rounding: of motions of this speed (n), of the motion as it is and was; it
+/* What of each slip velocity is rounding: of motions of this speed (nv), of the motion as it is and was; it
  * never becomes less. */
 SHARED void stick_slip_set_noise(Solver *s, const double *speed, StickSlip *modes);
 SHARED void stick_slip_renew_noise(Solver *s, StickSlip *modes);

@@ -16,7 +16,7 @@ static void look_ahead(Solver *s, Instant at, const double *q, const double *v, 
     const System *system = s->system;
     const double soon = fmax(SOON / (s->state.now.rate > 0 ? s->state.now.rate : 1), SOON * SOON * fabs(at.t));
     double *later = ahead + system->switches;
-    for (int j = 0; j < system->n; j++)
+    for (int j = 0; j < system->nq; j++)
         later[j] = q[j] + soon * (v[j] + (vdot == NULL ? 0 : soon * vdot[j] / 2));
     system->surfaces(at.t + soon, later, at.u, at.p, ahead);
 }
