@@ -68,9 +68,6 @@ static int *ints(const int *from, int count) {
 
 Bench *bench(int n, int m, int masses, int entries, const int *mass_row, const int *mass_column,
              const int *entry_row, const int *entry_column, const int *row_start, int formulation,
-             const char *const *names, const Row *rows, const int *plan_ints);
-Bench *bench(int n, int m, int masses, int entries, const int *mass_row, const int *mass_column,
-             const int *entry_row, const int *entry_column, const int *row_start, int formulation,
              const char *const *names, const Row *rows, const int *plan_ints) {
     Bench *b = calloc(1, sizeof *b);
     if (b == NULL) return NULL;
@@ -115,23 +112,16 @@ Bench *bench(int n, int m, int masses, int entries, const int *mass_row, const i
     return b;
 }
 
-size_t bench_bytes(const Bench *b);
 size_t bench_bytes(const Bench *b) { return b->bytes; }
-int bench_factor(Bench *b, const double *M, const double *G, const int *active);
 int bench_factor(Bench *b, const double *M, const double *G, const int *active) {
     return linear_factor(&b->linear, M, G, active);
 }
-int bench_solve(Bench *b, const double *rhs, const double *c, double *x, double *lambda);
 int bench_solve(Bench *b, const double *rhs, const double *c, double *x, double *lambda) {
     return linear_solve(&b->linear, rhs, c, x, lambda);
 }
-int bench_rung(const Bench *b);
 int bench_rung(const Bench *b) { return (int)b->linear.rung; }
-const int *bench_unique(const Bench *b);
 const int *bench_unique(const Bench *b) { return b->linear.unique; }
-const char *bench_why(const Bench *b);
 const char *bench_why(const Bench *b) { return b->why.text; }
-double bench_condition(const Bench *b);
 double bench_condition(const Bench *b) { return schur_of(&b->linear)->condition; }
 
 typedef struct {
@@ -142,7 +132,6 @@ static void solve_dense(void *context, double *x) {
     Dense *d = context;
     lu_solve(d->n, d->lu, d->pivots, x);
 }
-double bench_inverse_norm(int n, const double *A);
 double bench_inverse_norm(int n, const double *A) {
     Dense d = {n, {0}, {0}};
     double work[40];
@@ -151,7 +140,6 @@ double bench_inverse_norm(int n, const double *A) {
     return inverse_norm(n, solve_dense, &d, work);
 }
 
-void bench_exact(double a, double b, double *out);
 void bench_exact(double a, double b, double *out) {
     Doubled sum = two_sum(a, b), product = two_product(a, b);
     out[0] = sum.high;
@@ -160,19 +148,6 @@ void bench_exact(double a, double b, double *out) {
     out[3] = product.low;
 }
 
-void bench_active(int m, const Row *rows, int contacts, const int *contact, const int *closed,
-                  int *active);
-void bench_active(int m, const Row *rows, int contacts, const int *contact, const int *closed,
-                  int *active) {
-    System s = {0};
-    s.m = m;
-    s.rows = rows;
-    s.contacts = contacts;
-    s.contact = contact;
-    system_active(&s, closed, active);
-}
-
-void bench_free(Bench *b);
 void bench_free(Bench *b) {
     const int *arrays[] = {b->system.mass_row, b->system.mass_column, b->system.entry_row,
                            b->system.entry_column, b->system.row_start, b->plan.mass.order,

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import re
 import subprocess
-import sys
 from dataclasses import fields
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compiler
+from runtime import FLAGS, INCLUDES, compiler
 
 from lagfmu.testing import Elimination, eliminate, plan
-from lagfmu.testing import EliminationPlan as Plan
 
 
 def chain(links):
@@ -207,37 +203,6 @@ def test_the_plan_of_a_chain_grows_linearly():
     """Twice the links, twice the integers."""
     sizes = [numbers(plan(*chain(links))) for links in (128, 256, 512)]
     assert sizes[2] - sizes[1] == 2 * (sizes[1] - sizes[0])
-
-
-@pytest.mark.thorough
-def test_the_same_patterns_give_the_same_text():
-    """Nothing depends on the order of a set or a dictionary."""
-    mass = [(i, j) for i in range(8) for j in range(i + 1) if (i + j) % 3 == 0 or i == j]
-    jacobian = [(k, j) for k in range(5) for j in range(8) if (k * j) % 4 == 1]
-    command = "from lagfmu.testing import plan; print(plan(8, 5, {}, {}).c_text('p'))"
-    texts = {
-        subprocess.run(
-            [sys.executable, "-c", command.format(mass, jacobian)],
-            env={**os.environ, "PYTHONHASHSEED": seed},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for seed in ("0", "1", "2")
-    }
-    assert len(texts) == 1
-
-
-@pytest.mark.parametrize("part", [Elimination, Plan])
-def test_fields_stand_in_the_order_of_the_header(part):
-    """C fills a struct in the order of its members: plan.h and the dataclasses have the same one."""
-    header = RUNTIME_FILES["plan.h"].read_text(encoding="utf-8")
-    bodies = {name: body for body, name in re.findall(r"struct \{(.*?)\} (\w+);", header, re.S)}
-    body = re.sub(r"/\*.*?\*/", "", bodies[part.__name__], flags=re.S)
-    members = [(kind, name) for kind, name in re.findall(r"([\w ]+?[ *]+)(\w+);", body)]
-    kinds = {"int": "int", "const int *": "Ints", "Elimination": "Elimination"}
-    expected = [(kinds[kind.strip()], name) for kind, name in members]
-    assert expected == [(f.type, f.name) for f in fields(part)]
 
 
 @pytest.mark.parametrize("size", [(1, 0, [(0, 0)], []), chain(1), chain(40), (2, 1, [], [(0, 0)])])

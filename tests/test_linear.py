@@ -3,10 +3,11 @@ singular values on random systems."""
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
-from ctypes import c_double, c_int
+from ctypes import c_double
 from fractions import Fraction
 from pathlib import Path
 
@@ -20,10 +21,8 @@ from linear_bench import (
     SOURCES,
     Bench,
     RefusedError,
-    Row,
     declare,
     doubles,
-    integers,
     patterns,
     solver_of,
 )
@@ -97,22 +96,6 @@ def check(found, M, b, G, c):
     assert found.unique.all()
 
 
-def worst_at(angle, solver):
-    """Largest relative error of x over twenty pairs of walls at `angle` [rad] in space."""
-    rng = np.random.default_rng(0)
-    worst = 0.0
-    for _ in range(20):
-        M, b = np.diag(rng.uniform(1, 5, 3)), rng.normal(size=3)
-        Q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        G = np.array([Q[0], np.cos(angle) * Q[0] + np.sin(angle) * Q[1]])
-        c = G @ rng.normal(size=3)  # what a real motion asks of both
-        x, _ = exact(M, b, G, c)
-        found = solver(M, b, G, c)
-        worst = max(worst, np.abs(found.x - x).max() / np.abs(x).max())
-        assert found.unique.all()
-    return worst
-
-
 def judged(M, b, G, c):
     """x, the force G^T lambda, lambda and which of it are unique, from the singular values of the KKT matrix;
     or the words of the refusal.  For well-conditioned numbers of size 1."""
@@ -130,9 +113,6 @@ def judged(M, b, G, c):
     return z[:n], G.T @ z[n:], z[n:], ~free[n:]
 
 
-RATIOS = [1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e12]
-
-
 def condition(M, G):
     """Condition number of the KKT matrix, its rows and columns scaled until the largest element of
     each is 1."""
@@ -144,35 +124,15 @@ def condition(M, G):
     return np.linalg.cond(K)
 
 
-@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("links", [3, 6])
 @pytest.mark.parametrize("slope", [(0.0, -1.0), (0.6, -0.8)], ids=["hanging", "slanting"])
-def test_a_light_mass_between_heavy_ones(solver, ratio, slope):
+def test_a_light_mass_between_heavy_ones(solver, slope, links):
     """On a straight chain heavy - light - heavy every rod's lambda is right to 1e-12, where the Schur
-    complement loses up to all digits: mass ratios to 1e12 both ways."""
-    system = hanging_chain([1.0, ratio, 1.0], slope)
-    check(solver(*system), *system)
-
-
-@pytest.mark.parametrize("ratio", RATIOS)
-def test_a_long_chain_of_unequal_masses(solver, ratio):
-    """The same on six links with masses 1, ratio, 1, ratio, ...: each rod carries what hangs below it
-    and keeps it on its circle."""
-    masses = [1.0, ratio] * 3
-    system = hanging_chain(masses, spin=2.0)
-    found = solver(*system)
-    below = [
-        sum(m * (9.81 + 4.0 * (j + 1)) for j, m in enumerate(masses) if j >= k) for k in range(6)
-    ]
-    np.testing.assert_allclose(found.lam, -np.array(below) / 2, rtol=1e-12)
-    check(found, *system)
-
-
-def test_no_mass_ratio_falls_between_the_rungs(solver):
-    """Also where one solver hands over to the next, lambda is right to 1e-12."""
-    for ratio in 10.0 ** np.arange(-6, 6.01, 0.25):
-        for slope in ((0.0, -1.0), (0.6, -0.8)):
-            system = hanging_chain([1.0, ratio, 1.0], slope, spin=2.0)
-            np.testing.assert_allclose(solver(*system).lam, exact(*system)[1], rtol=1e-12)
+    complement loses up to all digits: mass ratios to 1e12 both ways, and no gap where one solver hands over
+    to the next."""
+    for decade in [-12, *np.arange(-6, 6.01, 0.25 if links == 3 else 3.0), 12]:
+        system = hanging_chain([1.0, 10.0**decade, 1.0] * (links // 3), slope, spin=2.0)
+        check(solver(*system), *system)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
@@ -205,118 +165,24 @@ def test_a_duplicated_constraint_shares_its_force_equally(solver, copies, ratio)
     assert many.unique.tolist() == [True, *[False] * copies, True]
 
 
-def test_scaled_copies_share_their_force_equally_too(solver):
-    """f = 0 and 1000 f = 0 are the same rod: in comparable units they carry the same share, so the
-    multiplier of the second is a thousandth."""
-    M, b, G, c = hanging_chain([1.0])
-    unit = np.array([1.0, 1000.0])
-    one = solver(M, b, G, c)
-    found = solver(M, b, G[[0, 0]] * unit[:, None], c[[0, 0]] * unit)
-    np.testing.assert_allclose(found.lam, one.lam / (2 * unit), rtol=1e-13)
-    assert not found.unique.any()
-
-
-def test_three_supports_of_a_beam_share_its_weight(solver):
-    """A rigid beam on three supports: the middle one and the ends cannot be told apart, but each
-    carries a third in the least-norm answer and the total is the weight."""
-    M, b = np.diag([3.0, 0.5]), np.array([-3.0 * 9.81, 0.0])
-    G = np.array([[1.0, -1.0], [1.0, 0.0], [1.0, 1.0]])  # y - l phi, y, y + l phi
-    found = solver(M, b, G, np.zeros(3))
-    assert found.lam.sum() == pytest.approx(3 * 9.81, rel=1e-12)
-    assert found.lam[0] == pytest.approx(found.lam[2], rel=1e-12)
-    assert not found.unique.any()
-    np.testing.assert_allclose(found.x, 0, atol=1e-12)
-
-
-@pytest.mark.parametrize("angle", [1e-2, 1e-4, 1e-6, 1e-8])
-def test_nearly_parallel_constraints_keep_nine_digits(ladder, angle):
-    """Two walls at an angle of 1e-8 rad still determine the accelerations to nine digits."""
-    assert worst_at(angle, ladder) < 1e-9
-
-
-@pytest.mark.parametrize("angle", [1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10])
-def test_nearly_parallel_constraints_lose_no_more_than_their_angle(solver, angle):
-    """An angle between two walls is known to eps, and so the motion between them to eps / angle."""
-    assert worst_at(angle, solver) < 100 * np.finfo(float).eps / angle
-
-
-def test_a_coordinate_without_mass(solver):
-    """A massless point tied to a mass by y = 2 x: the constraint gives its acceleration, and its own
-    force must be carried by lambda."""
-    M, b = np.diag([2.0, 0.0]), np.array([1.0, 3.0])
-    G, c = np.array([[-2.0, 1.0]]), np.array([0.5])
-    found = solver(M, b, G, c)
-    x, lam = exact(M, b, G, c)
-    np.testing.assert_allclose(lam, [-3.0])
-    np.testing.assert_allclose(found.x, x, rtol=1e-14)
-    np.testing.assert_allclose(found.lam, lam, rtol=1e-14)
-    assert found.unique.all()
-
-
-def test_a_massless_link_in_a_chain(solver):
-    """A hanging chain whose middle mass is exactly zero: the two rods beside it carry the same."""
-    M, b, G, c = hanging_chain([1.0, 0.0, 1.0], spin=0.0)
-    # sideways the middle point has no mass and no constraint: hold it by the line between the others
-    middle = np.array([[0.5, 0.0, -1.0, 0.0, 0.5, 0.0]])
-    G, c = np.vstack([G, middle]), np.append(c, 0.0)
-    found = solver(M, b, G, c)
-    x, lam = exact(M, b, G, c)
-    np.testing.assert_allclose(found.lam, lam, rtol=1e-13, atol=1e-13)
-    np.testing.assert_allclose(found.x, x, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(found.lam[1], found.lam[2], rtol=1e-13)
-
-
-def test_contradictory_constraints_are_refused(solver):
-    """The same row asked to accelerate at 1 and at 2 m/s^2: there is no such motion."""
-    M, b = np.diag([1.0, 2.0]), np.zeros(2)
-    G, c = np.array([[1.0, 1.0], [1.0, 1.0]]), np.array([1.0, 2.0])
-    with pytest.raises(RefusedError, match="contradict each other"):
-        solver(M, b, G, c)
-
-
-def test_contradictory_constraints_on_a_massless_coordinate_are_refused(solver):
-    """Also where M has a zero on its diagonal."""
-    M, b = np.diag([1.0, 0.0]), np.zeros(2)
-    G, c = np.array([[1.0, 1.0], [2.0, 2.0], [0.0, 1.0]]), np.array([1.0, 3.0, 0.0])
-    with pytest.raises(RefusedError, match="contradict each other"):
-        solver(M, b, G, c)
-
-
-@pytest.mark.parametrize(
-    "constraint", [np.zeros((0, 2)), np.array([[1.0, 0.0]])], ids=["free", "elsewhere"]
-)
-def test_neither_mass_nor_constraint(solver, constraint):
-    """A coordinate without mass that nothing constrains has no acceleration: refused by name."""
-    M, b = np.diag([1.0, 0.0]), np.array([0.0, 1.0])
-    with pytest.raises(RefusedError, match="mass matrix is singular"):
-        solver(M, b, constraint, np.zeros(len(constraint)))
-
-
-@pytest.mark.parametrize("which", ["M", "b", "G", "c"])
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_what_is_not_finite_is_refused(solver, which, value):
-    """No NaN and no infinity goes in or comes out, and the message says where it came from."""
-    terms = dict(zip("MbGc", hanging_chain([1.0, 2.0]), strict=True))
-    terms[which].flat[0] = value
-    what = "mass or a force" if which in "Mb" else "constraint or its derivative"
-    with (
-        np.errstate(all="ignore"),
-        pytest.raises(RefusedError, match=f"{what}.* not finite"),
-    ):
-        solver(*terms.values())
-
-
-@pytest.mark.parametrize("which", ["M", "b", "G", "c"])
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("case", ["coupled", "massless", "duplicated", "both"])
-def test_what_is_not_finite_is_refused_on_every_rung(solver, case, which, value):
-    """The same where M has blocks, a coordinate has no mass, or rows depend on each other."""
-    M, b, G, c = RUNGS[case][0]
-    terms = {"M": M.copy(), "b": b.copy(), "G": G.copy(), "c": c.copy()}
-    terms[which][(0,) * terms[which].ndim] = value
-    what = "mass or a force" if which in "Mb" else "constraint or its derivative"
-    with pytest.raises(RefusedError, match=f"{what}.* not finite"):
-        solver(*terms.values())
+@pytest.mark.parametrize("angle", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10])
+@pytest.mark.parametrize("formulation", [0, 1])
+def test_nearly_parallel_constraints_lose_no_more_than_their_angle(library, formulation, angle):
+    """Of twenty pairs of walls an angle is known to eps, and so the motion between them to eps / angle; with
+    multipliers two walls at 1e-8 rad still determine the accelerations to nine digits."""
+    rng = np.random.default_rng(0)
+    allowed = 100 * np.finfo(float).eps / angle
+    if formulation == 0 and angle >= 1e-8:
+        allowed = min(allowed, 1e-9)
+    for _ in range(20):
+        M, b = np.diag(rng.uniform(1, 5, 3)), rng.normal(size=3)
+        Q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        G = np.array([Q[0], np.cos(angle) * Q[0] + np.sin(angle) * Q[1]])
+        c = G @ rng.normal(size=3)  # what a real motion asks of both
+        x, _ = exact(M, b, G, c)
+        found = solver_of(library, formulation)(M, b, G, c)
+        assert np.abs(found.x - x).max() < allowed * np.abs(x).max()
+        assert found.unique.all()
 
 
 def rungs():
@@ -407,21 +273,33 @@ def test_a_row_that_does_not_act_is_not_there(library, case, formulation):
     np.testing.assert_allclose(found.x, expected.x, rtol=1e-13, atol=1e-15)
 
 
+@pytest.mark.parametrize("case", ["coupled", "massless", "duplicated", "both"])
+def test_what_is_not_finite_is_refused(solver, case):
+    """No NaN and no infinity goes in or comes out, and the message says where it came from: where M has
+    blocks, a coordinate has no mass, or rows depend on each other."""
+    for which, value in itertools.product("MbGc", (np.nan, np.inf, -np.inf)):
+        terms = {name: a.copy() for name, a in zip("MbGc", RUNGS[case][0], strict=True)}
+        terms[which][(0,) * terms[which].ndim] = value
+        what = "mass or a force" if which in "Mb" else "constraint or its derivative"
+        with pytest.raises(RefusedError, match=f"{what}.* not finite"):
+            solver(*terms.values())
+
+
 @pytest.mark.parametrize("case", ["diagonal", "coupled", "light", "duplicated"])
-@pytest.mark.parametrize("kilogram", [1e-200, 1e-9, 1e9, 1e200])
-@pytest.mark.parametrize("metre", [1e-9, 1e9])
-@pytest.mark.parametrize("second", [1e-9, 1e9])
-def test_units_scale_lambda_as_its_own_unit_says(solver, case, kilogram, metre, second):
+def test_units_scale_lambda_as_its_own_unit_says(solver, case):
     """With f = |r|^2 - L^2 in m^2, lambda is in N/m = kg/s^2: it scales as kilogram / second^2 to
     1e-12, whatever the units of mass, length and time."""
     M, b, G, c = RUNGS[case][0]
-    acceleration = metre / second**2
     plain = solver(M, b, G, c)
-    found = solver(M * kilogram, b * kilogram * acceleration, G * metre, c * metre * acceleration)
-    np.testing.assert_allclose(found.lam * second**2 / kilogram, plain.lam, rtol=1e-12)
     size = np.abs(plain.x).max()
-    np.testing.assert_allclose(found.x / acceleration, plain.x, rtol=1e-12, atol=1e-12 * size)
-    np.testing.assert_array_equal(found.unique, plain.unique)
+    units = itertools.product((1e-200, 1e-9, 1e9, 1e200), (1e-9, 1e9), (1e-9, 1e9))
+    for kilogram, metre, second in units:
+        acceleration = metre / second**2
+        force = kilogram * acceleration
+        found = solver(M * kilogram, b * force, G * metre, c * metre * acceleration)
+        np.testing.assert_allclose(found.lam * second**2 / kilogram, plain.lam, rtol=1e-12)
+        np.testing.assert_allclose(found.x / acceleration, plain.x, rtol=1e-12, atol=1e-12 * size)
+        np.testing.assert_array_equal(found.unique, plain.unique)
 
 
 @pytest.mark.parametrize("inertia", [3e-3, 1e-20, 1e-30, 1e-100, 1e-300])
@@ -460,7 +338,7 @@ def test_masses_from_picograms_to_gigagrams_in_one_chain(solver, seed):
     assert np.abs(found.lam - lam).max() <= bound
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(8))
 def test_a_full_mass_matrix(solver, seed):
     """Where every coordinate couples with every other, x and lambda are exact to 1e-12 too."""
     rng = np.random.default_rng(seed)
@@ -760,9 +638,7 @@ def test_the_plan_as_printed_is_the_plan(library, tmp_path):
     printed = compile_library(
         tmp_path,
         SOURCES,
-        DOOR + text + "const Plan *bench_plan(void);\n"
-        "const Plan *bench_plan(void) { return &the_plan; }\n"
-        "void bench_use(Bench *b);\nvoid bench_use(Bench *b) { b->system.plan = &the_plan; }\n",
+        DOOR + text + "void bench_use(Bench *b) { b->system.plan = &the_plan; }\n",
     )
     declare(printed)
     one, two = Bench(library, 4, 2, mass, jacobian), Bench(printed, 4, 2, mass, jacobian)
@@ -770,17 +646,6 @@ def test_the_plan_as_printed_is_the_plan(library, tmp_path):
     one.factor(M, G)
     two.factor(M, G)
     np.testing.assert_array_equal(one.solve(b, c).x, two.solve(b, c).x)
-
-
-@pytest.mark.parametrize("closed", [(0, 0), (1, 0), (0, 1), (1, 1)])
-def test_rows_act_as_their_contacts_stand(library, closed):
-    """A contact acts while closed, rolling on it too, everything else always."""
-    kinds = [(0, -1), (2, -1), (1, 1), (1, -1), (2, -1), (0, 4)]
-    rows = (Row * 6)(*(Row(b"row", kind, contact) for kind, contact in kinds))
-    active = (c_int * 6)()
-    library.bench_active(6, rows, 2, integers([1, 4]), integers(closed), active)
-    first, second = closed
-    assert list(active) == [1, first, first, 1, second, second]
 
 
 @pytest.mark.thorough
