@@ -6,9 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from fmpy.fmi1 import FMICallException
+
+from ..interface.rules import rules_of
 from ..prepare.prepare import Prepared
 from .binary import Hear
-from .python import slave_of
+from .python import offered, slave_of
+from .read import Experiment
 from .slave import Refused
 
 DISCARD, ERROR = 2, 3  # statuses
@@ -21,12 +25,19 @@ CALLS = {  # of a session -> of the slave
 }
 
 
-class CallError(Exception):
-    """A call that did not return OK or a warning."""
+class InProcess:
+    """A prepared model, for a session: what its slave's variables are called and may be set to, its default
+    experiment, and `instantiated(hear)`.  Raises BuildError if the python target cannot run it."""
 
-    def __init__(self, function: str, status: int) -> None:
-        super().__init__(function, status)
-        self.function, self.status = function, status
+    def __init__(self, prepared: Prepared) -> None:
+        table, scene = offered(prepared), prepared.scene
+        self.prepared, self.variables, self.rules = prepared, table.variables, rules_of(table)
+        self.reference = dict(table.position)
+        self.experiment = Experiment(scene.stop_time, scene.step_size, scene.tolerance)
+
+    def instantiated(self, hear: Hear) -> SlaveInProcess:
+        """An instance, of which `hear` is told what it logs."""
+        return SlaveInProcess(self.prepared, hear)
 
 
 class SlaveInProcess:
@@ -62,14 +73,14 @@ class SlaveInProcess:
     def doStep(self, time: float, size: float) -> None:
         """A communication step [s]."""
         if not self._called("doStep", self.slave.do_step, time, size):
-            raise CallError("doStep", DISCARD)
+            raise FMICallException("doStep", DISCARD)
 
     def _called(self, name: str, method: Callable[..., Any], *arguments: Any) -> Any:
         try:
             return method(*arguments)
         except Refused as error:  # without what is done to a text on its way to an importer
             self.hear(ERROR, str(error.__context__ or error))
-            raise CallError(name, ERROR) from error
+            raise FMICallException(name, ERROR) from error
         finally:
             for m in self.slave.log_queue:
                 self.hear(int(m.status), m.msg)

@@ -15,27 +15,25 @@ import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ..errors import SimulationError
-from ..interface.rules import rules_of
 from ..model.rule import missing
-from ..prepare.prepare import Prepared
 from .archive import unpack
 from .binary import instantiated, listen
-from .inprocess import CallError, SlaveInProcess
-from .python import offered
 from .read import (
-    Experiment,
     Trajectory,
     described_rules,
     experiment_of,
     obstacle,
     read_description,
 )
+
+if TYPE_CHECKING:  # a process that runs FMUs needs no SymPy
+    from .inprocess import InProcess
 
 STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 WARNING, DISCARD, ERROR = 1, 2, 3
@@ -69,7 +67,7 @@ class Run:
 
 class Session:
     """One instance for co-simulation, of an FMU (a file, or a folder that one was unpacked into) or of a
-    prepared model.  Close it, or use it in a `with` statement.
+    prepared model in this process.  Close it, or use it in a `with` statement.
 
     `rules`: what its variables may be set to; `outputs` and `inputs`: their names;
     `experiment`: the default one; `time`: where it stands
@@ -79,7 +77,7 @@ class Session:
     """
 
     def __init__(
-        self, target: str | Path | Prepared, name: str = "session", log: bool = False
+        self, target: str | Path | InProcess, name: str = "session", log: bool = False
     ) -> None:
         self.name, self.log, self.used, self.time = name, log, False, 0.0
         self.messages: list[tuple[int, str]] = []
@@ -87,13 +85,10 @@ class Session:
         self._said: list[str] = []  # of calls that fail
         self._unpacked = ""
         self.folder: Path | None = None
-        if isinstance(target, Prepared):
-            table = offered(target)
-            self.rules, variables = rules_of(table), table.variables
-            scene = target.scene
-            self.experiment = Experiment(scene.stop_time, scene.step_size, scene.tolerance)
-            self.reference = dict(table.position)
-            self._make: Callable[[], Any] = lambda: SlaveInProcess(target, self._hear)
+        if not isinstance(target, (str, Path)):
+            self.rules, variables = target.rules, target.variables
+            self.experiment, self.reference = target.experiment, target.reference
+            self._make: Callable[[], Any] = lambda: target.instantiated(self._hear)
         else:
             path = Path(target)
             self.description = read_description(path)
@@ -200,7 +195,7 @@ class Session:
         listen(self._hear)
         try:
             yield
-        except (FMICallException, CallError) as error:
+        except FMICallException as error:
             raise RefusalError(error.function, error.status, self.reason()) from None
 
     def _hear(self, status: int, text: str) -> None:

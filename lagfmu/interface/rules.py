@@ -8,12 +8,14 @@ runtime/fmi/experiment.c, and by the same kind of rule fmu/instance.py, the pyth
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import names
 from ..methods import NUMBERS
 from ..model.rule import Rule, missing
-from .variables import VariableTable
+
+if TYPE_CHECKING:  # who runs an FMU needs no SymPy
+    from .variables import VariableTable
 
 CALCULATED = ("output", "estimate")  # roles of what nobody sets
 

@@ -17,6 +17,7 @@ from .. import names
 from ..errors import SettingError, SimulationError
 from ..fmu import native
 from ..fmu.exchange import by_fmpy
+from ..fmu.inprocess import InProcess
 from ..fmu.inputs import check_inputs, columns_at, jumps
 from ..fmu.read import (
     Trajectory,
@@ -125,7 +126,7 @@ class _Asked:
 def _of_model(prepared: Prepared, target: str, asked: _Asked) -> Result:
     name = prepared.scene.name
     if target == PYTHON:
-        with Session(prepared, log=True) as session:
+        with Session(InProcess(prepared), log=True) as session:
             run = _run(session, name, asked)
         if run.refusal is not None:
             raise SimulationError(run.refusal.message)
