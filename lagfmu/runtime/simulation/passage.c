@@ -10,7 +10,9 @@
  *
  * Near is where `apart`, the sine of the angle between a row and those before it in the metric of M, is
  * small and would be zero within a natural time, or was, if it went on as in the last step.  A step from there
- * passes over the crossing with no stage next to it, or stops before it. */
+ * passes over the crossing with no stage next to it, or stops before it.  The angle is that of as many rows as
+ * are independent, for that of rows that depend on each other everywhere is rounding; these may be others in
+ * the step before. */
 #include "passage.h"
 
 #include <float.h>
@@ -23,8 +25,12 @@
 
 enum { PARTS = 16 };                 /* of a step, in which the least angle is looked for */
 static const double NARROW = 0.1;    /* angle [rad] below which a crossing may be near */
-static const double BETWEEN = 0.467;  /* of a step over a crossing, where it is to lie: the widest gap between the
-                                       * stages of dop853 */
+enum { GAPS = 3 };
+static const double GAP[GAPS] = {0.026, 0.184, 0.467}; /* of a step over a crossing, where it is to lie: between
+                                      * stages of dop853; the earlier, the longer the step, and the further
+                                      * from it are its stages */
+static const double STRIDE = 0.1;    /* natural times, that a step over a crossing is tried with at least */
+static const double CLEAR = 0.28;    /* of the next step: how far before a crossing ends one that cannot pass */
 static const double BACKED = 0.4;      /* of a step that ended in one: by so much it is shortened */
 static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how fast the angle falls */
 static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
@@ -32,12 +38,12 @@ static const double PLACED = 1e-9;   /* of a step: how well the time of a passag
 static const double NAMING = 1e-5;   /* how far off the constraints a state is taken to be that the rows are
                                       * named at: linear_rank_threshold() */
 
-/* Factors the rows at (t, y), taken to be off the constraints by that much. */
+/* Factors the rows that stages are evaluated by, at (t, y), taken to be off the constraints by that much. */
 static Status factor_there(Solver *s, double t, const double *y, double off) {
     Mechanism *b = &s->stepped;
     if (mechanism_evaluate(b, segment_instant(s, t), y, y + s->system->nq) != OK) return FAILED;
     b->linear.off = off;
-    const Status status = linear_factor(&b->linear, b->M, b->G, s->active);
+    const Status status = linear_factor(&b->linear, b->M, b->G, solver_rows(s));
     b->linear.off = 0;
     return status;
 }
@@ -55,19 +61,26 @@ static double falling(Solver *s, double t, const double *y, double apart) {
 
 static void look(Solver *s, double t, const double *y) {
     Approach *x = &s->state.now.approach;
-    const double apart = linear_apart(&s->stepped.linear), h = t - x->t, before = x->apart;
+    const int dependent = s->state.now.dependent;
+    const double h = t - x->t, before = x->apart;
     if (!(h > 0)) return;
+    if (dependent && factor_there(s, t, y, DBL_MIN) != OK) return;
+    const double apart = linear_apart(&s->stepped.linear);
     *x = (Approach){t, apart, -1, 0};
     if (!(apart < NARROW)) return;
-    const double fall = fabs(before) < NARROW ? (before - apart) / h : falling(s, t, y, apart);
+    const double fall = fabs(before) < NARROW && !dependent ? (before - apart) / h : falling(s, t, y, apart);
     x->near = fabs(fall) > apart * s->state.now.rate;
-    if (x->near) x->until = apart / fall;
+    if (!x->near) return;
+    x->until = apart / fall;
+    if (x->until > 0) s->integrator.h_next = fmax(s->integrator.h_next, STRIDE / s->state.now.rate);
 }
 
 static double longest(const Solver *s, double next) {
-    const double until = s->state.now.approach.until, over = until / BETWEEN;
+    const double until = s->state.now.approach.until;
     if (!(until > 0) || !(next > 0)) return HUGE_VAL;
-    return over <= next ? over : until - (1 - BACKED) * BETWEEN * next;
+    for (int k = 0; k < GAPS; k++)
+        if (until / GAP[k] <= next) return until / GAP[k];
+    return until - CLEAR * next;
 }
 
 static int suspected(const Solver *s) {

@@ -144,13 +144,13 @@ static Status accept(Solver *s, Integrator *i) {
 
 Status segment_step(Solver *s, Integrator *i, double t_bound, double longest) {
     s->narrowest = s->apart = 1;
+    if (s->settings.method != RATTLE && accept(s, i) != OK) return FAILED;
     const Control c = control(s, i, longest);
     if (s->settings.method == RATTLE) {
         const Instant at = segment_instant(s, i->t);
         return OPTIONAL.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,
                                  t_bound);
     }
-    if (accept(s, i) != OK) return FAILED;
     const Ode ode = equations_at(s, i->t);
     if (i->method->step(i, &ode, &c, t_bound) != OK) return FAILED;
     return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;
