@@ -14,16 +14,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .failure import StartFailureError, StepFailureError
+from .failure import StepFailureError
 from .instant import Instant
 from .motion import motion
 from .system import System, Vector
 from .thresholds import CONTACT_PULL, CONTACTS_MOST
 
 
-def check_restitution(system: System, p: Sequence[float]) -> None:
-    """Raises StartFailureError if a coefficient of restitution is not between 0 and 1."""
-    e = system.restitution(p) if system.contacts and system.restitution is not None else ()
+def restitution(system: System, p: Sequence[float]) -> Vector:
+    """e of each row (m), 0 where it is no contact.  Raises StepFailureError naming those that are none."""
+    if system.restitution is None:
+        return np.zeros(system.m)
+    e = np.array(system.restitution(p), dtype=float)
     wrong = [
         f"the coefficient of restitution of {system.rows[k].name!r} is {float(e[k])!r}, expected 0 (no "
         "rebound) to 1 (no loss)"
@@ -31,7 +33,8 @@ def check_restitution(system: System, p: Sequence[float]) -> None:
         if not 0 <= e[k] <= 1
     ]
     if wrong:
-        raise StartFailureError("the start is refused: " + "; ".join(wrong))
+        raise StepFailureError("; ".join(wrong))
+    return e
 
 
 def closed_contacts(

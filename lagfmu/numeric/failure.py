@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 
 class StepFailureError(Exception):
@@ -27,6 +28,16 @@ class StartFailureError(StepFailureError):
 
 class OmittedStartError(StartFailureError):
     """A start value that nobody gave, and whose 0 is singular: what is to be done is known."""
+
+
+def evaluated(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> Any:
+    """function(*arguments).  What Python cannot compute is a StepFailureError that says what and when [s]."""
+    try:
+        return function(*arguments)
+    except (ArithmeticError, ValueError) as error:
+        raise StepFailureError(
+            f"{what} cannot be evaluated at t = {float(t)!r} s ({plain(error)})"
+        ) from error
 
 
 def plain(error: Exception) -> str:

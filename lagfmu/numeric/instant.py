@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .failure import StepFailureError, plain
+from .failure import evaluated
 from .system import Matrix, System, Vector
 
 
@@ -23,24 +23,17 @@ class Instant:
 
     def equations(self, q: Vector, v: Vector) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
         """M (n, n), F (n), G (m, n), nu (m), gamma (m).  Raises StepFailureError where they have no value."""
-        try:
-            return self.system.assemble(self.t, q, v, self.u, self.p)
-        except (ArithmeticError, ValueError) as error:
-            raise self._failed("equations", error) from error
+        found: tuple[Matrix, Vector, Matrix, Vector, Vector] = evaluated(
+            "the equations", self.t, self.system.assemble, self.t, q, v, self.u, self.p
+        )
+        return found
 
     def residual(self, q: Vector) -> Vector:
         """f (m): how far each position constraint is missed; 0 for nonholonomic rows.  Raises likewise."""
         assert self.system.residual is not None
-        try:
-            f = self.system.residual(self.t, q.tolist(), self.u, self.p)
-        except (ArithmeticError, ValueError) as error:
-            raise self._failed("constraints", error) from error
+        arguments = self.t, q.tolist(), self.u, self.p
+        f = evaluated("the constraints", self.t, self.system.residual, *arguments)
         return np.array(f, dtype=float)
-
-    def _failed(self, what: str, error: Exception) -> StepFailureError:
-        return StepFailureError(
-            f"the {what} cannot be evaluated at t = {float(self.t)!r} s ({plain(error)})"
-        )
 
 
 def at_start(

@@ -74,18 +74,16 @@ def friction_law(at: Instant, q: Vector, v: Vector) -> FrictionLaw:
     return FrictionLaw(np.array(static, float), np.array(kinetic, float), np.array(load, float), C)
 
 
-def motion(
-    at: Instant, q: Vector, v: Vector, rows: Sequence[int], slips: Slips = NONE, off: float = 0.0
-) -> Motion:
+def motion(at: Instant, q: Vector, v: Vector, rows: Sequence[int], slips: Slips = NONE) -> Motion:
     """`rows` act, those that stick by friction among them; frictions slip as in `slips`, their normal forces
-    found by iteration; `off`: as in linear.py.  Raises StepFailureError."""
+    found by iteration.  Raises StepFailureError."""
     system, rows = at.system, list(rows)
     M, F, G, nu, gamma = at.equations(q, v)
     law = friction_law(at, q, v) if slips else None
     pushed, lam = np.zeros(system.m), np.zeros(system.m)
     for _ in range(ROUNDS):
         try:
-            x, found = solve(M, F + G.T @ pushed, G[rows], gamma[rows], off=off)
+            x, found = solve(M, F + G.T @ pushed, G[rows], gamma[rows])
         except MasslessError as error:
             raise error.named(system.coordinates) from error
         lam = pushed.copy()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..names import motion as names_of_motion
-from .contacts import check_restitution, closed_contacts, stays_low
+from .contacts import closed_contacts, restitution, stays_low
 from .failure import StartFailureError, StepFailureError
 from .initialization import EPS, initial_positions, initial_velocities
 from .instant import Instant, at_start
@@ -59,7 +59,7 @@ def start(
     """
     try:
         with np.errstate(all="ignore"):
-            check_restitution(system, p)
+            restitution(system, p)
             q, v = np.array(q0, float), np.array(v0, float)
             order = [GIVEN] * (2 * system.n) if priority is None else list(priority)
             return _start(at_start(system, q, u, p, t), q, v, order)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..numeric.failure import MasslessError, StepFailureError, plain
+from ..numeric.failure import MasslessError, StepFailureError, evaluated
 from ..numeric.system import NONHOLONOMIC, Matrix, System, Vector
 from .linear import Rows, rows_of, solve
 
@@ -57,12 +57,8 @@ class Motion:
 
     def terms(self, t: float, q: Vector, v: Vector) -> Terms:
         """Of all rows.  Raises StepFailureError."""
-        try:
-            terms = Terms(*self.system.assemble(t, q, v, self.inputs(t), self.p))
-        except (ArithmeticError, ValueError) as error:
-            raise StepFailureError(
-                f"the equations cannot be evaluated at t = {t!r} s: {plain(error)}"
-            ) from None
+        arguments = t, q, v, self.inputs(t), self.p
+        terms = Terms(*evaluated("the equations", t, self.system.assemble, *arguments))
         for name, value in zip(("M", "F", "G", "nu", "gamma"), terms, strict=True):
             if not np.isfinite(value).all():
                 raise StepFailureError(f"{name} is not finite at t = {t!r} s")
@@ -71,12 +67,8 @@ class Motion:
     def residual(self, t: float, q: Vector) -> Vector:
         """f of each row (m), 0 of nonholonomic ones.  Raises StepFailureError."""
         assert self.system.residual is not None
-        try:
-            f = np.array(self.system.residual(t, q.tolist(), self.inputs(t), self.p), dtype=float)
-        except (ArithmeticError, ValueError) as error:
-            raise StepFailureError(
-                f"the constraints cannot be evaluated at t = {t!r} s: {plain(error)}"
-            ) from None
+        arguments = t, q.tolist(), self.inputs(t), self.p
+        f = np.array(evaluated("the constraints", t, self.system.residual, *arguments), dtype=float)
         if not np.isfinite(f).all():
             raise StepFailureError(f"a constraint is not finite at t = {t!r} s")
         return f
@@ -106,10 +98,6 @@ class Motion:
         embedding = self.system.embedding
         if embedding is None:
             return tuple(q.tolist()), tuple(v.tolist())
-        try:
-            places, rates = embedding.embed(t, q.tolist(), v.tolist(), self.inputs(t), self.p)
-        except (ArithmeticError, ValueError) as error:
-            raise StepFailureError(
-                f"the embedding cannot be evaluated at t = {t!r} s: {plain(error)}"
-            ) from None
+        arguments = t, q.tolist(), v.tolist(), self.inputs(t), self.p
+        places, rates = evaluated("the embedding", t, embedding.embed, *arguments)
         return tuple(map(float, places)), tuple(map(float, rates))

@@ -19,7 +19,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from ..numeric.failure import StepFailureError
 from ..numeric.system import Vector
 from .complementarity import acting_together
 from .contacts import as_flags, speed_of_rounding
@@ -36,22 +35,6 @@ class Impact(NamedTuple):
     v: Vector
     impulses: Vector
     lost: float
-
-
-def coefficients(motion: Motion) -> Vector:
-    """e of each row (m).  Raises StepFailureError naming those that are no coefficients."""
-    system = motion.system
-    if system.restitution is None:
-        return np.zeros(system.m)
-    (e,) = (np.array(system.restitution(motion.p), dtype=float),)
-    wrong = [
-        f"{system.rows[k].name!r} has {e[k]:.6g}" for k in system.contacts if not 0 <= e[k] <= 1
-    ]
-    if wrong:
-        raise StepFailureError(
-            f"a coefficient of restitution lies between 0 and 1, but contact {', '.join(wrong)}"
-        )
-    return e
 
 
 def strike(

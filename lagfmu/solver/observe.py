@@ -7,7 +7,7 @@ the coordinates are embedded and lambda is recovered from the equations of the m
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import names
 from ..names import derivative, name
-from ..numeric.failure import StepFailureError, plain
+from ..numeric.failure import StepFailureError, evaluated
 from ..numeric.system import NONHOLONOMIC, System, Vector
 from .contacts import as_flags, closed_rows
 from .equations import Motion
@@ -106,8 +106,8 @@ def _energies(
 ) -> dict[str, float]:
     if model.energies is None:
         return {}
-    values = _values(model.energies, "the energies", state.t, q.tolist(), v.tolist(), u, p)
-    kinetic, potential = (float(x) for x in values)
+    arguments = state.t, q.tolist(), v.tolist(), u, p
+    kinetic, potential = map(float, evaluated("the energies", state.t, model.energies, *arguments))
     return {
         names.KINETIC: kinetic,
         names.POTENTIAL: potential,
@@ -139,7 +139,7 @@ def _own(
                 raise StepFailureError(
                     f"output {own.name!r} has no value at t = {t!r} s: `otherwise` can say what it is there"
                 )
-            (value,) = _values(own.otherwise, own.name, *arguments)
+            (value,) = evaluated(own.name, t, own.otherwise, *arguments)
         seen[own.name] = float(value)
     return seen
 
@@ -165,13 +165,3 @@ def _told(model: System, kind: str, contact: str, event: Event) -> Mapping[str, 
         seen[name(kind, contact, coordinate)] = q[j]
         seen[name(kind, contact, coordinate, 1)] = v[j]
     return seen
-
-
-def _values(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
-    try:
-        return function(*arguments)
-    except (ArithmeticError, ValueError) as error:
-        t = arguments[0]
-        raise StepFailureError(
-            f"{what} cannot be evaluated at t = {t!r} s: {plain(error)}"
-        ) from None

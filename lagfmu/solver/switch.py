@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..numeric.contacts import restitution
 from ..numeric.system import Vector
 from .contacts import (
     accelerations_at_hand,
@@ -23,7 +24,7 @@ from .contacts import (
 )
 from .equations import Motion, Terms
 from .events import Found
-from .impact import Impact, coefficients, strike
+from .impact import Impact, strike
 from .linear import rows_of
 from .projection import project_positions, project_velocities
 from .state import Event, Settings, State
@@ -88,7 +89,7 @@ def _settled(
     s = terms.G @ v - terms.nu
     before, struck = v, None
     if any(s[k] < -slow[k] for k in touching):
-        struck = strike(motion, terms, v, touching, coefficients(motion), settings)
+        struck = strike(motion, terms, v, touching, restitution(system, motion.p), settings)
         state = replace(state, dissipated=state.dissipated + struck.lost)
         v = _without_hops(motion, terms, struck.v, touching, small, slow)
         terms = motion.terms(t, q, v)
