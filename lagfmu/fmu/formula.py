@@ -24,6 +24,7 @@ from ..model.elements import Expr
 from ..model.spline import HIGHEST as HIGHEST_DERIVATIVE
 from ..model.spline import Spline
 
+Make = Callable[..., Expr]
 LONGEST = 200_000  # characters of one formula
 MOST_NODES = 50_000  # of its syntax tree
 DEEPEST = 60  # levels of it, a sum or a product being one
@@ -34,72 +35,17 @@ HIGHEST = 20  # order of a Bessel function
 MOST_JOINED = 12  # comparisons inside of "and" and "or", which SymPy multiplies out
 
 
-@dataclass(frozen=True)
-class _Function:
-    """A function with its arity, and its value for doubles."""
-
-    make: Callable[..., Expr]
-    arities: tuple[int, ...]
-    value: Callable[..., float]
-
-
-def _one(make: Any, value: Callable[..., float]) -> _Function:
-    return _Function(make, (1,), value)
-
-
-def _heaviside(x: float, middle: float = 0.5) -> float:
-    return middle if x == 0 else float(x > 0)
-
-
-def _loggamma(x: float) -> float:
-    """SymPy takes that of an integer by its factorial."""
-    return math.lgamma(x) if abs(x) <= 1000 else math.inf
-
-
-def _no_number(*_: float) -> float:
-    """A function whose value SymPy looks for without end is not taken of numbers."""
-    return math.nan
-
-
-FUNCTIONS = {
-    "sin": _one(sp.sin, math.sin),
-    "cos": _one(sp.cos, math.cos),
-    "tan": _one(sp.tan, math.tan),
-    "cot": _one(sp.cot, lambda x: 1 / math.tan(x)),
-    "sec": _one(sp.sec, lambda x: 1 / math.cos(x)),
-    "csc": _one(sp.csc, lambda x: 1 / math.sin(x)),
-    "asin": _one(sp.asin, math.asin),
-    "acos": _one(sp.acos, math.acos),
-    "atan": _one(sp.atan, math.atan),
-    "acot": _one(sp.acot, lambda x: math.atan(1 / x) if x else math.pi / 2),
-    "atan2": _Function(sp.atan2, (2,), math.atan2),
-    "sinh": _one(sp.sinh, math.sinh),
-    "cosh": _one(sp.cosh, math.cosh),
-    "tanh": _one(sp.tanh, math.tanh),
-    "coth": _one(sp.coth, lambda x: 1 / math.tanh(x)),
-    "sech": _one(sp.sech, lambda x: 1 / math.cosh(x)),
-    "csch": _one(sp.csch, lambda x: 1 / math.sinh(x)),
-    "asinh": _one(sp.asinh, math.asinh),
-    "acosh": _one(sp.acosh, math.acosh),
-    "atanh": _one(sp.atanh, math.atanh),
-    "exp": _one(sp.exp, math.exp),
-    "log": _one(sp.log, math.log),
-    "sqrt": _one(sp.sqrt, math.sqrt),
-    "Abs": _one(sp.Abs, abs),
-    "sign": _one(sp.sign, lambda x: float((x > 0) - (x < 0))),
-    "floor": _one(sp.floor, math.floor),
-    "ceiling": _one(sp.ceiling, math.ceil),
-    "sinc": _one(sp.sinc, lambda x: math.sin(x) / x if x else 1.0),
-    "Heaviside": _Function(sp.Heaviside, (1, 2), _heaviside),
-    "Min": _Function(sp.Min, (1, 2, 3, 4), lambda *x: min(x)),
-    "Max": _Function(sp.Max, (1, 2, 3, 4), lambda *x: max(x)),
-    "erf": _one(sp.erf, math.erf),
-    "erfc": _one(sp.erfc, math.erfc),
-    "gamma": _one(sp.gamma, math.gamma),
-    "loggamma": _one(sp.loggamma, _loggamma),
-    "besselj": _Function(sp.besselj, (2,), _no_number),
-    "bessely": _Function(sp.bessely, (2,), _no_number),
+ARITIES = {  # of the functions, which are SymPy's of these names
+    **dict.fromkeys(("sin", "cos", "tan", "cot", "sec", "csc"), (1,)),
+    **dict.fromkeys(("asin", "acos", "atan", "acot"), (1,)),
+    **dict.fromkeys(("sinh", "cosh", "tanh", "coth", "sech", "csch"), (1,)),
+    **dict.fromkeys(("asinh", "acosh", "atanh", "exp", "log", "sqrt"), (1,)),
+    **dict.fromkeys(("Abs", "sign", "floor", "ceiling", "sinc"), (1,)),
+    **dict.fromkeys(("erf", "erfc", "gamma", "loggamma"), (1,)),
+    **dict.fromkeys(("atan2", "besselj", "bessely"), (2,)),
+    **{"Heaviside": (1, 2), "Min": (1, 2, 3, 4), "Max": (1, 2, 3, 4)},
 }
+LARGEST_LOGGAMMA = 1000.0  # argument: SymPy takes that of an integer by its factorial
 CONSTANTS = {"pi": (sp.pi, math.pi), "E": (sp.E, math.e)}
 COMPARISONS: dict[type, Any] = {ast.Lt: sp.Lt, ast.LtE: sp.Le, ast.Gt: sp.Gt, ast.GtE: sp.Ge}
 EQUALITIES = {"Eq": sp.Eq, "Ne": sp.Ne}
@@ -129,19 +75,14 @@ def text_of(e: Expr) -> str:
     return str(_Printer({"order": None}).doprint(e))
 
 
-def functions_of(tables: Sequence[Spline]) -> dict[str, _Function]:
+def functions_of(tables: Sequence[Spline]) -> dict[str, Make]:
     """The tables and their derivatives, by the names that they have in a formula."""
-    return {
-        spline.derivative(order).__name__: _one(
-            spline.derivative(order), partial(spline.table, order=order)
-        )
-        for spline in tables
-        for order in range(HIGHEST_DERIVATIVE + 1)
-    }
+    made = (s.derivative(order) for s in tables for order in range(HIGHEST_DERIVATIVE + 1))
+    return {function.__name__: function for function in made}
 
 
 def read_formula(
-    text: str, symbols: Mapping[str, Expr], tables: Mapping[str, _Function] | None = None
+    text: str, symbols: Mapping[str, Expr], tables: Mapping[str, Make] | None = None
 ) -> Expr:
     """The expression that a text says; `symbols` are the names, `tables` the further functions of it.
 
@@ -175,7 +116,7 @@ class _Read:
 
 
 class _Reader:
-    def __init__(self, symbols: Mapping[str, Expr], tables: Mapping[str, _Function]) -> None:
+    def __init__(self, symbols: Mapping[str, Expr], tables: Mapping[str, Make]) -> None:
         self.symbols, self.tables = symbols, tables
         self.nodes = self.joined = 0
 
@@ -303,21 +244,20 @@ class _Reader:
             raise ValueError(f"{_short(name)} is called with {node.keywords[0].arg!r}=...")
         if name == "Piecewise":
             return self._piecewise(node.args, depth)
-        known = FUNCTIONS.get(name) or self.tables.get(name)
-        arities = (2,) if name in EQUALITIES else known.arities if known else ()
-        if not arities:
+        arities = ARITIES | dict.fromkeys(EQUALITIES, (2,)) | dict.fromkeys(self.tables, (1,))
+        if name not in arities:
             raise ValueError(
                 f"{_short(name)} is no function of a formula, expected one of "
-                + ", ".join([*FUNCTIONS, *EQUALITIES, "Piecewise"])
+                + ", ".join([*ARITIES, *EQUALITIES, "Piecewise"])
             )
-        if len(node.args) not in arities:
+        if len(node.args) not in arities[name]:
             raise ValueError(f"{name} of {len(node.args)} arguments")
         arguments = [self._number(a, depth) for a in node.args]
         if name.startswith("bessel") and not _is_order(arguments[0].value):
             raise ValueError(f"the order of {name} is no number between -{HIGHEST} and {HIGHEST}")
-        if known is None:
+        if name in EQUALITIES:
             return self._compared(EQUALITIES[name], *arguments)
-        return _made(known.make, arguments, known.value)
+        return _made(self.tables.get(name) or getattr(sp, name), arguments)
 
     def _piecewise(self, pieces: Sequence[ast.expr], depth: int) -> _Read:
         pairs = []
@@ -374,15 +314,24 @@ def _digits(e: Expr) -> None:
             raise ValueError(f"an exact number of more than {MOST_DIGITS} digits")
 
 
-def _made(make: Callable[..., Expr], parts: Sequence[_Read], value: Callable[..., float]) -> _Read:
-    """make(*parts); where no part holds a symbol, `value` of theirs has to be a finite double first."""
+def _made(make: Make, parts: Sequence[_Read], value: Callable[..., float] | None = None) -> _Read:
+    """make(*parts); where no part holds a symbol, `value` of theirs has to be a finite double first, which
+    without one is what SymPy makes of doubles."""
     expressions = [p.expr for p in parts]
     values = [p.value for p in parts if p.value is not None]
     if len(values) == len(parts):
-        number = _double(value, values)
+        number = _double(value or partial(_of_doubles, make), values)
         return _Read(make(*expressions), number)
     expr = make(*expressions)
     return _Read(expr, None if expr.free_symbols else _double(float, [expr]))  # they cancelled
+
+
+def _of_doubles(make: Make, *values: float) -> float:
+    """NaN where SymPy looks for the value without end."""
+    endless = make in (sp.besselj, sp.bessely)
+    if endless or (make is sp.loggamma and abs(values[0]) > LARGEST_LOGGAMMA):
+        return math.nan
+    return float(make(*map(sp.Float, values)))
 
 
 def _double(value: Callable[..., float], arguments: Sequence[Any]) -> float:
