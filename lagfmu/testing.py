@@ -26,7 +26,6 @@ from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_cl
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
 from .fmu.description import model_description
 from .fmu.exchange import by_fmpy
-from .fmu.formula import LONGEST_SUM, read_formula, text_of
 from .fmu.native import GENERATED
 from .fmu.read import (
     Trajectory,
@@ -52,6 +51,7 @@ from .mechanics.formulations.nullspace import lambda_free, null_space
 from .mechanics.integrability.classify import Kind, pfaffian
 from .mechanics.jumps import jumps_of, with_jumps
 from .model.closed_form import TIME
+from .model.expression import LONGEST_SUM, read_formula, text_of
 from .model.file import ModelFile, load
 from .model.formula import with_outputs
 from .model.goal import Goal

@@ -293,10 +293,10 @@ def test_an_output_of_the_command_line_is_that_of_the_file(text, expected):
     [
         ("tension", ("NAME = EXPRESSION [UNIT]", "lambda.rod [N]")),
         ("tension = -2*L*lambda.rope [N]", ("'lambda.rope' is unknown", "'lambda.rod'")),
-        ("h = y + [m]", ("'y +' is no expression",)),
+        ("h = y + [m]", ("'y +' is no formula", "expected an expression as in")),
         ("h = exec(1) [m]", ("'exec' is no function",)),
         ("h = y if x else L [m]", ("'if' is unknown",)),
-        ("h = (y, L) [m]", ("no part of an expression",)),
+        ("h = (y, L) [m]", ("none of the things that a formula is made of",)),
         ("h = sqrt() [m]", ("sqrt cannot take 0 arguments",)),
         ("h = y*y [m]", ("output 'h'", "m2", "expected m")),
     ],

@@ -16,10 +16,10 @@ from ..errors import ModelError, TableError, VerificationError
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
 from ..model.elements import Expr
+from ..model.expression import functions_of, read_formula, text_of
 from ..model.goal import parse
 from ..model.scene import Scene
 from ..model.spline import Spline, splines_in
-from .formula import functions_of, read_formula, text_of
 
 FORMAT = 1
 LARGEST_RECORD = 1 << 24  # bytes
@@ -192,7 +192,7 @@ def pack_closed_forms(
 
 
 def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
-    """The closed forms in an FMU, none of whose text is run (fmu/formula.py).
+    """The closed forms in an FMU, none of whose text is run (model/expression.py).
 
     Raises VerificationError if the file is not lagfmu's.
     """

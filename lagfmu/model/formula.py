@@ -1,19 +1,16 @@
 """An output as one writes it on a command line:  tension = -2*L*lambda.rod [N]
 
 Names are those of the FMU's variables: coordinates and parameters, der(x), der(x,2), lambda.rod, Q.x,
-time.  The text is read as an expression of names, numbers, + - * / ** (or ^) and functions, and is
-never executed.
+time.  The text is read as an expression of names, numbers, + - * / ** (or ^) and functions, and is never
+executed (expression.py).
 """
 
 from __future__ import annotations
 
-import ast
 import difflib
-import operator
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
@@ -21,6 +18,7 @@ from sympy.physics.vector import dynamicsymbols
 from ..errors import RequestError
 from ..names import derivative
 from .elements import Expr, Input, Output, name_of
+from .expression import read_formula
 from .model import Model
 from .reactions import force_of_constraint, multiplier
 
@@ -29,23 +27,7 @@ NAMES = re.compile(
     r"der\(\s*[A-Za-z_][\w.]*\s*(?:,\s*2\s*)?\)|(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*(?!\w|\s*\()"
 )
 EXAMPLE = "'tension = -2*L*lambda.rod [N]'"
-OPERATORS: dict[type, Any] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.USub: operator.neg,
-    ast.UAdd: operator.pos,
-}
-FUNCTIONS: dict[str, Any] = {
-    **{f.__name__: f for f in (sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.atan2)},
-    **{f.__name__: f for f in (sp.sinh, sp.cosh, sp.tanh, sp.exp, sp.log, sp.sign)},
-    "sqrt": sp.sqrt,
-    "abs": sp.Abs,
-    "min": sp.Min,
-    "max": sp.Max,
-}
+CAPITALS = re.compile(r"\b(abs|min|max)(?=\s*\()")  # SymPy's names of these begin with one
 
 
 def with_outputs(model: Model, texts: Sequence[str]) -> Model:
@@ -94,46 +76,21 @@ def _moves(model: Model, symbol: Expr) -> bool:
 def _read(formula: str, known: dict[str, Expr]) -> Expr:
     """The expression.  Raises ValueError with what cannot be read, and what was expected."""
     meant: dict[str, Expr] = {}
+    named: list[str] = []
 
     def stand_in(match: re.Match[str]) -> str:
         name = re.sub(r"\s+", "", match[0])
         if name not in known:
             near = difflib.get_close_matches(name, known, 3, 0.5) or list(known)[:8]
             raise ValueError(f"{name!r} is unknown; did you mean {', '.join(map(repr, near))}?")
+        named.append(name)
         meant[f"x{len(meant)}"] = known[name]
         return f"x{len(meant) - 1}"
 
-    plain = NAMES.sub(stand_in, formula.replace("^", "**"))
+    plain = CAPITALS.sub(lambda m: m[0].capitalize(), formula.replace("^", "**"))
+    plain = NAMES.sub(stand_in, plain)
     try:
-        tree = ast.parse(plain.strip(), mode="eval")
-    except SyntaxError:
-        raise ValueError(f"{formula!r} is no expression, expected one as in {EXAMPLE}") from None
-    return sp.sympify(_value(tree.body, meant, formula))
-
-
-def _value(node: ast.expr, meant: dict[str, Expr], formula: str) -> Expr:
-    if isinstance(node, ast.Name) and node.id in meant:
-        return meant[node.id]
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-        return sp.sympify(node.value)
-    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-        sides = (_value(node.left, meant, formula), _value(node.right, meant, formula))
-        return OPERATORS[type(node.op)](*sides)
-    if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
-        return OPERATORS[type(node.op)](_value(node.operand, meant, formula))
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-        if node.func.id not in FUNCTIONS:
-            raise ValueError(
-                f"{node.func.id!r} is no function that is known here, expected one of "
-                f"{', '.join(FUNCTIONS)}"
-            )
-        try:
-            return FUNCTIONS[node.func.id](*(_value(a, meant, formula) for a in node.args))
-        except TypeError:
-            raise ValueError(
-                f"{node.func.id} cannot take {len(node.args)} arguments: correct {formula!r}"
-            ) from None
-    raise ValueError(
-        f"{formula!r} holds what is no part of an expression, expected names, numbers, + - * / ** and "
-        "functions"
-    )
+        return read_formula(plain, meant)
+    except ValueError as error:
+        text = re.sub(r"\bx(\d+)\b", lambda m: named[int(m[1])], str(error))
+        raise ValueError(f"{text}, expected an expression as in {EXAMPLE}") from None

@@ -1,4 +1,4 @@
-"""A formula as it travels inside an FMU: text that is read back without being run.
+"""A formula as text, inside an FMU or on a command line: read back without being run.
 
 An FMU comes from anyone.  SymPy's own readers (`sympify`, `parse_expr`) hand text to Python's eval; here
 the text is parsed to a syntax tree (`ast.parse`, which runs nothing), and a SymPy expression is put together
@@ -20,9 +20,9 @@ from typing import Any
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
-from ..model.elements import Expr
-from ..model.spline import HIGHEST as HIGHEST_DERIVATIVE
-from ..model.spline import Spline
+from .elements import Expr
+from .spline import HIGHEST as HIGHEST_DERIVATIVE
+from .spline import Spline
 
 Make = Callable[..., Expr]
 LONGEST = 200_000  # characters of one formula
@@ -251,7 +251,7 @@ class _Reader:
                 + ", ".join([*ARITIES, *EQUALITIES, "Piecewise"])
             )
         if len(node.args) not in arities[name]:
-            raise ValueError(f"{name} of {len(node.args)} arguments")
+            raise ValueError(f"{name} cannot take {len(node.args)} arguments")
         arguments = [self._number(a, depth) for a in node.args]
         if name.startswith("bessel") and not _is_order(arguments[0].value):
             raise ValueError(f"the order of {name} is no number between -{HIGHEST} and {HIGHEST}")
