@@ -84,7 +84,8 @@ def test_the_small_oscillations_are_two_modes(native_fmu, sign):
 
 
 def test_at_rest_the_upper_rod_carries_both_and_the_lower_one(native_fmu):
-    """Hanging at rest T1 = (m1 + m2) g and T2 = m2 g."""
+    """Hanging at rest T1 = (m1 + m2) g and T2 = m2 g; together they carry m1 g at the upper bob."""
     result = swing(native_fmu("DoublePendulum"), (3.0, 0.2, 1.5, 0.6, 0, 0, 0, 0), points=3)
     np.testing.assert_allclose(result["lambda.upper"], -3.2 * G / (2 * 1.5), rtol=1e-14)
     np.testing.assert_allclose(result["lambda.lower"], -0.2 * G / (2 * 0.6), rtol=1e-14)
+    np.testing.assert_allclose(result["Q.y1"], 3.0 * G, rtol=1e-13)
