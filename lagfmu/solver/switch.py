@@ -90,8 +90,10 @@ def _settled(
     before, struck = v, None
     if any(s[k] < -slow[k] for k in touching):
         struck = strike(motion, terms, v, touching, restitution(system, motion.p), settings)
-        state = replace(state, dissipated=state.dissipated + struck.lost)
         v = _without_hops(motion, terms, struck.v, touching, small, slow)
+        caught = v - struck.v  # a plastic impact: M caught = G^T Lambda with s+ = 0
+        lost = struck.lost + float(caught @ terms.M @ caught) / 2
+        state = replace(state, dissipated=state.dissipated + lost)
         terms = motion.terms(t, q, v)
         s = terms.G @ v - terms.nu
     resting = {k for k in touching if abs(s[k]) <= slow[k]}
