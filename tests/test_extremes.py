@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from ctypes import c_double, c_size_t
 from dataclasses import replace
 from pathlib import Path
@@ -28,34 +27,12 @@ from instance import Instance, instance
 from sympy import cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Model, Parameter, Scene, build_fmu, names, simulate
-from lagfmu.testing import RedundantConstraintWarning, find_compiler
+from lagfmu import Holonomic, Model, Parameter, names, simulate
 
+pytestmark = pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
 g0 = 9.81  # m/s^2
 m, g, L = symbols("m g L", positive=True)
 x, y, z = dynamicsymbols("x y z")
-
-Build = Callable[..., Path]
-
-
-@pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """build(model): its native FMU, built once."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    folder = tmp_path_factory.mktemp("extremes")
-    made: dict[str, Path] = {}
-
-    def get(model: Model, **scene: Any) -> Path:
-        if model.name not in made:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RedundantConstraintWarning)
-                made[model.name] = build_fmu(
-                    model, folder, Scene(model.name, **scene), target="native", check=False
-                )
-        return made[model.name]
-
-    return get
 
 
 def why(one: Instance) -> str:
@@ -164,19 +141,28 @@ LIGHT, HEAVY = 1e-12, 1e12
         (LIGHT, 1.0, HEAVY),
         (LIGHT, LIGHT, HEAVY),
         (1e6, 1e-6, 1e6),
-        (1e3, 1e-3, 1e3),
+        (1.0, 1e-3, 1.0),
     ],
 )
-def test_masses_of_24_decades_on_a_straight_chain(build, masses):
-    """A light mass between heavy ones and the other way round: every rod's lambda, pointwise, to ten
-    roundings of its condition number, which is small: the problem is not the one that is ill-conditioned."""
-    with instance(build(chain(3))) as one:
-        one.start({f"m{k}": w for k, w in enumerate(masses, 1)})
-        assert check_multipliers(masses, one.outputs()) < 100
+def test_masses_of_24_decades_on_a_straight_chain(built, masses):
+    """A light mass between heavy ones and the other way round: every rod's lambda to ten roundings of its
+    condition number, which is small at the start, at every state that is reported, and the energy is
+    conserved; where the light mass would shake too fast to follow the step is refused."""
+    with instance(built(chain(3))) as one:
+        one.start({f"m{k}": w for k, w in enumerate(masses, 1)}, tolerance=1e-9)
+        seen, reason = walk(one, 0.02, 5)
+    causes = "internal steps", "step size", "nearly so"
+    assert len(seen) == 6 or any(cause in reason for cause in causes), reason
+    assert check_multipliers(masses, seen[0]) < 100
+    start = seen[0]["energy.total"]
+    for outputs in seen[1:]:
+        check_multipliers(masses, outputs)
+        assert max(abs(outputs[f"residual.link{k}"]) for k in (1, 2, 3)) < 1e-14
+        assert abs(outputs["energy.total"] - start) < 1e-7 * max(masses) * g0
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_masses_at_random_on_a_bent_chain(build, seed):
+def test_masses_at_random_on_a_bent_chain(built, seed):
     """Six bobs between 1e-12 and 1e12 kg, links in any direction, turning at any speed."""
     rng = np.random.default_rng(seed)
     masses = 10.0 ** rng.uniform(-12, 12, 6)
@@ -187,27 +173,9 @@ def test_masses_at_random_on_a_bent_chain(build, seed):
     for i, c in enumerate("xy"):
         values |= {f"{c}{k}": place[i, k - 1] for k in range(1, 7)}
         values |= {f"der({c}{k})": speed[i, k - 1] for k in range(1, 7)}
-    with instance(build(chain(6))) as one:
+    with instance(built(chain(6))) as one:
         one.start(values)
         check_multipliers(masses, one.outputs())
-
-
-@pytest.mark.parametrize(
-    "masses", [(1.0, 1e-3, 1.0), (1.0, 1e-6, 1.0), (HEAVY, LIGHT, HEAVY), (LIGHT, HEAVY, LIGHT)]
-)
-def test_a_light_mass_between_heavy_ones_moves_right_or_is_refused(build, masses):
-    """Between two communication points lambda stays right at every state that is reported, and the
-    energy is conserved; where the light mass would shake too fast to follow the step is refused."""
-    with instance(build(chain(3))) as one:
-        one.start({f"m{k}": w for k, w in enumerate(masses, 1)}, tolerance=1e-9)
-        seen, reason = walk(one, 0.02, 5)
-    causes = "internal steps", "step size", "nearly so"
-    assert len(seen) == 6 or any(cause in reason for cause in causes), reason
-    start = seen[0]["energy.total"]
-    for outputs in seen:
-        check_multipliers(masses, outputs)
-        assert max(abs(outputs[f"residual.link{k}"]) for k in (1, 2, 3)) < 1e-14
-        assert abs(outputs["energy.total"] - start) < 1e-7 * max(masses) * g0
 
 
 # ---------------------------------------------------------------------------- units
@@ -229,19 +197,12 @@ def exponents(path: Path) -> tuple[dict[str, tuple[float, ...]], dict[str, float
     return found, starts
 
 
-def rescaled(path: Path, units: Sequence[float], **options: Any) -> Any:
+def rescaled(path: Path, units: Sequence[float], stop: float, **settings: Any) -> Any:
     """A run in other units, given back in the old ones."""
     powers, starts = exponents(path)
     factor = {n: math.prod(u**e for u, e in zip(units, p, strict=True)) for n, p in powers.items()}
-    stop = options.pop("stop_time")
-    run = simulate(
-        path,
-        start_values={n: value * factor[n] for n, value in starts.items()}
-        | options.pop("also", {}),
-        stop_time=stop * units[2],
-        step_size=stop / 20 * units[2],
-        **options,
-    )
+    values = {n: value * factor[n] for n, value in starts.items()} | settings
+    run = simulate(path, stop * units[2], stop / 20 * units[2], start_values=values)
     back = run.copy()
     for n in run.dtype.names:
         if run[n].dtype.kind == "f":
@@ -250,38 +211,25 @@ def rescaled(path: Path, units: Sequence[float], **options: Any) -> Any:
 
 
 NANO, GIGA = 2.0**-30, 2.0**30  # 0.93e-9, 1.07e9: rounding is the same in both units
-SCALES = {
-    "masses up": (GIGA, 1, 1),
-    "masses down": (NANO, 1, 1),
-    "lengths up": (1, GIGA, 1),
-    "lengths down": (1, NANO, 1),
-    "times up": (1, 1, GIGA),
-    "times down": (1, 1, NANO),
-    "all": (GIGA, NANO, GIGA),
-    "all back": (NANO, GIGA, NANO),
-}
-STIFF = {
-    "SliderCrank"
-}  # the pivots of radau5's matrix are chosen by size, which is a matter of units
+BINARY = [(GIGA, 1, 1), (1, NANO, 1), (1, 1, GIGA), (NANO, 1, NANO), (NANO, GIGA, NANO)]
+DECADES = [(1e9, 1, 1), (1, 1e9, 1), (1, 1, 1e-9), (1e9, 1e-9, 1e9)]
+STIFF = (
+    "SliderCrank"  # the pivots of radau5's matrix are chosen by size, which is a matter of units
+)
+TABULATED = "HalfCar"  # the points of its road stay in metres
+FREE = of_each_kind(sorted(set(FILES) - {STIFF, TABULATED}))
 
 
-TABULATED = {"HalfCar"}  # the points of its road stay in metres
-
-
-def in_units(scales: dict[str, tuple[float, ...]]) -> list[Any]:
-    """(model, units) for every model whose motion these units must not change."""
-    names = sorted(set(FILES) - STIFF - TABULATED)
-    return [case for k, v in scales.items() for case in of_each_kind(names, v, label=k)]
-
-
-@pytest.mark.parametrize(("name", "units"), in_units(SCALES))
-def test_units_change_nothing_to_the_last_bit(native_fmu, name, units):
+@pytest.mark.parametrize("name", FREE)
+def test_units_change_nothing_to_the_last_bit(native_fmu, name):
     """The same system in units of 2^+-30 kg, m and s: lambda, Q, energies, the times of events and the
     number of steps are the same to the last bit, in the units that the description says."""
     path = native_fmu(name)
-    plain, other = (rescaled(path, u, stop_time=2.0) for u in ((1, 1, 1), units))
-    for n in plain.dtype.names:
-        np.testing.assert_array_equal(other[n], plain[n], err_msg=n)
+    plain = rescaled(path, (1, 1, 1), 2.0)
+    for units in BINARY:
+        other = rescaled(path, units, 2.0)
+        for n in plain.dtype.names:
+            np.testing.assert_array_equal(other[n], plain[n], err_msg=f"{n} {units}")
 
 
 def apart(expected: Any, found: Any) -> dict[str, float]:
@@ -304,39 +252,27 @@ def apart(expected: Any, found: Any) -> dict[str, float]:
     }
 
 
-DECADES = {
-    "masses": (1e9, 1, 1),
-    "lengths": (1, 1e9, 1),
-    "times": (1, 1, 1e9),
-    "masses and times": (1e-9, 1, 1e9),
-    "all": (1e9, 1e-9, 1e9),
-    "all back": (1e-9, 1e9, 1e-9),
-}
-
-
-def check_decades(path: Path, units: Sequence[float]) -> None:
-    run = {"stop_time": 1.5, "also": {"solver.method": "rk4"}}
-    plain, other = (rescaled(path, u, **run) for u in ((1, 1, 1), units))
-    worst = apart(plain, other)
-    assert max(worst.values()) < 1e-12, sorted(worst.items(), key=lambda a: -a[1])[:3]
-
-
-@pytest.mark.parametrize(("name", "units"), in_units(DECADES))
-def test_lambda_scales_as_its_unit_says(native_fmu, name, units):
+@pytest.mark.parametrize("name", FREE)
+def test_lambda_scales_as_its_unit_says(native_fmu, name):
     """By 1e+-9, which rounds every number anew: along a run in steps of a fixed part of the motion's own
     time lambda, Q, energies and the times of events scale as their units say, to 1e-12."""
-    check_decades(native_fmu(name), units)
+    settings = {"solver.method": "rk4"}
+    path = native_fmu(name)
+    plain = rescaled(path, (1, 1, 1), 1.5, **settings)
+    for units in DECADES:
+        worst = apart(plain, rescaled(path, units, 1.5, **settings))
+        assert max(worst.values()) < 1e-12, sorted(worst.items(), key=lambda a: -a[1])[:3]
 
 
 def test_a_stiff_system_scales_as_far_as_its_spring_lets_it(native_fmu):
     """The spring's pull is k = 1e6 N/m times a difference of two places of 0.6 m: rounding in them is
     eps k y/|pull| of the force, and radau5 tells lambda in any unit to ten times that."""
-    path = native_fmu("SliderCrank")
-    plain = rescaled(path, (1, 1, 1), stop_time=0.5)
+    path = native_fmu(STIFF)
+    plain = rescaled(path, (1, 1, 1), 0.5)
     pull = np.abs(plain["der(y,2)"]).max()
     rounding = np.finfo(float).eps * 1e6 * 0.6 / pull
-    for units in DECADES.values():
-        worst = apart(plain, rescaled(path, units, stop_time=0.5))
+    for units in DECADES:
+        worst = apart(plain, rescaled(path, units, 0.5))
         assert max(worst.values()) < 10 * rounding
 
 
@@ -362,13 +298,13 @@ ROD = x**2 + y**2 - L**2
     [(1, 1), (1, 1, 1), (1, 1000), (1, -2, 0.5)],
     ids=["twice", "thrice", "scaled", "mixed"],
 )
-def test_a_constraint_given_several_times_shares_its_force_equally(build, factors):
+def test_a_constraint_given_several_times_shares_its_force_equally(built, factors):
     """lambda of the pendulum's rod is -tension/(2 L).  Given k times, as c_i f = 0, the solution of least
     norm in comparable units is lambda/(k c_i) each; none is unique; Q and the motion are the single one's."""
     rows = [Holonomic(f"rod{i}", c * ROD) for i, c in enumerate(factors)]
-    single = build(bob("Single", [Holonomic("rod", ROD)]))
+    single = built(bob("Single", [Holonomic("rod", ROD)]))
     label = "Rods" + "_".join(str(c).replace(".", "d").replace("-", "n") for c in factors)
-    with instance(single) as alone, instance(build(bob(label, rows))) as many:
+    with instance(single) as alone, instance(built(bob(label, rows))) as many:
         for one in (alone, many):
             one.start(tolerance=1e-11)
         expected, reason = walk(alone, 0.25, 12)
@@ -387,49 +323,6 @@ def test_a_constraint_given_several_times_shares_its_force_equally(build, factor
 
 beta = dynamicsymbols("beta")
 a_, J = symbols("a J", positive=True)
-
-
-def swing() -> Model:
-    """A beam that hangs by three parallel rods of one length: the third is one too many."""
-    rods = {
-        name: Holonomic(
-            name, (x + s * a_ * (cos(beta) - 1)) ** 2 + (y + s * a_ * sin(beta)) ** 2 - L**2
-        )
-        for name, s in (("left", -1), ("middle", 0), ("right", 1))
-    }
-    return Model(
-        name="Swing",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * beta.diff() ** 2 / 2 - m * g * y,
-        coordinates={x: "m", y: "m", beta: "rad"},
-        constraints=list(rods.values()),
-        parameters=[
-            Parameter(m, 2.0, "kg"),
-            Parameter(J, 0.7, "kg.m^2"),
-            Parameter(g, g0, "m/s^2"),
-            Parameter(L, 1.25, "m"),
-            Parameter(a_, 0.5, "m"),
-        ],
-        start={x: 0.75, y: -1.0, beta: 0.0},
-    )
-
-
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-11])
-def test_a_beam_on_three_parallel_rods_swings_like_a_pendulum(build, tolerance):
-    """The rows depend on each other only on the constraints, not next to them, where the integrator's
-    stages are.  The beam does not turn, the forces sum up to the pendulum's tension, the two outer rods
-    carry the same, and no lambda is unique."""
-    with instance(build(swing())) as one:
-        one.start(tolerance=tolerance)
-        seen, reason = walk(one, 0.1, 30)
-    assert reason == ""
-    for a in seen:
-        tension = 2.0 * (a["der(x)"] ** 2 + a["der(y)"] ** 2 - g0 * a["y"]) / 1.25
-        total = a["lambda.left"] + a["lambda.middle"] + a["lambda.right"]
-        assert total == pytest.approx(-tension / 2.5, rel=10 * tolerance, abs=1e-8)
-        assert a["lambda.left"] == pytest.approx(a["lambda.right"], rel=1e-6, abs=1e-6)
-        assert not any(a[f"unique.{rod}"] for rod in ("left", "middle", "right"))
-        assert abs(a["beta"]) < 100 * tolerance
-        assert a["energy.total"] == pytest.approx(seen[0]["energy.total"], abs=2e3 * tolerance)
 
 
 alpha = symbols("alpha", positive=True)
@@ -457,12 +350,12 @@ def groove() -> Model:
     )
 
 
-@pytest.mark.parametrize("angle", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
-def test_nearly_parallel_constraints_lose_no_more_than_their_angle(build, angle):
+@pytest.mark.parametrize("angle", [1e-4, 1e-6, 1e-8])
+def test_nearly_parallel_constraints_lose_no_more_than_their_angle(built, angle):
     """Of two faces at an angle alpha the second alone holds the bead sideways: lambda_wall sin(alpha) =
     m g/2, and the first gives what is left of N = m (g + x'^2/R)/(1 + x^2/R^2).  Data rounded to eps fix
     lambda to eps/alpha, and no more is lost, along a run; the motion and Q lose nothing."""
-    with instance(build(groove())) as one:
+    with instance(built(groove())) as one:
         one.start({"alpha": angle}, tolerance=1e-10)
         seen, reason = walk(one, 0.1, 10)
     assert reason == ""
@@ -487,7 +380,7 @@ def test_nearly_parallel_constraints_lose_no_more_than_their_angle(build, angle)
 k_ = symbols("k", positive=True)
 
 
-def test_a_coordinate_without_mass_follows_its_constraint(build):
+def test_a_coordinate_without_mass_follows_its_constraint(built):
     """A massless slider z that is held at the bob's x, with a spring to the wall: what the constraint
     transmits is the spring's force, lambda = k z, and the energy of bob and spring is conserved."""
     model = bob(
@@ -503,7 +396,7 @@ def test_a_coordinate_without_mass_follows_its_constraint(build):
         ],
         start={x: 0.75, y: -1.0, z: 0.75},
     )
-    with instance(build(model)) as one:
+    with instance(built(model)) as one:
         one.start(tolerance=1e-10)
         seen, reason = walk(one, 0.1, 20)
     assert reason == ""
@@ -549,39 +442,33 @@ def parallelogram() -> Model:
     )
 
 
-@pytest.mark.parametrize("step", [0.1, 0.37, 3.0])
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
-def test_a_crank_through_its_singular_point_is_right_or_refused(build, tolerance, step):
-    """Where x = 2 r cos phi crosses the branch x = 0 nothing in the equations tells the branches apart.
-    Either the crank goes on along its smooth branch with its energy, or the step is refused."""
-    with instance(build(isosceles())) as one:
-        one.start(tolerance=tolerance)
-        seen, reason = walk(one, step, round(3.0 / step))
-    assert len(seen) > 1 or reason
-    for a in seen:
-        assert abs(a["residual.rod"]) < 1e-12
-        assert a["energy.total" if "energy.total" in a else "energy.kinetic"] == pytest.approx(
-            seen[0]["energy.kinetic"], rel=1e3 * tolerance
-        )
-        assert a["x"] == pytest.approx(math.cos(a["phi"]), abs=1e3 * tolerance)
+SMOOTH = {  # model, constraints, how long [s], what stays zero on the branch that goes on smoothly
+    "crank": (isosceles, ["rod"], 3.0, lambda a: [a["x"] - math.cos(a["phi"])]),
+    "parallelogram": (
+        parallelogram,
+        ["along", "across"],
+        1.0,
+        lambda a: [a["psi"] - a["phi"], a["theta"]],
+    ),
+}
 
 
-@pytest.mark.parametrize("step", [0.1, 0.37, 1.0])
+@pytest.mark.parametrize("share", [0.05, 0.37, 1.0])
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
-def test_a_parallelogram_through_its_change_point_is_right_or_refused(build, tolerance, step):
-    """With equal cranks it turns evenly, phi = psi = t - 1/2, the coupler keeping its direction; at the
-    change point another motion begins that satisfies the same constraints.  Either it is the smooth one, or
-    the step is refused."""
-    with instance(build(parallelogram())) as one:
+@pytest.mark.parametrize("name", SMOOTH)
+def test_a_way_through_a_singular_point_is_right_or_refused(built, name, tolerance, share):
+    """Where x = 2 r cos phi crosses the branch x = 0, and where a parallelogram may become the
+    anti-parallelogram, nothing in the equations tells the branches apart.  Either it goes on along its smooth
+    branch with its energy, or the step is refused."""
+    model, rows, stop, missed = SMOOTH[name]
+    with instance(built(model())) as one:
         one.start(tolerance=tolerance)
-        seen, reason = walk(one, step, round(1.0 / step))
+        seen, reason = walk(one, share * stop, round(1 / share))
     assert len(seen) > 1 or reason
     for a in seen:
-        assert abs(a["residual.along"]) < 1e-12
-        assert abs(a["residual.across"]) < 1e-12
-        assert a["energy.kinetic"] == pytest.approx(1.0, rel=1e3 * tolerance)
-        assert a["psi"] == pytest.approx(a["phi"], abs=1e3 * tolerance)
-        assert a["theta"] == pytest.approx(0.0, abs=1e3 * tolerance)
+        assert all(abs(a[f"residual.{row}"]) < 1e-12 for row in rows)
+        assert a["energy.kinetic"] == pytest.approx(seen[0]["energy.kinetic"], rel=1e3 * tolerance)
+        assert missed(a) == pytest.approx([0.0] * len(missed(a)), abs=1e3 * tolerance)
 
 
 def four_points(again: bool) -> Model:
@@ -620,7 +507,7 @@ def four_points(again: bool) -> Model:
 @pytest.mark.parametrize("again", [False, True])
 @pytest.mark.parametrize("step", [0.1, 1.5])
 @pytest.mark.parametrize("digits", [5, 8, 10, 12, 13])
-def test_a_singular_configuration_is_passed_smoothly_at_every_tolerance(build, digits, step, again):
+def test_a_singular_configuration_is_passed_smoothly_at_every_tolerance(built, digits, step, again):
     """With equal cranks the coupler keeps its direction, and the cranks turn as one pendulum: they lie in
     line with the frame at phi = 0, pi, ..., t = int dphi / sqrt(w^2 - 2 g (sin phi - sin phi0)/r). The
     anti-parallelogram begins at each; that it was not entered is said by name and time.  A constraint that
@@ -633,7 +520,7 @@ def test_a_singular_configuration_is_passed_smoothly_at_every_tolerance(build, d
         scipy.integrate.quad(inverse_rate, -0.5, k * math.pi, epsabs=1e-12)[0] for k in range(9)
     ]
     tolerance = 10.0**-digits
-    with instance(build(four_points(again))) as one:
+    with instance(built(four_points(again))) as one:
         one.start(tolerance=tolerance)
         seen, reason = walk(one, step, round(1.5 / step))
         log = [text for _, category, text in one.log if category == "logStatusWarning"]
@@ -651,11 +538,11 @@ def test_a_singular_configuration_is_passed_smoothly_at_every_tolerance(build, d
 
 
 @pytest.mark.parametrize("again", [False, True])
-def test_it_is_passed_wherever_steps_end_before_it(build, again):
+def test_it_is_passed_wherever_steps_end_before_it(built, again):
     """From forty states at 1e-12: the coupler keeps its direction, whatever step leads up to the crossing (a
     fourth of them ended in the anti-parallelogram, or at the crossing)."""
     draws = np.random.default_rng(3).uniform((-1.2, 7.0), (-0.1, 14.0), (40, 2))
-    with instance(build(four_points(again))) as one:
+    with instance(built(four_points(again))) as one:
         for a, w in draws:
             at = {f"x{k}": k - 1 + math.cos(a) / 2 for k in (1, 2)}
             at |= {f"y{k}": math.sin(a) / 2 for k in (1, 2)}
@@ -669,10 +556,10 @@ def test_it_is_passed_wherever_steps_end_before_it(build, again):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-17, 1e-9])
-def test_a_start_in_a_singular_configuration_is_right_or_refused(build, angle):
+def test_a_start_in_a_singular_configuration_is_right_or_refused(built, angle):
     """At, or next to, the point where the branches cross: at rest it may stay, a speed is refused unless
     a branch allows it."""
-    with instance(build(isosceles())) as one:
+    with instance(built(isosceles())) as one:
         place = {"phi": math.pi / 2 - angle, "x": math.cos(math.pi / 2 - angle)}
         try:
             one.start(place | {"der(phi)": 1.0, "der(x)": -1.0}, tolerance=1e-8)
@@ -764,13 +651,10 @@ def check_invariants(
         assert abs(seen["energy.total"] - first["energy.total"]) <= grown * size + 1e-300
 
 
-def test_a_prescribed_motion_may_jump(tmp_path):
+def test_a_prescribed_motion_may_jump(built):
     """A point that is set to a new place at each communication point, its rate left at zero: the mass
     follows onto the constraint, which is no singular configuration."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine")
-    path = build_fmu(absorber, tmp_path, target="native", check=False)
-    with instance(path) as one:
+    with instance(built(absorber)) as one:
         one.start()
         for k in range(1, 6):
             one.set("u", 1e-3 * k)
@@ -793,10 +677,10 @@ def tray() -> Model:
 
 
 @pytest.mark.parametrize("amplitude", [1e-300, 1e-160, 1e-20, 1e-12, 1e-6])
-def test_a_place_near_zero_is_projected_to_rounding_of_the_terms(build, amplitude):
+def test_a_place_near_zero_is_projected_to_rounding_of_the_terms(built, amplitude):
     """Swings of 1e-6 rad to 1e-300 rad: L (1 - cos theta) is rounding of L, the height is 0 but for 5e-13 m;
     no step "cannot be projected", and theta swings as cos(sqrt(g/L) t)."""
-    with instance(build(tray())) as one:
+    with instance(built(tray())) as one:
         one.start({"theta": amplitude}, tolerance=1e-9)
         seen, reason = walk(one, 0.1, 20)
     assert reason == ""
@@ -818,10 +702,10 @@ def reeled() -> Model:
 
 
 @pytest.mark.parametrize("step", [0.25, 0.37, 1.0])
-def test_a_step_into_a_singular_configuration_is_right_or_names_it(build, step):
+def test_a_step_into_a_singular_configuration_is_right_or_names_it(built, step):
     """Where the string ends no direction is left to hold the mass by: either it goes on straight,
     x = L - c t, or the message says that the configuration is singular, not to take smaller steps."""
-    with instance(build(reeled())) as one:
+    with instance(built(reeled())) as one:
         one.start(tolerance=1e-9)
         seen, reason = walk(one, step, math.ceil(1.5 / step))
     for k, a in enumerate(seen):
@@ -844,10 +728,10 @@ def stretched() -> Model:
     )
 
 
-def test_a_parallelogram_in_line_is_named_as_singular(build):
+def test_a_parallelogram_in_line_is_named_as_singular(built):
     """d(along)/dq = 0 in line: the frame grows and nothing can follow. The message names the constraint and
     the singular configuration; smaller steps would not help."""
-    with instance(build(stretched())) as one:
+    with instance(built(stretched())) as one:
         one.start(tolerance=1e-6)
         _, reason = walk(one, 0.1, 3)
     assert reason != ""

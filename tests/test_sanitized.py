@@ -11,8 +11,9 @@ from pathlib import Path
 import fmpy
 import pytest
 from conftest import of_each_kind
+from redundant import platform
 from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
-from test_extremes import isosceles, swing
+from test_extremes import isosceles
 from test_jumps import MODELS as JUMPS
 
 from lagfmu import Peak, Scene, build_fmu
@@ -32,7 +33,7 @@ LIVES = {  # steps that reach the event or the singular point in between
     "SlippingSphere": 0.1,  # friction
     "FallingRod": 0.05,  # friction in an impact
     "PendulumNullspace": 0.1,
-    "Swing": 0.1,  # one constraint too many
+    "Platform": 0.1,  # one constraint too many
     "Isosceles": 0.37,  # a step that fails
     "Gate": 0.2,  # forces that jump at two places, no contact
     "Lifted": 0.2,  # a force that jumps and opens a contact
@@ -52,8 +53,8 @@ def unpacked(native_fmu, prepared, tmp_path_factory):
     folder = tmp_path_factory.mktemp("sources")
 
     def get(name: str):
-        if name == "Swing":
-            path = build_fmu(swing(), folder, target="native", check=False)
+        if name == "Platform":
+            path = build_fmu(platform(True), folder, target="native", check=False)
         elif name == "FallingRod":
             file = load(Path(__file__).parent.parent / "models" / "falling_rod.py")
             path = build_fmu(file.model, folder, target="native", check=False)
