@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -148,18 +148,18 @@ def native_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """built(model), built(model, scene): the native FMU of a model of a test's own, built once."""
+    """built(model), built(model, scene, closed_forms): the native FMU of a test's own model, built once."""
     if find_compiler() is None:
         pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    made: list[tuple[tuple[Model, Scene], Path]] = []
+    made: list[tuple[tuple[Any, ...], Path]] = []
 
-    def get(model: Model, scene: Scene | None = None) -> Path:
-        wanted = model, scene or Scene(model.name)
+    def get(model: Model, scene: Scene | None = None, closed_forms: Sequence[Any] = ()) -> Path:
+        wanted = model, scene or Scene(model.name), tuple(closed_forms)
         for known, path in made:
             if known == wanted:
                 return path
         folder = tmp_path_factory.mktemp("own")
-        made.append((wanted, build_fmu(model, folder, wanted[1], target="native", check=False)))
+        made.append((wanted, build_fmu(model, folder, *wanted[1:], target="native", check=False)))
         return made[-1][1]
 
     return get
