@@ -7,11 +7,11 @@ import math
 from ctypes import byref, c_double
 
 import pytest
-from fmi2 import DISCARD, Library
+from fmi2 import DISCARD
 from sympy import Rational, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Model, Parameter, build_fmu
+from lagfmu import Contact, Holonomic, Model, Parameter
 from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -139,11 +139,11 @@ def test_a_landing_ahead_is_invisible_until_its_time(library, step):
     one.free()
 
 
-def lifted(folder) -> Library:
+def lifted() -> Model:
     """A ball lifted by a force that has no value deeper than 1 cm below the floor: P sqrt(y/l + 0.01)."""
     y = dynamicsymbols("y")
     m, g, P, l = symbols("m g P l", positive=True)  # noqa: E741
-    model = Model(
+    return Model(
         name="Lifted",
         lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
         forces={y: P * sqrt(y / l + Rational(1, 100))},
@@ -157,15 +157,14 @@ def lifted(folder) -> Library:
         ],
         start={y: 1.0},
     )
-    return Library(build_fmu(model, folder, target="native", check=False), folder / "library")
 
 
 @pytest.mark.parametrize("step", [1.0, 2.0**-6])
-def test_what_lies_behind_an_obstacle_need_not_be_defined(tmp_path, step):
+def test_what_lies_behind_an_obstacle_need_not_be_defined(built, library, step):
     """On its way to the floor the integrator meets a force that has no value behind it.  The ball lands all
     the same, no faster than the work v^2/2 = g h - (P/m) 2/3 (1.01^(3/2) - 0.01^(3/2)) h allows, and lies
     there: lambda = m g - 0.1 P."""
-    one = lifted(tmp_path)().start(None, 1e-9)
+    one = library(built(lifted()))().start(None, 1e-9)
     fastest = 0.0
     while one.time < 2.0:
         one.step(step)
@@ -213,12 +212,12 @@ def test_rollback_within_a_step_ahead_is_exact(library, name):
     other.free()
 
 
-def candle(folder) -> Library:
+def candle() -> Model:
     """A bead on a line, driven by a force that ends with a root: nothing is defined after t = T."""
     t = dynamicsymbols._t
     x, y = dynamicsymbols("x y")
     m, P, T = symbols("m P T", positive=True)
-    model = Model(
+    return Model(
         name="Candle",
         lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
         forces={x: P * sqrt(1 - t / T)},
@@ -227,15 +226,14 @@ def candle(folder) -> Library:
         parameters=[Parameter(m, 1.0, "kg"), Parameter(P, 3.0, "N"), Parameter(T, 1.0, "s")],
         start={x: 1.0, y: 1.0},
     )
-    return Library(build_fmu(model, folder, target="native", check=False), folder / "library")
 
 
 @pytest.mark.parametrize("stop", [None, 1.0], ids=["no stop time", "stop time"])
 @pytest.mark.parametrize("step", [1.0, 0.25, 2.0**-10])
-def test_a_failure_ahead_is_invisible_until_its_time(tmp_path, step, stop):
+def test_a_failure_ahead_is_invisible_until_its_time(built, library, step, stop):
     """The force is defined until t = 1 s, where it ends: the FMU gets there, with and without being told
     to stop, and x = 1 + P/(2 m) (t^2/2 - ...) is right; then the step is refused and nothing changes."""
-    one = candle(tmp_path)().start(None, 1e-9, stop)
+    one = library(built(candle()))().start(None, 1e-9, stop)
     run(one, step, 1.0)
     speed, place, lam = one.reals(["der(x)", "x", "lambda.line"])
     assert speed == pytest.approx(3.0 / 2 * 2 / 3, rel=1e-6)  # P/(2 m) (2/3) T
@@ -249,10 +247,10 @@ def test_a_failure_ahead_is_invisible_until_its_time(tmp_path, step, stop):
     one.free()
 
 
-def test_the_stop_time_is_never_passed(tmp_path):
+def test_the_stop_time_is_never_passed(built, library):
     """Neither by the integrator, whose stages would meet the undefined force, nor by a sum of steps that
     exceeds it by rounding: ten steps of 0.1 s."""
-    one = candle(tmp_path)().start(None, 1e-9, 1.0)
+    one = library(built(candle()))().start(None, 1e-9, 1.0)
     for _ in range(10):
         one.step(0.1)
     (speed,) = one.reals(["der(x)"])

@@ -5,16 +5,13 @@ The particle flies freely, so that nothing but the contact could shorten a step.
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 from instance import instance
 from sympy import cos, exp, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Model, Parameter, Scene, build_fmu
-from lagfmu.testing import find_compiler
+from lagfmu import Contact, Model, Parameter
 
 x, y = dynamicsymbols("x y")
 m, a, H, w, R = symbols("m a H w R", positive=True)
@@ -56,26 +53,12 @@ def table():
     return flight("Dip", Contact("table", y), [Parameter(a, PULL, "m/s^2")], pull=a)
 
 
-@pytest.fixture(scope="module")
-def own(tmp_path_factory):
-    """own(MODEL): its FMU."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    folder = tmp_path_factory.mktemp("own")
-
-    def build(model):
-        made = model()
-        return build_fmu(made, folder, Scene(made.name), target="native", check=False)
-
-    return cache(build)
-
-
 @pytest.mark.parametrize("radius", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("offset", [0.0, 0.6])
-def test_a_grain_in_the_way_is_hit(own, radius, offset):
+def test_a_grain_in_the_way_is_hit(built, radius, offset):
     """A particle that flies 1 m a step meets a sphere of 1e-6 to 1e-2 m: head on it comes straight back; at
     0.6 R beside its centre it is turned as light is by a round mirror, by pi - 2 asin 0.6."""
-    with instance(own(grain)) as one:
+    with instance(built(grain())) as one:
         one.start({"R": radius, "y": offset * radius, "der(x)": 10.0})
         one.step(0.1)
         turn = np.pi - 2 * np.arcsin(offset)
@@ -83,9 +66,9 @@ def test_a_grain_in_the_way_is_hit(own, radius, offset):
         assert one.get("der(y)") == pytest.approx(10 * np.sin(turn), abs=1e-4)
 
 
-def test_a_flight_past_a_grain_is_not_turned(own):
+def test_a_flight_past_a_grain_is_not_turned(built):
     """At 1.001 R it passes by, at 10 m/s still, and the step is one."""
-    with instance(own(grain)) as one:
+    with instance(built(grain())) as one:
         one.start({"y": 1.001e-4, "der(x)": 10.0})
         one.step(0.1)
         assert one.get("der(y)") == 0
@@ -93,10 +76,10 @@ def test_a_flight_past_a_grain_is_not_turned(own):
 
 
 @pytest.mark.parametrize("speed", [5.0, 50.0, 500.0])
-def test_a_narrow_bump_is_not_tunnelled(own, speed):
+def test_a_narrow_bump_is_not_tunnelled(built, speed):
     """At half the height of the bump the particle meets its slope where exp(-(x/w)^2) = 1/2, and is mirrored
     there: f is 0.5 m of flat road before and after, and nothing of the bump is seen from there."""
-    with instance(own(bump)) as one:
+    with instance(built(bump())) as one:
         one.start({"y": 0.005, "der(x)": speed})
         meet = -0.01 * np.sqrt(np.log(2))
         slope = -2 * meet / 0.01**2 * 0.005
@@ -107,10 +90,10 @@ def test_a_narrow_bump_is_not_tunnelled(own, speed):
         np.testing.assert_allclose(found, mirrored, rtol=1e-6)
 
 
-def test_of_many_hills_the_first_is_hit(own):
+def test_of_many_hills_the_first_is_hit(built):
     """A flight that comes down by 5 mm a hill would pass through four of them, one after another: it stays on
     the road or above it at each point."""
-    with instance(own(hills)) as one:
+    with instance(built(hills())) as one:
         one.start({"y": 0.05, "der(x)": 10.0, "der(y)": -0.1})
         for _ in range(350):
             one.step(0.002)
@@ -118,26 +101,25 @@ def test_of_many_hills_the_first_is_hit(own):
 
 
 @pytest.mark.parametrize("depth", [1e-3, 1e-6, 1e-8])
-def test_a_grazing_dip_is_seen(own, depth):
+def test_a_grazing_dip_is_seen(built, depth):
     """Drawn upwards at 9.81 m/s^2 it would dip below the table by 1e-8 to 1e-3 m at t = 0.5 s, and be above
     at every look at a whole step: it stops at the table instead and leaves it with no speed."""
     touch = 0.5 - np.sqrt(2 * depth / PULL)
-    with instance(own(table)) as one:
+    with instance(built(table())) as one:
         one.start({"y": PULL / 8 - depth, "der(y)": -PULL / 2}, tolerance=1e-12)
         one.step(1.0)
         assert one.get("y") == pytest.approx(PULL * (1 - touch) ** 2 / 2, rel=1e-6)
 
 
-def test_a_miss_stays_a_miss(own):
+def test_a_miss_stays_a_miss(built):
     """The same flight 1e-8 m above the table touches nothing."""
-    with instance(own(table)) as one:
+    with instance(built(table())) as one:
         one.start({"y": PULL / 8 + 1e-8, "der(y)": -PULL / 2}, tolerance=1e-12)
         one.step(1.0)
         assert one.get("y") == pytest.approx(PULL / 8 + 1e-8, rel=1e-10)
 
 
-@pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
-def test_a_narrow_bump_at_the_turn_of_a_flight_is_hit(tmp_path):
+def test_a_narrow_bump_at_the_turn_of_a_flight_is_hit(built):
     """A particle that is thrown up to v^2/(2 g) turns round in a bump a thousandth as wide: between two
     samples it goes beyond both, and beyond the one in the middle, by what its path bends."""
     h, g = symbols("h g", positive=True)
@@ -154,7 +136,7 @@ def test_a_narrow_bump_at_the_turn_of_a_flight_is_hit(tmp_path):
         ],
         start={y.diff(): 2.0},
     )
-    with instance(build_fmu(model, tmp_path, target="native", check=False)) as one:
+    with instance(built(model)) as one:
         for speed in np.linspace(1.9, 2.4, 14):
             one.start({"der(y)": speed, "h": speed**2 / (2 * PULL)})
             one.step(0.5)

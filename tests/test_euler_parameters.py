@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from sympy import Matrix, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter, Scene, simulate
-from lagfmu.testing import StartMovedWarning, find_compiler, prepare, write
+from lagfmu.testing import StartMovedWarning
 
 A, C, m, g, arm = symbols("A C m g l", positive=True)
 LEAN, SPIN = 0.4, 60.0  # rad; rad/s about the axis of figure
@@ -75,24 +74,27 @@ def in_angles(size: float) -> Model:
     )
 
 
-def run(model: Model, folder: Path, **values: float) -> Any:
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", (StartMovedWarning))
+@pytest.fixture
+def run(built: Any) -> Any:
+    """run(model, ...) of its native FMU."""
+
+    def get(model: Model, **values: float) -> Any:
         scene = Scene(model.name, stop_time=0.5, step_size=0.025)
-        fmu = write(prepare(model, scene), folder, target="native")
-        return simulate(fmu, tolerance=1e-8, start_values=values)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StartMovedWarning)
+            return simulate(built(model, scene), tolerance=1e-8, start_values=values)
+
+    return get
 
 
-def test_a_top_nutates_alike_in_parameters_and_in_angles_at_any_size(tmp_path):
+def test_a_top_nutates_alike_in_parameters_and_in_angles_at_any_size(run):
     """Inertias of 1e-3 kg m^2 and of 1e-20 kg m^2, a speck of dust, with masses in proportion: the axis leans
     by the same angle at all times, as it does in Euler angles, and p keeps its length."""
-    angles = run(in_angles(1e-3), tmp_path)
+    angles = run(in_angles(1e-3))
     model = top(1e-3)
-    found = run(model, tmp_path)
+    found = run(model)
     small = {"A": 2e-20, "C": 1e-20, "m": 1e-18}
-    dust = run(model, tmp_path, **small)
+    dust = run(model, **small)
     for seen in (found, dust):
         p = [seen[f"p{k}"] for k in range(4)]
         rise = p[0] ** 2 - p[1] ** 2 - p[2] ** 2 + p[3] ** 2
@@ -102,9 +104,9 @@ def test_a_top_nutates_alike_in_parameters_and_in_angles_at_any_size(tmp_path):
     np.testing.assert_allclose(dust["lambda.unit"] / 1e-17, found["lambda.unit"], rtol=1e-4)
 
 
-def test_the_length_said_twice_costs_no_digits(tmp_path):
+def test_the_length_said_twice_costs_no_digits(run):
     """|p| = 1 stated twice: the multipliers are shared, and the motion is the same."""
-    once, twice = run(top(1e-3), tmp_path), run(top(1e-3, twice=True), tmp_path)
+    once, twice = run(top(1e-3)), run(top(1e-3, twice=True))
     for k in range(4):
         np.testing.assert_allclose(twice[f"p{k}"], once[f"p{k}"], atol=1e-6)
         np.testing.assert_allclose(twice[f"Q.p{k}"], once[f"Q.p{k}"], atol=1e-6)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from fmi2 import CO_SIMULATION, DISCARD, EXCHANGE, OK, Library, Single
 
-from lagfmu import Scene, build_fmu
+from lagfmu import Scene
 from lagfmu.testing import find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -20,18 +20,13 @@ HEAD = 80  # bytes before the record: magic, layout, byte order, size, checksum,
 EXTREME = (1e300, -1e300, 1e308, -1e308, 1e150, -1e150, 1e-300, 1e100, 1.0, 0.0, 5e-324, -1e20)
 
 
-@pytest.fixture(scope="module")
-def rough(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Library]:
+@pytest.fixture
+def rough(built: Callable[..., Path], library: Callable[..., Library]) -> Callable[..., Library]:
     """rough(NAME): the native FMU of benchmarks/unseen/NAME.py, of friction and forces from outside."""
-    made: dict[tuple[str, bool], Library] = {}
 
     def get(name: str, error_bars: bool = False) -> Library:
-        if (name, error_bars) not in made:
-            folder, model = tmp_path_factory.mktemp("finite"), load(UNSEEN / f"{name}.py").model
-            scene = Scene(model.name, error_bars=error_bars)
-            path = build_fmu(model, folder, scene=scene, target="native", check=False)
-            made[name, error_bars] = Library(path, folder)
-        return made[name, error_bars]
+        model = load(UNSEEN / f"{name}.py").model
+        return library(built(model, Scene(model.name, error_bars=error_bars)))
 
     return get
 

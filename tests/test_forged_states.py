@@ -9,7 +9,7 @@ import struct
 import subprocess
 import sys
 import zlib
-from ctypes import byref, c_double, c_int, c_size_t
+from ctypes import c_double
 from pathlib import Path
 
 import pytest
@@ -19,7 +19,7 @@ from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Input, Model, Parameter, Scene, build_fmu
+from lagfmu import Holonomic, Input, Model, Parameter
 
 HEAD = 80  # bytes before the record: magic, layout, byte order, size, checksum, GUID
 SUM = 24  # where the checksum stands
@@ -170,30 +170,24 @@ def test_a_contact_is_open_or_closed(library):
     assert any("modes" in text for text in said)
 
 
-def steps_of(one: Single) -> int:
-    count = c_int()
-    one.does("GetInteger", one.references(["solver.steps"]), c_size_t(1), byref(count))
-    return count.value
-
-
 @pytest.mark.parametrize("steps", [2**30, 2**31 - 2, 2**40])
 def test_a_run_may_last(library, steps):
     """The state of a run of so many internal steps (2^31 in 60 h at 1e-4 s) is one: it goes on from there and
     saves itself again; `solver.steps` shows the most that an Integer holds."""
     one = library("CartPendulum")().start()
-    while steps_of(one) < 137:
+    while one.integer("solver.steps") < 137:
         one.step(0.1)
-    before, saved = steps_of(one), one.bytes_of(one.saved())
+    before, saved = one.integer("solver.steps"), one.bytes_of(one.saved())
     word = struct.pack("=q", before)
     places = [k for k in range(HEAD, len(saved) - 7, 8) if saved[k : k + 8] == word]
     assert len(places) == 1
     one.step(0.1)
-    more = steps_of(one) - before
+    more = one.integer("solver.steps") - before
     assert more > 2
     one.time -= 0.1
     one.does("SetFMUstate", one.loaded(forged(saved, places[0], struct.pack("=q", steps))))
     one.step(0.1)
-    assert steps_of(one) == min(steps + more, 2**31 - 1)
+    assert one.integer("solver.steps") == min(steps + more, 2**31 - 1)
     one.does("SetFMUstate", one.loaded(one.bytes_of(one.saved())))
     one.step(0.1)
     one.free()
@@ -210,7 +204,7 @@ def test_a_coordinate_is_a_number(library):
     assert any("coordinates" in text for text in said)
 
 
-def test_an_estimated_motion_has_no_more_points_than_there_is_room_for(tmp_path):
+def test_an_estimated_motion_has_no_more_points_than_there_is_room_for(built, library):
     """One point more is kept at each step, up to four; five are refused."""
     place, drive = dynamicsymbols("x u")
     mass = symbols("m", positive=True)
@@ -223,8 +217,7 @@ def test_an_estimated_motion_has_no_more_points_than_there_is_room_for(tmp_path)
         inputs=[Input(drive, "m", rates="estimated")],
         start={place: 0.0},
     )
-    path = build_fmu(model, tmp_path, Scene(model.name), target="native", check=False)
-    one, states = Library(path, tmp_path / "unpacked")().start(), []
+    one, states = library(built(model))().start(), []
     for k in range(5):
         one.set("u", 0.01 * k)
         one.step(0.1)

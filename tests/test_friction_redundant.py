@@ -25,7 +25,6 @@ from lagfmu import (
     Nonholonomic,
     Parameter,
     Scene,
-    build_fmu,
     multiplier,
     simulate,
 )
@@ -84,23 +83,13 @@ def standing() -> Model:
     )
 
 
-Make = Callable[[str], Path]
+Make = Callable[[Model], Path]
 NORMALS = {"one of them": multiplier("lo"), "their sum": SUM}
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Make:
-    """built(NORMAL): the guide, or what stands, as a native FMU."""
-    made: dict[str, Path] = {}
-
-    def get(which: str) -> Path:
-        if which not in made:
-            model = guided(NORMALS[which]) if which in NORMALS else standing()
-            folder = tmp_path_factory.mktemp("fmu")
-            made[which] = build_fmu(model, folder, target="native", check=False)
-        return made[which]
-
-    return get
+def model_of(which: str) -> Model:
+    """The guide, or what stands."""
+    return guided(NORMALS[which]) if which in NORMALS else standing()
 
 
 def pressed(table: Any, which: str) -> Any:
@@ -116,7 +105,7 @@ def test_both_interfaces_slide_by_the_multiplier_that_is_read(built: Make, which
     for values, v0 in (({}, 2.0), ({"der(x)": 0.0, "F": 3.0}, 0.0)):
         for kind in ("CoSimulation", "ModelExchange"):
             table = simulate_fmu(
-                str(built(which)),
+                str(built(model_of(which))),
                 fmi_type=kind,
                 start_values=values,
                 stop_time=0.5,
@@ -133,7 +122,7 @@ def test_both_interfaces_slide_by_the_multiplier_that_is_read(built: Make, which
 def test_what_is_held_is_held_by_the_normal_force_that_is_read(built: Make) -> None:
     """No strain of the guide's own holds it: it sticks below mu N = 0.4905 N and slips above."""
     for push in (0.49, 0.5):
-        with instance(built("one of them")) as one:
+        with instance(built(model_of("one of them"))) as one:
             one.start({"der(x)": 0.0, "F": push})
             one.step(0.5)
             assert one.get("sticks.grip") == (push < 0.4905)
@@ -147,7 +136,7 @@ def test_three_feet_in_line_hold_what_one_would(built: Make, part: float) -> Non
     g (sin(alpha) - mu cos(alpha)) beyond; a foot that could as well be lifted is no paradox."""
     slope = float(np.arctan(MU * part))
     table = simulate(
-        built("standing"), start_values={"alpha": slope}, stop_time=0.5, step_size=0.25
+        built(standing()), start_values={"alpha": slope}, stop_time=0.5, step_size=0.25
     )
     drive = max(g * (np.sin(slope) - MU * np.cos(slope)), 0.0)
     assert table["der(x)"] == pytest.approx(drive * table["time"], abs=1e-12)
@@ -162,13 +151,13 @@ def test_three_feet_in_line_hold_what_one_would(built: Make, part: float) -> Non
 def test_a_normal_force_that_is_not_unique_is_told(built: Make, which: str) -> None:
     """By build, show and the log, with the remedy; not where the sum that presses is unique."""
     alone = which != "their sum"
-    model = guided(NORMALS[which]) if which in NORMALS else standing()
+    model = model_of(which)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         prepared = prepare(model, Scene(model.name))
     page = StringIO()
     show(prepared, Console(width=200, file=page))
-    with instance(built(which)) as one:
+    with instance(built(model)) as one:
         one.start({})
         told = [text for status, _, text in one.log if status == 1]
     texts = (

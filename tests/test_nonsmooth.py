@@ -3,8 +3,6 @@ made again, again and again."""
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 from instance import instance
@@ -13,8 +11,7 @@ from scipy.optimize import brentq
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Model, Parameter, Scene, build_fmu
-from lagfmu.testing import find_compiler
+from lagfmu import Contact, Model, Parameter
 
 G = 9.81
 COUNT = 3
@@ -53,20 +50,6 @@ def table():
     )
 
 
-MODELS = {"Spheres": spheres, "Table": table}
-
-
-@pytest.fixture(scope="module")
-def own(tmp_path_factory):
-    """own(NAME): the FMU of one of the models above."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    folder = tmp_path_factory.mktemp("own")
-    return cache(
-        lambda name: build_fmu(MODELS[name](), folder, Scene(name), target="native", check=False)
-    )
-
-
 def time_to_leave(theta0):
     """From theta'^2 = 2 (g/a)(cos theta0 - cos theta) and cos theta = (2/3) cos theta0 at the end; with
     theta = theta0 + w^2 nothing is singular."""
@@ -84,10 +67,10 @@ def time_to_leave(theta0):
 @pytest.mark.parametrize(
     "starts", [(0.3, 0.2, 0.1), (0.1, 0.3, 0.2), (0.2, 0.2, 0.3), (0.2, 0.2 + 1e-9, 0.2)]
 )
-def test_contacts_open_in_the_order_of_their_times(own, starts, points):
+def test_contacts_open_in_the_order_of_their_times(built, starts, points):
     """Each particle leaves its sphere when it would alone, the one that started further from the top
     first, whether all that happens within one communication step or in a hundred."""
-    with instance(own("Spheres")) as one:
+    with instance(built(spheres())) as one:
         one.start({f"theta{k}": theta for k, theta in enumerate(starts)}, tolerance=1e-11)
         for n in range(points):
             one.step(1.2 * (n + 1) / points - one.time)
@@ -105,7 +88,7 @@ def test_contacts_open_in_the_order_of_their_times(own, starts, points):
 
 
 @pytest.mark.parametrize("method", ["auto", "dop853", "radau5"])
-def test_a_block_is_thrown_off_and_caught_again(own, method):
+def test_a_block_is_thrown_off_and_caught_again(built, method):
     """A table u = A (1 - cos w t) with A w^2 > g throws the block off where u'' = -g and meets it again
     where the block's parabola meets u: at each of these times in each of three periods, lambda =
     m (g + u'') between."""
@@ -121,7 +104,7 @@ def test_a_block_is_thrown_off_and_caught_again(own, method):
     period = 2 * np.pi / w
     assert caught < period
     assert G + A * w**2 * np.cos(w * caught) > 0  # from there on the table carries it
-    with instance(own("Table")) as one:
+    with instance(built(table())) as one:
         one.start({"solver.method": method}, tolerance=1e-10)
         while one.time < 3 * period:
             one.step(0.01)

@@ -54,10 +54,10 @@ def test_a_state_goes_on_alike_wherever_it_is_taken_over(library, name):
             each.step(0.11)
 
 
-def test_a_run_that_must_not_pass_its_stop_time_does_so_nowhere(tmp_path):
+def test_a_run_that_must_not_pass_its_stop_time_does_so_nowhere(built, library):
     """Its force is not defined beyond 1 s: not in an instance either whose own experiment had no end."""
-    library = candle(tmp_path)
-    one, other = library().start(None, 1e-9, 1.0), library().start(None, 1e-9, 100.0)
+    burning = library(built(candle()))
+    one, other = burning().start(None, 1e-9, 1.0), burning().start(None, 1e-9, 100.0)
     for each in (one, other):
         each.step(0.25)
     taken_over(one, other)

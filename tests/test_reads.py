@@ -13,7 +13,7 @@ from instance import Instance, instance
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu
+from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene
 from lagfmu.testing import find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -63,21 +63,21 @@ def tied() -> Model:
     )
 
 
+def model_of(name: str) -> Model:
+    """Of benchmarks/unseen/, or of this file."""
+    own: dict[str, Callable[[], Model]] = {"box": box, "tied": tied}
+    return own[name]() if name in own else load(UNSEEN / f"{name}.py").model
+
+
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """built(NAME): a native FMU of benchmarks/unseen/NAME.py, or of a model of this file."""
-    made: dict[str, Path] = {}
+def built(built: Callable[..., Path]) -> Built:
+    """built(NAME): its native FMU; with an option of the scene after a blank."""
+    options = {"": {}, "nullspace": {"formulation": "nullspace"}, "bars": {"error_bars": True}}
 
     def get(name: str) -> Path:
         stem, _, option = name.partition(" ")
-        options = {"nullspace": {"formulation": "nullspace"}, "bars": {"error_bars": True}}
-        if name not in made:
-            file = UNSEEN / f"{stem}.py"
-            model = load(file).model if file.exists() else globals()[stem]()
-            scene = Scene(model.name, **options.get(option, {}))
-            folder = tmp_path_factory.mktemp("reads")
-            made[name] = build_fmu(model, folder, scene=scene, target="native", check=False)
-        return made[name]
+        model = model_of(stem)
+        return built(model, Scene(model.name, **options[option]))
 
     return get
 
