@@ -1,7 +1,5 @@
 """The absorber of coupled_model.py as a model file: `lagfmu build tests/absorber.py`."""
 
-from coupled_model import SCENES
 from coupled_model import absorber as model
 
-scenes = [SCENES["absorber"]]
-__all__ = ["model", "scenes"]
+__all__ = ["model"]

@@ -1,4 +1,4 @@
-"""An absorber on the cart of CartPendulum, as an FMU of its own and as one system with it.
+"""An absorber on the cart of CartPendulum, as an FMU of its own.
 
 The absorber is a mass n that a spring k and a damper d tie to a point p; p is moved as the input u says.
 The multiplier of the tie u - p = 0 is the force that the absorber exerts on what moves it,
@@ -10,25 +10,13 @@ and so lambda.tie drives F of CartPendulum, whose s, s' and s'' are the absorber
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Input, Model, Parameter, Scene
-from lagfmu.testing import load
-
-cart = load(Path(__file__).parent.parent / "models" / "cart_pendulum.py").model
-s, x, y = cart.coordinates
-(driven,) = cart.inputs
+from lagfmu import Holonomic, Input, Model, Parameter
 
 z, p, u = dynamicsymbols("z p u")
 n, k, d = symbols("n k d", positive=True)
-OWN = [
-    Parameter(n, 0.5, "kg", "mass of the absorber", min=0),
-    Parameter(k, 20.0, "N/m", "stiffness of its spring", min=0),
-    Parameter(d, 0.5, "N.s/m", "viscosity of its damper", min=0),
-]
 
 absorber = Model(
     name="Absorber",
@@ -36,24 +24,11 @@ absorber = Model(
     forces={z: -d * (z.diff() - p.diff()), p: d * (z.diff() - p.diff())},
     coordinates={z: "m", p: "m"},
     constraints=[Holonomic("tie", u - p, "the absorber's point is where it is moved to")],
-    parameters=OWN,
+    parameters=[
+        Parameter(n, 0.5, "kg", "mass of the absorber", min=0),
+        Parameter(k, 20.0, "N/m", "stiffness of its spring", min=0),
+        Parameter(d, 0.5, "N.s/m", "viscosity of its damper", min=0),
+    ],
     inputs=[Input(u, "m", 0.0, "where the absorber's point is moved to")],
     start={z: 0.3},
 )
-
-pull = k * (z - s) + d * (z.diff() - s.diff())
-whole = Model(
-    name="CartPendulumAbsorber",
-    kinetic_energy=cart.kinetic_energy + n * z.diff() ** 2 / 2,
-    forces={
-        **cart.forces,
-        s: cart.forces[s].subs(driven.symbol, 0) + pull,
-        z: -pull,
-    },
-    coordinates={s: "m", x: "m", y: "m", z: "m"},
-    constraints=cart.constraints,
-    parameters=[*cart.parameters, *OWN],
-    start={**cart.start, z: 0.3},
-)
-
-SCENES = {"absorber": Scene("Absorber"), "whole": Scene("CartPendulumAbsorber")}

@@ -661,9 +661,11 @@ app(sys.argv[1:])
 
 
 def test_a_file_that_is_missing_or_no_python_file_is_refused(tmp_path):
-    """A missing file, a folder, a text file."""
+    """A missing file, a folder, whose Python files are named, a text file."""
+    (tmp_path / "bead.py").write_text("")
     says(refusal(lambda: load(tmp_path / "none.py"), ModelError), "none.py", "no such file")
-    says(refusal(lambda: load(tmp_path), ModelError), str(tmp_path), "this is a folder")
+    message = refusal(lambda: load(tmp_path), ModelError)
+    says(message, str(tmp_path), "this is a folder, expected a Python file", "bead.py")
     (tmp_path / "model.txt").write_text(GOOD)
     says(refusal(lambda: load(tmp_path / "model.txt"), ModelError), "model.txt", "NAME.py")
 

@@ -7,6 +7,7 @@ import importlib.metadata
 import importlib.resources
 import os
 import re
+import runpy
 import subprocess
 import sys
 import zipfile
@@ -53,13 +54,17 @@ def lagfmu(*arguments, code=0) -> str:
 
 
 def test_build_writes_and_verifies_every_fmu_of_a_file(small, tmp_path):
-    """OUT/native/NAME.fmu for each scene; each is held against its closed forms."""
+    """OUT/native/NAME.fmu for each scene; each is held against its closed forms, and says so in its page."""
     text = lagfmu("build", small, "--out", tmp_path / "dist")
     assert "Link: pass" in text
     assert "LinkMinimal: pass" in text
     assert "lambda.link" in text
     made = sorted(p.name for p in (tmp_path / "dist" / "native").iterdir())
     assert made == ["Link.fmu", "LinkMinimal.fmu"]
+    with zipfile.ZipFile(tmp_path / "dist" / "native" / "Link.fmu") as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert "lambda.link" in page
+    assert "pass" in page
 
 
 def test_build_takes_one_scene_and_may_skip_the_check(small, tmp_path):
@@ -80,22 +85,17 @@ def test_a_closed_form_that_is_missed_makes_build_fail(tmp_path):
     assert lagfmu("verify", tmp_path / "native" / "Link.fmu", code=1).count("FAIL") >= 2
 
 
-def test_the_fmus_documentation_carries_the_verification(small, tmp_path):
-    """After the check the figures stand in documentation/index.html."""
-    lagfmu("build", small, "--out", tmp_path, "--scene", "Link")
-    with zipfile.ZipFile(tmp_path / "native" / "Link.fmu") as archive:
-        page = archive.read("documentation/index.html").decode()
-    assert "lambda.link" in page
-    assert "pass" in page
-
-
 def test_show_prints_equations_degrees_of_freedom_classes_and_units():
-    """`lagfmu show` on the knife edge: 3 coordinates, 1 constraint, 2 degrees of freedom."""
+    """`lagfmu show` on the knife edge: 3 coordinates, 1 constraint, 2 degrees of freedom; on the cart its
+    friction c = 0.1 N s/m, and the force F that starts at 0 N."""
     text = lagfmu("show", MODELS / "knife_edge.py")
     assert re.search(r"degrees of freedom\D*2\b|\b2 degrees of freedom|3 - 1 = 2", text), text
     assert "nonholonomic" in text
     for unit in ("lambda.edge", "Q.phi", "N.m", "rad"):
         assert unit.replace(".", "·") in text or unit in text, unit
+    text = lagfmu("show", MODELS / "cart_pendulum.py")
+    assert "c 0.1 N·s/m viscous friction of the cart" in text
+    assert "F 0 N force on the cart" in text
 
 
 CRANE = """
@@ -109,13 +109,6 @@ model = Model(name="Crane", lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 -
               inputs=[Input(L, "m")], start={x: 0.5, y: -1.0},
               parameters=[Parameter(m, 1.0, "kg"), Parameter(g, 9.81, "m/s^2")])
 """
-
-
-def test_show_lists_parameters_and_inputs_with_their_values():
-    """The cart's friction c = 0.1 N s/m, and the force F that starts at 0 N."""
-    text = lagfmu("show", MODELS / "cart_pendulum.py")
-    assert "c 0.1 N·s/m viscous friction of the cart" in text
-    assert "F 0 N force on the cart" in text
 
 
 def test_show_prints_the_equations_of_a_model_that_cannot_start(tmp_path):
@@ -141,49 +134,31 @@ def test_show_takes_one_scene():
 
 def test_verify_obeys_changed_parameters_and_settings(native_fmu):
     """The closed forms follow --set; tolerance, stop time and step size are passed on."""
-    text = lagfmu(
-        *(
-            "verify",
-            native_fmu("Hemisphere"),
-            "--set",
-            "theta=0.3",
-            "--set",
-            "g=3.7",
-            "--set",
-            "m=2",
-        ),
-        *("--stop-time", "1.5", "--step-size", "0.05", "--tolerance", "1e-10"),
+    words = (
+        "--set theta=0.3 --set g=3.7 --set m=2 --stop-time 1.5 --step-size 0.05 --tolerance 1e-10"
     )
+    text = lagfmu("verify", native_fmu("Hemisphere"), *words.split())
     assert "Hemisphere: pass" in text
     assert "cos(theta) at the departure" in text
 
 
 @pytest.mark.parametrize("command", ["verify", "simulate"])
-def test_a_value_may_have_a_unit(native_fmu, command):
-    """2000 g is 2 kg, 90 deg no mass: `--set` converts what has a unit of its own, everything else is SI."""
+def test_a_setting_is_a_number_and_may_have_a_unit(native_fmu, command):
+    """2000 g is 2 kg, 90 deg no mass: `--set` converts what has a unit, all else is SI.  What
+    cannot be ends with exit status 2, and one message with what was expected."""
     lagfmu(command, native_fmu("Hemisphere"), "--set", "m=2000g", "--set", "theta=17.2 deg", code=0)
     text = lagfmu(command, native_fmu("Hemisphere"), "--set", "m=90deg", code=2)
     assert "--set 'm=90deg': value = '90deg' has unit rad, expected kg" in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "parts"),
-    [
+    for arguments, parts in (
         (("--set", "theta"), ("--set 'theta'", "NAME=VALUE")),
         (("--set", "=3"), ("--set '=3'", "NAME=VALUE")),
         (("--set", "theta=wide"), ("theta=wide", "'wide' is no number")),
         (("--set", "radius=1"), ("radius",)),
         (("--stop-time", "-1"), ("stop_time = -1.0",)),
-        (("--step-size", "0"), ("step_size = 0.0",)),
-    ],
-)
-@pytest.mark.parametrize("command", ["verify", "simulate"])
-def test_settings_that_cannot_be_are_one_message(native_fmu, command, arguments, parts):
-    """Exit status 2, wrong usage; the setting and what was expected."""
-    text = lagfmu(command, native_fmu("Hemisphere"), *arguments, code=2)
-    assert "error:" in text
-    for part in parts:
-        assert part in text
+    ):
+        text = lagfmu(command, native_fmu("Hemisphere"), *arguments, code=2)
+        assert "error:" in text
+        assert all(part in text for part in parts)
 
 
 def test_simulate_writes_a_figure_and_a_table(native_fmu, tmp_path):
@@ -328,10 +303,11 @@ def test_the_version_is_that_of_the_package():
 
 @pytest.mark.parametrize("words", [["--version"], ["--help"], ["sweep", "--help"]])
 def test_help_and_version_are_told_without_waiting(words):
-    """Nothing that calculates is imported for what can be said without it."""
+    """`python -m lagfmu` imports nothing that calculates for what can be said without it."""
     code = (
-        f"import sys\nfrom lagfmu.cli import main\nsys.argv = {['lagfmu', *words]!r}\n"
-        "try: main()\nexcept SystemExit as end: assert end.code == 0\n"
+        f"import runpy, sys\nsys.argv = {['lagfmu', *words]!r}\n"
+        "try: runpy.run_module('lagfmu', run_name='__main__')\n"
+        "except SystemExit as end: assert end.code == 0\n"
         "heavy = {'sympy', 'numpy', 'scipy', 'pint', 'fmpy', 'matplotlib', 'xarray'}\n"
         "assert not heavy & sys.modules.keys(), heavy & sys.modules.keys()\n"
     )
@@ -361,14 +337,6 @@ def test_ctrl_c_while_it_is_loading_ends_without_a_traceback(interrupted):
 def test_types_are_told_to_users_type_checkers():
     """PEP 561: the package has the marker py.typed."""
     assert importlib.resources.files("lagfmu").joinpath("py.typed").is_file()
-
-
-def test_a_folder_is_no_model_file(tmp_path):
-    """`lagfmu build .` names the Python files that stand in the folder."""
-    (tmp_path / "bead.py").write_text("")
-    text = lagfmu("build", tmp_path, code=3)
-    assert "this is a folder, expected a Python file" in text
-    assert "bead.py" in text
 
 
 def test_what_an_encoding_lacks_is_spelled_out():
@@ -436,14 +404,6 @@ def test_curves_are_told_apart_and_the_legend_covers_none():
         assert legend.x0 >= axes[0].get_window_extent().x1
 
 
-def test_python_m_lagfmu_is_the_same_command():
-    """python -m lagfmu --help, in a process of its own."""
-    command = [sys.executable, "-m", "lagfmu", "--help"]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert run.returncode == 0
-    assert "simulate" in run.stdout
-
-
 @pytest.mark.thorough
 def test_build_fmus_prints_a_line_an_fmu(tmp_path):
     """python build_fmus.py incline_disk belt --out DIR, from another folder: disks of each target and a block
@@ -480,12 +440,11 @@ def test_build_fmus_prints_a_line_an_fmu(tmp_path):
     assert "all 5 FMUs" in " ".join(run.stdout.split())
 
 
-def test_build_fmus_fails_where_it_cannot_write(tmp_path):
-    """A path below a file: exit status 1 and the reason, no traceback."""
+def test_build_fmus_fails_where_it_cannot_write(tmp_path, monkeypatch, capsys):
+    """A path below a file: exit status 1 and the reason."""
     (tmp_path / "file").write_text("")
-    command = [sys.executable, str(REPOSITORY / "build_fmus.py"), "atwood"]
-    command += ["--out", str(tmp_path / "file/x")]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert run.returncode == 1
-    assert "cannot write" in run.stdout
-    assert "Traceback" not in run.stdout + run.stderr
+    monkeypatch.setattr(sys, "argv", ["build_fmus.py", "atwood", "--out", str(tmp_path / "file/x")])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(REPOSITORY / "build_fmus.py"), run_name="__main__")
+    assert ended.value.code == 1
+    assert "cannot write" in capsys.readouterr().out
