@@ -52,9 +52,9 @@ def test_a_rod_that_is_said_twice_carries_half_each():
     assert one["unique.rod0"].all()
 
 
-def plank(**start: float) -> Model:
-    """A plank on two feet that rebound with e = 0.25."""
-    kinetic = m * z.diff() ** 2 / 2 + m * L**2 * theta.diff() ** 2 / 24
+def plank(z0: float, theta0: float, spread: float = 1 / 12) -> Model:
+    """A plank on two feet that rebound with e = 0.25; moment of inertia spread m L^2."""
+    kinetic = m * z.diff() ** 2 / 2 + spread * m * L**2 * theta.diff() ** 2 / 2
     return Model(
         name="Plank",
         lagrangian=kinetic - m * g * z,
@@ -64,13 +64,13 @@ def plank(**start: float) -> Model:
             Contact("right", z + L * sin(theta) / 2, restitution=0.25),
         ],
         parameters=PARAMETERS,
-        start={z: start["z"], theta: start["theta"]},
+        start={z: z0, theta: theta0},
     )
 
 
 def test_a_plank_that_falls_flat_rebounds_flat():
     """Both feet are struck together: v becomes e v, nothing turns, and (1 - e^2) m g h is lost."""
-    run = simulate(plank(z=0.1, theta=0.0), 0.16, 0.02, target="python")
+    run = simulate(plank(0.1, 0.0), 0.16, 0.02, target="python")
     assert run["closing.left.count"][-1] == run["closing.right.count"][-1] == 1
     fall = np.sqrt(2 * 0.1 / 9.81)
     np.testing.assert_allclose(run["closing.left.time"][-1], fall, rtol=1e-9)
@@ -84,13 +84,36 @@ def test_a_plank_that_falls_flat_rebounds_flat():
 def test_a_plank_that_rocks_comes_to_rest():
     """It strikes with one foot, then the other, ever faster, and ends: both feet carry half of it, and its
     energy is dissipated, that of the hops that are ended with it."""
-    run = simulate(plank(z=0.1, theta=0.1), 1.5, 0.1, target="python", tolerance=1e-10)
+    run = simulate(plank(0.1, 0.1), 1.5, 0.1, target="python", tolerance=1e-10)
     energy = run["energy.total"] + run["energy.dissipated"]
     np.testing.assert_allclose(energy, energy[0], rtol=1e-12)
     assert run["closing.left.count"][-1] > 5
     for foot in ("left", "right"):
         assert run[f"contact.{foot}"][-1]
         np.testing.assert_allclose(run[f"lambda.{foot}"][-1], 2.0 * 9.81 / 2, rtol=1e-9)
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_foot_that_the_other_foot_s_impact_lifts_has_departed(target):
+    """With J = m L^2 a plank that tips about its left foot falls at w^2 = g sin(theta0)/(1.25 L); the impact
+    of the right one is m w L and throws the left one up at 0.75 w L: it was closed, and departs at that
+    instant with that speed.  The right one arrives at -w L, and its rebound is no departure."""
+    run = simulate(plank(np.sin(0.2) / 2, 0.2, 1.0), 0.4, 0.001, target=target, tolerance=1e-10)
+    last = run[int(np.flatnonzero(run["closing.right.count"])[0])]
+    w = np.sqrt(9.81 * np.sin(0.2) / 1.25)
+    assert last["departure.left.count"] == last["closing.right.count"] == 1
+    assert last["departure.right.count"] == last["closing.left.count"] == 0
+    assert last["departure.left.time"] == last["closing.right.time"]
+    velocity = {
+        e: [last[f"{e}.velocity.{q}"] for q in ("z", "theta")]
+        for e in ("departure.left", "closing.right")
+    }
+    thrown = velocity["departure.left"] @ np.array([1, -0.5])
+    arrived = velocity["closing.right"] @ np.array([1, 0.5])
+    np.testing.assert_allclose([thrown, arrived], [0.75 * w, -w], rtol=1e-8)
+    before = run["time"] < last["departure.left.time"]
+    assert run["contact.left"][before].all()
+    assert not last["contact.left"]
 
 
 def test_a_fall_from_nothing_has_a_size():

@@ -102,7 +102,7 @@ def _settled(
         rows = system.active(as_flags(system, now))
         v = project_velocities(terms.of(rows), v)
     state = replace(state, q=tuple(q.tolist()), v=tuple(v.tolist()), closed=as_flags(system, now))
-    return _told(motion, state, q, before, was, struck, slow, terms)
+    return _told(motion, state, before, was, struck, slow, terms)
 
 
 def _chosen(
@@ -180,23 +180,24 @@ def _left_behind(motion: Motion, settings: Settings, state: State, terms: Terms)
 def _told(
     motion: Motion,
     state: State,
-    q: Vector,
     before: Vector,
     was: frozenset[int],
     struck: Impact | None,
     slow: Vector,
     terms: Terms,
 ) -> State:
-    """The same with what happened to each contact written down."""
+    """The same with what happened to each contact written down: a closing with the velocities of `before`, a
+    departure with those that it begins with."""
     system, t = motion.system, state.t
     length = rows_of(terms.M, terms.G).length
-    where = motion.whole(t, q, before)
+    arriving = motion.whole(t, np.array(state.q), before)
+    leaving = motion.whole(t, np.array(state.q), np.array(state.v))
     departures, closings = list(state.departures), list(state.closings)
     for c, k in enumerate(system.contacts):
         impulse = 0.0 if struck is None else float(struck.impulses[k])
         blow = impulse * length[k] ** 2 > slow[k]
         if blow or (state.closed[c] and k not in was):
-            closings[c] = Event(closings[c].count + 1, t, *where, impulse)
-        elif k in was and not state.closed[c] and struck is None:
-            departures[c] = Event(departures[c].count + 1, t, *where)
+            closings[c] = Event(closings[c].count + 1, t, *arriving, impulse)
+        if k in was and not state.closed[c]:
+            departures[c] = Event(departures[c].count + 1, t, *leaving)
     return replace(state, departures=tuple(departures), closings=tuple(closings))
