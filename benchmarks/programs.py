@@ -124,10 +124,10 @@ def write_problem(folder: Path, equations: EquationsOfMotion) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     model = equations.model
     arrays = {
-        "Q": start_values(equations)[: equations.n],
-        "V": start_values(equations)[equations.n :],
+        "Q": start_values(equations)[: equations.nq],
+        "V": start_values(equations)[equations.nq :],
         "P": [float(p.value) for p in model.parameters],
-        "SCALE": [1.0] * (2 * equations.n),
+        "SCALE": [1.0] * (2 * equations.nq),
     }
     lines = [
         f"const double PROBLEM_{name}[] = {{{', '.join(map(repr, values))}}};\n"

@@ -75,7 +75,7 @@ def index_one(problem: Problem, method: str, tolerance: float) -> Answer:
     M, F, G, gamma come from the generated Python code.  Counts evaluations instead of steps.
     """
     system, equations = problem.prepared.system, problem.prepared.equations
-    n, m = system.n, system.m
+    n, m = system.nv, system.m
     p = [float(parameter.value) for parameter in equations.model.parameters]
     K, b = np.zeros((n + m, n + m)), np.zeros(n + m)
 

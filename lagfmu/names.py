@@ -106,6 +106,12 @@ def derivative(coordinate: str, order: int = 1) -> str:
     return (coordinate, f"der({coordinate})", f"der({coordinate},{order})")[min(order, 2)]
 
 
+def rate_of(state: str) -> str:
+    """The derivative of a coordinate, a velocity der(x) or a speed of the model's own."""
+    found = RATE.fullmatch(state)
+    return derivative(found[1], int(found[2] or 1) + 1) if found else derivative(state)
+
+
 def motion(coordinates: Iterable[str]) -> list[str]:
     """The coordinates, then their velocities."""
     known = list(coordinates)

@@ -325,7 +325,7 @@ def assert_embedding(one: Case, seed: int) -> None:
     assert one.reduction is not None
     point = Point(one.reduction.reduced, seed)
     values = point.values()
-    sizes = {"q": one.eom.n, "v": one.eom.n}
+    sizes = {"q": one.eom.nq, "v": one.eom.nv}
     found = one.native.call("embed_of", sizes, *point.state)
     change = one.native.call("embed_tangent_of", sizes, *point.state, *point.direction)
     for label, group in (("q", one.reduction.phi), ("v", one.reduction.vel)):

@@ -106,12 +106,12 @@ def test_printed_equations_are_those_that_are_integrated(model):
     notation = Notation(eom)
     point = {symbol: generator.uniform(-2, 2) for symbol in notation.into}
     multipliers = notation.multipliers
-    Q = [sum(eom.G[k, j] * multipliers[k] for k in range(eom.m)) for j in range(eom.n)]
+    Q = [sum(eom.G[k, j] * multipliers[k] for k in range(eom.m)) for j in range(eom.nv)]
     motion = [
-        sum(eom.M[j, i] * vdot[i] for i in range(eom.n)) - eom.F[j] - Q[j] for j in range(eom.n)
+        sum(eom.M[j, i] * vdot[i] for i in range(eom.nv)) - eom.F[j] - Q[j] for j in range(eom.nv)
     ]
     closing = [
-        sum(eom.G[k, j] * vdot[j] for j in range(eom.n)) - eom.gamma[k] for k in range(eom.m)
+        sum(eom.G[k, j] * vdot[j] for j in range(eom.nv)) - eom.gamma[k] for k in range(eom.m)
     ]
     for title, expected in (
         ("Lagrange's equations with multipliers", motion),

@@ -16,7 +16,7 @@ def test_a_chain_of_n_links_has_n_degrees_of_freedom(n: int) -> None:
     """2 n coordinates and n links; every link's multiplier has its closed form."""
     file = load(MODELS / "chain.py", [f"n={n}"])
     system = prepare(file.model, file.scenes[0]).system
-    assert (system.n, system.m) == (2 * n, n)
+    assert (system.nv, system.m) == (2 * n, n)
     assert file.scenes[0].name == f"Chain{n}"
     assert {c.name for c in file.closed_forms} >= {f"lambda.link{k + 1}" for k in range(n)}
 

@@ -94,12 +94,12 @@ def test_virtual_velocities_meet_the_constraints(model):
     """Each column of S is a virtual velocity: G S = 0, and N = n - m of them are independent."""
     eom = derive(model)
     S = null_space(eom)
-    assert S.shape == (eom.n, eom.n - eom.m)
+    assert S.shape == (eom.nv, eom.nv - eom.m)
     for seed in range(5):
         point = numbers(eom, seed)
         G, s = array(eom.G, point), array(S, point)
         assert np.abs(G @ s).max() <= 1e-13 * np.abs(G).max() * np.abs(s).max()
-        assert np.linalg.matrix_rank(s) == eom.n - eom.m
+        assert np.linalg.matrix_rank(s) == eom.nv - eom.m
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
@@ -112,7 +112,7 @@ def test_motion_is_the_one_with_multipliers(model):
         point = numbers(eom, seed)
         M, G = array(eom.M, point), array(eom.G, point)
         kkt = np.block([[M, -G.T], [G, np.zeros((eom.m, eom.m))]])
-        expected = np.linalg.solve(kkt, array([*eom.F, *eom.gamma], point))[: eom.n]
+        expected = np.linalg.solve(kkt, array([*eom.F, *eom.gamma], point))[: eom.nv]
         found = np.linalg.solve(array(left, point), array(right, point))
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 

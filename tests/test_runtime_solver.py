@@ -86,7 +86,7 @@ class Bench:
         return not self.c.bench_start(self.handle, doubles(q), doubles(v), c_double(tolerance))
 
     def state(self) -> dict[str, Any]:
-        n = self.system.n
+        n = self.system.nq
         return {name: self.array(f"state.{name}", n).copy() for name in ("q", "v", "size")}
 
     def project(self, q: Any, v: Any, active: Sequence[int]) -> tuple[Any, Any]:
@@ -231,7 +231,7 @@ def test_an_output_that_overflows_is_named(bench):
 def disturbed(one: Bench, size: float, rng: Any) -> tuple[Any, Any]:
     """The start moved by `size`, relative to the coordinates' magnitudes."""
     state = one.state()
-    n = one.system.n
+    n = one.system.nq
     scale = state["size"]
     speed = np.maximum(scale * one.number("rate"), np.abs(state["v"]))
     move = rng.standard_normal(2 * n) * size

@@ -103,7 +103,7 @@ def test_forces_alone_are_the_same_to_the_last_bit(name: str, native_fmu: Any, m
     names = [n for n in full.dtype.names if n.startswith(("lambda.", "Q."))]
     assert named(path, "output") == names
     prepared = narrowed(name, **needs)
-    assert prepared.coded.equations.n == len(prepared.model.coordinates)
+    assert prepared.coded.equations.nv == len(prepared.model.coordinates)
     for n in names:
         assert (run[n] == full[n]).all(), n
 

@@ -1,8 +1,9 @@
 """What the numeric form of a model consists of, in no language: c/ and py/ print this list.
 
     M(q,t) vdot = F(q,v,t,u) + G^T lambda ,  G v = nu(q,t,u) ,  G vdot = gamma(q,v,t,u) ,  f(q,t) = 0
+    q' = B(q,t,u) v + b(q,t,u), or q' = v
 
-M is listed by the non-zeros of its lower triangle, G by its non-zeros, both sorted by row, then column.  A
+M is listed by the non-zeros of its lower triangle, G and B by their non-zeros, sorted by row, then column.  A
 tangent is the change of a function's results along a direction in t, q, v and u; d(x) is the change of x.
 """
 
@@ -22,6 +23,7 @@ from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.jumps import NONE, Jumps
 from ..model.elements import Expr
 from ..model.model import Constraint, Contact, Nonholonomic
+from ..model.units import ONE, SECOND, Unit
 from ..numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Friction, Row
 
 Arguments = Mapping[str, Sequence[Expr]]
@@ -49,6 +51,17 @@ class Function:
 def values(expressions: Sequence[Expr], places: Sequence[Any]) -> list[Value]:
     """Each expression with its place."""
     return [Value(sp.sympify(e), str(x)) for e, x in zip(expressions, places, strict=True)]
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """The number of the dimension of each coordinate, of each speed times a second, of each parameter (-1:
+    that of none of these, or none); that of angles (-1: there are none)."""
+
+    coordinates: tuple[int, ...]
+    speeds: tuple[int, ...]
+    parameters: tuple[int, ...]
+    angles: int
 
 
 @dataclass(frozen=True)
@@ -80,6 +93,11 @@ class Parts:
     def jacobian(self) -> list[tuple[int, int]]:
         """(row, column) of each value of G."""
         return sorted(self.eom.G.todok())
+
+    @cached_property
+    def rates(self) -> list[tuple[int, int]]:
+        """(row, column) of each value of B; none where q' = v."""
+        return [] if self.eom.moves_plainly else sorted(self.eom.kinematics.B)
 
     @cached_property
     def rows(self) -> list[Row]:
@@ -127,9 +145,31 @@ class Parts:
         return tuple(k for k, s in enumerate(self.eom.u) if s in self.eom.estimated)
 
     @cached_property
-    def folded(self) -> tuple[float, ...]:
-        """Of each coordinate's dimension the largest parameter that is a number in the code."""
-        return tuple(self.eom.folded(self.eom.units[str(q)]) for q in self.eom.q)
+    def spans(self) -> tuple[list[Unit], list[Unit]]:
+        """The units of the coordinates, and of the speeds times a second."""
+        units = self.eom.units
+        return [units[str(q)] for q in self.eom.q], [units[str(v)] * SECOND for v in self.eom.v]
+
+    @cached_property
+    def dimensions(self) -> Dimensions:
+        """One number for each dimension of coordinates and of speeds times a second."""
+        number: dict[Any, int] = {}
+        places, speeds = (
+            tuple(number.setdefault(u.exponents, len(number)) for u in group)
+            for group in self.spans
+        )
+        parameters = tuple(
+            -1 if u.dimensionless else number.get(u.exponents, -1)
+            for u in (self.eom.units[str(p)] for p in self.eom.p)
+        )
+        return Dimensions(places, speeds, parameters, number.get(ONE.exponents, -1))
+
+    @cached_property
+    def folded(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The largest parameter that is a number in the code, of each coordinate's dimension and of each
+        speed's times a second."""
+        places, speeds = (tuple(map(self.eom.folded, group)) for group in self.spans)
+        return places, speeds
 
     @cached_property
     def formulas(self) -> dict[int, Expr]:
@@ -161,7 +201,7 @@ class Parts:
         """The numbers of the equations: M, F, G, nu, gamma, f, energy."""
         eom = self.eom
         M, G = eom.M.todok(), eom.G.todok()
-        q, rows = [str(s) for s in eom.q], [c.name for c in self.constraints]
+        q, rows = eom.directions, [c.name for c in self.constraints]
         energy = {"kinetic": eom.kinetic, "potential": eom.potential}
         if eom.kinetic is None and eom.potential is None:
             energy = {}
@@ -200,6 +240,8 @@ class Parts:
                     {"f": groups["f"]},
                 ),
             ]
+        if self.rates:
+            found += self._of_kinematics()
         if groups["energy"]:
             text = "Kinetic and potential energy [J]."
             found.append(Function("energies", text, state, {"energy": groups["energy"]}))
@@ -224,6 +266,24 @@ class Parts:
         if eom.outputs and not self.prefix:
             found += self._of_outputs()
         return found
+
+    def _of_kinematics(self) -> Iterator[Function]:
+        """q' = B v + b, and the angles that follow from other coordinates."""
+        eom, moving = self.eom, self.eom.kinematics
+        still = {a: s for a, s in self.state.items() if a != "v"}
+        places = [f"{eom.q[j]}, {eom.v[i]}" for j, i in self.rates]
+        results = {
+            "rates": values([moving.B[ji] for ji in self.rates], places),
+            "drift": values(moving.b, eom.q),
+        }
+        yield Function("kinematics", "Rates B and drift b of  q' = B v + b.", still, results)
+        if self.tangents:
+            text = "Their change along the direction (dt, dq, du)."
+            yield self._tangent("kinematics_tangent", text, still, results)
+        if eom.unwrapped:
+            angles = values([*eom.unwrapped.values()], [eom.q[j] for j in eom.unwrapped])
+            text = "What angles equal modulo 2 pi."
+            yield Function("unwrapped_angles", text, still, {"angle": angles})
 
     def _of_contacts(self) -> Iterator[Function]:
         """Restitution and Coulomb's law."""

@@ -217,8 +217,8 @@ class Instance:
                 f"tolerance {tolerance!r} is below what double precision allows, "
                 f"{SMALLEST_TOLERANCE!r} is used"
             )
-        states, n, u = names.motion(self.system.coordinates), self.system.n, self._of(self.inputs)
-        y, priority = self._start_values(states)
+        n, u = self.system.nq, self._of(self.inputs)
+        y, priority = self._start_values(self.system.states)
         found = start(self.system, y[:n], y[n:], u, self.p, priority, self.start_time)
         for moved in found.moved:
             if moved.priority != OMITTED:
@@ -231,6 +231,7 @@ class Instance:
             value[names.MAXIMUM_STEP],
             value[names.MAXIMUM_STEPS],
             tuple(float(x) for x in found.size),
+            tuple(float(x) for x in found.span),
             float(found.rate),
         )
         never = (Event(),) * len(found.closed)
@@ -372,7 +373,7 @@ class Instance:
             raise ValueError(f"its inputs were {saved['foreseen']!r}, {saved['past']!r}")
         if saved["settings"] is not None:
             methods = (*self.facts.methods.values(), self.facts.method)
-            self.settings = restored_settings(dict(saved["settings"]), methods, self.system.n)
+            self.settings = restored_settings(dict(saved["settings"]), methods, self.system)
         if saved["state"] is not None:
             self.state = restored(self.system, dict(saved["state"]))
         whole = None not in (self.settings, self.state) and len(self.foreseen) == len(self.inputs)

@@ -181,10 +181,9 @@ def as_built(prepared: Prepared, target: str) -> Prepared:
 
 def _nominals(prepared: Prepared) -> dict[str, float]:
     """The sizes of coordinates at the described start, and times the natural rate those of velocities."""
-    begun = prepared.structure.start
-    states = [n for n in prepared.whole.states if n != names.DISSIPATED]  # x, der(x), y, ...
-    sizes = dict(zip(states[::2], begun.size, strict=True))
-    rates = dict(zip(states[1::2], begun.size * begun.rate, strict=True))
+    begun, system = prepared.structure.start, prepared.examined
+    sizes = dict(zip(system.coordinates, begun.size, strict=True))
+    rates = dict(zip(system.speeds, begun.span * begun.rate, strict=True))
     energy = (
         {names.DISSIPATED: _energy(prepared)} if names.DISSIPATED in prepared.table.states else {}
     )
@@ -195,11 +194,11 @@ def _nominals(prepared: Prepared) -> dict[str, float]:
 def _energy(prepared: Prepared) -> float:
     """Kinetic energy of coordinates that move through their sizes at the natural rate; 0 if not known."""
     begun, system, eom = prepared.structure.start, prepared.system, prepared.coded.equations
-    if system.n != len(begun.size) or system.dynamics is None:
+    if system.nv != len(begun.span) or system.dynamics is None:
         return 0.0
     u, p = values_at_start(eom, prepared.whole, eom.numbers)
     M, *_ = system.assemble(0.0, begun.q, begun.v, [*u, *begun.switch_states], p)
-    speeds = np.maximum(begun.size * begun.rate, np.abs(begun.v))
+    speeds = np.maximum(begun.span * begun.rate, np.abs(begun.v))
     return float(np.diag(M) @ speeds**2 / 2)
 
 

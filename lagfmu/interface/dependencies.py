@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from functools import cached_property
 
 import sympy as sp
 
 from ..mechanics.coupling import coupled
+from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..model.elements import Expr
 
@@ -15,7 +16,7 @@ from ..model.elements import Expr
 class Dependencies:
     """Of the variables of a form.
 
-    `states`: names of the coordinates that are stepped, then of their velocities; `inputs`: names of what the
+    `states`: names of the coordinates that are stepped, then of the speeds; `inputs`: names of what the
     importer drives; `known`: both; `given`: the starts that the model gives, `starts`: those of all states.
     """
 
@@ -45,22 +46,22 @@ class Dependencies:
         own = {j: a for (i, j), a in self.eom.G.todok().items() if i == k}
         return self.symbols(*own.values(), self.eom.nu[k], *(self.eom.v[j] for j in own))
 
-    def group(self, *, coordinate: int | None = None, row: int | None = None) -> set[str]:
+    def group(self, *, speed: int | None = None, row: int | None = None) -> set[str]:
         """Symbols behind the accelerations and multipliers that are solved together."""
-        for coordinates, rows, symbols in self.groups:
-            if coordinate in coordinates or (row is not None and row in rows):
+        for speeds, rows, symbols in self.groups:
+            if speed in speeds or (row is not None and row in rows):
                 return symbols
-        raise KeyError((coordinate, row))
+        raise KeyError((speed, row))
 
     @cached_property
     def groups(self) -> list[tuple[frozenset[int], frozenset[int], set[str]]]:
         """The groups of `coupled`, with the symbols in their equations."""
         eom, found = self.eom, []
-        for coordinates, rows in coupled(eom):
-            M = [m for (i, _), m in eom.M.todok().items() if i in coordinates]
+        for speeds, rows in coupled(eom):
+            M = [m for (i, _), m in eom.M.todok().items() if i in speeds]
             G = [a for (k, _), a in eom.G.todok().items() if k in rows]
-            rest = [eom.F[j] for j in coordinates] + [eom.gamma[k] for k in rows]
-            found.append((coordinates, rows, self.symbols(*M, *G, *rest)))
+            rest = [eom.F[i] for i in speeds] + [eom.gamma[k] for k in rows]
+            found.append((speeds, rows, self.symbols(*M, *G, *rest)))
         return found
 
     @cached_property
@@ -73,11 +74,11 @@ class Dependencies:
     def _stepped_groups(self) -> list[tuple[set[str], set[str]]]:
         """Of the coordinates that are stepped: the states of each group, the symbols of its start."""
         eom, found = self.stepped, []
-        for coordinates, rows in coupled(eom):
-            own = {str(s) for j in coordinates for s in (eom.q[j], eom.v[j])}
+        for speeds, rows in coupled(eom):
+            own = _moved(eom, speeds) | {str(eom.v[i]) for i in speeds}
             behind = self.symbols(*(eom.f[k] for k in rows), *(eom.nu[k] for k in rows))
             behind |= self.symbols(*(a for (k, _), a in eom.G.todok().items() if k in rows))
-            behind |= self.symbols(*(m for (i, _), m in eom.M.todok().items() if i in coordinates))
+            behind |= self.symbols(*(m for (i, _), m in eom.M.todok().items() if i in speeds))
             found.append((own, own | behind))
         return found
 
@@ -86,13 +87,14 @@ class Dependencies:
         """States that the projection of the start values can move."""
         moved: set[str] = set()
         eom = self.stepped
-        for coordinates, group in coupled(eom):
+        for speeds, group in coupled(eom):
             rows = {k for k in group if eom.constraints[k].name not in eom.limited}
             if any(eom.f[k] is not None for k in rows):
-                moved |= {str(eom.q[j]) for j in coordinates}
+                moved |= _moved(eom, speeds)
             if rows:
-                moved |= {str(eom.v[j]) for j in coordinates}
-        return moved
+                moved |= {str(eom.v[i]) for i in speeds}
+        settled = {j for places in eom.quaternions for j in places} | eom.unwrapped.keys()
+        return moved | {str(eom.q[j]) for j in settled}
 
     def at_points(self, symbols: Iterable[str]) -> tuple[str, ...]:
         """Inputs and states behind a value at a communication point."""
@@ -113,3 +115,9 @@ class Dependencies:
     def _sorted(self, names: set[str]) -> tuple[str, ...]:
         order = [*(str(p) for p in self.eom.p), *self.inputs, *self.states]
         return tuple(n for n in order if n in names)
+
+
+def _moved(eom: EquationsOfMotion, speeds: Collection[int]) -> set[str]:
+    """The coordinates that these speeds move."""
+    rows = eom.kinematics.rows
+    return {str(q) for q, row in zip(eom.q, rows, strict=True) if row.keys() & set(speeds)}

@@ -90,10 +90,12 @@ class Outputs:
 
     def motion(self) -> list[Variable]:
         """Coordinates, velocities, accelerations: those of the model, then those of an embedding."""
+        if not self.eom.moves_plainly:
+            return self._places_and_speeds()
         variables = []
         eom, of_stepped = self.eom, self.behind.of_stepped
         for j, (q, v) in enumerate(zip(eom.q, eom.v, strict=True)):
-            symbols = of_stepped if eom.bare else self.behind.group(coordinate=j)
+            symbols = of_stepped if eom.bare else self.behind.group(speed=j)
             of_one = self._of_coordinate(q, v, symbols)
             stepped = str(q) in self.behind.states
             variables += of_one if stepped or not eom.bare else of_one[:2]
@@ -105,8 +107,7 @@ class Outputs:
     def _of_coordinate(self, q: Expr, v: Expr, symbols: set[str]) -> list[Variable]:
         """Itself, its velocity, and its acceleration, behind which are these `symbols`."""
         name = str(q)
-        texts = {name_of(s): text for s, text in self.model.descriptions.items()}
-        text = texts.get(name, f"coordinate {name}")
+        text = self._text(name, "coordinate")
         of = Subject(names.VALUE, "", name, 2)
         rate = f"acceleration of: {text}"
         return [
@@ -114,6 +115,34 @@ class Outputs:
             self._moving(Subject(names.VALUE, "", name, 1), f"velocity of: {text}", v, name),
             self.output(of, rate, self.units[of.name], symbols, "Real", str(v)),
         ]
+
+    def _text(self, name: str, kind: str) -> str:
+        texts = {name_of(s): text for s, text in self.model.descriptions.items()}
+        return texts.get(name, f"{kind} {name}")
+
+    def _places_and_speeds(self) -> list[Variable]:
+        """Coordinates with their rates, then speeds with theirs; a rate that is a speed is told there."""
+        variables, eom = [], self.eom
+        speeds = {str(v) for v in eom.v}
+        for q, rate in zip(eom.q, eom.qdot, strict=True):
+            text = self._text(str(q), "coordinate")
+            variables.append(self._moving(Subject(names.VALUE, "", str(q)), text, q, None))
+            of = Subject(names.VALUE, "", str(q), 1)
+            if of.name not in speeds:
+                unit, behind = self.units[of.name], self.behind.symbols(rate)
+                text = f"velocity of: {text}"
+                variables.append(self.output(of, text, unit, behind, "Real", str(q)))
+        for i, v in enumerate(eom.v):
+            of = names.read(str(v))
+            kind, of_what = ("coordinate", of.coordinate) if of.order else ("speed", None)
+            text = self._text(of.coordinate, kind)
+            text = f"velocity of: {text}" if of.order else text
+            variables.append(self._moving(of, text, v, of_what))
+            rate = dataclasses.replace(of, order=of.order + 1)
+            unit, behind = self.units[rate.name], self.behind.group(speed=i)
+            text = f"rate of: {text}"
+            variables.append(self.output(rate, text, unit, behind, "Real", str(v)))
+        return variables
 
     def _moving(self, of: Subject, text: str, symbol: Expr, derivative_of: str | None) -> Variable:
         """A coordinate or velocity: a state with its start, or what follows from states."""
@@ -167,14 +196,15 @@ class Outputs:
             text = f"true where {of.name} is determined uniquely"
             of = Subject(names.UNIQUE, c.name)
             variables.append(self.output(of, text, None, entries, "Boolean"))
-        for j, q in enumerate(() if self.eom.bare else self.eom.q):
-            unit = generalized_force_unit(self.units[str(q)])
+        pairs = zip(self.eom.directions, self.eom.v, strict=True)
+        for j, (q, v) in enumerate(() if self.eom.bare else pairs):
+            unit = generalized_force_unit(self.units[str(v)] * SECOND)
             touching = [k for k in range(self.eom.m) if (k, j) in jacobian]
-            symbols = self.behind.group(coordinate=j) if touching else set()
+            symbols = self.behind.group(speed=j) if touching else set()
             text = f"generalized force of all constraints on {q}"
-            variables.append(self.output(Subject(names.FORCE, "", str(q)), text, unit, symbols))
+            variables.append(self.output(Subject(names.FORCE, "", q), text, unit, symbols))
             for k in touching:
-                of = Subject(names.FORCE, self.eom.constraints[k].name, str(q))
+                of = Subject(names.FORCE, self.eom.constraints[k].name, q)
                 if not names.shared(of.constraint, of.coordinate):
                     continue
                 text = f"generalized force of constraint {of.constraint} on {q}"
@@ -200,7 +230,7 @@ class Outputs:
             symbols = self.behind.symbols(*found)
             for j, (a, force) in enumerate(zip(self.eom.vdot, self.eom.Q, strict=True)):
                 if found & {a, force}:
-                    symbols |= self.behind.group(coordinate=j)
+                    symbols |= self.behind.group(speed=j)
             for k, lam in enumerate(self.eom.lam):
                 if lam in found:
                     symbols |= self.behind.group(row=k)
@@ -289,11 +319,13 @@ class Outputs:
             self.output(count, what.format("s"), None, (), "Integer"),
             self.output(moment, f"time of {tail}", SECOND, (), discrete=True),
         ]
-        for q, v in zip(self.eom.q, self.eom.v, strict=True):
-            if not names.shared(of, str(q)):
-                continue
-            for order, s in enumerate((str(q), str(v))):
-                at = Subject(quantity, of, str(q), order)
+        states = [str(s) for s in (*self.eom.q, *self.eom.v)]
+        if self.eom.moves_plainly:
+            states = [names.derivative(str(q), k) for q in self.eom.q for k in (0, 1)]
+        for s in states:
+            read = names.read(s)
+            if names.shared(of, read.coordinate):
+                at = Subject(quantity, of, read.coordinate, read.order)
                 found.append(self.output(at, f"{s} at {tail}", self.units[s], (), discrete=True))
         return found
 

@@ -52,9 +52,10 @@ def _table(form: Form, scene: Scene) -> VariableTable:
     variables += outputs.peaks(VariableTable(tuple(variables), (), ()).measurable)
     shown = eom.model.display_units
     variables = [replace(v, display=_displayed(v, shown.get(v.of.coordinate))) for v in variables]
-    q = [str(s) for s in form.stepped.q]
-    derivatives = [derivative(c, k) for c in q for k in (1, 2)]
-    states = [derivative(c, k) for c in q for k in (0, 1)]
+    states = outputs.behind.states
+    if eom.moves_plainly:  # each coordinate with its velocity
+        states = [derivative(str(q), k) for q in form.stepped.q for k in (0, 1)]
+    derivatives = [names.rate_of(s) for s in states]
     if loses:
         states.append(names.DISSIPATED)
         derivatives.append(names.DISSIPATION)

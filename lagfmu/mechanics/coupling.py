@@ -8,12 +8,12 @@ from scipy.sparse.csgraph import connected_components
 
 from .equations import EquationsOfMotion
 
-Group = tuple[frozenset[int], frozenset[int]]  # coordinates, rows
+Group = tuple[frozenset[int], frozenset[int]]  # speeds, rows
 
 
 def coupled(eom: EquationsOfMotion) -> list[Group]:
     """What one linear solve ties together, by the sparsity of M, G and frictions."""
-    position = {c.name: eom.n + k for k, c in enumerate(eom.constraints)}
+    position = {c.name: eom.nv + k for k, c in enumerate(eom.constraints)}
     pairs = list(eom.M.todok())
     for law in eom.frictions:
         first, *others = (position[name] for name in (*law.of, *law.normal))
@@ -27,12 +27,12 @@ def constrained_together(eom: EquationsOfMotion) -> list[Group]:
 
 
 def _tied(eom: EquationsOfMotion, pairs: list[tuple[int, int]]) -> list[Group]:
-    pairs = [*pairs, *((eom.n + k, j) for k, j in eom.G.todok())]
-    size = eom.n + eom.m
+    pairs = [*pairs, *((eom.nv + k, j) for k, j in eom.G.todok())]
+    size = eom.nv + eom.m
     i, j = np.array(pairs, dtype=int).reshape(-1, 2).T
     count, of = connected_components(coo_array((np.ones(len(i)), (i, j)), (size, size)))
     groups = [np.flatnonzero(of == g).tolist() for g in range(count)]
     return [
-        (frozenset(i for i in g if i < eom.n), frozenset(i - eom.n for i in g if i >= eom.n))
+        (frozenset(i for i in g if i < eom.nv), frozenset(i - eom.nv for i in g if i >= eom.nv))
         for g in groups
     ]

@@ -25,10 +25,12 @@ from ..model.display import Displayed
 from ..model.elements import Expr
 from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
 from ..model.reactions import force_of_constraint, multiplier, reactions_in
+from ..model.speeds import quaternions
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
-from ..names import derivative, read
+from ..names import derivative, rate_of, read
 from .formulations.multipliers import multipliers
+from .kinematics import Kinematics
 
 TIME = dynamicsymbols._t
 
@@ -66,16 +68,17 @@ class FrictionLaw:
 
 @dataclass(frozen=True)
 class EquationsOfMotion(Displayed):
-    """The equations of one model in plain symbols; n coordinates, m constraints.
+    """The equations of one model in plain symbols; nq coordinates, nv speeds, m constraints.
 
-    q, v (n): coordinates and velocities; u: inputs (with derivatives where they are needed);
-    p: parameters.  M (n, n) and G (m, n) are sparse; `constraints` (m) are those of the rows of G.
-    F (n) holds all forces without lambda, nu and gamma (m) the right-hand sides of G v = nu and
-    G vdot = gamma, f (m) the residual of a position constraint (None for a nonholonomic one).
-    `symbols` maps the model's dynamicsymbols to the plain symbols, `rates` a prescribed motion u to
-    der(u) and der(u) to der(u,2).  Energies in joule: `kinetic` is the part of L that is quadratic in
-    v, `potential` minus the part without v; their sum is Jacobi's integral.  `outputs` are the model's
-    own, in the same symbols and those of accelerations (`vdot`), lambda (`lam`) and Q (`Q`).
+    q (nq), v (nv): coordinates and speeds, q' = `qdot` (nq), the same as v where the model has no speeds of
+    its own; u: inputs (with derivatives where they are needed); p: parameters.  M (nv, nv) and G (m, nv)
+    are sparse; `constraints` (m) are those of the rows of G.  F (nv) holds all forces without lambda, nu
+    and gamma (m) the right-hand sides of G v = nu and G vdot = gamma, f (m) the residual of a position
+    constraint (None for a nonholonomic one). `symbols` maps the model's dynamicsymbols to the plain
+    symbols, `rates` a prescribed motion u to der(u) and der(u) to der(u,2).  Energies in joule: `kinetic`
+    is the part of L that is quadratic in v, `potential` minus the part without v; their sum is Jacobi's
+    integral.  `outputs` are the model's own, in the same symbols and those of accelerations (`vdot`),
+    lambda (`lam`) and Q (`Q`).
 
     A scene may need less than the model (prune.py): then some coordinates and constraints are not
     there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
@@ -87,6 +90,7 @@ class EquationsOfMotion(Displayed):
     model: Model
     q: tuple[Expr, ...]
     v: tuple[Expr, ...]
+    qdot: tuple[Expr, ...]
     u: tuple[Expr, ...]
     p: tuple[Expr, ...]
     M: Expr
@@ -112,7 +116,8 @@ class EquationsOfMotion(Displayed):
         Raises DerivationError where the system is too large, or M or G M^-1 G^T has no inverse.
         """
         found = multipliers(self.model.name, self.M, self.G, self.F, self.gamma)
-        back = {plain: model for model, plain in self.symbols.items()} | {TIME: sp.Symbol("t")}
+        back = {plain: s for s, plain in self.symbols.items() if plain.is_Symbol}
+        back |= {TIME: sp.Symbol("t")}
         return {c.name: e.xreplace(back) for c, e in zip(self.constraints, found, strict=True)}
 
     @property
@@ -121,9 +126,39 @@ class EquationsOfMotion(Displayed):
         return (*self.u, *self.switch_states)
 
     @property
-    def n(self) -> int:
+    def nq(self) -> int:
         """Number of coordinates."""
         return len(self.q)
+
+    @property
+    def nv(self) -> int:
+        """Number of speeds."""
+        return len(self.v)
+
+    @property
+    def moves_plainly(self) -> bool:
+        """True if q' = v: every coordinate's rate is its speed."""
+        return self.qdot == self.v
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """How the coordinates move."""
+        angles = {self.symbols[s] for s in self.model.unwrapped}
+        places = frozenset(j for j, s in enumerate(self.q) if s in angles)
+        return Kinematics(self.q, self.v, self.qdot, TIME, self.rates, places)
+
+    @cached_property
+    def unwrapped(self) -> dict[int, Expr]:
+        """The angles that equal an expression modulo 2 pi, by their place in q."""
+        given = {self.symbols[s]: self.plain(e) for s, e in self.model.unwrapped.items()}
+        return {j: given[s] for j, s in enumerate(self.q) if s in given}
+
+    @cached_property
+    def quaternions(self) -> tuple[tuple[int, int, int, int], ...]:
+        """The places in q of the unit quaternions."""
+        place = {s: j for j, s in enumerate(self.q)}
+        found = [[self.symbols[s] for s in four] for four in quaternions(self.model)]
+        return tuple((place[a], place[b], place[c], place[d]) for a, b, c, d in found if a in place)
 
     @property
     def m(self) -> int:
@@ -167,8 +202,8 @@ class EquationsOfMotion(Displayed):
 
     @property
     def vdot(self) -> tuple[Expr, ...]:
-        """The symbols der(q,2) of the accelerations (n)."""
-        return tuple(sp.Symbol(derivative(str(q), 2), real=True) for q in self.q)
+        """The symbols of the accelerations v' (nv)."""
+        return tuple(sp.Symbol(rate_of(str(v)), real=True) for v in self.v)
 
     @property
     def lam(self) -> tuple[Expr, ...]:
@@ -177,13 +212,18 @@ class EquationsOfMotion(Displayed):
 
     @property
     def Q(self) -> tuple[Expr, ...]:
-        """The symbols of the generalized forces of constraint (n)."""
-        return tuple(force_of_constraint(q) for q in self.q)
+        """The symbols of the generalized forces of constraint (nv)."""
+        return tuple(force_of_constraint(sp.Symbol(name)) for name in self.directions)
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """What the forces of constraint are on (nv): a coordinate whose rate is the speed, else the speed."""
+        return tuple(read(str(v)).coordinate for v in self.v)
 
     @cached_property
     def units(self) -> dict[str, Unit]:
         """The unit of each quantity, by its name in the FMU."""
-        return {str(self.symbols.get(s, s)): unit for s, unit in self.model.units.items()}
+        return {_name_in_fmu(s): unit for s, unit in self.model.units.items()}
 
     def folded(self, unit: Unit) -> float:
         """The largest magnitude of that dimension among the parameters that became numbers."""
@@ -208,6 +248,7 @@ class EquationsOfMotion(Displayed):
         kinetic, potential = each((self.kinetic, self.potential))
         return replace(
             self,
+            qdot=each(self.qdot),
             M=sparse(self.M),
             F=each(self.F),
             G=sparse(self.G),
@@ -246,6 +287,12 @@ class EquationsOfMotion(Displayed):
         return sp.sympify(expression).xreplace(self.symbols).xreplace(self.numbers)
 
 
+def _name_in_fmu(symbol: Expr) -> str:
+    if isinstance(symbol, sp.Derivative):
+        return derivative(name_of(symbol.expr), int(symbol.derivative_count))
+    return name_of(symbol)
+
+
 def _changed(output: Output, change: Callable[[Expr], Expr]) -> Output:
     """The output with `change` done to its expressions."""
     other = output.otherwise
@@ -280,7 +327,21 @@ def plain_symbols(model: Model) -> dict[Expr, Expr]:
         table[s] = sp.Symbol(name, real=True)
         for k in (1, 2):
             table[s.diff(TIME, k)] = sp.Symbol(derivative(name, k), real=True)
-    return table
+    return table | _own_speeds(model, table)
+
+
+def _own_speeds(model: Model, table: Mapping[Expr, Expr]) -> dict[Expr, Expr]:
+    """Speeds of the model's own, and the derivatives of the coordinates that move by them."""
+    found = {}
+    for w in model.speeds:
+        found[w] = sp.Symbol(name_of(w), real=True)
+        found[w.diff(TIME)] = sp.Symbol(derivative(name_of(w)), real=True)
+    rates = {s.diff(TIME): sp.sympify(rate) for s, rate in model.kinematics.items()}
+    whole = {**table, **found}
+    for s, rate in rates.items():
+        second = rate.diff(TIME).xreplace(rates)
+        found[s], found[s.diff(TIME)] = rate.xreplace(whole), second.xreplace(whole)
+    return found
 
 
 def derive(model: Model) -> EquationsOfMotion:
@@ -291,15 +352,19 @@ def derive(model: Model) -> EquationsOfMotion:
     """
     table = plain_symbols(model)
     q = tuple(table[c] for c in model.coordinates)
-    v = tuple(table[c.diff(TIME)] for c in model.coordinates)
+    qdot = tuple(table[c.diff(TIME)] for c in model.coordinates)
+    v = tuple(table[s] for s in model.states[len(q) :])
     u, rates = _inputs(model, table)
-    clock = _Clock(q, v, rates)
+    angles = {table[s] for s in model.unwrapped}
+    places = frozenset(j for j, s in enumerate(q) if s in angles)
+    moving = Kinematics(q, v, qdot, TIME, rates, places)
+    clock = _Clock(q, qdot, rates)
     problems: list[str] = []
 
     energy = model.energy_expression.xreplace(table)
-    M, F = _left_hand_side(list(_terms(energy)), q, v, clock, problems)
-    for coordinate, force in model.forces.items():
-        F[list(model.coordinates).index(coordinate)] += sp.sympify(force).xreplace(table)
+    M, F = _left_hand_side(list(_terms(energy)), moving, clock, problems)
+    for direction, force in model.forces.items():
+        F[model.directions.index(direction)] += sp.sympify(force).xreplace(table)
 
     G: dict[tuple[int, int], Expr] = {}
     nu: list[Expr] = []
@@ -311,8 +376,8 @@ def derive(model: Model) -> EquationsOfMotion:
             row, drift = _pfaffian(constraint, expression, v, problems)
             f.append(None)
         else:
-            row = dict(_gradient(expression, q))
-            drift = clock.partial(expression)
+            row = _along(expression, moving)
+            drift = moving.along_time(expression)
             f.append(expression)
         G.update({(k, j): a for j, a in row.items()})
         nu.append(-drift)
@@ -321,16 +386,17 @@ def derive(model: Model) -> EquationsOfMotion:
 
     if problems:
         raise ModelError(model.name, problems)
-    kinetic, potential = _energies(model, energy, M, q, v, table)
+    kinetic, potential = _energies(model, energy, M, v, table)
     return EquationsOfMotion(
         model=model,
         q=q,
         v=v,
+        qdot=qdot,
         u=u,
         p=tuple(p.symbol for p in model.parameters),
-        M=sp.ImmutableSparseMatrix(len(q), len(q), M),
+        M=sp.ImmutableSparseMatrix(len(v), len(v), M),
         F=tuple(F),
-        G=sp.ImmutableSparseMatrix(len(nu), len(q), G),
+        G=sp.ImmutableSparseMatrix(len(nu), len(v), G),
         nu=tuple(nu),
         gamma=tuple(gamma),
         f=tuple(f),
@@ -362,21 +428,15 @@ def _friction(f: Friction, table: dict[Expr, Expr]) -> FrictionLaw:
 class _Clock:
     """Time derivatives along a motion, by the chain rule over the symbols that occur."""
 
-    def __init__(self, q: tuple[Expr, ...], v: tuple[Expr, ...], rates: dict[Expr, Expr]) -> None:
-        self.inputs = rates
-        self.all = {**dict(zip(q, v, strict=True)), **rates}
-
-    def partial(self, expression: Expr) -> Expr:
-        """The part of d/dt that is there when the coordinates rest: d/dt and prescribed inputs."""
-        return self._chain(expression, self.inputs)
+    def __init__(
+        self, q: tuple[Expr, ...], qdot: tuple[Expr, ...], rates: dict[Expr, Expr]
+    ) -> None:
+        self.rates = {**dict(zip(q, qdot, strict=True)), **rates}
 
     def total(self, expression: Expr) -> Expr:
         """d/dt of an expression of q, t and prescribed inputs."""
-        return self._chain(expression, self.all)
-
-    def _chain(self, expression: Expr, rates: dict[Expr, Expr]) -> Expr:
-        present = sorted(expression.free_symbols & rates.keys(), key=str)
-        parts = [expression.diff(s) * rates[s] for s in present]
+        present = sorted(expression.free_symbols & self.rates.keys(), key=str)
+        parts = [expression.diff(s) * self.rates[s] for s in present]
         if expression.has(TIME):
             parts.append(expression.diff(TIME))
         return sp.Add(*parts)
@@ -426,26 +486,35 @@ def _gradient(expression: Expr, symbols: tuple[Expr, ...]) -> Iterator[tuple[int
             yield j, d
 
 
+def _along(expression: Expr, moving: Kinematics) -> dict[int, Expr]:
+    """Its derivative along each speed that moves it: sum_j d/dq_j B_ji."""
+    found: dict[int, list[Expr]] = defaultdict(list)
+    for j, slope in _gradient(expression, moving.q):
+        for i, a in moving.rows[j].items():
+            found[i].append(slope * a)
+    along = {i: sp.Add(*parts) for i, parts in sorted(found.items())}
+    return {i: a for i, a in along.items() if a != 0}
+
+
 def _left_hand_side(
-    terms: list[Expr],
-    q: tuple[Expr, ...],
-    v: tuple[Expr, ...],
-    clock: _Clock,
-    problems: list[str],
+    terms: list[Expr], moving: Kinematics, clock: _Clock, problems: list[str]
 ) -> tuple[dict[tuple[int, int], Expr], list[Expr]]:
-    """M, and F = dL/dq - (d/dt dL/dv without its vdot terms), term by term of L."""
+    """M, and F = X L + c v dL/dv - (d/dt dL/dv without its v' terms), term by term of L."""
     M: dict[tuple[int, int], list[Expr]] = defaultdict(list)
-    F: list[list[Expr]] = [[] for _ in q]
-    position = {s: j for j, s in enumerate(q)}
-    speed = {s: j for j, s in enumerate(v)}
+    F: list[list[Expr]] = [[] for _ in moving.v]
+    speed = {s: i for i, s in enumerate(moving.v)}
+    turning, found = moving.commutators
+    problems += found
     for term in terms:
-        for s in sorted(term.free_symbols & position.keys(), key=position.__getitem__):
-            F[position[s]].append(term.diff(s))
-        moving = sorted(term.free_symbols & speed.keys(), key=speed.__getitem__)
-        for s in moving:
+        for i, along in _along(term, moving).items():
+            F[i].append(along)
+        present = sorted(term.free_symbols & speed.keys(), key=speed.__getitem__)
+        for s in present:
             momentum = term.diff(s)
             F[speed[s]].append(-clock.total(momentum))
-            for r in moving:
+            for i, c in turning[speed[s]]:
+                F[i].append(c * momentum)
+            for r in present:
                 mass = momentum.diff(r)
                 if mass.free_symbols & speed.keys():
                     problems.append(
@@ -481,7 +550,6 @@ def _energies(
     model: Model,
     energy: Expr,
     M: dict[tuple[int, int], Expr],
-    q: tuple[Expr, ...],
     v: tuple[Expr, ...],
     table: dict[Expr, Expr],
 ) -> tuple[Expr, Expr | None]:
@@ -490,17 +558,18 @@ def _energies(
     standing = -energy.xreplace(dict.fromkeys(v, sp.S.Zero))
     if model.lagrangian is not None:
         return kinetic, standing
-    return kinetic, _potential(model, q, standing, table)
+    return kinetic, _potential(model, standing, table)
 
 
-def _potential(
-    model: Model, q: tuple[Expr, ...], standing: Expr, table: dict[Expr, Expr]
-) -> Expr | None:
+def _potential(model: Model, standing: Expr, table: dict[Expr, Expr]) -> Expr | None:
     """V of the forces that depend on q alone, where they are a gradient of polynomials and sines.
 
     Each force is split into the terms that hold coordinates and parameters only, and the rest.
-    None if the first have a curl: then there is no potential energy to report.
+    None if the first have a curl, or act on speeds: then there is no potential energy to report.
     """
+    if model.forces.keys() & model.speeds.keys():
+        return None
+    q = tuple(table[c] for c in model.coordinates)
     allowed = set(q) | {p.symbol for p in model.parameters}
     forces = []
     for coordinate in model.coordinates:

@@ -104,7 +104,9 @@ def with_jumps(eom: EquationsOfMotion) -> EquationsOfMotion:
             problems.append(_refusal(eom, surface, speeds, plain))
         wrapped[surface] = held(surface.h, sp.Integer(len(wrapped)))
     if any(e.has(sp.DiracDelta) for e in plain.values()):
-        where = [str(q) for q, e in zip(eom.q, eom.F, strict=True) if plain[e].has(sp.DiracDelta)]
+        where = [
+            q for q, e in zip(eom.directions, eom.F, strict=True) if plain[e].has(sp.DiracDelta)
+        ]
         problems.append(
             f"the energy jumps, so that the force on {', '.join(where) or 'a constraint'} is infinite "
             "there: use an energy that is continuous, or a Contact"

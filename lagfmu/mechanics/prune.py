@@ -1,10 +1,9 @@
 """Equations -> equations without what a scene does not need.  Each step leaves a full scene as it is.
 
-A contact that cannot open is a holonomic constraint.  A coordinate goes if nothing that is read
-depends on it: what one linear solve ties together (coupling.py) is needed as a whole, with all that
-stands in its equations.
-Where the dependent coordinates are eliminated and no lambda is asked for, of the full equations only
-the coordinates that are read remain.
+A contact that cannot open is a holonomic constraint.  A speed goes, with the coordinates that it moves, if
+nothing that is read depends on it: what one linear solve ties together (coupling.py) is needed as a whole,
+with all that stands in its equations. Where the dependent coordinates are eliminated and no lambda is asked
+for, of the full equations only the coordinates that are read remain.
 """
 
 from __future__ import annotations
@@ -48,45 +47,48 @@ def held(eom: EquationsOfMotion, scene: Scene, problems: list[str]) -> Equations
 
 
 def needed(form: Form, outputs: Collection[str]) -> tuple[Indices, Indices]:
-    """Coordinates and constraint rows on which the outputs depend, by position.
+    """Speeds and constraint rows on which the outputs depend, by position.
 
     Raises RequestError if there are none.
     """
     eom, of = form.equations, subjects(form)
-    coordinates: set[int] = set()
+    speeds: set[int] = set()
     rows: set[int] = set()
     for name in outputs:
         more, more_rows = of.get(name, (NONE, NONE))
-        coordinates |= more
+        speeds |= more
         rows |= more_rows
     groups = [(c, r, _positions(eom, _behind(eom, c, r))) for c, r in coupled(eom)]
     known = [c.name for c in eom.constraints]
     grown = True
     while grown:
-        before = len(coordinates), len(rows)
+        before = len(speeds), len(rows)
         for own, own_rows, others in groups:
-            if own & coordinates or own_rows & rows:
-                coordinates |= own | others
+            if own & speeds or own_rows & rows:
+                speeds |= own | others
                 rows |= own_rows
         rows |= {
             known.index(w) for k in rows if (w := getattr(eom.constraints[k], "while_closed", None))
         }
-        grown = (len(coordinates), len(rows)) != before
-    if not coordinates:
+        grown = (len(speeds), len(rows)) != before
+    if not speeds:
         raise RequestError(
             eom.model.name,
             ["the outputs of the scene depend on no coordinate: name one of the motion"],
         )
-    return frozenset(coordinates), frozenset(rows)
+    return frozenset(speeds), frozenset(rows)
 
 
 def subjects(form: Form) -> dict[str, tuple[Indices, Indices]]:
-    """Name of an output -> the coordinates and rows that it is of."""
+    """Name of an output -> the speeds and rows that it is of."""
     eom, reduction = form.equations, form.reduction
     found: dict[str, tuple[Indices, Indices]] = {}
-    for j, q in enumerate(eom.q):
-        for name in (*_motion(q), names.name(names.FORCE, "", str(q))):
-            found[name] = frozenset({j}), NONE
+    moved = _moved(eom)
+    for q, speeds in zip(eom.q, moved, strict=True):
+        found |= dict.fromkeys(_motion(q), (speeds, NONE))
+    for i, (v, direction) in enumerate(zip(eom.v, eom.directions, strict=True)):
+        of = (str(v), names.rate_of(str(v)), names.name(names.FORCE, "", direction))
+        found |= dict.fromkeys(of, (frozenset({i}), NONE))
     of_rows = (names.MULTIPLIER, names.UNIQUE, names.RESIDUAL, names.CONTACT)
     for k, c in enumerate(eom.constraints):
         row = frozenset({k})
@@ -94,8 +96,8 @@ def subjects(form: Form) -> dict[str, tuple[Indices, Indices]]:
         found |= _event(eom, names.DEPARTURE, c.name, row)
         found |= _event(eom, names.CLOSING, c.name, row)
         found[names.name(names.IMPULSE, c.name)] = NONE, row
-        for j, q in enumerate(eom.q):
-            found[names.name(names.FORCE, c.name, str(q))] = frozenset({j}), row
+        for i, direction in enumerate(eom.directions):
+            found[names.name(names.FORCE, c.name, direction)] = frozenset({i}), row
     for o in eom.outputs:
         found[o.name] = _of_output(eom, o)
     found |= _of_frictions(eom)
@@ -109,10 +111,15 @@ def subjects(form: Form) -> dict[str, tuple[Indices, Indices]]:
     if reduction is None:
         return found
     for s in reduction.s:
-        moved = frozenset(j for j, phi in enumerate(reduction.phi) if s in phi.free_symbols)
+        behind = frozenset(j for j, phi in enumerate(reduction.phi) if s in phi.free_symbols)
         for name in _motion(s):
-            found.setdefault(name, (moved, NONE))
+            found.setdefault(name, (behind, NONE))
     return found
+
+
+def _moved(eom: EquationsOfMotion) -> list[Indices]:
+    """The speeds by which each coordinate moves."""
+    return [frozenset(row) for row in eom.kinematics.rows]
 
 
 def _motion(q: Expr) -> list[str]:
@@ -125,9 +132,11 @@ def _event(
 ) -> dict[str, tuple[Indices, Indices]]:
     """What is kept of what happens to a contact or a friction."""
     found = {names.name(f"{quantity}.{what}", of): (NONE, rows) for what in ("count", "time")}
-    for j, q in enumerate(eom.q):
-        for order in (0, 1):
-            found[names.name(quantity, of, str(q), order)] = frozenset({j}), rows
+    for q, speeds in zip(eom.q, _moved(eom), strict=True):
+        found[names.name(quantity, of, str(q))] = speeds, rows
+    for i, v in enumerate(eom.v):
+        state = names.read(str(v))
+        found[names.name(quantity, of, state.coordinate, state.order)] = frozenset({i}), rows
     return found
 
 
@@ -150,19 +159,19 @@ def _of_frictions(eom: EquationsOfMotion) -> dict[str, tuple[Indices, Indices]]:
 
 
 def _of_output(eom: EquationsOfMotion, o: Output) -> tuple[Indices, Indices]:
-    """The coordinates and rows that an output of the model's own is of."""
+    """The speeds and rows that an output of the model's own is of."""
     symbols = symbols_of(o)
-    coordinates = {
-        j for group in (eom.q, eom.v, eom.vdot, eom.Q) for j, s in enumerate(group) if s in symbols
-    }
-    return frozenset(coordinates), frozenset(k for k, s in enumerate(eom.lam) if s in symbols)
+    solved = {i for group in (eom.vdot, eom.Q) for i, s in enumerate(group) if s in symbols}
+    rows = frozenset(k for k, s in enumerate(eom.lam) if s in symbols)
+    return _positions(eom, symbols) | solved, rows
 
 
-def _behind(eom: EquationsOfMotion, coordinates: Indices, rows: Indices) -> set[Expr]:
+def _behind(eom: EquationsOfMotion, speeds: Indices, rows: Indices) -> set[Expr]:
     """The symbols in the equations of a group."""
-    flat = [m for (i, _), m in eom.M.todok().items() if i in coordinates]
+    flat = [m for (i, _), m in eom.M.todok().items() if i in speeds]
     flat += [a for (k, _), a in eom.G.todok().items() if k in rows]
-    flat += [eom.F[j] for j in coordinates]
+    flat += [eom.F[i] for i in speeds]
+    flat += [rate for rate, by in zip(eom.qdot, _moved(eom), strict=True) if by & speeds]
     for k in rows:
         flat += [eom.nu[k], eom.gamma[k], *([] if eom.f[k] is None else [eom.f[k]])]
         law = eom.limited.get(eom.constraints[k].name)
@@ -171,17 +180,19 @@ def _behind(eom: EquationsOfMotion, coordinates: Indices, rows: Indices) -> set[
 
 
 def _positions(eom: EquationsOfMotion, symbols: set[Expr]) -> Indices:
-    pairs = enumerate(zip(eom.q, eom.v, strict=True))
-    return frozenset(j for j, (q, v) in pairs if q in symbols or v in symbols)
+    moving = [by for q, by in zip(eom.q, _moved(eom), strict=True) if q in symbols]
+    return frozenset(i for i, v in enumerate(eom.v) if v in symbols).union(*moving)
 
 
 def only(
-    eom: EquationsOfMotion, coordinates: Collection[int], rows: Collection[int]
+    eom: EquationsOfMotion, speeds: Collection[int], rows: Collection[int]
 ) -> EquationsOfMotion:
-    """The equations of some coordinates and rows; energies are left out where they hold others."""
-    if len(coordinates) == eom.n and len(rows) == eom.m:
+    """The equations of some speeds, of the coordinates that they move, and of some rows; energies are left
+    out where they hold others."""
+    if len(speeds) == eom.nv and len(rows) == eom.m:
         return eom
-    js, ks = sorted(coordinates), sorted(rows)
+    js, ks = sorted(speeds), sorted(rows)
+    moved = [j for j, by in enumerate(_moved(eom)) if not by or by & set(js)]
 
     def pick(group: Sequence[Any], which: Sequence[int]) -> tuple[Any, ...]:
         return tuple(group[i] for i in which)
@@ -197,8 +208,8 @@ def only(
         )
 
     kept = {eom.constraints[k].name for k in ks}
-    away = [j for j in range(eom.n) if j not in js]
-    gone = {s for j in away for s in (eom.q[j], eom.v[j])}
+    away = [j for j in range(eom.nv) if j not in js]
+    gone = {q for j, q in enumerate(eom.q) if j not in moved} | {eom.v[j] for j in away}
     unsolved = gone | {s for j in away for s in (eom.vdot[j], eom.Q[j])}
     unsolved |= {s for k, s in enumerate(eom.lam) if k not in ks}
 
@@ -207,8 +218,9 @@ def only(
 
     return replace(
         eom,
-        q=pick(eom.q, js),
+        q=pick(eom.q, moved),
         v=pick(eom.v, js),
+        qdot=pick(eom.qdot, moved),
         M=part(eom.M, js),
         F=pick(eom.F, js),
         G=part(eom.G, ks),

@@ -21,6 +21,7 @@ from .page import check_page
 from .picture import check_picture
 from .reactions import reaction_units, reactions_in
 from .shapes import unusable_surfaces
+from .speeds import check_rates, check_speeds
 from .spline import Spline, splines_in
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
@@ -42,6 +43,7 @@ def problems_of(model: ModelFields) -> list[str]:
         return problems
     _check_numbers(model, problems)
     _check_symbols(model, problems)
+    check_speeds(model, problems)
     problems += unusable_surfaces(model)
     check_outputs(model, problems)
     check_picture(model, problems)
@@ -100,8 +102,7 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
                 "constraint (a prescribed motion) has one: leave it out"
             )
     parameters = {p.symbol: p.value for p in model.parameters}
-    states = {s for q in model.coordinates for s in (q, q.diff(t))}
-    _check_start("start", model.start, states, parameters, problems)
+    _check_start("start", model.start, set(model.states), parameters, problems)
     if model.embedding is not None:
         states = {s for q in model.embedding.coordinates for s in (q, q.diff(t))}
         _check_start("embedding start", model.embedding.start, states, parameters, problems)
@@ -127,8 +128,8 @@ def _check_start(
             continue
         if state not in states:
             problems.append(
-                f"{what} names {plain(state)}, which is neither a coordinate nor the first "
-                "derivative of one"
+                f"{what} names {plain(state)}, which is neither a coordinate nor a speed"
+                + (" (it moves by `kinematics`)" if state.is_Derivative else "")
             )
         if isinstance(value, sp.Basic) and value.free_symbols:
             if others := _unknown(value, set(parameters)):
@@ -184,6 +185,8 @@ def _expressions(model: ModelFields) -> list[tuple[str, Expr]]:
     kind = "lagrangian" if model.lagrangian is not None else "kinetic_energy"
     out = [(kind, model.energy_expression)]
     out += [(f"force on {plain(q)}", sp.sympify(f)) for q, f in model.forces.items()]
+    out += [(f"kinematics of {plain(q)}", sp.sympify(e)) for q, e in model.kinematics.items()]
+    out += [(f"unwrapped {plain(q)}", sp.sympify(e)) for q, e in model.unwrapped.items()]
     out += [(f"constraint {c.name!r}", sp.sympify(c.expression)) for c in model.constraints]
     for c in model.constraints:
         if isinstance(c, Contact):
@@ -194,15 +197,18 @@ def _expressions(model: ModelFields) -> list[tuple[str, Expr]]:
 def _check_symbols(model: ModelFields, problems: list[str]) -> None:
     t = dynamicsymbols._t
     known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t}
-    names = {name_of(s) for s in (*known, *model.coordinates)}
+    moving = {*model.coordinates, *model.speeds}
+    names = {name_of(s) for s in known | moving}
     for q in model.forces:
-        if q not in model.coordinates:
+        if q in model.kinematics:
+            problems.append(
+                f"a force is given on {plain(q)}, which moves by `kinematics`: give it on the speeds"
+            )
+        elif q not in model.directions:
             problems.append(f"a force is given on {plain(q)}, which is no coordinate of the model")
     for what, expression in _expressions(model):
         problems += _solved_for(what, expression)
-        unknown = _unknown(
-            expression, known | set(model.coordinates) | set(reactions_in(expression))
-        )
+        unknown = _unknown(expression, known | moving | set(reactions_in(expression)))
         problems += [
             f"{what}: {name} is neither coordinate, parameter nor input: "
             + (
@@ -213,12 +219,15 @@ def _check_symbols(model: ModelFields, problems: list[str]) -> None:
             )
             for name in unknown
         ]
-        if what.startswith("constraint") and not expression.has(*model.coordinates):
+        if what.startswith("constraint") and not expression.has(*moving):
             problems.append(
                 f"{what}: {expression} holds no coordinate, expected a condition on the motion: "
                 "correct it or leave it out"
             )
-        orders = [d.derivative_count for d in expression.atoms(sp.Derivative)]
+        orders = [
+            d.derivative_count + (d.expr in model.speeds) for d in expression.atoms(sp.Derivative)
+        ]
+        orders += [1 for w in model.speeds if expression.has(w)]
         limit = 0 if what.startswith("constraint") and not _pfaffian(model, what) else 1
         if any(order > limit for order in orders):
             problems.append(
@@ -262,6 +271,7 @@ def declared_units(model: ModelFields, problems: list[str]) -> dict[Expr, Unit]:
     units: dict[Expr, Unit] = {t: parse_unit("s", "time")}
     extra = model.embedding.coordinates if model.embedding else {}
     declared = [("coordinate", q, u) for q, u in (*model.coordinates.items(), *extra.items())]
+    declared += [("speed", w, u) for w, u in model.speeds.items()]
     declared += [("parameter", p.symbol, p.unit) for p in model.parameters]
     declared += [("input", i.symbol, i.unit) for i in model.inputs]
     for kind, symbol, text in declared:
@@ -287,7 +297,9 @@ def _check_dimensions(model: ModelFields, units: dict[Expr, Unit], problems: lis
     kind = "lagrangian" if model.lagrangian is not None else "kinetic_energy"
     check(model.energy_expression, ENERGY, kind)
     for q, force in model.forces.items():
-        check(force, ENERGY / units[q], f"force on {plain(q)}")
+        unit = POWER / units[q] if q in model.speeds else ENERGY / units[q]
+        check(force, unit, f"force on {plain(q)}")
+    check_rates(model, units, problems)
     for constraint in model.constraints:
         check(constraint.expression, None, f"constraint {constraint.name!r}")
         if isinstance(constraint, Contact):

@@ -11,6 +11,7 @@ from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
+from sympy.physics.vector import dynamicsymbols
 
 Expr = Any  # a SymPy expression: SymPy 1.14 ships no types, so that a stricter name would check nothing
 
@@ -176,6 +177,23 @@ class ModelFields:
     picture: Sequence[Any] = ()  # of the shapes in picture.py
     page: Any = None  # the Page of page.py
     display_units: Mapping[str, str] = field(default_factory=dict)
+    speeds: Mapping[Expr, str] = field(default_factory=dict)
+    kinematics: Mapping[Expr, Expr] = field(default_factory=dict)
+    unwrapped: Mapping[Expr, Expr] = field(default_factory=dict)
+
+    @property
+    def directions(self) -> tuple[Expr, ...]:
+        """What generalized forces belong to: the coordinates whose rates are speeds, then the speeds."""
+        return (*(q for q in self.coordinates if q not in self.kinematics), *self.speeds)
+
+    @property
+    def states(self) -> tuple[Expr, ...]:
+        """What can start somewhere: coordinates, and the speeds in the order of `directions`."""
+        t = dynamicsymbols._t
+        return (
+            *self.coordinates,
+            *(s if s in self.speeds else s.diff(t) for s in self.directions),
+        )
 
     @property
     def energy_expression(self) -> Expr:

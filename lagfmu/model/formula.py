@@ -58,13 +58,15 @@ def _known(model: Model) -> dict[str, Expr]:
     t = dynamicsymbols._t
     known: dict[str, Expr] = {"time": t, "pi": sp.pi}
     known |= {name_of(p.symbol): p.symbol for p in model.parameters}
-    for symbol in (*model.coordinates, *(i.symbol for i in model.inputs)):
+    for symbol in (*model.coordinates, *model.speeds, *(i.symbol for i in model.inputs)):
         name = name_of(symbol)
         known[name] = symbol
-        if symbol in model.coordinates or _moves(model, symbol):
+        if symbol in model.speeds:
+            known[derivative(name)] = symbol.diff(t)
+        elif symbol in model.coordinates or _moves(model, symbol):
             known |= {derivative(name, k): symbol.diff(t, k) for k in (1, 2)}
     reactions = [multiplier(c.name) for c in model.constraints]
-    reactions += [force_of_constraint(q) for q in model.coordinates]
+    reactions += [force_of_constraint(q) for q in model.directions]
     return known | {str(s): s for s in reactions}
 
 

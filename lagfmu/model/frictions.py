@@ -252,7 +252,7 @@ def _check_symbols(
 ) -> None:
     t = dynamicsymbols._t
     known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t} | also
-    known |= {s for q in model.coordinates for s in (q, q.diff(t))}
+    known |= {s for q in model.coordinates for s in (q, q.diff(t))} | {*model.speeds}
     found = {s for s in expression.free_symbols if s != t}
     found |= expression.atoms(AppliedUndef) | expression.atoms(sp.Derivative)
     inner = {a for d in expression.atoms(sp.Derivative) for a in d.atoms(AppliedUndef)}

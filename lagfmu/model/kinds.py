@@ -47,6 +47,9 @@ def check_containers(model: ModelFields) -> list[str]:
         ("forces", model.forces, "{x: F}"),
         ("start", model.start, "{x: 1.0}"),
         ("descriptions", model.descriptions, "{x: 'height'}"),
+        ("speeds", model.speeds, "{w: 'rad/s'}"),
+        ("kinematics", model.kinematics, "{phi: w}"),
+        ("unwrapped", model.unwrapped, "{phi: atan2(y, x)}"),
     ]
     problems = []
     if isinstance(model.embedding, Embedding):
@@ -110,6 +113,8 @@ def check_types(model: ModelFields, problems: list[str]) -> None:
     expressions += [(f"constraint {c.name!r}", c.expression) for c in model.constraints]
     expressions += [(f"output {o.name!r}", o.expression) for o in model.outputs]
     expressions += [(f"otherwise of output {o.name!r}", o.otherwise) for o in model.outputs]
+    rates = (("kinematics of", model.kinematics), ("unwrapped", model.unwrapped))
+    expressions += [(f"{kind} {plain(q)}", e) for kind, of in rates for q, e in of.items()]
     relations = model.embedding.relations if model.embedding else {}
     expressions += [(f"embedding of {plain(sp.sympify(q))}", e) for q, e in relations.items()]
     for what, expression in expressions:
@@ -165,13 +170,14 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
     """Names that no FMI variable or Python file can bear, and names of two things."""
     named = [("model", model.name)]
     extra = model.embedding.coordinates if model.embedding else {}
-    for q in (*model.coordinates, *extra):
-        if not (isinstance(q, AppliedUndef) and q.args == (dynamicsymbols._t,)):
-            problems.append(
-                f"coordinate {q} is no function of time: write it as dynamicsymbols('{q}')"
-            )
-            continue
-        named.append(("coordinate", name_of(q)))
+    for kind, symbols in (("coordinate", (*model.coordinates, *extra)), ("speed", model.speeds)):
+        for q in symbols:
+            if not (isinstance(q, AppliedUndef) and q.args == (dynamicsymbols._t,)):
+                problems.append(
+                    f"{kind} {q} is no function of time: write it as dynamicsymbols('{q}')"
+                )
+                continue
+            named.append((kind, name_of(q)))
     if not model.coordinates:
         problems.append("there is no coordinate: a model needs at least one")
     named += [("parameter", name_of(p.symbol)) for p in model.parameters]
@@ -205,9 +211,9 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
         if constraint.name in names:
             problems.append(f"two constraints are called {constraint.name!r}: rename one")
         names.add(constraint.name)
-        if constraint.name in seen and seen[constraint.name] == "coordinate":
+        if seen.get(constraint.name) in ("coordinate", "speed"):
             problems.append(
-                f"constraint {constraint.name!r} has the name of a coordinate, so that "
+                f"constraint {constraint.name!r} has the name of a {seen[constraint.name]}, so that "
                 f"'Q.{constraint.name}' would be two things: rename one"
             )
         closed = getattr(constraint, "while_closed", None)

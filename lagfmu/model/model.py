@@ -59,15 +59,18 @@ __all__ = [
 class Model(ModelFields, Displayed):
     """A mechanical system.
 
-    Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is
-    given; `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps
-    each `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to
-    numbers in that unit or to expressions of parameters.  A unit may be a multiple of an SI unit (g, mm,
-    deg): the model keeps every number in SI, and in `display_units` the unit in which importers show it.
+    Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is given;
+    `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps each
+    `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to numbers in
+    that unit or to expressions of parameters.  A unit may be a multiple of an SI unit (g, mm, deg): the
+    model keeps every number in SI, and in `display_units` the unit in which importers show it.
     `descriptions` may explain coordinates.  `outputs` are quantities besides those that every FMU reports,
     `picture` how it looks.  Write a `Friction` among `constraints` (it is kept in `frictions`), a `Peak`
-    among `outputs` (it is kept in `peaks`).  `author`, `version`, `license` and `copyright` stand in the
-    FMU's description.
+    among `outputs` (it is kept in `peaks`).  `speeds` maps speeds of the model's own (dynamicsymbols) to
+    their units, `kinematics` the coordinates that move by them to their rates, q' = B(q, t) v + b(q, t)
+    [unit/s]; four that keep e0^2 + e1^2 + e2^2 + e3^2 are a unit quaternion.  `unwrapped` maps an angle to
+    what it equals modulo 2 pi.  Generalized forces on a speed are in W/[speed].  `author`, `version`,
+    `license` and `copyright` stand in the FMU's description.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -78,7 +81,8 @@ class Model(ModelFields, Displayed):
         problems = check_containers(self)
         if problems:
             raise ModelError(str(self.name), problems)
-        for name in ("coordinates", "forces", "start", "descriptions", "display_units"):
+        maps = ("coordinates", "forces", "start", "descriptions", "display_units")
+        for name in (*maps, "speeds", "kinematics", "unwrapped"):
             object.__setattr__(self, name, dict(getattr(self, name)))
         for name in ("constraints", "parameters", "inputs", "outputs", "picture"):
             object.__setattr__(self, name, tuple(getattr(self, name)))

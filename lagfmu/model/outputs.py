@@ -56,6 +56,7 @@ def check_output_units(model: ModelFields, units: Mapping[Expr, Unit], problems:
 def _check_names(model: ModelFields, problems: list[str]) -> None:
     extra = model.embedding.coordinates if model.embedding else {}
     taken = {name_of(q): "a coordinate" for q in (*model.coordinates, *extra)}
+    taken |= {name_of(w): "a speed" for w in model.speeds}
     taken |= {name_of(p.symbol): "a parameter" for p in model.parameters}
     taken |= {name_of(i.symbol): "an input" for i in model.inputs}
     own = {o.name for o in model.outputs if is_name(o.name)}
@@ -92,7 +93,7 @@ def _check_names(model: ModelFields, problems: list[str]) -> None:
 def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
     t = dynamicsymbols._t
     known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t}
-    known |= set(model.coordinates)
+    known |= {*model.coordinates, *model.speeds}
     embedded = set(model.embedding.coordinates) if model.embedding else set()
     names = {name_of(s) for s in known}
     found = expression.free_symbols | expression.atoms(AppliedUndef)
@@ -109,11 +110,11 @@ def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
         yield f"{what}: {name} is neither coordinate, parameter nor input: {remedy}"
     constraints = [c.name for c in model.constraints]
     reactions = {multiplier(c) for c in constraints}
-    reactions |= {force_of_constraint(q) for q in model.coordinates}
+    reactions |= {force_of_constraint(q) for q in model.directions}
     for symbol in reactions_in(expression):
         if symbol not in reactions:
             kind = "constraint" if read(str(symbol)).quantity == MULTIPLIER else "coordinate"
-            known_names = constraints if kind == "constraint" else map(name_of, model.coordinates)
+            known_names = constraints if kind == "constraint" else map(name_of, model.directions)
             yield (
                 f"{what}: {symbol} is of no {kind} of this model, expected one of "
                 f"{', '.join(known_names) or 'none: there are no constraints'}"
@@ -124,10 +125,11 @@ def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
 def _derivatives(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
     prescribed = {i.symbol for i in model.prescribed}
     for d in sorted(expression.atoms(sp.Derivative), key=str):
-        if d.derivative_count > HIGHEST:
+        highest = HIGHEST - (d.expr in model.speeds)
+        if d.derivative_count > highest:
             yield (
                 f"{what}: holds {plain(d)}, a derivative of order {d.derivative_count}, expected at "
-                f"most {HIGHEST}"
+                f"most {highest}"
             )
         elif d.expr in {i.symbol for i in model.inputs} - prescribed:
             yield (
@@ -161,4 +163,7 @@ def _nothing_in_the_open(model: ModelFields, contact: str) -> dict[Expr, Expr]:
             f = sp.sympify(c.expression)
             rate = isinstance(c, Nonholonomic)
             left |= {q for q in model.coordinates if f.has(q.diff(t) if rate else q)}
-    return gone | {force_of_constraint(q): sp.S.Zero for q in model.coordinates if q not in left}
+            left |= {w for w in model.speeds if f.has(w)}
+    moved = {q for q in left if q in model.kinematics}
+    left |= {w for q in moved for w in model.speeds if sp.sympify(model.kinematics[q]).has(w)}
+    return gone | {force_of_constraint(q): sp.S.Zero for q in model.directions if q not in left}

@@ -182,7 +182,7 @@ def expressions_of(shape: Shape) -> Iterator[Expr]:
 def _unknown(model: ModelFields, shape: Shape) -> Iterator[str]:
     """Names that are none of the model's; those with a dot are outputs."""
     extra = model.embedding.coordinates if model.embedding else {}
-    known: set[Any] = {*model.coordinates, *extra, dynamicsymbols._t}
+    known: set[Any] = {*model.coordinates, *model.speeds, *extra, dynamicsymbols._t}
     known |= {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs}
     own = {o.name for o in model.outputs}
     if isinstance(shape, Track):

@@ -18,7 +18,7 @@ from sympy.core.function import AppliedUndef
 from ..errors import UnitError
 from ..names import FORCE, MULTIPLIER, REACTIONS, name, read
 from .elements import Expr, ModelFields, Nonholonomic, name_of
-from .units import ONE, Unit, dimension_of, generalized_force_unit, multiplier_unit
+from .units import ONE, SECOND, Unit, dimension_of, generalized_force_unit, multiplier_unit
 
 
 def multiplier(constraint: str) -> Expr:
@@ -27,7 +27,7 @@ def multiplier(constraint: str) -> Expr:
 
 
 def force_of_constraint(coordinate: Expr) -> Expr:
-    """Q of all constraints on a coordinate, in J/[coordinate]."""
+    """Q of all constraints on a coordinate, in J/[coordinate], or on a speed, in W/[speed]."""
     return sp.Symbol(name(FORCE, "", name_of(coordinate)), real=True)
 
 
@@ -55,7 +55,8 @@ def reaction_units(model: ModelFields, units: Mapping[Expr, Unit]) -> dict[Expr,
         except UnitError:
             continue
         found[multiplier(c.name)] = multiplier_unit(unit, isinstance(c, Nonholonomic))
-    for q in model.coordinates:
+    for q in model.directions:
         if q in units and isinstance(q, AppliedUndef):
-            found[force_of_constraint(q)] = generalized_force_unit(units[q])
+            moved = units[q] * SECOND if q in model.speeds else units[q]
+            found[force_of_constraint(q)] = generalized_force_unit(moved)
     return found

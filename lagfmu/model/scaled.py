@@ -36,6 +36,7 @@ def in_si(model: ModelFields) -> dict[str, Any]:
         for name, of in numbers.items()
     }
     found["coordinates"], found["start"] = _motion(model.coordinates, model.start, shown)
+    found["speeds"], found["start"] = _motion(model.speeds, found["start"], shown)
     if model.embedding is not None:
         coordinates, start = _motion(model.embedding.coordinates, model.embedding.start, shown)
         found["embedding"] = replace(model.embedding, coordinates=coordinates, start=start)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from .failure import OmittedStartError, StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
-from .nominals import extents, motion_speeds
+from .nominals import extents, in_speeds, motion_speeds
 from .start_priority import GIVEN, OMITTED, SET
 from .system import NONHOLONOMIC, Matrix, System, Vector
 from .thresholds import (
@@ -40,7 +40,7 @@ HALVINGS = 25  # of a step of Newton's method
 
 @dataclass(frozen=True)
 class Stage:
-    """Who may move: `free` (n), and how reluctantly: `weight` (n); `priority`: the highest that may."""
+    """Who may move: `free` (nv), and how reluctantly: `weight` (nv); `priority`: the highest that may."""
 
     priority: int
     free: NDArray[np.bool_]
@@ -52,7 +52,8 @@ class Stage:
         return [i for i, k in enumerate(rows) if k in held]
 
     def nearest(self, M: Matrix, G: Matrix, c: Vector, off: float = 0.0) -> Vector:
-        """dq (n), zero where nothing is free, with G dq = c as nearly as can be; `off` as in linear.py."""
+        """dq in speeds (nv), zero where nothing is free, with G dq = c as nearly as can be; `off` as in
+        linear.py."""
         M = np.where(np.outer(self.free, self.free), M, np.diag(M.diagonal()))
         M = M * self.weight * self.weight[:, None]
         G = np.where(self.free, G, 0.0)
@@ -60,7 +61,7 @@ class Stage:
 
 
 def stages(priority: Sequence[int]) -> Iterator[Stage]:
-    """Of coordinates of these priorities (n), one after another."""
+    """Of speeds of these priorities (nv), one after another."""
     of = np.array(priority, dtype=int)
     for highest in (OMITTED, GIVEN, SET):
         if (of == highest).any():
@@ -77,22 +78,23 @@ def initial_positions(
     size: Vector,
     priority: Sequence[int] | None = None,
 ) -> Vector:
-    """Positions with f = 0 on the rows: of the lowest priority (n) that reaches them, weighted by M.
+    """Positions with f = 0 on the rows: of the lowest priority (nq) that reaches them, weighted by M.
 
-    `size` (n): the coordinates' magnitudes.  Raises StartFailureError naming the constraints that remain
+    `size` (nq): the coordinates' magnitudes.  Raises StartFailureError naming the constraints that remain
     violated and by how much, or the omitted value that is in the way.
     """
     system = at.system
     fixed = [k for k in rows if system.rows[k].kind != NONHOLONOMIC]
+    q0 = at.moved(q0, np.zeros(system.nv))
     if not fixed:
         return q0
-    priority = [GIVEN] * system.n if priority is None else priority
+    priority = [GIVEN] * system.nq if priority is None else priority
     missed = np.zeros(len(fixed))
-    for stage in stages(priority):
+    for stage in stages(_of_speeds(system, priority)):
         q, missed = _newton(at, q0, v0, fixed, size, stage)
         if not missed.any():
             return q
-        if stage.priority == OMITTED:
+        if stage.priority == OMITTED and system.kinematics is None:
             _check_omitted(at, q0, v0, fixed, priority)
     violated = ", ".join(
         f"{system.rows[k].name!r} by {a:.3g}" for k, a in zip(fixed, missed, strict=True) if a
@@ -102,6 +104,11 @@ def initial_positions(
         f"the start values {values} cannot be projected onto the constraints (missed: {violated}): "
         "choose start values near a configuration that satisfies them, or other parameters"
     )
+
+
+def _of_speeds(system: System, priority: Sequence[int]) -> list[int]:
+    """The priority (nv) of displacements in speeds: the highest of the coordinates (nq) that each moves."""
+    return [max((priority[j] for j in places), default=OMITTED) for places in system.moved_by]
 
 
 def _newton(
@@ -119,9 +126,10 @@ def _newton(
     for _ in range(INITIAL_ITERATIONS):
         M, _, G, _, _ = at.equations(q, v0)
         G = G[fixed]
-        if (np.abs(f) <= 4 * EPS * (np.abs(G) @ np.maximum(np.abs(q), least))).all():
+        span = in_speeds(at.system, at.p, np.maximum(np.abs(q), least))
+        if (np.abs(f) <= 4 * EPS * (np.abs(G) @ span)).all():
             return q, np.zeros(len(fixed))
-        reach = np.abs(G) @ np.maximum(np.abs(q), size)
+        reach = np.abs(G) @ in_speeds(at.system, at.p, np.maximum(np.abs(q), size))
         unit = np.where(reach > 0, reach, np.where(f != 0, np.abs(f), 1.0))
         rounding = np.abs(f) <= 1e3 * EPS * reach
         left = np.where(rounding, 0.0, f)
@@ -135,14 +143,15 @@ def _newton(
         before = np.linalg.norm((f / unit)[own])
         for damping in 2.0 ** -np.arange(HALVINGS):
             try:
-                there = at.residual(q + damping * step)[fixed]
+                place = at.moved(q, damping * step)
+                there = at.residual(place)[fixed]
             except StepFailureError:
                 continue
             if np.linalg.norm((there / unit)[own]) < (1 - 0.1 * damping) * before:
                 break
         else:
             return q, left
-        q, f = q + damping * step, there
+        q, f = place, there
     return q, f
 
 
@@ -182,8 +191,8 @@ def initial_velocities(
     least: Vector,
     priority: Sequence[int],
 ) -> Vector:
-    """Velocities with G v = nu on the rows, of the lowest priority (n) that reaches them, weighted by M; as
-    near as can be if none does.  `least` (n) >= 0: speeds below which nothing counts."""
+    """Velocities with G v = nu on the rows, of the lowest priority (nv) that reaches them, weighted by M; as
+    near as can be if none does.  `least` (nv) >= 0: speeds below which nothing counts."""
     M, _, G, nu, _ = at.equations(q, v0)
     G, nu, v = G[list(rows)], nu[list(rows)], v0
     for stage in stages(priority):

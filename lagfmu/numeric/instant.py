@@ -22,7 +22,8 @@ class Instant:
     p: Sequence[float]
 
     def equations(self, q: Vector, v: Vector) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
-        """M (n, n), F (n), G (m, n), nu (m), gamma (m).  Raises StepFailureError where they have no value."""
+        """M (nv, nv), F (nv), G (m, nv), nu (m), gamma (m).  Raises StepFailureError where they have no
+        value."""
         found: tuple[Matrix, Vector, Matrix, Vector, Vector] = evaluated(
             "the equations", self.t, self.system.assemble, self.t, q, v, self.u, self.p
         )
@@ -34,6 +35,12 @@ class Instant:
         arguments = self.t, q.tolist(), self.u, self.p
         f = evaluated("the constraints", self.t, self.system.residual, *arguments)
         return np.array(f, dtype=float)
+
+    def moved(self, q: Vector, w: Vector) -> Vector:
+        """q (nq) after a displacement w (nv) in speeds.  Raises likewise."""
+        arguments = self.t, q, w, self.u, self.p
+        found: Vector = evaluated("the kinematics", self.t, self.system.moved, *arguments)
+        return found
 
 
 def at_start(

@@ -26,7 +26,7 @@ ARRIVED = 1e-15  # of the largest multiplier: a change that is rounding
 
 @dataclass(frozen=True)
 class Motion:
-    """M, F, G, nu, gamma at a state, accelerations (n) and multipliers (m; 0 for rows that do not act)."""
+    """M, F, G, nu, gamma at a state, accelerations (nv) and multipliers (m; 0 for rows that do not act)."""
 
     M: Matrix
     F: Vector
@@ -85,7 +85,7 @@ def motion(at: Instant, q: Vector, v: Vector, rows: Sequence[int], slips: Slips 
         try:
             x, found = solve(M, F + G.T @ pushed, G[rows], gamma[rows])
         except MasslessError as error:
-            raise error.named(system.coordinates) from error
+            raise error.named(system.directions) from error
         lam = pushed.copy()
         lam[rows] = found
         if law is None:
@@ -100,14 +100,15 @@ def motion(at: Instant, q: Vector, v: Vector, rows: Sequence[int], slips: Slips 
 
 
 def stick_slip(
-    at: Instant, q: Vector, v: Vector, rows: Sequence[int], size: Vector
+    at: Instant, q: Vector, v: Vector, rows: Sequence[int], span: Vector
 ) -> tuple[list[int], Slips]:
-    """The rows that act, those that stick by friction with them, and the frictions that slip; `size` (n): of
-    the coordinates.  Of frictions at s = 0, the one farthest out of its cone slips first."""
+    """The rows that act, those that stick by friction with them, and the frictions that slip; `span` (nv):
+    sizes of displacements in speeds.  Of frictions at s = 0, the one farthest out of its cone slips
+    first."""
     system, law = at.system, friction_law(at, q, v)
     M, F, G, nu, _ = at.equations(q, v)
     mass = np.where(M.diagonal() > 0, M.diagonal(), np.inf)
-    speed = np.maximum(np.abs(v), np.sqrt(size * np.abs(F) / mass))
+    speed = np.maximum(np.abs(v), np.sqrt(span * np.abs(F) / mass))
     s, noise = G @ v - nu, FRICTION_SLACK * (np.abs(G) @ speed + np.abs(nu))
     loaded = [i for i, f in enumerate(system.frictions) if not f.gated or {*f.normal} & {*rows}]
     tangential = {i: list(system.frictions[i].rows) for i in loaded}

@@ -30,13 +30,28 @@ Mask = NDArray[np.bool_]
 
 
 def extents(system: System, p: Sequence[float]) -> Vector:
-    """For each coordinate the largest magnitude among the parameters of its dimension, those that are
+    """For each coordinate (nq) the largest magnitude among the parameters of its dimension, those that are
     numbers in the code with them; angles: 0."""
-    parts = system.extent or ((),) * system.n
-    folded = system.folded or (0.0,) * system.n
-    return np.array([max((abs(p[i]) for i in part), default=0.0) for part in parts]).clip(
-        min=folded
-    )
+    return _largest(system, p, system.dimension, system.folded or (0.0,) * system.nq)
+
+
+def _largest(
+    system: System, p: Sequence[float], dimensions: Sequence[int], folded: Sequence[float]
+) -> Vector:
+    largest: dict[int, float] = {}
+    for value, of in zip(p, system.extent_dimension, strict=False):
+        largest[of] = max(largest.get(of, 0.0), abs(value))
+    return np.array([largest.get(of, 0.0) for of in dimensions]).clip(min=folded)
+
+
+def in_speeds(system: System, p: Sequence[float], size: Vector) -> Vector:
+    """Sizes (nq) of coordinates as those of displacements in speeds (nv): of the coordinates of the same
+    dimension that a speed moves, else of the parameters of that dimension; of an angle alone 1 rad."""
+    if system.kinematics is None:
+        return size
+    alone = _largest(system, p, system.speed_dimension, system.speed_folded or (0.0,) * system.nv)
+    turns = np.array(system.speed_dimension) == system.angle_dimension
+    return system.across(size, np.where(turns, 1.0, alone))
 
 
 def sizes(system: System, q: Vector, p: Sequence[float], before: Vector) -> Vector:
@@ -50,7 +65,7 @@ def sizes(system: System, q: Vector, p: Sequence[float], before: Vector) -> Vect
 
 
 def motion_speeds(system: System, M: Matrix, speed: Vector) -> Vector:
-    """What speeds (n) a whole motion has that moves each coordinate at `speed` (n) >= 0: the largest of its
+    """What speeds (nv) a whole motion has that moves in each at `speed` (nv) >= 0: the largest of its
     dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its own.
 
     A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed is
@@ -58,14 +73,19 @@ def motion_speeds(system: System, M: Matrix, speed: Vector) -> Vector:
     """
     mass = M.diagonal()
     momentum = (np.sqrt(np.maximum(mass, 0.0)) * speed).max(initial=0.0)
-    shared = np.empty(system.n)
-    for j in range(system.n):
-        like = list(system.like[j]) if system.like else [j]
+    shared = np.empty(system.nv)
+    for j in range(system.nv):
+        like = _alike(system, system.speed_dimension[j]) if system.speed_dimension else [j]
         heaviest = mass[like].max()
         shared[j] = speed[like].max()
         if heaviest > 0:
             shared[j] = max(shared[j], momentum / np.sqrt(heaviest))
     return shared
+
+
+def _alike(system: System, dimension: int) -> list[int]:
+    """The speeds of that dimension, times a second."""
+    return [i for i, of in enumerate(system.speed_dimension) if of == dimension]
 
 
 def natural(
@@ -84,11 +104,15 @@ def natural(
     size = size.copy()
     measured = extents(system, at.p) > 0
     measured[list(system.angles)] = True
-    steady = _rate(system, size, speed, felt, known & measured)
-    slowest = min(_rates(system, size, speed, np.zeros(system.n), known), default=0.0)
+    span = in_speeds(system, at.p, size)
+    sure = in_speeds(system, at.p, np.where(known & measured, size, 0.0)) > 0
+    steady = _rate(system, span, speed, felt, sure)
+    slowest = min(_rates(system, span, speed, np.zeros(system.nv), span > 0), default=0.0)
     fastest = 0.0  # of the rates by which sizes are taken from the motion
     for j in np.flatnonzero(~known):
-        like = list(system.like[j]) if system.like else [j]
+        like = _alike(system, system.dimension[j]) if system.dimension else [j]
+        if not like:
+            continue
         V, A, pull = speed[like].max(), np.abs(now.vdot[like]).max(), felt[like].max()
         if LOST * pull >= A:
             A = pull  # at rest: what is left is rounding of forces that cancel
@@ -103,32 +127,32 @@ def natural(
     pull = np.abs(now.vdot)
     if not v.any() and bool((pull <= LOST * np.maximum(felt, back)).all()):  # it rests
         pull = np.where(back > LOST / DISPLACED * felt, back, 0.0)
-    rate = max(_rate(system, size, speed, pull, known), fastest)
-    return size, rate or _rate(system, size, speed, felt, known)
+    rate = max(_rate(system, span, speed, pull, span > 0), fastest)
+    return size, rate or _rate(system, span, speed, felt, span > 0)
 
 
 def _held(q: Vector, size: Vector, now: Motion, moving: Callable[[Vector], Motion]) -> Vector:
-    """Accelerations (n) with which a state comes back if each coordinate in turn is displaced by its size,
+    """Accelerations (nv) with which a state comes back if each coordinate in turn is displaced by its size,
     linearly; 0 at the edge of what the equations describe."""
-    back = np.zeros(len(q))
+    back = np.zeros(len(now.vdot))
     for j in np.flatnonzero(size):
         moved = q.copy()
         moved[j] += DISPLACED * size[j]
         try:
             back += np.abs(moving(moved).vdot - now.vdot) / DISPLACED
         except StepFailureError:
-            return np.zeros(len(q))
+            return np.zeros(len(now.vdot))
     return back
 
 
-def _rates(system: System, size: Vector, speed: Vector, pull: Vector, counted: Mask) -> list[float]:
-    """speed / size or sqrt(pull / size) of those that count, where it is not 0; an angle's speed by 1 rad."""
-    unit = size.copy()
-    unit[list(system.angles)] = 1.0
-    rates = np.maximum(speed[counted] / unit[counted], np.sqrt(pull[counted] / size[counted]))
+def _rates(system: System, span: Vector, speed: Vector, pull: Vector, counted: Mask) -> list[float]:
+    """speed / span or sqrt(pull / span) (nv) of those that count, where it is not 0; an angle's speed by 1
+    rad."""
+    unit = np.where(np.array(system.speed_dimension) == system.angle_dimension, 1.0, span)
+    rates = np.maximum(speed[counted] / unit[counted], np.sqrt(pull[counted] / span[counted]))
     return [rate for rate in rates.tolist() if rate > 0]
 
 
-def _rate(system: System, size: Vector, speed: Vector, pull: Vector, counted: Mask) -> float:
+def _rate(system: System, span: Vector, speed: Vector, pull: Vector, counted: Mask) -> float:
     """The largest of them."""
-    return max(_rates(system, size, speed, pull, counted), default=0.0)
+    return max(_rates(system, span, speed, pull, counted), default=0.0)

@@ -36,7 +36,7 @@ def rank_of(system: System, G: Matrix, f: Vector, size: Vector, C: Matrix) -> Ra
     norm = np.linalg.norm(G, axis=1)
     norm = np.where(norm > 0, norm, 1.0)
     G, f, size, C = G / norm[:, None], f / norm, size / norm, C / norm
-    span = np.zeros((0, system.n))
+    span = np.zeros((0, system.nv))
     redundant: list[str] = []
     rows: list[int] = []
     for k in sorted(range(system.m), key=lambda k: k in system.contacts):
@@ -46,7 +46,7 @@ def rank_of(system: System, G: Matrix, f: Vector, size: Vector, C: Matrix) -> Ra
         for _ in range(2):
             rest -= span.T @ (span @ rest)
         length = float(np.linalg.norm(rest))
-        if len(span) < system.n and length > np.sqrt(RANK):
+        if len(span) < system.nv and length > np.sqrt(RANK):
             span = np.vstack([span, rest / length])
         elif k in system.contacts and _apart(k, rows, G, f, size):
             continue

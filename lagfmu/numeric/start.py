@@ -13,14 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..names import motion as names_of_motion
 from .contacts import closed_contacts, restitution, stays_low
 from .failure import StartFailureError, StepFailureError
 from .initialization import EPS, initial_positions, initial_velocities
 from .instant import Instant, at_start
 from .linear import independent
 from .motion import NONE, motion, stick_slip
-from .nominals import motion_speeds, natural, sizes
+from .nominals import in_speeds, motion_speeds, natural, sizes
 from .start_priority import GIVEN, Moved
 from .system import Matrix, System, Vector
 from .thresholds import LARGEST_ANGLE, TOUCH
@@ -31,14 +30,16 @@ MOVED = 1e-12  # part of a value by which it has moved
 
 @dataclass(frozen=True)
 class Start:
-    """q, v (n) on the constraints; one entry a contact: is it closed; the switch states of forces that jump;
-    the coordinates' sizes (n) and the natural rate [1/s] of the motion; each value that had to be moved."""
+    """q (nq), v (nv) on the constraints; one entry a contact: is it closed; the switch states of forces
+    that jump; the sizes of coordinates (nq) and of displacements in speeds (nv), the natural rate [1/s];
+    each value that had to be moved."""
 
     q: Vector
     v: Vector
     closed: tuple[bool, ...]
     switch_states: tuple[float, ...]
     size: Vector
+    span: Vector
     rate: float
     moved: tuple[Moved, ...]
 
@@ -54,14 +55,14 @@ def start(
 ) -> Start:
     """The consistent start at t [s] nearest to the start values.  Raises StartFailureError with the cause.
 
-    `priority` (2 n), of the coordinates and then of the velocities: which of them move first; without it they
+    `priority` (nq + nv), of the coordinates and then of the speeds: which of them move first; without it they
     are all alike.
     """
     try:
         with np.errstate(all="ignore"):
             restitution(system, p)
             q, v = np.array(q0, float), np.array(v0, float)
-            order = [GIVEN] * (2 * system.n) if priority is None else list(priority)
+            order = [GIVEN] * len(system.states) if priority is None else list(priority)
             return _start(at_start(system, q, u, p, t), q, v, order)
     except StartFailureError:
         raise
@@ -70,7 +71,7 @@ def start(
 
 
 def _start(at: Instant, q0: Vector, v0: Vector, priority: list[int]) -> Start:
-    system, n = at.system, at.system.n
+    system, n = at.system, at.system.nq
     q, size, gap, near = _positions(at, q0, v0, priority[:n])
     if system.switches:
         at = at_start(system, q, at.u[: len(at.u) - len(system.switches)], at.p, at.t)
@@ -78,27 +79,29 @@ def _start(at: Instant, q0: Vector, v0: Vector, priority: list[int]) -> Start:
     closed = closed_contacts(at, q, v, touching) if system.contacts else ()
     rows, slips = system.active(closed), NONE
     if system.frictions:
-        rows, slips = stick_slip(at, q, v, rows, size)
+        rows, slips = stick_slip(at, q, v, rows, in_speeds(system, at.p, size))
     now = motion(at, q, v, rows, slips)
     held = [rows[i] for i in independent(now.M, now.G[rows])]
     size, rate = natural(at, q, v, size, now, lambda there: motion(at, there, v, held, slips))
     states = tuple(at.u[len(at.u) - len(system.switches) :])
-    moved = _moved(system, [*q0, *v0], [*q, *v], size, rate, priority)
-    return Start(q, v, closed, states, size, rate, moved)
+    span = in_speeds(system, at.p, size)
+    moved = _moved(system, [*q0, *v0], [*q, *v], [*size, *(span * rate)], priority)
+    return Start(q, v, closed, states, size, span, rate, moved)
 
 
 def _positions(
     at: Instant, q0: Vector, v0: Vector, priority: Sequence[int]
 ) -> tuple[Vector, Vector, Vector, list[bool]]:
-    """q (n) on the constraints, sizes (n), and of each contact |f| below which it touches and if it does."""
+    """q (nq) on the constraints, sizes (nq), and of each contact |f| below which it touches and if it
+    does."""
     system = at.system
     contacts = list(system.contacts)
-    size = sizes(system, q0, at.p, np.zeros(system.n))
+    size = sizes(system, q0, at.p, np.zeros(system.nq))
     q = initial_positions(at, q0, v0, system.permanent, size, priority)
     gap, near = np.zeros(0), [False] * len(contacts)
     for _ in range(len(contacts) + 1):
         G = at.equations(q, v0)[2]
-        gap = TOUCH * (np.abs(G) @ np.maximum(np.abs(q), size))[contacts]
+        gap = TOUCH * (np.abs(G) @ in_speeds(system, at.p, np.maximum(np.abs(q), size)))[contacts]
         near = (at.residual(q)[contacts] <= gap).tolist()
         before, q = q, initial_positions(at, q, v0, system.active(near), size, priority)
         if (np.abs(q - before) <= 4 * EPS * size).all():
@@ -122,13 +125,15 @@ def _velocities(
     gap: Vector,
     priority: Sequence[int],
 ) -> tuple[Vector, list[bool]]:
-    """v (n) on G v = nu, and which contacts touch: one that is already parting (df/dt > 0) is open, unless it
-    parts so slowly that it would not rise above the gap within which contacts touch, as after an impact."""
+    """v (nv) on G v = nu, and which contacts touch: one that is already parting (df/dt > 0) is open, unless
+    it parts so slowly that it would not rise above the gap within which contacts touch, as after an
+    impact."""
     system = at.system
     M, F, G, nu, _ = at.equations(q, v0)
     _check_masses(at, q, v0, M)
     mass = np.where(M.diagonal() > 0, M.diagonal(), np.inf)
-    free = np.sqrt(size * np.abs(F) / mass)  # speeds that the forces alone would give
+    span = in_speeds(system, at.p, size)
+    free = np.sqrt(span * np.abs(F) / mass)  # speeds that the forces alone would give
     unit = np.abs(G) @ motion_speeds(system, M, np.maximum(np.abs(v0), free))
     rising = (G @ v0 - nu > TOUCH * unit)[list(system.contacts)]
     shut = [touches and not rises for touches, rises in zip(near, rising, strict=True)]
@@ -160,7 +165,7 @@ def _check_masses(at: Instant, q: Vector, v0: Vector, M: Matrix) -> None:
     Then a parameter of the order of 1 in place of a small one makes it positive, and a double does not
     hold it; one that vanishes with a parameter that is 0, or at this place, is what the model says.
     """
-    names, masses = at.system.coordinates, M.diagonal().tolist()
+    names, masses = at.system.directions, M.diagonal().tolist()
     for name, mass in zip(names, masses, strict=True):
         if 0 < mass < SMALLEST_MASS:
             raise StartFailureError(
@@ -186,15 +191,12 @@ def _moved(
     system: System,
     given: Sequence[float],
     used: Sequence[float],
-    size: Vector,
-    rate: float,
+    whole: Sequence[float],
     priority: Sequence[int],
 ) -> tuple[Moved, ...]:
-    """The values (2 n) that are not the given ones, but for rounding."""
-    whole = [*size, *(size * rate)]
-    states = names_of_motion(system.coordinates)
+    """The values (nq + nv) that are not the given ones, but for rounding; `whole`: their sizes."""
     return tuple(
         Moved(name, float(a), float(b), rank, float(max(unit, abs(a))))
-        for name, a, b, rank, unit in zip(states, given, used, priority, whole, strict=True)
+        for name, a, b, rank, unit in zip(system.states, given, used, priority, whole, strict=True)
         if abs(a - b) > max(MOVED * max(abs(a), abs(b)), 4 * EPS * max(unit, abs(a)))
     )

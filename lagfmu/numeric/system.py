@@ -1,6 +1,7 @@
 """The numeric form of a model: callables and index patterns, no symbols.
 
     M(q,t) vdot = F(q,v,t,u) + G^T lambda ,   G v = nu(q,t,u) ,   G vdot = gamma(q,v,t,u) ,   f(q,t) = 0
+    q' = B(q,t,u) v + b(q,t,u), or q' = v
 
 The callables return flat lists of the structurally non-zero values; `assemble` puts them into place.
 That memory layout is decided here and in the code printer, and nowhere else.
@@ -15,6 +16,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..names import read
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -66,15 +69,20 @@ class Lookups:
 
 @dataclass(frozen=True)
 class System:
-    """M, F, G, nu, gamma, f and the energies of n coordinates under m constraint rows.
+    """M, F, G, nu, gamma, f and the energies of nq coordinates with nv speeds under m constraint rows.
 
     dynamics(t, q, v, u, p) -> (M values, F, G values, nu, gamma);  residual(t, q, u, p) -> f (m), 0
     for a nonholonomic row;  energies(t, q, v, u, p) -> (kinetic, potential) [J];  restitution(p) ->
     one coefficient a row.  `mass` and `jacobian` are the (row, column) indices of the values; M's
     are those of the lower triangle.  `prescribed` are the positions in u where a prescribed motion
-    and its two derivatives begin.  `like` (n) lists for each coordinate those of its dimension,
-    `extent` (n) the positions in p whose values have it, `folded` (n) the largest magnitude of it among
-    the parameters that are numbers in the code; `angles` are those without dimension.
+    and its two derivatives begin.  `dimension` (nq), `speed_dimension` (nv) and `extent_dimension` (p) number
+    the dimensions of coordinates, of speeds times a second and of parameters (-1: of none of these),
+    `angle_dimension` is that of angles (-1: there are none); `folded` (nq) and `speed_folded` (nv) are the
+    largest magnitudes of the dimension among the parameters that are numbers in the code.
+
+    kinematics(t, q, u, p) -> (B values, b) of q' = B v + b, None where q' = v; `rates` are the (row,
+    column) indices of B.  `quaternions`: the places in q of e0, e1, e2, e3, whose norm is 1;
+    unwrapped_angles(t, q, u, p) -> what the coordinates at `unwrapped` equal modulo 2 pi.
 
     coulomb(t, q, v, u, p) -> (coefficients, load, normal) of the `frictions`: the static and the kinetic one
     of each in turn, and N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`.
@@ -91,6 +99,7 @@ class System:
     """
 
     coordinates: tuple[str, ...]
+    speeds: tuple[str, ...]
     rows: tuple[Row, ...]
     mass: tuple[Sequence[int], Sequence[int]]
     jacobian: tuple[Sequence[int], Sequence[int]]
@@ -99,10 +108,17 @@ class System:
     energies: Callable[..., Any] | None
     restitution: Callable[..., Any] | None
     prescribed: tuple[int, ...] = ()
-    like: tuple[tuple[int, ...], ...] = ()
-    extent: tuple[tuple[int, ...], ...] = ()
+    dimension: tuple[int, ...] = ()
+    speed_dimension: tuple[int, ...] = ()
+    extent_dimension: tuple[int, ...] = ()
+    angle_dimension: int = -1
     folded: tuple[float, ...] = ()
-    angles: tuple[int, ...] = ()
+    speed_folded: tuple[float, ...] = ()
+    kinematics: Callable[..., Any] | None = None
+    rates: tuple[Sequence[int], Sequence[int]] = ((), ())
+    quaternions: tuple[tuple[int, int, int, int], ...] = ()
+    unwrapped: tuple[int, ...] = ()
+    unwrapped_angles: Callable[..., Any] | None = None
     embedding: Embedding | None = None
     formulation: str = "multipliers"
     parameters: tuple[str, ...] = field(default=())
@@ -118,9 +134,40 @@ class System:
     starts: Callable[..., Any] | None = None
 
     @cached_property
-    def n(self) -> int:
+    def nq(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)
+
+    @cached_property
+    def nv(self) -> int:
+        """Number of speeds."""
+        return len(self.speeds)
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """The names of q, then those of v."""
+        return (*self.coordinates, *self.speeds)
+
+    @cached_property
+    def directions(self) -> tuple[str, ...]:
+        """What masses and forces belong to (nv): a coordinate whose rate is the speed, else the speed."""
+        return tuple(read(s).coordinate for s in self.speeds)
+
+    @cached_property
+    def angles(self) -> tuple[int, ...]:
+        """The coordinates without dimension."""
+        found = self.angle_dimension
+        return tuple(j for j, d in enumerate(self.dimension) if d == found)
+
+    @cached_property
+    def moved_by(self) -> tuple[tuple[int, ...], ...]:
+        """The coordinates (each of nv) that a speed moves: those of its column of B."""
+        if self.kinematics is None:
+            return tuple((j,) for j in range(self.nv))
+        found: list[list[int]] = [[] for _ in self.speeds]
+        for j, i in zip(*self.rates, strict=True):
+            found[i].append(j)
+        return tuple(map(tuple, found))
 
     @cached_property
     def m(self) -> int:
@@ -162,6 +209,18 @@ class System:
         k, j = (np.asarray(a, dtype=np.intp) for a in self.jacobian)
         return k, j
 
+    def across(self, size: Vector, alone: Vector) -> Vector:
+        """Sizes (nq) of coordinates as those of displacements in speeds (nv): the largest of the
+        coordinates of its own dimension that a speed moves; `alone` (nv) where it moves none."""
+        if self.kinematics is None:
+            return size
+        found = alone.copy()
+        for i, places in enumerate(self.moved_by):
+            own = [j for j in places if self.dimension[j] == self.speed_dimension[i]]
+            if own:
+                found[i] = size[own].max()
+        return found
+
     def active(self, closed: Sequence[bool]) -> list[int]:
         """Rows that act while the contacts stand as in `closed` (one entry a contact); those that stick
         by friction come to them."""
@@ -176,16 +235,67 @@ class System:
     def assemble(
         self, t: float, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
     ) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
-        """M (n, n), F (n), G (m, n), nu (m), gamma (m) at a state; all constraint rows."""
+        """M (nv, nv), F (nv), G (m, nv), nu (m), gamma (m) at a state; all constraint rows."""
         assert self.dynamics is not None
         mass, F, jacobian, nu, gamma = self.dynamics(t, q.tolist(), v.tolist(), u, p)
-        M = np.zeros((self.n, self.n))
+        M = np.zeros((self.nv, self.nv))
         i, j = self._mass
         M[i, j] = mass
         M[j, i] = mass
-        G = np.zeros((self.m, self.n))
+        G = np.zeros((self.m, self.nv))
         G[self._jacobian] = jacobian
         return M, np.array(F, dtype=float), G, np.array(nu, dtype=float), np.array(gamma, float)
+
+    def rate(
+        self, t: float, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
+    ) -> Vector:
+        """q' = B v + b (nq)."""
+        if self.kinematics is None:
+            return v
+        B, b = self.kinematics(t, q.tolist(), u, p)
+        found: Vector = self._times(B, v) + np.array(b, dtype=float)
+        return found
+
+    def shift(
+        self, t: float, q: Vector, w: Vector, u: Sequence[float], p: Sequence[float]
+    ) -> Vector:
+        """B w (nq): how the coordinates move by a displacement w (nv) in speeds."""
+        return (
+            w
+            if self.kinematics is None
+            else self._times(self.kinematics(t, q.tolist(), u, p)[0], w)
+        )
+
+    def _times(self, B: Sequence[float], w: Vector) -> Vector:
+        rows, columns = (np.asarray(a, dtype=np.intp) for a in self.rates)
+        moved: Vector = np.bincount(rows, np.asarray(B) * w[columns], self.nq).astype(float)
+        return moved
+
+    def moved(
+        self, t: float, q: Vector, w: Vector, u: Sequence[float], p: Sequence[float]
+    ) -> Vector:
+        """q (nq) after a displacement w (nv) in speeds: with unit quaternions of norm 1, and unwrapped angles
+        where they equal their angle.
+
+        Raises ArithmeticError for a quaternion without a direction.
+        """
+        return self._settled(t, q + self.shift(t, q, w, u, p), u, p)
+
+    def _settled(self, t: float, q: Vector, u: Sequence[float], p: Sequence[float]) -> Vector:
+        if not self.quaternions and not self.unwrapped:
+            return q
+        for places in map(list, self.quaternions):
+            norm = np.linalg.norm(q[places])
+            if not 0 < norm < np.inf:
+                names = ", ".join(self.coordinates[j] for j in places)
+                raise ArithmeticError(f"the quaternion {names} has the norm {norm:g}, expected 1")
+            q[places] /= norm
+        if self.unwrapped_angles is not None:
+            for j, angle in zip(
+                self.unwrapped, self.unwrapped_angles(t, q.tolist(), u, p), strict=True
+            ):
+                q[j] = angle + 2 * np.pi * np.round((q[j] - angle) / (2 * np.pi))
+        return q
 
     def inputs_at(self, u: Sequence[float], elapsed: float) -> list[float]:
         """Inputs `elapsed` seconds after they were set: held, prescribed motions by Taylor's rule."""

@@ -51,7 +51,7 @@ def cost(prepared: Prepared) -> Cost:
         "outputs": len(prepared.table.outputs),
         "adjustable parameters": len(form.equations.p),
         "inputs": len(form.equations.u),
-        "coordinates that are integrated": stepped.n,
+        "coordinates that are integrated": stepped.nq,
         "constraints that are solved with them": stepped.m,
         "contacts that are watched": len(prepared.system.contacts),
         "methods to choose from": len(prepared.scene.selectable),
@@ -71,14 +71,14 @@ def operations(eom: EquationsOfMotion) -> int:
     flat += [*eom.F, *eom.nu, *eom.gamma]
     common, rest = sp.cse(flat, order="none", list=True)
     equations = sum(int(sp.count_ops(e)) for e in (*(e for _, e in common), *rest))
-    way = plan(eom.n, eom.m, lower, entries)
+    way = plan(eom.nv, eom.m, lower, entries)
     solve = 0
     for part in (way.mass, way.schur):
         rows = [set(part.row(p)) for p in range(part.size)]
         factor = sum(len(rows[q] & row) for row in rows for q in row)
         solve += factor + 4 * sum(map(len, rows)) + 2 * part.size  # L D, D^-1, and both sweeps
     if way.diagonal:
-        solve += 2 * eom.n  # M^-1 and M^-1 b
+        solve += 2 * eom.nv  # M^-1 and M^-1 b
     return equations + solve + 4 * len(way.w_value) + len(way.pair_a)
 
 

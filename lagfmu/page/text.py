@@ -202,6 +202,7 @@ def _units(prepared: Prepared) -> Table:
     eom = prepared.equations
     names = [str(q) for q in eom.q]
     names += [str(s) for s in prepared.form.stepped.q if s not in eom.q]
+    names += [d for d in eom.directions if d not in names]  # speeds of the model's own
     reported = prepared.table.those(MULTIPLIER, FORCE, OWN)
     found = [prepared.table[name] for name in names if name in prepared.table]
     for v in (*found, *(v for v in reported if not (v.of.constraint and v.of.coordinate))):

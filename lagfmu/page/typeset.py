@@ -25,11 +25,11 @@ from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.formulations.nullspace import lambda_free, largest_group
-from ..model.elements import Expr
+from ..model.elements import Expr, name_of
 from ..model.model import Contact, Nonholonomic
 from ..model.reactions import multiplier
 from ..model.units import SUPERSCRIPT
-from ..names import derivative, read
+from ..names import derivative, rate_of, read
 
 Printed = tuple[str, str]  # LaTeX, text
 MOST = 24  # equations of a kind that are printed
@@ -68,6 +68,8 @@ def typeset(form: Form) -> tuple[Section, ...]:
     eom, reduction = form.equations, form.reduction
     page = _Typesetter(eom, reduction)
     sections = [page.energies(), page.lagrange()]
+    if not eom.moves_plainly:
+        sections.insert(1, page.kinematics())
     if eom.m:
         sections += [page.constraints(), page.forces(), page.accelerations()]
     if eom.frictions:
@@ -160,11 +162,11 @@ class Notation:
         for p in eom.p:
             written[p] = name_latex(str(p)), name_text(str(p))
         written[TIME] = "t", "t"
-        pairs = list(zip(eom.q, eom.v, strict=True))
+        places, speeds = list(eom.q), list(eom.v)
         if reduction is not None:
-            pairs += list(zip(reduction.s, reduction.sdot, strict=True))
-        moving = [*eom.u, *(q for q, _ in pairs), *(v for _, v in pairs)]
-        moving += [sp.Symbol(derivative(str(q), 2), real=True) for q, _ in pairs]
+            places, speeds = [*places, *reduction.s], [*speeds, *reduction.sdot]
+        moving = [*eom.u, *places, *speeds]
+        moving += [sp.Symbol(rate_of(str(v)), real=True) for v in speeds]
         for symbol in moving:
             of = read(str(symbol))
             name, dots = of.coordinate, of.order
@@ -174,8 +176,8 @@ class Notation:
             symbol = multiplier(c.name)
             written[symbol] = f"\\lambda_{{{_letter(c.name)}}}", f"λ_{c.name}"
             self.multipliers.append(symbol)
-        for q, force in zip(eom.q, eom.Q, strict=True):
-            written[force] = f"Q_{{{name_latex(str(q))}}}", f"Q_{name_text(str(q))}"
+        for q, force in zip(eom.directions, eom.Q, strict=True):
+            written[force] = f"Q_{{{name_latex(q)}}}", f"Q_{name_text(q)}"
         self.into = {s: sp.Symbol(f"x{k:06d}", **s.assumptions0) for k, s in enumerate(written)}
         names = [self.into[s] for s in written]
         latex = dict(zip(names, (a for a, _ in written.values()), strict=True))
@@ -298,7 +300,7 @@ class _Typesetter:
     def energies(self) -> Section:
         show = self.notation.show
         v, M = self.eom.v, self.eom.M.todok()
-        mass = {ij: _tidy(m) for ij, m in M.items()} if self.eom.n <= MOST else M
+        mass = {ij: _tidy(m) for ij, m in M.items()} if self.eom.nv <= MOST else M
         T = sp.Add(*(m * v[i] * v[j] / 2 for (i, j), m in mass.items()))
         equations = [("kinetic energy", [("T =", "T ="), show(_energy(T))])]
         if self.eom.potential is not None:
@@ -361,29 +363,29 @@ class _Typesetter:
         """(M vdot)_j - (F - Q_nc)_j = Q_nc,j + sum_k lambda_k a_kj."""
         eom, model = self.eom, self.eom.model
         equations = []
-        known = (c for c in model.coordinates if eom.symbols[c] in eom.q)
-        for j, coordinate in enumerate(islice(known, MOST)):
-            given = _tidy(eom.plain(model.forces.get(coordinate, 0)))
+        forces = {name_of(c): force for c, force in model.forces.items()}
+        for j, direction in enumerate(eom.directions[:MOST]):
+            given = _tidy(eom.plain(forces.get(direction, 0)))
             left = self._motion(eom, j, self.vdot, given)
             right = self.terms(given) + self.multiplied(eom.G, range(eom.m), j)
-            equations.append((str(eom.q[j]), [left, ("=", "="), _total(right)]))
+            equations.append((direction, [left, ("=", "="), _total(right)]))
         if model.lagrangian is not None:
             left_text, force = "d/dt ∂L/∂q̇ − ∂L/∂q", "the non-conservative forces"
         else:
             left_text, force = "d/dt ∂T/∂q̇ − ∂T/∂q", "the generalized forces"
         sides = [force] * bool(model.forces) + ["the forces of constraint"] * bool(eom.m)
-        remark = (
-            f"On the left {left_text} for each coordinate q, "
-            f"on the right {' and '.join(sides) or 'zero'}."
-        )
+        each = "for each coordinate q"
+        if not eom.moves_plainly:
+            each = "in the direction of each speed (the equations of Boltzmann and Hamel)"
+        remark = f"On the left {left_text} {each}, on the right {' and '.join(sides) or 'zero'}."
         title = "Lagrange's equations" + (" with multipliers" if eom.m else "")
-        return self.section(title, remark, equations, eom.n)
+        return self.section(title, remark, equations, eom.nv)
 
     def _motion(
         self, eom: EquationsOfMotion, j: int, vdot: Sequence[Expr], given: Expr = sp.S.Zero
     ) -> Printed:
         """M vdot - F + given, in coordinate j."""
-        row = [(i, _tidy(eom.M[j, i])) for i in range(eom.n) if eom.M[j, i] != 0]
+        row = [(i, _tidy(eom.M[j, i])) for i in range(eom.nv) if eom.M[j, i] != 0]
         inertia = self.notation.linear((mass, vdot[i]) for i, mass in row)
         rest = _tidy(given - eom.F[j])
         short = simplification.gathered(rest, eom.p, eom.q)
@@ -410,7 +412,7 @@ class _Typesetter:
             if closed is not None:
                 label += f", while {closed} is closed"
             if isinstance(c, Nonholonomic):
-                row = ((_tidy(eom.G[k, j]), eom.v[j]) for j in range(eom.n))
+                row = ((_tidy(eom.G[k, j]), eom.v[j]) for j in range(eom.nv))
                 left = _total(self.notation.linear(row) + self.terms(_tidy(-eom.nu[k])))
                 parts = [left, ("= 0", "= 0")]
             else:
@@ -428,21 +430,34 @@ class _Typesetter:
 
     def forces(self) -> Section:
         equations = []
-        for j, q in enumerate(self.eom.q[:MOST]):
+        for j, q in enumerate(self.eom.directions[:MOST]):
             right = self.multiplied(self.eom.G, range(self.eom.m), j)
-            left = f"Q_{{{name_latex(str(q))}}} =", f"Q_{name_text(str(q))} ="
-            equations.append((str(q), [left, _total(right)]))
+            left = f"Q_{{{name_latex(q)}}} =", f"Q_{name_text(q)} ="
+            equations.append((q, [left, _total(right)]))
         remark = (
             "Q = Gᵀλ stands with a plus on the side of the forces; a multiplier is zero while its "
             "constraint does not act."
         )
-        return self.section("Generalized forces of constraint", remark, equations, self.eom.n)
+        return self.section("Generalized forces of constraint", remark, equations, self.eom.nv)
+
+    def kinematics(self) -> Section:
+        """q' = B v + b."""
+        equations = []
+        for q, rate in islice(zip(self.eom.q, self.eom.qdot, strict=True), MOST):
+            left = f"\\dot{{{name_latex(str(q))}}} =", f"d{name_text(str(q))}/dt ="
+            equations.append((str(q), [left, self.notation.show(_tidy(rate))]))
+        remark = "How the coordinates move by the speeds."
+        four = [[str(self.eom.q[j]) for j in places] for places in self.eom.quaternions]
+        if four:
+            each = "; ".join(", ".join(names) for names in four[:MOST])
+            remark += f" A unit quaternion: {each}."
+        return self.section("Kinematics", remark, equations, self.eom.nq)
 
     def accelerations(self) -> Section:
         eom = self.eom
         equations = []
         for k, c in enumerate(eom.constraints[:MOST]):
-            row = ((_tidy(eom.G[k, j]), self.vdot[j]) for j in range(eom.n))
+            row = ((_tidy(eom.G[k, j]), self.vdot[j]) for j in range(eom.nv))
             left = _total(self.notation.linear(row))
             equations.append((c.name, [left, ("=", "="), self.notation.show(_tidy(eom.gamma[k]))]))
         remark = (
@@ -467,7 +482,7 @@ class _Typesetter:
             "Sᵀ (M v̇ − F) = 0 with G S = 0, and G v̇ = γ, without common factors. They hold while "
             "all constraints act; λ is evaluated afterwards."
         )
-        return self.section(title, remark, equations, self.eom.n)
+        return self.section(title, remark, equations, self.eom.nv)
 
     def _homogeneous(self, equation: Expr) -> Printed:
         """The terms with accelerations, then the others."""
@@ -498,7 +513,7 @@ class _Typesetter:
             "The equations that are integrated, in the independent coordinates; λ is recovered "
             "from Lagrange's equations with multipliers."
         )
-        return self.section("Reduced equations", remark, equations, eom.n)
+        return self.section("Reduced equations", remark, equations, eom.nv)
 
     def outputs(self) -> Section:
         """What the model reports of its own."""

@@ -24,12 +24,12 @@ from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..model.model import Contact, name_of
 from ..model.units import ONE, for_reading
-from ..names import RESIDUAL, derivative, motion, name
+from ..names import RESIDUAL, name
 from ..numeric.failure import OmittedStartError, StepFailureError
 from ..numeric.initialization import initial_positions
 from ..numeric.instant import at_start, expanded
 from ..numeric.motion import friction_law
-from ..numeric.nominals import Mask
+from ..numeric.nominals import Mask, in_speeds
 from ..numeric.rank import MISSED, rank_of
 from ..numeric.start import Start, start
 from ..numeric.start_priority import GIVEN
@@ -102,7 +102,8 @@ def structure_of(posed: Posed) -> Structure:
         if trial:  # a nearby configuration that satisfies the constraints as well
             shift = [0.1 * s * generator.uniform(-1, 1) for s in _spans(system, begun, p)]
             try:
-                q = _nearby(system, begun, q + np.array(shift), v, u, p)
+                shifted = at_start(system, q, u, p).moved(q, np.array(shift))
+                q = _nearby(system, begun, shifted, v, u, p)
             except StepFailureError:
                 continue
         at, q, v = expanded(at_start(system, q, u, p), q, v)
@@ -113,7 +114,7 @@ def structure_of(posed: Posed) -> Structure:
             C = friction_law(at, q, v).C if full.frictions else np.zeros((0, full.m))
         except StepFailureError:
             continue
-        ranks.append(rank_of(full, G, f, np.abs(G) @ np.abs(q), C))
+        ranks.append(rank_of(full, G, f, np.abs(G) @ full.across(np.abs(q), begun.span), C))
         masses.append(M)
     size = np.abs([M.diagonal() for M in masses]).max(axis=0)
     negative = negative_energy(full, masses[0], size)
@@ -137,7 +138,7 @@ def structure_of(posed: Posed) -> Structure:
             stacklevel=5,
         )
     missed = _missed(posed, begun)
-    return Structure(eom.n, eom.m, found.rank, redundant, shared, undecided, begun, missed)
+    return Structure(eom.nv, eom.m, found.rank, redundant, shared, undecided, begun, missed)
 
 
 def of_undecided(frictions: Sequence[str], redundant: Sequence[str]) -> str:
@@ -152,14 +153,13 @@ def of_undecided(frictions: Sequence[str], redundant: Sequence[str]) -> str:
 
 
 def _spans(system: System, begun: Start, p: Sequence[float]) -> list[float]:
-    """Ten times what each coordinate may be moved by and still be near: the least length among the model's
+    """Ten times what may be moved in each speed (nv) and still be near: the least length among the model's
     parts, if it has any. In a chain of 40 bars the places are up to 40 bars from the origin; a tenth of that
     is far."""
-    numbers = system.folded or (0.0,) * system.n
+    numbers = system.speed_folded or (0.0,) * system.nv
     spans = []
-    for part, number, size in zip(
-        system.extent or ((),) * system.n, numbers, begun.size, strict=True
-    ):
+    for dimension, number, size in zip(system.speed_dimension, numbers, begun.span, strict=True):
+        part = [i for i, of in enumerate(system.extent_dimension) if of == dimension]
         lengths = [x for x in (*(abs(p[i]) for i in part), number) if x > 0] or [size or 1e-3]
         spans.append(max(min(lengths), 1e-3 * max(lengths)))
     return spans
@@ -168,18 +168,17 @@ def _spans(system: System, begun: Start, p: Sequence[float]) -> list[float]:
 def _missed(posed: Posed, begun: Start) -> tuple[str, ...]:
     """The constraints that act at the start and that the values of the model miss: by how much."""
     table, system, (u, p) = posed.table, posed.system, posed.values
-    n, rows = system.n, system.active(begun.closed)
-    q, v = begun.q.copy(), begun.v.copy()
-    free = np.ones(2 * n, dtype=bool)  # nobody said what these are: they follow
-    for j, state in enumerate(motion(system.coordinates)):
-        free[j] = not table[state].given
-    place = {state: j for j, state in enumerate(motion(system.coordinates))}
+    n, rows = system.nq, system.active(begun.closed)
+    y = np.array([*begun.q, *begun.v])
+    free = np.array([not table[state].given for state in system.states])  # they follow
     for m in begun.moved:
         if m.priority == GIVEN:
-            (q if place[m.name] < n else v)[place[m.name] % n] = m.given
+            y[system.states.index(m.name)] = m.given
+    q, v = y[:n], y[n:]
     at = at_start(system, q, u, p)
     _, _, G, nu, _ = at.equations(q, v)
-    places = _uncured(at.residual(q)[rows], G[rows], np.abs(q), free[:n])
+    moves = np.array([all(free[j] for j in places) for places in system.moved_by], dtype=bool)
+    places = _uncured(at.residual(q)[rows], G[rows], in_speeds(system, p, np.abs(q)), moves)
     rates = _uncured((G @ v - nu)[rows], G[rows], np.abs(v), free[n:])
     units = {r.name: r.unit or ONE for r in table.those(RESIDUAL)}
     found = []
@@ -212,7 +211,7 @@ def begin(posed: Posed) -> Start:
     eom, system, (u, p) = posed.equations, posed.system, posed.values
     given = {name: eom.at_parameters(e, posed.fixed) for name, e in eom.starts().items()}
     q0 = [given.get(c, 0.0) for c in system.coordinates]
-    v0 = [given.get(derivative(c), 0.0) for c in system.coordinates]
+    v0 = [given.get(s, 0.0) for s in system.speeds]
     try:
         return start(system, q0, v0, u, p, priorities(system, posed.table))
     except OmittedStartError as error:
@@ -253,7 +252,7 @@ def check_embedding(form: Form) -> None:
     eom, reduction = form.equations, form.reduction
     if reduction is None:
         return
-    taken, satisfied = eom.n - len(reduction.s), eom.m - len(reduction.rows)
+    taken, satisfied = eom.nq - len(reduction.s), eom.m - len(reduction.rows)
     if taken <= satisfied:
         return
     left = zip(reduction.rows, reduction.reduced.f, strict=True)
@@ -263,7 +262,7 @@ def check_embedding(form: Form) -> None:
         if f is not None
     )
     raise DerivationError(
-        f"the embedding of model {eom.model.name!r} takes {taken} of {eom.n} coordinates away, but "
+        f"the embedding of model {eom.model.name!r} takes {taken} of {eom.nq} coordinates away, but "
         f"satisfies {satisfied} constraints{': ' + violated if violated else ''}; correct its "
         "relations, keep more coordinates, or add the constraint that it stands for"
     )

@@ -75,7 +75,7 @@ def negative_energy(system: System, M: Matrix, size: Vector) -> str:
         "at the start, expected no negative kinetic energy: check the sign of T in L = T - V, and the "
         "parameters in it"
     )
-    masses = dict(zip(system.coordinates, M.diagonal().tolist(), strict=True))
+    masses = dict(zip(system.directions, M.diagonal().tolist(), strict=True))
     below = (M.diagonal() < -NEGATIVE * size).tolist()
     wrong = [
         f"{name!r} is {mass:.6g}"
@@ -88,7 +88,7 @@ def negative_energy(system: System, M: Matrix, size: Vector) -> str:
     values, vectors = np.linalg.eigh(M / unit[:, None] / unit)
     if not values.min(initial=0.0) < -INDEFINITE:
         return ""
-    names = zip(system.coordinates, vectors[:, 0].tolist(), strict=True)
+    names = zip(system.directions, vectors[:, 0].tolist(), strict=True)
     moving = ", ".join(repr(name) for name, part in names if abs(part) > 1e-2)
     return (
         f"the kinetic energy is negative where {moving} move together: the mass matrix, scaled to a "
@@ -102,7 +102,7 @@ def _massless(system: System, M: Matrix, G: Matrix) -> str:
     _, sizes, V = np.linalg.svd(np.array(rows))
     free = V[len(sizes) :].tolist() + V[: len(sizes)][sizes < RANK].tolist()
     loose = sorted({j for direction in free for j, a in enumerate(direction) if abs(a) > 1e-6})
-    return ", ".join(repr(system.coordinates[j]) for j in loose)
+    return ", ".join(repr(system.directions[j]) for j in loose)
 
 
 def _projected(at: Instant, q: Vector, v: Vector, rows: list[int]) -> Vector | None:

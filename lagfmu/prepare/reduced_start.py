@@ -70,7 +70,7 @@ def _misses(value: Prepared, asked: Prepared | None = None) -> dict[str, tuple[f
     wanted = {name: source.at_parameters(e, value.fixed) for name, e in given}
     (u, p), begun = posed(value).values, value.structure.start
     at, q, v = expanded(at_start(value.examined, begun.q, u, p), begun.q, begun.v)
-    names, n = motion(at.system.coordinates), at.system.n
+    names, n = at.system.states, at.system.nq
     has = dict(zip(names, [*q.tolist(), *v.tolist()], strict=True))
     size = dict.fromkeys(names[:n], np.abs(q).max(initial=0.0))
     size |= dict.fromkeys(names[n:], np.abs(v).max(initial=0.0))

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 
 from ..errors import ModelError
 from ..interface.variables import VariableTable
-from ..names import motion
 from ..numeric.start_priority import GIVEN, LEFT_OUT, OMITTED, Moved, left_out
 from ..numeric.system import System
 
@@ -21,8 +20,8 @@ class StartMovedWarning(UserWarning):
 
 
 def priorities(system: System, table: VariableTable) -> list[int]:
-    """Of each coordinate and then each velocity (2 n): who said its start value, as in start_priority.py."""
-    return [GIVEN if table[name].given else OMITTED for name in motion(system.coordinates)]
+    """Of each coordinate (nq) and then each speed (nv): who said its start value, as in start_priority.py."""
+    return [GIVEN if table[name].given else OMITTED for name in system.states]
 
 
 def tell(moved: Iterable[Moved | str]) -> None:

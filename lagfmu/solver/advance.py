@@ -1,6 +1,7 @@
 """One communication step: SciPy's integrator step by step, projection after each, events in between.
 
-    y = (q, v) ,  y' = (v, vdot)      the index-1 equations; lambda is eliminated or solved for in each one
+    y = (q, v) ,  y' = (B v + b, vdot)      the index-1 equations; lambda is eliminated or solved for in
+    each one
 
 The integrators are scipy.integrate's DOP853 (Hairer, Norsett & Wanner, Solving Ordinary Differential
 Equations I, sect. II.5 and II.6) and Radau (Hairer & Wanner II, sect. IV.8).  After each accepted step y
@@ -82,19 +83,21 @@ def looked_at(
 
 
 def _scaled(motion: Motion, settings: Settings, state: State, h: float) -> Settings:
-    """With a size for each coordinate.  Where the start says none (all at 0, no lengths) it is the way that
-    it goes in this communication step, or else one that takes as much kinetic energy as those of the
-    others.
+    """With a size for each displacement and coordinate.  Where the start says none (all at 0, no lengths)
+    it is the way that it goes in this communication step, or else one that takes as much kinetic energy as
+    those of the others.
     """
-    size = np.array(settings.size)
+    size, span = np.array(settings.size), np.array(settings.span)
     rate = settings.rate or 1 / h
-    if (size == 0).any():
+    if (size == 0).any() or (span == 0).any():
         q, v = np.array(state.q), np.array(state.v)
         terms = motion.terms(state.t, q, v)
         vdot, _, rows = motion.accelerations(terms.of(motion.system.active(state.closed)))
-        size = np.where(size > 0, size, np.abs(v) * h + np.abs(vdot) * h**2 / 2)
-        size = np.where(size > 0, size, rows.D * float((size / rows.D).max() or 1.0))
-    return replace(settings, size=tuple(size.tolist()), rate=rate)
+        span = np.where(span > 0, span, np.abs(v) * h + np.abs(vdot) * h**2 / 2)
+        span = np.where(span > 0, span, rows.D * float((span / rows.D).max() or 1.0))
+        way = np.abs(motion.system.shift(state.t, q, span, motion.inputs(state.t), motion.p))
+        size = np.where(size > 0, size, way)
+    return replace(settings, size=tuple(size.tolist()), span=tuple(span.tolist()), rate=rate)
 
 
 class _Headway:
@@ -125,8 +128,8 @@ def _segment(
     motion: Motion, settings: Settings, state: State, end: float, headway: _Headway
 ) -> tuple[State, Found | None]:
     """The smooth motion to `end` or to the next event; the state there, and the event."""
-    system, n = motion.system, motion.system.n
-    size = np.array(settings.size)
+    system, n = motion.system, motion.system.nq
+    span = np.array(settings.span)
     rows = system.active(state.closed)
     t, y = state.t, np.array([*state.q, *state.v])
     ranks = motion.ranks(motion.terms(t, y[:n], y[n:]), rows)
@@ -144,7 +147,7 @@ def _segment(
             found = search.first(t, now, dense)
             if found is not None:
                 now, y = found.t, dense(found.t)
-        q, v, ranks = _projected(motion, now, y, rows, size, ranks)
+        q, v, ranks = _projected(motion, now, y, rows, span, ranks)
         t, y, stepper.rank = now, np.concatenate([q, v]), ranks.all
         if found is not None or now >= end:
             proposed = stepper.proposal(before)
@@ -157,14 +160,14 @@ def _segment(
 
 
 def _projected(
-    motion: Motion, t: float, y: Vector, rows: Sequence[int], size: Vector, ranks: Ranks
+    motion: Motion, t: float, y: Vector, rows: Sequence[int], span: Vector, ranks: Ranks
 ) -> tuple[Vector, Vector, Ranks]:
-    """q and v (n) on the constraints, and how many of `rows` are independent there."""
-    n = motion.system.n
+    """q and v on the constraints, and how many of `rows` are independent there."""
+    n = motion.system.nq
     q, v = y[:n], y[n:]
+    q = project_positions(motion, t, q, v, rows, span, ranks.positions)
     if not rows:
         return q, v, ranks
-    q = project_positions(motion, t, q, v, rows, size, ranks.positions)
     terms = motion.terms(t, q, v)
     ranks = motion.ranks(terms, rows)
     return q, project_velocities(terms.of(rows), v), ranks
@@ -185,8 +188,8 @@ class _Stepper:
     ) -> None:
         self.motion, self.settings, self.end = motion, settings, end
         self.rows, self.rank = rows
-        size = np.array(settings.size)
-        self.weights = settings.tolerance * np.concatenate([size, settings.rate * size])
+        scale = [*settings.size, *(settings.rate * s for s in settings.span)]
+        self.weights = settings.tolerance * np.array(scale)
         self.method: Any = self._begin(t, y, first)
 
     @property
@@ -250,8 +253,9 @@ class _Stepper:
         return method
 
     def _rates(self, t: float, y: Vector) -> Vector:
-        """(v, vdot) at y = (q, v)."""
-        n = len(y) // 2
-        terms = self.motion.terms(t, y[:n], y[n:]).of(self.rows)
+        """(q', vdot) at y = (q, v)."""
+        n = self.motion.system.nq
+        q, v = y[:n], y[n:]
+        terms = self.motion.terms(t, q, v).of(self.rows)
         vdot, _, _ = self.motion.accelerations(terms, self.rank)
-        return np.concatenate([y[n:], vdot])
+        return np.concatenate([self.motion.rate(t, q, v), vdot])

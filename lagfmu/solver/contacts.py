@@ -29,15 +29,16 @@ def closed_rows(system: System, closed: Iterable[bool]) -> frozenset[int]:
     return frozenset(k for k, shut in zip(system.contacts, closed, strict=True) if shut)
 
 
-def gap_of_rounding(terms: Terms, q: Vector, settings: Settings) -> Vector:
+def gap_of_rounding(system: System, terms: Terms, q: Vector, settings: Settings) -> Vector:
     """(m) what f may be of a contact that touches."""
-    reach: Vector = TOUCHING * (np.abs(terms.G) @ np.maximum(np.abs(q), settings.size))
+    span = np.array(settings.span)
+    reach: Vector = TOUCHING * (np.abs(terms.G) @ np.maximum(system.across(np.abs(q), span), span))
     return reach
 
 
 def speed_of_rounding(terms: Terms, v: Vector, settings: Settings) -> Vector:
     """(m) what |G v - nu| may be of a contact at rest."""
-    speed = np.maximum(np.abs(v), settings.rate * np.array(settings.size))
+    speed = np.maximum(np.abs(v), settings.rate * np.array(settings.span))
     reach: Vector = TOUCHING * (np.abs(terms.G) @ speed + np.abs(terms.nu))
     return reach
 
@@ -45,7 +46,7 @@ def speed_of_rounding(terms: Terms, v: Vector, settings: Settings) -> Vector:
 def accelerations_at_hand(terms: Terms, settings: Settings) -> Vector:
     """(m) the size of f'' of each row: of the forces' share in it, or of the motion that is natural."""
     D = rows_of(terms.M, terms.G).D
-    forced = np.maximum(D**2 * np.abs(terms.F), settings.rate**2 * np.array(settings.size))
+    forced = np.maximum(D**2 * np.abs(terms.F), settings.rate**2 * np.array(settings.span))
     size: Vector = np.abs(terms.G) @ forced + np.abs(terms.gamma)
     return np.maximum(size, np.finfo(float).tiny)
 

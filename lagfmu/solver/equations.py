@@ -17,7 +17,7 @@ from .linear import Rows, rows_of, solve
 
 
 class Terms(NamedTuple):
-    """M (n, n), F (n), and of the rows that act G (m, n), nu (m), gamma (m) at one state."""
+    """M (nv, nv), F (nv), and of the rows that act G (m, nv), nu (m), gamma (m) at one state."""
 
     M: Matrix
     F: Vector
@@ -74,13 +74,26 @@ class Motion:
         return f
 
     def accelerations(self, terms: Terms, rank: int | None = None) -> tuple[Vector, Vector, Rows]:
-        """vdot (n), lambda (m) of the rows in `terms`, and these rows decomposed."""
+        """vdot (nv), lambda (m) of the rows in `terms`, and these rows decomposed."""
         rows = rows_of(terms.M, terms.G, rank)
         try:
             vdot, lam = solve(terms.M, terms.F, rows, terms.gamma, self.eliminate)
         except MasslessError as error:
-            raise error.named(self.system.coordinates) from None
+            raise error.named(self.system.directions) from None
         return vdot, lam, rows
+
+    def rate(self, t: float, q: Vector, v: Vector) -> Vector:
+        """q' (nq).  Raises StepFailureError."""
+        arguments = t, q, v, self.inputs(t), self.p
+        found: Vector = evaluated("the kinematics", t, self.system.rate, *arguments)
+        return found
+
+    def moved(self, t: float, q: Vector, w: Vector) -> Vector:
+        """q (nq) after a displacement w (nv) in speeds: with unit quaternions of norm 1, and unwrapped angles
+        where they belong.  Raises StepFailureError."""
+        arguments = t, q, w, self.inputs(t), self.p
+        found: Vector = evaluated("the kinematics", t, self.system.moved, *arguments)
+        return found
 
     def holonomic(self, rows: Sequence[int]) -> list[int]:
         """Those of the rows that tie positions."""

@@ -49,14 +49,14 @@ class Search:
         self.open = [k for k in motion.system.contacts if k not in self.closed]
 
     def first(self, t0: float, t1: float, dense: Callable[[float], Vector]) -> Found | None:
-        """The first event in t0 < t <= t1 of the motion y(t) = dense(t) = (q, v) (2 n); None if there is
+        """The first event in t0 < t <= t1 of the motion y(t) = dense(t) = (q, v); None if there is
         none.
         """
         times = np.linspace(t0, t1, LOOKS + 1).tolist()
         looks = [self._look(t, dense) for t in times]
-        n = self.motion.system.n
+        n = self.motion.system.nq
         terms = self.motion.terms(t1, dense(t1)[:n], dense(t1)[n:])
-        small = gap_of_rounding(terms, dense(t1)[:n], self.settings)
+        small = gap_of_rounding(self.motion.system, terms, dense(t1)[:n], self.settings)
         roots: dict[int, float] = {}
         for k in self.closed:
 
@@ -89,7 +89,7 @@ class Search:
         self, t: float, dense: Callable[[float], Vector]
     ) -> tuple[dict[int, float], dict[int, float]]:
         """By row: lambda of a closed contact or f of an open one; f' of an open one."""
-        n, y = self.motion.system.n, dense(t)
+        n, y = self.motion.system.nq, dense(t)
         terms = self.motion.terms(t, y[:n], y[n:])
         values: dict[int, float] = {}
         if self.closed:

@@ -24,8 +24,8 @@ from .state import Event, State
 
 @dataclass(frozen=True)
 class _Forces:
-    """Of a model at a state: accelerations (n), lambda (m; 0 of rows that do not act), Q (n), each row's
-    share of it (m, n), what is missed by each row (m), and whether its multiplier is unique (m)."""
+    """Of a model at a state: accelerations (nv), lambda (m; 0 of rows that do not act), Q (nv), each row's
+    share of it (m, nv), what is missed by each row (m), and whether its multiplier is unique (m)."""
 
     vdot: Vector
     lam: Vector
@@ -40,7 +40,7 @@ def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]
     motion, t = Motion(system, u, p, state.t), state.t
     with np.errstate(all="ignore"):
         q, v = np.array(state.q), np.array(state.v)
-        seen = dict(zip(names.motion(system.coordinates), [*state.q, *state.v], strict=True))
+        seen = dict(zip(system.states, [*state.q, *state.v], strict=True))
         model, forces = system, None
         if system.embedding is not None:
             model = system.embedding.full
@@ -49,7 +49,10 @@ def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]
             vdot, *_ = motion.accelerations(terms)
             seen |= _accelerations(system, vdot)
             q, v = np.array(places), np.array(rates)
-            seen |= dict(zip(names.motion(model.coordinates), [*places, *rates], strict=True))
+            seen |= dict(zip(model.states, [*places, *rates], strict=True))
+        if model.kinematics is not None:
+            rates = motion.rate(t, q, v).tolist()
+            seen |= {derivative(c): x for c, x in zip(model.coordinates, rates, strict=True)}
         if model.dynamics is not None:
             forces = _forces(Motion(model, u, p, t), state, system, q, v)
             seen |= _accelerations(model, forces.vdot) | _of_constraints(model, forces)
@@ -82,21 +85,21 @@ def _forces(motion: Motion, state: State, stepped: System, q: Vector, v: Vector)
 
 
 def _accelerations(system: System, vdot: Vector) -> dict[str, float]:
-    found = zip(system.coordinates, vdot.tolist(), strict=True)
-    return {derivative(q, 2): a for q, a in found}
+    found = zip(system.speeds, vdot.tolist(), strict=True)
+    return {names.rate_of(v): a for v, a in found}
 
 
 def _of_constraints(model: System, forces: _Forces) -> dict[str, Any]:
     seen: dict[str, Any] = {
         name(names.FORCE, "", q): x
-        for q, x in zip(model.coordinates, forces.Q.tolist(), strict=True)
+        for q, x in zip(model.directions, forces.Q.tolist(), strict=True)
     }
     for k, row in enumerate(model.rows):
         seen[name(names.MULTIPLIER, row.name)] = float(forces.lam[k])
         seen[name(names.RESIDUAL, row.name)] = float(forces.residual[k])
         seen[name(names.UNIQUE, row.name)] = forces.unique[k]
     for k, j in zip(*model.jacobian, strict=True):
-        of = name(names.FORCE, model.rows[k].name, model.coordinates[j])
+        of = name(names.FORCE, model.rows[k].name, model.directions[j])
         seen[of] = float(forces.shares[k, j])
     return seen
 
@@ -156,12 +159,12 @@ def _of_contacts(system: System, model: System, state: State) -> dict[str, Any]:
 
 
 def _told(model: System, kind: str, contact: str, event: Event) -> Mapping[str, Any]:
-    q, v = event.q or (0.0,) * model.n, event.v or (0.0,) * model.n
+    y = (*event.q, *event.v) or (0.0,) * len(model.states)
     seen: dict[str, Any] = {
         name(f"{kind}.count", contact): event.count,
         name(f"{kind}.time", contact): event.time,
     }
-    for j, coordinate in enumerate(model.coordinates):
-        seen[name(kind, contact, coordinate)] = q[j]
-        seen[name(kind, contact, coordinate, 1)] = v[j]
+    for state, x in zip(model.states, y, strict=True):
+        of = names.read(state)
+        seen[name(kind, contact, of.coordinate, of.order)] = x
     return seen

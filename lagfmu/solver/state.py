@@ -17,8 +17,8 @@ from ..numeric.system import System
 @dataclass(frozen=True)
 class Settings:
     """Method, relative tolerance, longest step [s] (0: any), how many tiny steps a communication step may
-    take (0: any), and the scale of the motion at the start: the size of each coordinate (n) and its rate
-    [1/s].
+    take (0: any), and the scale of the motion at the start: the size of each coordinate (nq), that of a
+    displacement in each speed (nv), and the rate [1/s].
     """
 
     method: str
@@ -26,13 +26,14 @@ class Settings:
     maximum_step: float
     maximum_steps: float
     size: tuple[float, ...]
+    span: tuple[float, ...]
     rate: float
 
 
 @dataclass(frozen=True)
 class Event:
     """The latest of a kind that happened to a contact: how many there were, time [s], and where: the model's
-    coordinates and velocities just before; the impulse [lambda times s]."""
+    coordinates and speeds just before; the impulse [lambda times s]."""
 
     count: int = 0
     time: float = 0.0
@@ -43,9 +44,9 @@ class Event:
 
 @dataclass(frozen=True)
 class State:
-    """Time [s], coordinates, velocities (n); of each contact: is it closed, latest departure and closing; the
-    next step [s] (0: to be found), the latest communication step [s], steps so far, energy lost in impacts
-    [J]."""
+    """Time [s], coordinates (nq), speeds (nv); of each contact: is it closed, latest departure and closing;
+    the next step [s] (0: to be found), the latest communication step [s], steps so far, energy lost in
+    impacts [J]."""
 
     t: float
     q: tuple[float, ...]
@@ -59,10 +60,10 @@ class State:
     dissipated: float = 0.0
 
 
-def restored_settings(kept: dict[str, Any], methods: Sequence[str], n: int) -> Settings:
+def restored_settings(kept: dict[str, Any], methods: Sequence[str], system: System) -> Settings:
     """From what asdict made of them.  Raises ValueError, TypeError or KeyError if that is none."""
-    size = _numbers(kept.pop("size"), n)
-    settings = Settings(**kept, size=size)
+    size, span = _numbers(kept.pop("size"), system.nq), _numbers(kept.pop("span"), system.nv)
+    settings = Settings(**kept, size=size, span=span)
     if settings.method not in methods:
         raise ValueError(f"its method is {settings.method!r}")
     numbers = settings.tolerance, settings.maximum_step, settings.maximum_steps, settings.rate
@@ -76,12 +77,12 @@ def restored(system: System, kept: dict[str, Any]) -> State:
 
     Raises ValueError, TypeError or KeyError if that is none of this system's.
     """
-    n, contacts = system.n, len(system.contacts)
-    whole = n if system.embedding is None else system.embedding.full.n
+    contacts = len(system.contacts)
+    whole = system if system.embedding is None else system.embedding.full
     closed = tuple(kept.pop("closed"))
     if len(closed) != contacts or not all(isinstance(c, bool) for c in closed):
         raise ValueError(f"its contacts are {closed!r}")
-    q, v = _numbers(kept.pop("q"), n), _numbers(kept.pop("v"), n)
+    q, v = _numbers(kept.pop("q"), system.nq), _numbers(kept.pop("v"), system.nv)
     departures, closings = (
         tuple(_event(e, whole) for e in kept.pop(what)) for what in ("departures", "closings")
     )
@@ -97,9 +98,9 @@ def restored(system: System, kept: dict[str, Any]) -> State:
     return state
 
 
-def _event(kept: dict[str, Any], n: int) -> Event:
-    n = n if kept["count"] else 0
-    event = Event(**kept | {"q": _numbers(kept["q"], n), "v": _numbers(kept["v"], n)})
+def _event(kept: dict[str, Any], system: System) -> Event:
+    nq, nv = (system.nq, system.nv) if kept["count"] else (0, 0)
+    event = Event(**kept | {"q": _numbers(kept["q"], nq), "v": _numbers(kept["v"], nv)})
     if not (_is_count(event.count) and _is_number(event.time) and _is_number(event.impulse)):
         raise ValueError(f"one of its events is {kept!r}")
     return event

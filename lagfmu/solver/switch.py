@@ -49,10 +49,10 @@ def begun(motion: Motion, settings: Settings, state: State) -> State:
     if system.prescribed:
         left = _left_behind(motion, settings, state, terms)
         closed -= left
-        f, small = motion.residual(state.t, q), gap_of_rounding(terms, q, settings)
+        f, small = motion.residual(state.t, q), gap_of_rounding(motion.system, terms, q, settings)
         met = frozenset(k for k in system.contacts if k not in closed and f[k] < -small[k])
         rows = system.active(as_flags(system, closed | met))
-        q = project_positions(motion, state.t, q, v, rows, np.array(settings.size))
+        q = project_positions(motion, state.t, q, v, rows, np.array(settings.span))
         terms = motion.terms(state.t, q, v)
         if not met:
             v = project_velocities(terms.of(system.active(as_flags(system, closed))), v)
@@ -68,7 +68,7 @@ def at_event(motion: Motion, settings: Settings, state: State, found: Found) -> 
     q, v = np.array(state.q), np.array(state.v)
     closed = closed_rows(system, state.closed)
     together = system.active(as_flags(system, closed | found.closing))
-    q = project_positions(motion, state.t, q, v, together, np.array(settings.size))
+    q = project_positions(motion, state.t, q, v, together, np.array(settings.span))
     return _settled(motion, settings, state, q, v, closed, found.departing)
 
 
@@ -84,7 +84,10 @@ def _settled(
     """The state after the impacts of all contacts that touch, with those closed that then press."""
     system, t, was = motion.system, state.t, closed_rows(motion.system, state.closed)
     terms, f = motion.terms(t, q, v), motion.residual(t, q)
-    small, slow = gap_of_rounding(terms, q, settings), speed_of_rounding(terms, v, settings)
+    small, slow = (
+        gap_of_rounding(motion.system, terms, q, settings),
+        speed_of_rounding(terms, v, settings),
+    )
     touching = closed | {k for k in system.contacts if f[k] <= small[k]}
     s = terms.G @ v - terms.nu
     before, struck = v, None
@@ -169,7 +172,10 @@ def _left_behind(motion: Motion, settings: Settings, state: State, terms: Terms)
         for k, x, size in zip(rows, lam.tolist(), decomposed.length.tolist(), strict=True)
     }  # the accelerations with which they would follow
     f, s, h = motion.residual(state.t, q), terms.G @ v - terms.nu, state.span
-    small, slow = gap_of_rounding(terms, q, settings), speed_of_rounding(terms, v, settings)
+    small, slow = (
+        gap_of_rounding(motion.system, terms, q, settings),
+        speed_of_rounding(terms, v, settings),
+    )
     return frozenset(
         k
         for k in closed

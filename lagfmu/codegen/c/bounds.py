@@ -40,7 +40,7 @@ def rates(eom: EquationsOfMotion, constraints: Sequence[Constraint], jumps: Jump
     found = [
         sp.Add(*(a * eom.v[j] for (i, j), a in entries if i == k), -eom.nu[k]) for k in contacts
     ]
-    moving = dict(zip(eom.q, eom.v, strict=True)) | dict(eom.rates) | {TIME: sp.S.One}
+    moving = dict(zip(eom.q, eom.qdot, strict=True)) | dict(eom.rates) | {TIME: sp.S.One}
     if jumps.surfaces:
         names = {str(s): s for s in (*eom.q, *eom.u)}
         direction = {s: moving[s] for s in moving if s is TIME or str(s) in names}

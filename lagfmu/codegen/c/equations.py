@@ -53,7 +53,10 @@ def model_source(form: Form, tangents: bool = True) -> str:
     time = symbols.get(TIME, TIME)
     whole = parts_of(_in_reals(form), jumps.mapped(symbols), tangents, time)
     eom = whole[0].eom
-    index = _index("coordinates", eom.q) + _index("constraints", [c.name for c in eom.constraints])
+    index = _index("coordinates", eom.q)
+    if not eom.moves_plainly:
+        index += _index("speeds", eom.v)
+    index += _index("constraints", [c.name for c in eom.constraints])
     if len(whole) > 1:
         index += _index("coordinates that are stepped", whole[-1].eom.q)
     text = "\n".join(piece for parts in whole for piece in (*_embedding(parts), _system(parts)))

@@ -87,7 +87,7 @@ MATH = """
 """
 OURS = """
     t q v u p s sdot M F G nu gamma f h e energy dt dq dv du ds dsdot dM dF dG dnu dgamma df denergy fill
-    places shared blocks vdot Q dvdot dlambda dQ w dw other dother
+    rates drift angle drates ddrift places shared blocks vdot Q dvdot dlambda dQ w dw other dother
     sign heaviside cubic Cubic
     Kind Formulation Row System Plan Type Role Place Variable near far small interface
     linux unix i386 main Friction coefficients load normal

@@ -24,9 +24,8 @@ class Tables:
 
     def of_what_is_read(self, functions: Collection[str]) -> str:
         """A System of coordinates that are only read: names, and the energies if they are read."""
-        names = self._array("const char *const", "coordinates", [f'"{s}"' for s in self.eom.q])
+        names, fields = self._layout()
         own, more = self._outputs(functions)
-        fields = self._layout()
         fields |= {name: f"{self.prefix}{name}" for name in sorted(functions)} | more
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return f"{names}{own}static const System {self.prefix}equations = {{\n{lines}}};\n"
@@ -36,11 +35,11 @@ class Tables:
         parts, eom = self.parts, self.eom
         start = [bisect_left(self.entries, (k,)) for k in range(eom.m + 1)]
         contacts = [k for k, row in enumerate(parts.rows) if row.kind == CONTACT]
-        prescribed, estimated, folded = parts.prescribed, parts.estimated, parts.folded
-        dimension, extent, angles = self._dimensions()
-        names = [f'"{s}"' for s in eom.q]
+        prescribed, estimated = parts.prescribed, parts.estimated
+        names, layout = self._layout()
+        sizes, measures = self._sizes()
         tables = [
-            self._array("const char *const", "coordinates", names),
+            names,
             self._array("const Row", "rows", self._rows()),
             self._integers("contact", contacts),
             self._integers("mass_row", [i for i, _ in self.mass]),
@@ -50,8 +49,7 @@ class Tables:
             self._integers("row_start", start),
             self._integers("prescribed", prescribed),
             *([self._integers("estimated", estimated)] if estimated else []),
-            self._integers("dimension", dimension),
-            self._integers("extent_dimension", extent),
+            sizes,
         ]
         frictions, normal_rows = self._frictions()
         if frictions:
@@ -59,23 +57,22 @@ class Tables:
             tables.append(self._integers("normal_row", normal_rows))
         if parts.at_integers:
             tables.append(self._integers("at_integers", [int(x) for x in parts.at_integers]))
-        if any(folded):
-            tables.append(self._array("const double", "folded", [repr(x) for x in folded]))
         p = self.prefix
-        plan = elimination.plan(eom.n, eom.m, self.mass, self.entries)
+        plan = elimination.plan(eom.nv, eom.m, self.mass, self.entries)
         tables.append("\n" + plan.c_text(f"{p}plan") + "\n")
         solve = None
         if parts.formulation != "nullspace":
-            solve = csolve.solve_source(f"{p}solve", eom.n, self.entries, plan)
+            solve = csolve.solve_source(f"{p}solve", eom.nv, self.entries, plan)
             tables.append(f"{solve}\n" if solve else "")
         quick = solve is not None and not eom.u
         if quick:
-            sizes = (len(self.mass), eom.n, len(self.entries), eom.m, eom.m)
-            tables.append(csolve.accelerate_source(p, sizes) + "\n")
+            counts = (len(self.mass), eom.nv, len(self.entries), eom.m, eom.m)
+            tables.append(csolve.accelerate_source(p, counts) + "\n")
         own, more = self._outputs(functions)
         reach, ends = self._lookups(functions)
-        tables += [own, reach]
-        more |= ends
+        kinematics, moving = self._kinematics(functions)
+        tables += [own, reach, kinematics]
+        more |= ends | moving
         if "starts" in functions:
             started = list(parts.formulas)
             tables.append(self._integers("started", started))
@@ -85,7 +82,7 @@ class Tables:
                 "starts": f"{p}starts",
             }
         fields = {
-            **self._layout(),
+            **layout,
             "m": eom.m,
             "contacts": len(contacts),
             "inputs": len(eom.u),
@@ -102,17 +99,13 @@ class Tables:
                 )
             },
             "prescribed_count": len(prescribed),
-            **{name: p + name for name in ("prescribed", "dimension", "extent_dimension")},
-            "speed_dimension": f"{p}dimension",
+            "prescribed": f"{p}prescribed",
             **(
                 {"estimated_count": len(estimated), "estimated": f"{p}estimated"}
                 if estimated
                 else {}
             ),
-            "angles": angles,
-            **{
-                name: f"{p}folded" if any(folded) else "NULL" for name in ("folded", "speed_folded")
-            },
+            **measures,
             "formulation": parts.formulation.upper(),
             "constant_mass": int(_constant_mass(eom)),
             "separable": int(not entanglements(eom, parts.formulation)),
@@ -143,11 +136,6 @@ class Tables:
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return "".join(tables) + f"static const System {p}equations = {{\n{lines}}};\n"
 
-    def _layout(self) -> dict[str, Any]:
-        """How many coordinates and speeds there are, and their names."""
-        names = f"{self.prefix}coordinates"
-        return {"nq": self.eom.n, "nv": self.eom.n, "coordinates": names, "speeds": names}
-
     def _outputs(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
         """Tables of the model's own outputs, and the System's fields that hold them."""
         if "outputs" not in functions:
@@ -168,6 +156,56 @@ class Tables:
         text += self._array("const double", "lookup_last", [repr(s.x[-1]) for s in tables])
         names = ("lookup_names", "lookup_first", "lookup_last", "lookups")
         return text, {"lookup_count": len(tables), **{name: p + name for name in names}}
+
+    def _kinematics(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
+        """The pattern of B, the unit quaternions and unwrapped angles, and the System's fields for them."""
+        if "kinematics" not in functions:
+            return "", {}
+        rates, four, p = self.parts.rates, self.eom.quaternions, self.prefix
+        text = self._integers("rate_row", [j for j, _ in rates])
+        text += self._integers("rate_column", [i for _, i in rates])
+        fields: dict[str, Any] = {"rates": len(rates), "quaternions": len(four)}
+        fields |= {name: p + name for name in ("rate_row", "rate_column", "kinematics")}
+        if four:
+            text += self._integers("quaternion", [j for places in four for j in places])
+            fields["quaternion"] = f"{p}quaternion"
+        if self.eom.unwrapped:
+            text += self._integers("unwrapped", [*self.eom.unwrapped])
+            fields |= {name: p + name for name in ("unwrapped", "unwrapped_angles")}
+            fields["unwrapped_count"] = len(self.eom.unwrapped)
+        if "kinematics_tangent" in functions:
+            fields["kinematics_tangent"] = f"{p}kinematics_tangent"
+        return text, fields
+
+    def _layout(self) -> tuple[str, dict[str, Any]]:
+        """How many coordinates and speeds there are, and their names."""
+        names = [[f'"{s}"' for s in self.eom.q], [f'"{s}"' for s in self.eom.directions]]
+        text, fields = self._pair("const char *const", ("coordinates", "speeds"), names)
+        return text, {"nq": self.eom.nq, "nv": self.eom.nv, **fields}
+
+    def _sizes(self) -> tuple[str, dict[str, Any]]:
+        """The dimensions of coordinates, speeds and parameters, and the largest of them that are numbers."""
+        of = self.parts.dimensions
+        numbers = [[str(k) for k in group] for group in (of.coordinates, of.speeds)]
+        text, fields = self._pair("const int", ("dimension", "speed_dimension"), numbers)
+        text += self._integers("extent_dimension", of.parameters)
+        fields |= {"extent_dimension": f"{self.prefix}extent_dimension", "angles": of.angles}
+        folded, names = self.parts.folded, ("folded", "speed_folded")
+        if not any(map(any, folded)):
+            return text, fields | dict.fromkeys(names, "NULL")
+        more, found = self._pair("const double", names, [[*map(repr, group)] for group in folded])
+        return text + more, fields | found
+
+    def _pair(
+        self, kind: str, names: tuple[str, str], items: Sequence[Sequence[str]]
+    ) -> tuple[str, dict[str, Any]]:
+        """A table for coordinates and one for speeds; one for both where they are alike."""
+        first, second = names
+        text = self._array(kind, first, items[0])
+        if items[0] == items[1]:
+            return text, dict.fromkeys(names, self.prefix + first)
+        text += self._array(kind, second, items[1])
+        return text, {name: self.prefix + name for name in names}
 
     def _array(self, kind: str, name: str, items: Sequence[str]) -> str:
         head = f"static {kind} {self.prefix}{name}[] = {{"
@@ -201,19 +239,6 @@ class Tables:
             normal_rows += law.normal
         return items, normal_rows
 
-    def _dimensions(self) -> tuple[list[int], list[int], int]:
-        """One number for each dimension of coordinates; that of each parameter; that of angles; -1: none."""
-        eom = self.eom
-        units = [eom.units[str(q)] for q in eom.q]
-        number: dict[Any, int] = {}
-        of_coordinates = [number.setdefault(u.exponents, len(number)) for u in units]
-        of_parameters = [
-            -1 if u.dimensionless else number.get(u.exponents, -1)
-            for u in (eom.units[str(p)] for p in eom.p)
-        ]
-        angles = [k for u, k in zip(units, of_coordinates, strict=True) if u.dimensionless]
-        return of_coordinates, of_parameters or [-1], angles[0] if angles else -1
-
 
 def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:
     """Why the method rattle cannot step these equations; nothing if it can.
@@ -225,12 +250,14 @@ def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:
     found = []
     if formulation != "multipliers":
         found.append(f"the formulation is {formulation!r}, expected 'multipliers'")
+    if not eom.moves_plainly:
+        found.append("speeds are other than the rates of coordinates")
     if not _constant_mass(eom):
         found.append("the mass matrix holds more than parameters")
     found += [f"the friction {law.name!r} jumps" for law in eom.frictions]
     moved = [
-        str(q)
-        for q, e in zip(eom.q, eom.F, strict=True)
+        q
+        for q, e in zip(eom.directions, eom.F, strict=True)
         if not e.free_symbols.isdisjoint(velocities)
     ]
     if moved:

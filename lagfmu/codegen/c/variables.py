@@ -100,7 +100,12 @@ class Places:
     def __init__(self, system: System, inputs: Sequence[str], parameters: Sequence[str]) -> None:
         self.system = system
         self.full = full = system if system.embedding is None else system.embedding.full
-        self.coordinates = _numbered(full.coordinates)
+        self.states = {
+            name: (part, j)
+            for part, group in (("Q", full.coordinates), ("V", full.speeds))
+            for j, name in enumerate(group)
+        }
+        self.directions = {names.read(s).coordinate: i for i, s in enumerate(full.speeds)}
         self.rows = _numbered(row.name for row in full.rows)
         self.contacts = _numbered(system.rows[k].name for k in system.contacts)
         self.frictions = _numbered(f.name for f in system.frictions)
@@ -112,6 +117,8 @@ class Places:
         }
         stepped = _motion(system, ("S", "SDOT", "SDDOT"))
         read = _motion(full, ("Q", "V", "VDOT"))
+        if full.kinematics is not None:
+            read |= {names.derivative(q): ("QDOT", j, NONE) for j, q in enumerate(full.coordinates)}
         # a coordinate of both is read from the full ones, unless these have no accelerations
         self.values = {name: ("PARAMETER", k, NONE) for k, name in enumerate(parameters)}
         self.values |= {name: ("INPUT", k, NONE) for k, name in enumerate(inputs)}
@@ -131,7 +138,8 @@ class Places:
         if what in OF_CONTACT:
             return OF_CONTACT[what], self.contacts[c], NONE
         if of.head in names.EVENTS:
-            index, part = (self.coordinates[q], "QV"[rate]) if q else (0, what.partition(".")[2])
+            state = names.derivative(q, rate)
+            part, index = self.states[state] if q else (what.partition(".")[2], 0)
             i = (self.contacts if of.head in (names.DEPARTURE, names.CLOSING) else self.frictions)[
                 c
             ]
@@ -142,9 +150,9 @@ class Places:
             i, j = self.slips[c]
             return "SLIP", 2 * i + j, i
         if what == names.FORCE and c:
-            return "SHARE", self.shares[self.rows[c], self.coordinates[q]], NONE
+            return "SHARE", self.shares[self.rows[c], self.directions[q]], NONE
         if what == names.FORCE:
-            return "FORCE", self.coordinates[q], NONE
+            return "FORCE", self.directions[q], NONE
         return self.own[v.name] if what == names.OWN else self.values[v.name]
 
 
@@ -153,11 +161,12 @@ def _numbered(known: Iterable[str]) -> dict[str, int]:
 
 
 def _motion(system: System, rates: tuple[str, str, str]) -> dict[str, Place]:
-    """Where coordinates, velocities and accelerations lie."""
+    """Where coordinates, speeds and accelerations lie."""
+    groups = system.coordinates, system.speeds, [names.rate_of(s) for s in system.speeds]
     return {
-        names.derivative(q, order): (place, j, NONE)
-        for j, q in enumerate(system.coordinates)
-        for order, place in enumerate(rates)
+        name: (place, j, NONE)
+        for place, group in zip(rates, groups, strict=True)
+        for j, name in enumerate(group)
     }
 
 

@@ -11,7 +11,6 @@ from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.form import Form
 from ...mechanics.jumps import with_switch_states
 from ...model.elements import Expr
-from ...model.units import Unit
 from ...numeric.cubic import Cubic
 from ...numeric.system import System
 from ..parts import Function, Parts, parts_of
@@ -110,6 +109,7 @@ def _system(parts: Parts) -> list[str]:
     eom, p, own, texts = parts.eom, parts.prefix, _outputs(parts), _functions(parts)
     fields = {
         "coordinates": _strings(eom.q),
+        "speeds": _strings(eom.v),
         "rows": "()" if eom.bare else _rows(parts),
         "mass": _pattern(parts.mass),
         "jacobian": _pattern(parts.jacobian),
@@ -120,14 +120,16 @@ def _system(parts: Parts) -> list[str]:
         "parameters": _strings(eom.p),
     }
     if not eom.bare:
-        units = [eom.units[str(q)] for q in eom.q]
+        dimensions = parts.dimensions
         embedding = "Embedding(embed, SYSTEM_OF_COORDINATES)" if parts.reduction else "None"
         fields |= {
             "prescribed": repr(parts.prescribed),
-            "like": repr(_like(units)),
-            "extent": repr(_extent(eom, units)),
-            "folded": repr(parts.folded),
-            "angles": repr(tuple(j for j, unit in enumerate(units) if unit.dimensionless)),
+            "dimension": repr(dimensions.coordinates),
+            "speed_dimension": repr(dimensions.speeds),
+            "extent_dimension": repr(dimensions.parameters),
+            "angle_dimension": repr(dimensions.angles),
+            "folded": repr(parts.folded[0]),
+            "speed_folded": repr(parts.folded[1]),
             "embedding": embedding,
             "formulation": repr(parts.formulation),
         }
@@ -139,7 +141,11 @@ def _system(parts: Parts) -> list[str]:
         fields["started"] = repr(tuple(parts.formulas))
     if parts.frictions:
         fields["frictions"] = _frictions(parts)
-    for name in ("surfaces", "starts", "coulomb"):
+    if "kinematics" in texts:
+        fields["rates"] = _pattern(parts.rates)
+        fields["quaternions"] = repr(eom.quaternions)
+        fields["unwrapped"] = repr(tuple(eom.unwrapped))
+    for name in ("surfaces", "starts", "coulomb", "kinematics", "unwrapped_angles"):
         if name in texts:
             fields[name] = f"{p}{name}"
     if "lookups" in texts:
@@ -193,21 +199,3 @@ def _strings(symbols: Sequence[Expr]) -> str:
 
 def _pattern(indices: Sequence[tuple[int, int]]) -> str:
     return repr((tuple(i for i, _ in indices), tuple(j for _, j in indices)))
-
-
-def _like(units: Sequence[Unit]) -> tuple[tuple[int, ...], ...]:
-    """For each coordinate, the coordinates of the same dimension."""
-    return tuple(
-        tuple(i for i, other in enumerate(units) if other.same_dimension(unit)) for unit in units
-    )
-
-
-def _extent(eom: EquationsOfMotion, units: Sequence[Unit]) -> tuple[tuple[int, ...], ...]:
-    """For each coordinate, the parameters of the same dimension (for an angle: none)."""
-    known = [eom.units[str(p)] for p in eom.p]
-    return tuple(
-        tuple(k for k, other in enumerate(known) if other.same_dimension(unit))
-        if not unit.dimensionless
-        else ()
-        for unit in units
-    )

@@ -94,6 +94,7 @@ def reduce(eom: EquationsOfMotion) -> Reduction:
         eom,
         q=s,
         v=sdot,
+        qdot=sdot,
         M=sp.ImmutableSparseMatrix(N, N, {k: m for k, m in Mr.items() if m != 0}),
         F=Fr,
         G=G,
@@ -178,7 +179,7 @@ def _remaining(
     gamma: list[Expr] = []
     f: list[Expr | None] = []
     for k in range(eom.m):
-        a = {j: eom.G[k, j].xreplace(into) for j in range(eom.n) if eom.G[k, j] != 0}
+        a = {j: eom.G[k, j].xreplace(into) for j in range(eom.nv) if eom.G[k, j] != 0}
         reduced = [sp.simplify(sp.Add(*(a[j] * J[j][b] for j in a))) for b in range(N)]
         if all(r == 0 for r in reduced):
             continue
@@ -208,7 +209,7 @@ def _check(
         name = eom.constraints[k].name
         f = eom.f[k]
         if f is None:
-            f = sp.Add(*(eom.G[k, j] * eom.v[j] for j in range(eom.n))) - eom.nu[k]
+            f = sp.Add(*(eom.G[k, j] * eom.v[j] for j in range(eom.nv))) - eom.nu[k]
         rest = sp.simplify(f.xreplace(into))
         if rest != 0 and not _vanishes(rest):
             problems.append(f"constraint {name!r} becomes {rest}, expected 0")

@@ -36,7 +36,7 @@ def null_space(eom: EquationsOfMotion) -> Expr:
     for coordinates, rows in constrained_together(eom):
         columns += _group_columns(eom.G, sorted(coordinates), sorted(rows))
     entries = {(i, b): e for b, column in enumerate(columns) for i, e in column.items()}
-    return sp.SparseMatrix(eom.n, len(columns), entries)
+    return sp.SparseMatrix(eom.nv, len(columns), entries)
 
 
 def lambda_free(eom: EquationsOfMotion) -> list[Expr]:
@@ -51,10 +51,10 @@ def lambda_free(eom: EquationsOfMotion) -> list[Expr]:
     S = null_space(eom)
     found = []
     for b in range(S.cols):
-        column = [(i, S[i, b]) for i in range(eom.n) if S[i, b] != 0]
+        column = [(i, S[i, b]) for i in range(eom.nv) if S[i, b] != 0]
         found.append(_reduced(sp.Add(*(s * inertia[i] for i, s in column)), eom))
     for k in range(eom.m):
-        row = (eom.G[k, j] * vdot[j] for j in range(eom.n) if eom.G[k, j] != 0)
+        row = (eom.G[k, j] * vdot[j] for j in range(eom.nv) if eom.G[k, j] != 0)
         found.append(_reduced(sp.Add(*row, -eom.gamma[k]), eom))
     return found
 

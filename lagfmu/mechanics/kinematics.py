@@ -1,0 +1,195 @@
+"""How coordinates move: q' = B(q, t) v + b(q, t), and the terms that this gives to Lagrange's equations.
+
+In speeds that are no rates of coordinates Lagrange's equations are those of Boltzmann and Hamel (Poincare
+1901; Hamel, Theoretische Mechanik, sect. 4; Greenwood, Advanced Dynamics, eq. 4.35):
+
+    d/dt dL/dv_i - X_i L - sum_kr c^r_ki v_k dL/dv_r = Q_i + (G^T lambda)_i
+
+X_i = sum_j B_ji d/dq_j is the derivative along speed i, X_0 = d/dt + sum_j b_j d/dq_j that along time with
+v_0 = 1, and [X_k, X_i] = sum_r c^r_ki X_r defines the coefficients c.  For the rates of coordinates they
+are 0.  With the angular velocity in the frame of the body, c = +1 for (k, i, r) = (1, 2, 3) and its cycles:
+the term is Pi x omega, and J omega' = (J omega) x omega + tau.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import sympy as sp
+
+from ..model.elements import Expr
+
+TRIALS = 3
+Inverse = Callable[[Mapping[int, Expr]], dict[int, Expr] | None]
+Turning = list[list[tuple[int, Expr]]]  # of each speed r: (i, sum_k c^r_ki v_k)
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """q' = B v + b of coordinates q (nq) and speeds v (nv), in plain symbols.
+
+    `rates` (nq) are the expressions of q', `time` is the symbol of time, `drift` the rates of prescribed
+    inputs. `unwrapped` are the places of angles that follow from other coordinates.
+    """
+
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    rates: tuple[Expr, ...]
+    time: Expr
+    drift: Mapping[Expr, Expr]
+    unwrapped: frozenset[int] = frozenset()
+
+    @cached_property
+    def B(self) -> dict[tuple[int, int], Expr]:
+        """The non-zeros of B (nq, nv)."""
+        place = {s: i for i, s in enumerate(self.v)}
+        found = {}
+        for j, rate in enumerate(self.rates):
+            for s in sorted(rate.free_symbols & place.keys(), key=place.__getitem__):
+                found[j, place[s]] = rate.diff(s)
+        return found
+
+    @cached_property
+    def b(self) -> tuple[Expr, ...]:
+        """b (nq)."""
+        still = dict.fromkeys(self.v, sp.S.Zero)
+        return tuple(rate.xreplace(still) for rate in self.rates)
+
+    @cached_property
+    def columns(self) -> list[dict[int, Expr]]:
+        """X_i as {coordinate: B_ji} for each speed."""
+        found: list[dict[int, Expr]] = [{} for _ in self.v]
+        for (j, i), a in self.B.items():
+            found[i][j] = a
+        return found
+
+    def along(self, i: int, expression: Expr) -> Expr:
+        """X_i of an expression of q and t."""
+        present = expression.free_symbols
+        parts = [
+            a * expression.diff(self.q[j])
+            for j, a in self.columns[i].items()
+            if self.q[j] in present
+        ]
+        return sp.Add(*parts)
+
+    def along_time(self, expression: Expr) -> Expr:
+        """X_0 of an expression: what changes while the speeds are 0."""
+        present = expression.free_symbols
+        parts = [
+            b * expression.diff(s)
+            for s, b in zip(self.q, self.b, strict=True)
+            if s in present and b != 0
+        ]
+        parts += [rate * expression.diff(u) for u, rate in self.drift.items() if u in present]
+        if expression.has(self.time):
+            parts.append(expression.diff(self.time))
+        return sp.Add(*parts)
+
+    @cached_property
+    def rows(self) -> list[dict[int, Expr]]:
+        """Row j of B as {speed: B_ji} for each coordinate."""
+        found: list[dict[int, Expr]] = [{} for _ in self.q]
+        for (j, i), a in self.B.items():
+            found[j][i] = a
+        return found
+
+    @cached_property
+    def commutators(self) -> tuple[Turning, list[str]]:
+        """What multiplies dL/dv_r in equation i, sum_k c^r_ki v_k, for each r; and where there is none.
+
+        There is none where the speeds are fewer than the directions that their commutators reach: then the
+        kinematics restrict the motion as a nonholonomic constraint does.
+        """
+        found: Turning = [[] for _ in self.v]
+        for group in self._groups():
+            inverse = self._inverse(group)
+            for i in group:
+                for k in (None, *group):
+                    bracket = self._bracket(k, i) if k != i else {}
+                    c = (inverse(bracket) if inverse else None) if bracket else {}
+                    if c is None:
+                        names = " and ".join(
+                            "time" if x is None else str(self.v[x]) for x in (k, i)
+                        )
+                        return found, [
+                            f"the directions of {names} lead out of those that the kinematics allow, which "
+                            "so restrict the motion: take a speed for each direction, and a Nonholonomic "
+                            "constraint for what is not allowed"
+                        ]
+                    for r, x in c.items():
+                        found[r].append((i, x if k is None else x * self.v[k]))
+        return found, []
+
+    def _groups(self) -> list[list[int]]:
+        """Speeds that share coordinates in B, or in what it depends on; without those that are rates."""
+        plain = {i for i, column in enumerate(self.columns) if list(column.values()) == [sp.S.One]}
+        of = {s: j for j, s in enumerate(self.q)}
+        touched = []
+        for i, column in enumerate(self.columns):
+            if i in plain:
+                continue
+            kept = {j: a for j, a in column.items() if j not in self.unwrapped}
+            inside = {of[s] for a in kept.values() for s in a.free_symbols if s in of}
+            touched.append(({i}, set(kept) | inside))
+        groups: list[tuple[set[int], set[int]]] = []
+        for speeds, places in touched:
+            for other in [g for g in groups if g[1] & places]:
+                groups.remove(other)
+                speeds, places = speeds | other[0], places | other[1]
+            groups.append((speeds, places))
+        rates = {j: i for i in plain for j in self.columns[i]}
+        return [sorted(s | {rates[j] for j in p if j in rates}) for s, p in groups]
+
+    @cached_property
+    def _drifting(self) -> list[int]:
+        return [j for j, b in enumerate(self.b) if b != 0]
+
+    def _bracket(self, k: int | None, i: int) -> dict[int, Expr]:
+        """[X_k, X_i] by coordinate."""
+        rows = {*self.columns[i], *(self._drifting if k is None else self.columns[k])}
+        found = {}
+        for j in sorted(rows - self.unwrapped):
+            first = self.columns[i].get(j, sp.S.Zero)
+            second = self.b[j] if k is None else self.columns[k].get(j, sp.S.Zero)
+            forward = self.along_time(first) if k is None else self.along(k, first)
+            entry = sp.expand(forward - self.along(i, second))
+            if entry != 0:
+                found[j] = entry
+        return found
+
+    def _inverse(self, group: list[int]) -> Inverse | None:
+        """bracket -> {r: c^r}, by (B^T B)^-1 B^T of the group's speeds; None for a bracket that is none of
+        theirs."""
+        rows = sorted({j for i in group for j in self.columns[i]} - self.unwrapped)
+        B = sp.Matrix(
+            len(rows), len(group), lambda a, c: self.columns[group[c]].get(rows[a], sp.S.Zero)
+        )
+        gram = (B.T * B).applyfunc(sp.factor)
+        try:
+            left = gram.inv() * B.T
+        except (sp.matrices.exceptions.NonInvertibleMatrixError, ZeroDivisionError):
+            return None
+
+        def solve(bracket: Mapping[int, Expr]) -> dict[int, Expr] | None:
+            right = sp.Matrix([bracket.get(j, sp.S.Zero) for j in rows])
+            c = (left * right).applyfunc(lambda e: sp.cancel(sp.trigsimp(e)))
+            if set(bracket) - set(rows) or not _vanishes(B * c - right):
+                return None
+            return {group[r]: x for r, x in enumerate(c) if x != 0}
+
+        return solve
+
+
+def _vanishes(entries: Expr) -> bool:
+    """Zero at random points."""
+    generator = random.Random(11)
+    symbols = sorted(entries.free_symbols, key=str)
+    for _ in range(TRIALS):
+        at = {s: sp.Rational(generator.randint(100, 999), 331) for s in symbols}
+        if any(abs(sp.N(e.xreplace(at), 30)) > sp.Float("1e-20") for e in entries):
+            return False
+    return True

@@ -1,0 +1,167 @@
+"""Speeds of a model's own, q' = B v + b: Boltzmann's and Hamel's equations are Newton's and Euler's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from sympy.physics.mechanics import dynamicsymbols
+from tops import E, W, reference, top, turning
+
+from lagfmu import Holonomic, Model, Nonholonomic, Parameter, simulate
+from lagfmu.errors import ModelError
+
+X, Y, PHI, R, S, U = dynamicsymbols("x y phi vr vt u")
+m, k = sp.symbols("m k", positive=True)
+T = dynamicsymbols._t
+
+
+def test_a_heavy_top_turns_by_eulers_equations() -> None:
+    """J w' = (J w) x w + tau; the quaternion keeps its norm by normalization, without a multiplier."""
+    run = simulate(top(), target="python", stop_time=1.0, tolerance=1e-10)
+    expected = reference(1.0)
+    assert {n: run[n][-1] for n in expected} == pytest.approx(expected, abs=1e-12)
+    norm = sum(run[f"e{i}"] ** 2 for i in range(4))
+    np.testing.assert_allclose(norm, 1.0, rtol=0, atol=1e-15)
+    assert not [n for n in run.units if n.startswith("lambda")]
+
+
+def particle(**more: Any) -> Model:
+    """A mass on a spring in the plane, in Cartesian coordinates."""
+    energy = m * (X.diff() ** 2 + Y.diff() ** 2) / 2 - k * (X**2 + Y**2) / 2
+    options: dict[str, Any] = {
+        "start": {X: 1.0, X.diff(): 0.3, Y.diff(): 0.7},
+        "parameters": [Parameter(m, 2.0, "kg"), Parameter(k, 3.0, "N/m")],
+    }
+    return Model(
+        "Particle",
+        coordinates={X: "m", Y: "m"},
+        lagrangian=energy,
+        **{**options, **more},
+    )
+
+
+def radial(turn: Any = 0) -> dict[str, Any]:
+    """Its speeds along the radius and across it, in a frame that turns at the rate `turn`."""
+    r = sp.sqrt(X**2 + Y**2)
+    return {
+        "speeds": {R: "m/s", S: "m/s"},
+        "kinematics": {X: (X * R - Y * S) / r - turn * Y, Y: (Y * R + X * S) / r + turn * X},
+    }
+
+
+@pytest.mark.parametrize("turn", [0, 1.5], ids=["resting", "turning"])
+def test_the_motion_is_that_of_the_rates(turn: float) -> None:
+    """Radial and transverse speeds, which are the rates of no coordinates, move a particle as x' and y' do;
+    likewise relative to a turning frame, q' = B v + b."""
+    plain = simulate(particle(), target="python", stop_time=2.0, tolerance=1e-10)
+    w = sp.Symbol("w")
+    parameters = [*particle().parameters, Parameter(w, turn, "rad/s")]
+    own = particle(start={X: 1.0, R: 0.3, S: 0.7 - turn}, parameters=parameters, **radial(w))
+    other = simulate(own, target="python", stop_time=2.0, tolerance=1e-10)
+    for name in ("x", "y", "energy.total"):
+        if name != "energy.total" or not turn:
+            np.testing.assert_allclose(other[name], plain[name], rtol=0, atol=1e-10)
+
+
+def test_a_force_of_constraint_is_conjugate_to_its_speed() -> None:
+    """A bead on a circle in radial speed: lambda = -m v^2/r is the force along the radius, and Q of the
+    radial speed is lambda too (W per m/s), in newtons."""
+    a = sp.Symbol("a", positive=True)
+    circle = Holonomic("circle", sp.sqrt(X**2 + Y**2) - a)
+    parameters = [*particle().parameters, Parameter(a, 1.0, "m")]
+    start = {X: 1.0, S: 0.7}
+    own = particle(constraints=[circle], start=start, parameters=parameters, **radial())
+    run = simulate(own, target="python", stop_time=2.0)
+    v, lam = run["vt"], run["lambda.circle"]
+    np.testing.assert_allclose(lam, 3.0 - 2.0 * v**2, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(run["Q.vr"], lam, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run["Q.vt"], 0.0, rtol=0, atol=1e-12)
+    assert run.units["Q.vr"] == "N"
+
+
+def test_speeds_may_stand_in_a_rolling_condition() -> None:
+    """A knife edge whose speeds are forward and lateral: lateral = 0 is its constraint, and lambda [N] the
+    force m u w across, which the curved path needs."""
+    J = sp.Symbol("J", positive=True)
+    w = dynamicsymbols("w")
+    model = Model(
+        "Blade",
+        coordinates={X: "m", Y: "m", PHI: "rad"},
+        speeds={U: "m/s", S: "m/s", w: "rad/s"},
+        kinematics={
+            X: U * sp.cos(PHI) - S * sp.sin(PHI),
+            Y: U * sp.sin(PHI) + S * sp.cos(PHI),
+            PHI: w,
+        },
+        kinetic_energy=m * (U**2 + S**2) / 2 + J * w**2 / 2,
+        constraints=[Nonholonomic("blade", S)],
+        parameters=[Parameter(m, 2.0, "kg"), Parameter(J, 0.1, "kg.m2")],
+        start={U: 1.5, w: 2.0},
+    )
+    run = simulate(model, target="python", stop_time=1.0)
+    np.testing.assert_allclose(run["lambda.blade"], 2.0 * 1.5 * 2.0, rtol=1e-9)
+    np.testing.assert_allclose(run["y"], 0.75 * (1 - np.cos(2.0 * run["time"])), rtol=0, atol=1e-9)
+
+
+def test_an_angle_goes_on_through_many_turns() -> None:
+    """An angle that equals an arctangent modulo 2 pi, with a rate of its own, counts the turns."""
+    e0, e3 = E[0], E[3]
+    model = Model(
+        "Turns",
+        coordinates={**dict.fromkeys(E, "1"), PHI: "rad"},
+        speeds=dict.fromkeys(W, "rad/s"),
+        kinematics={**turning(), PHI: W[2]},
+        unwrapped={PHI: 2 * sp.atan2(e3, e0)},
+        kinetic_energy=k * sum(w**2 for w in W) / 2,
+        parameters=[Parameter(k, 1.0, "kg.m2")],
+        start={e0: 1.0, W[2]: 20.0},
+    )
+    run = simulate(model, target="python", stop_time=10.0)
+    np.testing.assert_allclose(run["phi"], 20.0 * run["time"], rtol=0, atol=1e-6)
+    half = 2 * np.arctan2(run["e3"], run["e0"])
+    np.testing.assert_allclose(np.cos(run["phi"] - half), 1.0, rtol=0, atol=1e-14)
+
+
+def test_a_quaternion_that_is_set_in_part_is_normalized() -> None:
+    """The nearest unit quaternion is taken, and each value that it moves is told."""
+    model = top(start={E[0]: 1.0, E[1]: 1.0, W[2]: 1.0})
+    with pytest.warns(UserWarning, match="e0 = 1.0 misses the constraints: projected to 0.7071"):
+        run = simulate(model, target="python", stop_time=0.1)
+    assert [run["e0"][0], run["e1"][0]] == pytest.approx([0.5**0.5] * 2, abs=1e-15)
+
+
+WRONG = {
+    "of nothing": ({"kinematics": {X: R, PHI: R}}, "phi, which is no coordinate"),
+    "quadratic": ({"kinematics": {X: R * S, Y: S}}, "not affine in the speeds"),
+    "idle": ({"kinematics": {X: R}}, "speed vt moves nothing"),
+    "unit": ({"kinematics": {X: R, Y: S * k}}, "kinematics of y"),
+    "too many": ({"kinematics": {X: R + S}}, "no more speeds"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_kinematics_that_are_wrong_are_named(case: str) -> None:
+    """What moves nothing, is no rate, or leaves no equation, is refused by name."""
+    given, told = WRONG[case]
+    options = {"speeds": {R: "m/s", S: "m/s"}, "start": {}, **given}
+    with pytest.raises(ModelError, match=told):
+        particle(**options)
+
+
+def test_kinematics_that_restrict_the_motion_are_refused() -> None:
+    """A blade's speeds without the lateral one: their commutator leads sideways, so that the kinematics are a
+    nonholonomic constraint without its force."""
+    w = dynamicsymbols("w")
+    model = Model(
+        "Blade",
+        coordinates={X: "m", Y: "m", PHI: "rad"},
+        speeds={U: "m/s", w: "rad/s"},
+        kinematics={X: U * sp.cos(PHI), Y: U * sp.sin(PHI), PHI: w},
+        kinetic_energy=m * U**2 / 2 + m * k * w**2 / 2,
+        parameters=[Parameter(m, 2.0, "kg"), Parameter(k, 1.0, "m2")],
+    )
+    with pytest.raises(ModelError, match="which so restrict the motion"):
+        simulate(model, target="python", stop_time=0.1)

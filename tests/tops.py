@@ -1,0 +1,73 @@
+"""Rigid bodies about a fixed point by a unit quaternion and the angular velocity in their own frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import Model, Parameter
+
+E = dynamicsymbols("e0 e1 e2 e3")
+W = dynamicsymbols("wx wy wz")
+INERTIA = (1.0, 2.0, 3.0)  # kg m2
+WEIGHT, LEVER = 9.81, 0.3  # N, m
+
+
+def turning() -> dict[Any, Any]:
+    """e0' = -e.w/2, e' = (e0 w + e x w)/2: the rates of a quaternion, w in the frame of the body."""
+    e0, e1, e2, e3 = E
+    wx, wy, wz = W
+    return {
+        e0: -(e1 * wx + e2 * wy + e3 * wz) / 2,
+        e1: (e0 * wx + e2 * wz - e3 * wy) / 2,
+        e2: (e0 * wy + e3 * wx - e1 * wz) / 2,
+        e3: (e0 * wz + e1 * wy - e2 * wx) / 2,
+    }
+
+
+def top(name: str = "HeavyTop", **more: Any) -> Model:
+    """A heavy top: the centre of mass is on its third axis, `l` above the point about which it turns."""
+    A, B, C, P, arm = sp.symbols("A B C P l", positive=True)
+    e1, e2 = E[1], E[2]
+    kinetic = sum(J * w**2 / 2 for J, w in zip((A, B, C), W, strict=True))
+    options: dict[str, Any] = {
+        "lagrangian": kinetic - P * arm * (1 - 2 * (e1**2 + e2**2)),
+        "start": {E[0]: 1.0, W[0]: 0.1, W[1]: 0.2, W[2]: 5.0},
+    }
+    return Model(
+        name,
+        coordinates=dict.fromkeys(E, "1"),
+        speeds=dict.fromkeys(W, "rad/s"),
+        kinematics=turning(),
+        parameters=[
+            *(Parameter(J, x, "kg.m2") for J, x in zip((A, B, C), INERTIA, strict=True)),
+            Parameter(P, WEIGHT, "N"),
+            Parameter(arm, LEVER, "m"),
+        ],
+        **{**options, **more},
+    )
+
+
+def rate(_: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Newton's and Euler's equations of the heavy top, written by hand: y = (e, w)."""
+    (e0, e1, e2, e3), w = y[:4], y[4:]
+    e = np.array([e1, e2, e3])
+    up = np.array([2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1**2 + e2**2)])
+    spin = np.array(INERTIA) * w
+    torque = np.cross([0, 0, LEVER], -WEIGHT * up)
+    return np.concatenate(
+        [[-e @ w / 2], (e0 * w + np.cross(e, w)) / 2, (np.cross(spin, w) + torque) / INERTIA]
+    )
+
+
+def reference(stop: float) -> dict[str, float]:
+    """The state of the heavy top at `stop` [s]."""
+    begin = [1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 5.0]
+    y = solve_ivp(rate, (0, stop), begin, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    names = ("e0", "e1", "e2", "e3", "wx", "wy", "wz")
+    return dict(zip(names, y.tolist(), strict=True))
