@@ -116,6 +116,20 @@ def test_a_foot_that_the_other_foot_s_impact_lifts_has_departed(target):
     assert not last["contact.left"]
 
 
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_a_foot_that_lands_with_the_other_may_be_thrown_off_by_it(target):
+    """With J = m L^2 both feet land at once, at 1 m/s and at 0.2 m/s.  The impulse 1.25 m/s / (1.25/m) of the
+    one gives the other 0.75 m/s, of which 0.55 m/s are left: the floor neither strikes it nor holds it."""
+    fall = 0.02  # s
+    start = {"der(z)": -0.6 + 9.81 * fall, "der(theta)": 0.8}
+    high = plank(0.6 * fall - 9.81 * fall**2 / 2, -0.8 * fall, 1.0)
+    end = simulate(high, 0.021, 0.021, target=target, tolerance=1e-10, start_values=start)[-1]
+    np.testing.assert_allclose(end["closing.left.impulse"], 2.0, rtol=1e-8)
+    assert end["closing.right.impulse"] == 0
+    np.testing.assert_allclose(end["der(theta)"], 0.55 - 0.25, rtol=1e-8)
+    np.testing.assert_allclose(end["der(z)"], (0.55 + 0.25) / 2 - 9.81 * 0.001, rtol=1e-8)
+
+
 def test_a_fall_from_nothing_has_a_size():
     """From rest at 0, without a length in the model, the way itself is the size of z: z = -g t^2 / 2."""
     model = Model(
