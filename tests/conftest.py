@@ -148,18 +148,23 @@ def native_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """built(model), built(model, scene, closed_forms): the native FMU of a test's own model, built once."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine: native FMUs are not tested")
+    """built(model), built(model, scene, closed_forms, target): the FMU of a test's own model, built once."""
     made: list[tuple[tuple[Any, ...], Path]] = []
 
-    def get(model: Model, scene: Scene | None = None, closed_forms: Sequence[Any] = ()) -> Path:
-        wanted = model, scene or Scene(model.name), tuple(closed_forms)
+    def get(
+        model: Model,
+        scene: Scene | None = None,
+        closed_forms: Sequence[Any] = (),
+        target: str = "native",
+    ) -> Path:
+        if target == "native" and find_compiler() is None:
+            pytest.skip("no C compiler on this machine: native FMUs are not tested")
+        wanted = model, scene or Scene(model.name), tuple(closed_forms), target
         for known, path in made:
             if known == wanted:
                 return path
         folder = tmp_path_factory.mktemp("own")
-        made.append((wanted, build_fmu(model, folder, *wanted[1:], target="native", check=False)))
+        made.append((wanted, build_fmu(model, folder, *wanted[1:], check=False)))
         return made[-1][1]
 
     return get

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,26 +12,18 @@ import pytest
 from linkages import straight_line
 
 from lagfmu import Scene, simulate
-from lagfmu.testing import StartMovedWarning, find_compiler, prepare, write
+from lagfmu.testing import StartMovedWarning
 
 TURNED = 0.5  # rad
 
 
-@pytest.fixture(scope="module")
-def frames(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+@pytest.fixture
+def frames(built: Callable[..., Path]) -> list[Path]:
     """Peaucellier's linkage along its own axes, and in axes that are turned."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine")
-    folder, scene = (
-        tmp_path_factory.mktemp("frame"),
-        Scene("StraightLine", stop_time=0.5, step_size=0.05),
-    )
+    scene = Scene("StraightLine", stop_time=0.5, step_size=0.05)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StartMovedWarning)
-        return [
-            write(prepare(straight_line(t), scene), folder / str(t), target="native")
-            for t in (0.0, TURNED)
-        ]
+        return [built(straight_line(turned), scene) for turned in (0.0, TURNED)]
 
 
 def run(fmu: Path, tolerance: float, method: str) -> Any:

@@ -29,25 +29,21 @@ from lagfmu import (
     Nonholonomic,
     Parameter,
     Scene,
-    build_fmu,
     multiplier,
     simulate,
 )
 from lagfmu.errors import ModelError
-from lagfmu.testing import app, find_compiler, load, prepare, write
+from lagfmu.testing import app, find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"
 g = 9.81  # m/s^2
+Build = Callable[..., Path]
 
 
 @pytest.fixture(scope="module")
 def belt(native_fmu: Callable[[str], Path]) -> Path:
     return native_fmu("Belt")
-
-
-def build(model: Model, name: str, folder: Path, **scene: object) -> Path:
-    return write(prepare(model, Scene(name, **scene)), folder, (), target="native")
 
 
 def described(path: Path) -> Element:
@@ -57,11 +53,11 @@ def described(path: Path) -> Element:
 
 
 def test_without_multipliers_in_the_equations_friction_is_the_same(
-    belt: Path, tmp_path: Path
+    belt: Path, built: Build
 ) -> None:
     """`nullspace` eliminates lambda from the equations of motion and reports it: the block on the belt
     sticks, slips and turns as with `multipliers`."""
-    other = build(load(MODELS / "belt.py").model, "Belt", tmp_path, formulation="nullspace")
+    other = built(load(MODELS / "belt.py").model, Scene("Belt", formulation="nullspace"))
     run = {"stop_time": 2.0, "step_size": 0.05, "tolerance": 1e-10}
     ours, theirs = simulate(belt, **run), simulate(other, **run)
     assert ours["slipping.grip.count"][-1] == 3
@@ -144,10 +140,10 @@ def test_two_rough_feet_that_land_together_share_one_impact(friction: float) -> 
     assert total == pytest.approx(g * (0.5 + height) + v**2 / 2, rel=1e-8)
 
 
-def test_model_exchange_counts_the_heat_of_impacts_and_slides(tmp_path: Path) -> None:
+def test_model_exchange_counts_the_heat_of_impacts_and_slides(built: Build) -> None:
     """A body dropped flat that slides on: `energy.dissipated` jumps by what the impact takes, 1/2 m v_n^2 and
     the friction's share, and grows by -power.low - power.up from there."""
-    path = build(feet(), "Feet", tmp_path)
+    path = built(feet())
     values = {"mu": 0.2, "alpha": 0.0, "y": 0.7, "der(x)": 2.0}
     outputs = ["energy.dissipated", "energy.total", "power.low", "power.up", "der(x)"]
     run = {"stop_time": 0.5, "output_interval": 0.01, "start_values": values, "output": outputs}
@@ -165,10 +161,10 @@ def test_model_exchange_counts_the_heat_of_impacts_and_slides(tmp_path: Path) ->
     np.testing.assert_allclose(total, total[0], rtol=1e-7)
 
 
-def test_the_energy_dissipated_is_a_state_of_model_exchange(tmp_path: Path) -> None:
+def test_the_energy_dissipated_is_a_state_of_model_exchange(built: Build) -> None:
     """Where frictions rub: calculated at the start, with a derivative, both among the initial unknowns, its
     nominal value the energy of the motion, and set anew by impacts.  A scene that leaves it out has none."""
-    root = described(build(feet(), "Feet", tmp_path))
+    root = described(built(feet()))
     entries = root.findall("ModelVariables/ScalarVariable")
     index = {e.get("name"): str(k) for k, e in enumerate(entries, 1)}
     lost, rate = (
@@ -182,14 +178,14 @@ def test_the_energy_dissipated_is_a_state_of_model_exchange(tmp_path: Path) -> N
     for place, n in (("Derivatives", rate), ("InitialUnknowns", rate), ("InitialUnknowns", lost)):
         listed = {u.get("index") for u in root.findall(f"ModelStructure/{place}/Unknown")}
         assert index[n.get("name")] in listed
-    root = described(build(feet(), "FeetX", tmp_path, outputs=("x",)))
+    root = described(built(feet(), Scene("FeetX", outputs=("x",))))
     assert not [e for e in root.iter("ScalarVariable") if "dissipated" in str(e.get("name"))]
     assert len(root.findall("ModelStructure/Derivatives/Unknown")) == 6
 
 
-def test_model_exchange_of_two_rows_comes_to_rest_too(tmp_path: Path) -> None:
+def test_model_exchange_of_two_rows_comes_to_rest_too(built: Build) -> None:
     """The puck slides along its curve, and stops when and where it does in co-simulation."""
-    path = str(build(puck(), "Puck", tmp_path))
+    path = str(built(puck()))
     run = {"stop_time": 2.5, "output_interval": 0.1, "relative_tolerance": 1e-9}
     outputs = ["x", "y", "sticks.grip"]
     near, far = (
@@ -293,10 +289,10 @@ def swing(theta0: float, way: float) -> float:
     return float(run.y[0, -1])
 
 
-def test_a_journal_in_its_bearing_rubs_by_the_norm_of_its_force(tmp_path: Path) -> None:
+def test_a_journal_in_its_bearing_rubs_by_the_norm_of_its_force(built: Build) -> None:
     """lambda of a contact at the clearance is the normal force of a joint, whatever its direction: a pendulum
     loses its amplitude by tau = mu r N with F = sqrt(1 + mu^2) N, to the clearance's own swing."""
-    path = build_fmu(journal(1.0, 1e-5), tmp_path, target="native", check=False)
+    path = built(journal(1.0, 1e-5))
     run = simulate(path, stop_time=3.6, step_size=0.002)
     theta, way, amplitude = run["theta"], -1.0, 1.0
     turns = [

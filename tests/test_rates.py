@@ -13,7 +13,7 @@ from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu
+from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene
 from lagfmu.errors import ModelError
 from lagfmu.testing import load
 
@@ -43,11 +43,9 @@ def told(path, h: float, connected: int, still: bool = False) -> list[str]:
         return [text for _, _, text in one.log if "rates" in text]
 
 
-@pytest.mark.parametrize("target", ["python", "native"])
 @pytest.mark.parametrize("connected", [1, 2])
-def test_a_motion_that_is_half_connected_is_told(target, connected, native_fmu, python_fmu):
+def test_a_motion_that_is_half_connected_is_told(connected, fmu):
     """l alone, or l and l' without l'': one warning, that names the input and both remedies."""
-    fmu = native_fmu if target == "native" else python_fmu
     (text,) = told(fmu("Crane"), 0.1, connected)
     for part in ("prescribed motion l has moved", "connect all three", 'rates="estimated"'):
         assert part in text
@@ -76,11 +74,10 @@ def turned_wire() -> Model:
 
 
 @pytest.mark.parametrize("target", ["python", "native"])
-def test_a_rate_counts_from_the_moment_at_which_it_is_set(tmp_path, target):
+def test_a_rate_counts_from_the_moment_at_which_it_is_set(built, target):
     """A bead on a wire that is turned from outside runs outward as r'' = r omega^2: with 1 rad/s for 0.1 s,
     from there with the 3 rad/s that are set, of which the first internal step knows already."""
-    fmu = build_fmu(turned_wire(), tmp_path, target=target, check=False)
-    with instance(fmu) as one:
+    with instance(built(turned_wire(), target=target)) as one:
         one.start(tolerance=1e-10)
         one.step(0.1)
         one.set("der(phi)", 3.0)
@@ -93,12 +90,11 @@ def test_a_rate_counts_from_the_moment_at_which_it_is_set(tmp_path, target):
 @pytest.mark.parametrize(
     ("target", "bars"), [("python", False), ("native", False), ("native", True)]
 )
-def test_what_is_read_after_a_rate_was_set_belongs_to_it(tmp_path, target, bars):
+def test_what_is_read_after_a_rate_was_set_belongs_to_it(built, target, bars):
     """The torque that turns the wire is 2 m r r' omega: of the new omega as soon as that is set, before any
     step; the wire turns at it, and the energy is that of its speed.  To have read, saved and read again
     leaves no trace in the steps that follow."""
-    scene = Scene("Wire", error_bars=bars)
-    fmu = build_fmu(turned_wire(), tmp_path, scene=scene, target=target, check=False)
+    fmu = built(turned_wire(), Scene("Wire", error_bars=bars), target=target)
     ends = []
     for looks in (False, True):
         with instance(fmu) as one:
@@ -125,7 +121,7 @@ def test_what_is_read_after_a_rate_was_set_belongs_to_it(tmp_path, target, bars)
 
 
 @pytest.mark.parametrize("target", ["python", "native"])
-def test_a_floor_that_was_pulled_away_is_left_as_soon_as_that_is_read(tmp_path, target):
+def test_a_floor_that_was_pulled_away_is_left_as_soon_as_that_is_read(built, target):
     """A block on a floor that drops by 1 m at once: nothing pushes it any more, before the next step too;
     the step tells of one departure, whether somebody has looked or not."""
     z, u = dynamicsymbols("z u")
@@ -139,7 +135,7 @@ def test_a_floor_that_was_pulled_away_is_left_as_soon_as_that_is_read(tmp_path, 
         inputs=[Input(u, "m")],
         start={z: 0.0},
     )
-    fmu = build_fmu(model, tmp_path, target=target, check=False)
+    fmu = built(model, target=target)
     ends = []
     for looks in (False, True):
         with instance(fmu) as one:
@@ -171,18 +167,10 @@ def crane(rates: str = "estimated"):
     return replace(model, inputs=inputs)
 
 
-@pytest.fixture(scope="module")
-def estimating(tmp_path_factory):
+@pytest.fixture
+def estimating(built):
     """estimating(target): the crane's FMU with `l` alone."""
-    made = {}
-
-    def get(target):
-        if target not in made:
-            folder = tmp_path_factory.mktemp(target)
-            made[target] = build_fmu(crane(), folder, target=target, check=False)
-        return made[target]
-
-    return get
+    return lambda target: built(crane(), target=target)
 
 
 def lifted(path, h: float, stop: float = 4.0, rates: int = 0) -> dict[str, np.ndarray]:
