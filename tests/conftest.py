@@ -73,6 +73,7 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     "FrictionOscillator": "friction_oscillator",
     "InclineFriction": "incline_friction",
     "RoughHemisphere": "rough_hemisphere",
+    "SliderCrankBodies": "slider_crank_bodies",
 }
 # one of each kind: forces alone, multipliers eliminated, a contact and velocities, an input, a table and an
 # output and a prescribed motion, nothing left to integrate by rows

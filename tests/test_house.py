@@ -20,6 +20,7 @@ ROOMS = (  # each imports from those before it, and from no other
     "numeric",
     "solver",
     "model",
+    "bodies",
     "mechanics",
     "interface",
     "codegen",

@@ -1,0 +1,209 @@
+"""Where a mechanism begins: rough places and joint coordinates -> positions that satisfy every joint.
+
+Newton's method with the least movement in the metric of M, damped by halving,
+
+    minimize  d^T M d   with   f(q) + f_q d = 0 ,   then   minimize  (v - v0)^T M (v - v0)   with   G v = nu ,
+
+at first with all that was given held by rows of its own; if that cannot be closed, given values move too, and
+each that does is told with both numbers.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import LagfmuWarning, ModelError
+from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, is_number, name_of
+from ..model.model import Model
+from ..names import derivative
+from .draft import Draft
+from .guess import guessed
+from .rows import TIME, Array, Rows, numbers_of
+
+STEPS, HALVINGS = 100, 12
+TRIES = 12  # beginnings with other omitted values, where the first leads nowhere
+CLOSED = 1e-9  # of the size of the mechanism: what a row may miss, and a given value be another
+REDUNDANT = 1e-11  # a singular value, relative to the largest: rows that say the same
+EPS = float(np.finfo(float).eps)
+
+
+class GivenStartWarning(LagfmuWarning):
+    """A start value that was given, and cannot be."""
+
+
+def assemble(
+    draft: Draft, model: Model, parts: Sequence[Any], start: Mapping[str, Any]
+) -> dict[Expr, float]:
+    """The start of each coordinate and velocity, in SI.
+
+    Raises ModelError if a name is unknown, or the joints cannot be closed.
+    """
+    known = _known(draft, model)
+    given = _given(model, known, start)
+    places = {n: x for n, x in given.items() if not known[n][1]}
+    rates = {n: x for n, x in given.items() if known[n][1]}
+    acting = [c for c in model.constraints if not isinstance(c, Contact) and not c.while_closed]
+    closing = [c for c in acting if isinstance(c, Holonomic)]
+    rolling = [c for c in acting if isinstance(c, Nonholonomic)]
+    f = Rows(model, [c.expression for c in closing])
+    weight = np.sqrt(numbers_of(model, [m for body in draft.motions.values() for m in body.masses]))
+    rough = guessed(draft, model, parts, places)
+    lengths = np.array([unit == "m" for unit in model.coordinates.values()])
+    size = float(np.abs(np.where(lengths, rough, 0.0)).max(initial=0.0)) or 1.0
+    moving = _Moving(weight, np.where(lengths, size, 1.0))
+
+    held = Rows(model, [known[n][0] for n in places])
+    wanted = np.concatenate([np.zeros(len(closing)), np.array([*places.values()])])
+    q, missed = moving.closed([f, held], wanted, rough)
+    if missed.max(initial=0.0) > CLOSED:
+        q, missed = moving.closed([f], np.zeros(len(closing)), q)
+    if missed.max(initial=0.0) > CLOSED:
+        raise ModelError(model.name, list(_open([c.name for c in closing], f.values(q), missed)))
+    _tell(model, places, held.values(q), size)
+
+    still = [f, Rows(model, [c.expression for c in rolling], True)]
+    driven = Rows(model, [known[n][0] for n in rates], True)
+    asked = np.concatenate([np.zeros(len(acting)), np.array([*rates.values()])])
+    v = moving.velocities([*still, driven], asked, q, np.zeros(len(q)))
+    v = moving.velocities(still, np.zeros(len(acting)), q, v)
+    found = driven.values(q, v)
+    _tell(model, rates, found, float(np.abs(found).max(initial=0.0)))
+    states = [*model.coordinates, *(c.diff(TIME) for c in model.coordinates)]
+    return {
+        s: float(x) if abs(x) > 4 * EPS * scale else 0.0
+        for s, x, scale in zip(
+            states,
+            (*q, *v),
+            (*moving.scale, *(moving.scale * np.abs(v / moving.scale).max())),
+            strict=True,
+        )
+    }
+
+
+class _Moving:
+    """Movements d (n) that are least in d^T W^2 d; `scale`: what is much of each coordinate."""
+
+    def __init__(self, weight: Array, scale: Array) -> None:
+        self.weight, self.scale = weight, scale
+
+    def closed(self, rows: Sequence[Rows], wanted: Array, rough: Array) -> tuple[Array, Array]:
+        """Coordinates at which the rows have the wanted values, and what each misses, relative to its size.
+
+        A beginning from which Newton's method comes to rest elsewhere, as where all links lie on a line, is
+        left for others about it.
+        """
+        draws = np.random.default_rng(0)
+        best, least = rough, np.full(len(wanted), np.inf)
+        for k in range(TRIES):
+            away = draws.uniform(-0.5, 0.5, len(rough)) * self.scale if k else 0.0
+            q, missed = self._newton(rows, wanted, rough + away)
+            if missed.max(initial=0.0) < least.max(initial=0.0):
+                best, least = q, missed
+            if least.max(initial=0.0) <= CLOSED:
+                break
+        return best, least
+
+    def _newton(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array]:
+        r, A, size = self._missed(rows, wanted, q)
+        for _ in range(STEPS):
+            step = self._least(A / size[:, None], r / size)
+            for halved in range(HALVINGS):
+                new = q + step * 0.5**halved
+                after = self._missed(rows, wanted, new)
+                if np.linalg.norm(after[0] / after[2]) < np.linalg.norm(r / size):
+                    break
+            else:
+                break
+            q, (r, A, size) = new, after
+        return q, np.abs(r / size)
+
+    def _missed(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array, Array]:
+        """What is missing (m), the slopes (m, n), and how large a change each row sees (m)."""
+        A = np.vstack([r.slopes(q) for r in rows])
+        size = np.abs(A * self.scale).max(axis=1, initial=0.0)
+        r = wanted - np.concatenate([row.values(q) for row in rows])
+        return r, A, np.where(size > 0, size, 1.0)
+
+    def _least(self, A: Array, r: Array) -> Array:
+        """d with A d = r as nearly as can be, and least among those."""
+        d: Array = np.linalg.lstsq(A / self.weight, r, rcond=REDUNDANT)[0] / self.weight
+        return d
+
+    def velocities(self, rows: Sequence[Rows], wanted: Array, q: Array, v: Array) -> Array:
+        """The velocities nearest to v at which the rows have the wanted rates."""
+        A = np.vstack([r.slopes(q) for r in rows])
+        missing = wanted - np.concatenate([r.drift(q) for r in rows]) - A @ v
+        size = np.abs(A * self.scale).max(axis=1, initial=0.0)
+        size = np.where(size > 0, size, 1.0)
+        return v + self._least(A / size[:, None], missing / size)
+
+
+def _known(draft: Draft, model: Model) -> dict[str, tuple[Expr, bool]]:
+    """The names of the FMU that may begin somewhere: expression, and whether it is a rate."""
+    found: dict[str, tuple[Expr, bool]] = {}
+    for q in model.coordinates:
+        found[name_of(q)] = q, False
+        found[derivative(name_of(q))] = q.diff(TIME), True
+    for of in draft.relative.values():
+        found[of.name] = of.values[0], False
+        found[derivative(of.name)] = of.values[1], True
+    moving = re.compile(r"\w+\.(velocity|omega)\.\w")
+    found |= {o.name: (o.expression, True) for o in draft.outputs if moving.fullmatch(o.name)}
+    return found
+
+
+def _given(model: Model, known: Mapping[str, Any], start: Mapping[str, Any]) -> dict[str, float]:
+    """Each component by itself.  Raises ModelError for names and values that cannot be."""
+    found: dict[str, float] = {}
+    problems = []
+    for name, value in start.items():
+        parts = [n for n in known if n.startswith(f"{name}.")]
+        values = [value] if name in known else value
+        if name not in known and not parts:
+            near = difflib.get_close_matches(str(name), known, 1)
+            problems.append(
+                f"start names {name!r}, which does not begin anywhere, expected a coordinate, the angle or "
+                f"the position of a joint, or a rate of these{f'; did you mean {near[0]!r}?' if near else ''}"
+            )
+        elif not isinstance(values, Sequence) or len(values) != len(parts or values):
+            problems.append(f"start of {name!r} is {value!r}, expected {len(parts)} numbers")
+        elif not all(map(is_number, values)):
+            problems.append(f"start of {name!r} is {value!r}, expected finite numbers")
+        else:
+            names = [name] if name in known else parts
+            found |= dict(zip(names, map(float, values), strict=True))
+    if problems:
+        raise ModelError(model.name, problems)
+    return found
+
+
+def _open(names: Sequence[str], values: Array, missed: Array) -> Iterator[str]:
+    """Which joints miss, the worst first."""
+    worst: dict[str, tuple[float, float]] = {}
+    for name, value, miss in zip(names, values.tolist(), missed.tolist(), strict=True):
+        joint = name.split(".")[0]
+        worst[joint] = max(worst.get(joint, (0.0, 0.0)), (miss, abs(value)))
+    for joint, (miss, value) in sorted(worst.items(), key=lambda item: -item[1][0]):
+        if miss > CLOSED:
+            yield (
+                f"joint {joint!r} cannot be closed: the nearest that was found misses it by {value:.3g} "
+                "(m or rad): correct a length, or give a start nearer to where it closes"
+            )
+
+
+def _tell(model: Model, given: Mapping[str, float], found: Array, size: float) -> None:
+    """Given values that had to move, with both numbers."""
+    for (name, asked), is_now in zip(given.items(), found.tolist(), strict=True):
+        if abs(is_now - asked) > CLOSED * max(abs(asked), size):
+            warnings.warn(
+                f"model {model.name!r}: start of {name} = {asked!r} is {is_now!r}: the joints cannot be "
+                "closed there",
+                GivenStartWarning,
+                stacklevel=5,
+            )

@@ -1,0 +1,145 @@
+"""What is wrong with the parts of a mechanism, in words, before any equation is written."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ..model.elements import NAME, Parameter, is_number
+from ..names import RESERVED
+from .body import Body, Ground, Marker
+from .contacts import Contact
+from .joints import Distance, Gear, Joint, Rolling, name_of_joint
+from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
+
+PARTS = (Joint, Distance, Rolling, Gear, Contact)
+PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor)  # type: ignore[assignment]
+PLANES = ("xy",)
+
+
+def problems_of(plane: object, bodies: Sequence[Any], parts: Sequence[Any]) -> list[str]:
+    """All of them."""
+    problems = []
+    if plane not in PLANES:
+        problems.append(f"plane = {plane!r}, expected 'xy'")
+    problems += [
+        f"bodies hold {b!r}, expected Body(...)" for b in bodies if not isinstance(b, Body)
+    ]
+    problems += [
+        f"joints and loads hold {p!r}, expected one of {', '.join(k.__name__ for k in PARTS)}"
+        for p in parts
+        if not isinstance(p, PARTS)
+    ]
+    if problems:
+        return problems
+    return [
+        *_names([*bodies, *parts]),
+        *(problem for body in bodies for problem in _of_body(body)),
+        *(problem for part in parts for problem in _of_markers(part, bodies)),
+        *(problem for part in parts if isinstance(part, Joint) for problem in _of_joint(part)),
+        *(problem for part in parts for problem in _of_references(part, parts)),
+    ]
+
+
+def _kind(part: Any) -> str:
+    return type(part).__name__
+
+
+def _names(named: Sequence[Any]) -> Iterator[str]:
+    seen: dict[str, str] = {"ground": "Ground"}
+    for part in named:
+        name, kind = part.name, _kind(part)
+        if not isinstance(name, str) or not NAME.match(name):
+            yield (
+                f"{kind} has the name {name!r}, expected one word of letters a-z, A-Z, digits and _, not "
+                "beginning with a digit"
+            )
+        elif name in RESERVED:
+            yield f"{kind} {name!r}: this name is reserved for the FMU's own variables: choose another"
+        elif name in seen:
+            yield f"the name {name!r} is used twice, by a {seen[name]} and a {kind}: rename one"
+        seen[str(name)] = kind
+
+
+def _of_body(body: Body) -> Iterator[str]:
+    for what, value, unit in (("mass", body.mass, "kg"), ("inertia", body.inertia, "kg.m^2")):
+        number = value.value if isinstance(value, Parameter) else value
+        if is_number(number) and not float(number) > 0:
+            yield (
+                f"body {body.name!r} has the {what} {number!r}, expected a positive number in {unit}: what "
+                "has none cannot move by itself: put its markers on the body that it belongs to, or use "
+                "Distance for a rod without mass"
+            )
+
+
+def _markers(part: Any) -> Iterator[tuple[str, Any]]:
+    for field in ("first", "second", "at"):
+        if hasattr(part, field) and not isinstance(part, Gear):
+            yield field, getattr(part, field)
+
+
+def _of_markers(part: Any, bodies: Sequence[Body]) -> Iterator[str]:
+    what = f"{_kind(part)} {part.name!r}"
+    found = dict(_markers(part))
+    for field, marker in found.items():
+        if not isinstance(marker, Marker):
+            yield f"{what}: {field} is {marker!r}, expected a marker, as body.at((0.1, 0))"
+        elif not isinstance(marker.body, Ground) and marker.body not in bodies:
+            yield (
+                f"{what}: its {field} marker is on {getattr(marker.body, 'name', marker.body)!r}, which is "
+                f"not among the bodies ({', '.join(b.name for b in bodies)}): add it"
+            )
+    first, second = found.get("first"), found.get("second")
+    if isinstance(first, Marker) and isinstance(second, Marker) and first.body == second.body:
+        yield (
+            f"{what}: both markers are on {first.body.name!r}, expected two bodies: what is fixed on one "
+            "body needs no joint"
+        )
+    if isinstance(part, Torque) and part.on not in bodies:
+        yield f"{what} acts on {part.on!r}, which is not among the bodies: name one of them"
+
+
+def _of_joint(joint: Joint) -> Iterator[str]:
+    what = f"{_kind(joint)} {joint.name!r}"
+    possible = joint.possible[0]
+    if joint.axis and (len(joint.axis) > 1 or joint.axis not in possible):
+        yield (
+            f"{what}: axis is {joint.axis!r}, expected {' or '.join(map(repr, possible))} in the plane xy"
+        )
+    limits = joint.limits
+    if limits is None:
+        return
+    if (joint.slides and joint.turns) or not (joint.slides or joint.turns):
+        yield f"{what}: limits are given, but it has no angle or position to be limited: leave them out"
+    elif isinstance(limits, str) or not isinstance(limits, Sequence) or len(limits) != 2:
+        yield f"{what}: limits are {limits!r}, expected the smallest and the largest value"
+    elif all(map(is_number, limits)) and not float(limits[0]) < float(limits[1]):  # type: ignore[arg-type]
+        yield f"{what}: limits are {limits!r}, expected the smaller value first: exchange them"
+
+
+def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
+    """Joints that a gear, a motor or a torsion spring names."""
+    if isinstance(part, Gear):
+        named = [part.first, part.second]
+    elif isinstance(part, Motor | Torsion):
+        named = [part.joint]
+    else:
+        return
+    known = {j.name: j for j in parts if isinstance(j, Joint)}
+    fit = [n for n, j in known.items() if j.measure]
+    for joint in map(name_of_joint, named):
+        if joint not in known:
+            near = difflib.get_close_matches(joint, fit, 1)
+            yield (
+                f"{_kind(part)} {part.name!r}: no joint is called {joint!r}, expected one of "
+                f"{', '.join(fit) or 'none: no joint turns or slides'}"
+                + (f"; did you mean {near[0]!r}?" if near else "")
+            )
+        elif joint not in fit:
+            yield (
+                f"{_kind(part)} {part.name!r}: {_kind(known[joint])} {joint!r} has no angle or position, "
+                f"expected one of {', '.join(fit) or 'none: no joint turns or slides'}"
+            )
+    if len(named) == 2 and len({*map(name_of_joint, named)}) == 1:
+        yield f"Gear {part.name!r} ties {name_of_joint(named[0])!r} to itself, expected two joints"

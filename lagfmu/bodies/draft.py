@@ -1,0 +1,162 @@
+"""A mechanism while it is put together: what its bodies, joints and loads add to the Model that it becomes.
+
+Every number that is not 0 becomes a Parameter under the name of what it is of: crank.mass, A.first.x.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from ..model.elements import Constraint, Expr, Friction, Input, Output, Parameter, is_number
+from .body import Body, Ground, Marker
+from .motion import Motion, Placed
+from .vectors import AXES, ZERO, Vector, cross, minus, times
+
+
+class Wrench:
+    """What the second body receives through a joint, about its own marker point, in the axes of the first
+    marker: `force` [N] and `torque` [N.m], three components each."""
+
+    def __init__(self) -> None:
+        self.force: list[Expr] = [sp.S.Zero] * 3
+        self.torque: list[Expr] = [sp.S.Zero] * 3
+
+
+@dataclass(frozen=True, eq=False)
+class Relative:
+    """The one motion that a joint leaves free: angle.A [rad] or position.A [m], and its two derivatives."""
+
+    name: str
+    unit: str
+    values: tuple[Expr, Expr, Expr]
+    first: Placed
+    second: Placed
+    axis: int
+
+    def drive(self, draft: Draft, effort: Expr) -> None:
+        """A torque [N.m] or force [N] along it on the second body, and its reaction on the first."""
+        e = times(effort, self.first.axes[self.axis])
+        if self.unit == "m":
+            draft.pull_together(self.first, self.second, self.second.point, e)
+        else:
+            draft.turn(self.second.body, e)
+            draft.turn(self.first.body, times(-1, e))
+
+
+class Draft:
+    """All that a Model needs, in the order in which it is added; `problems` is what is wrong."""
+
+    def __init__(self, components: str) -> None:
+        self.components = components  # of a vector: "xy" in the plane
+        self.problems: list[str] = []
+        self.parameters: dict[Expr, Parameter] = {}
+        self.inputs: list[Input] = []
+        self.constraints: list[Constraint | Friction] = []
+        self.outputs: list[Output] = []
+        self.kinetic: list[Expr] = []
+        self.potential: list[Expr] = []
+        self.forces: dict[Expr, Expr] = defaultdict(lambda: sp.S.Zero)
+        self.motions: dict[Any, Motion] = {}
+        self.wrenches: dict[str, Wrench] = {}
+        self.relative: dict[str, Relative] = {}  # of the joints that have one
+        self.placed: dict[Marker, Placed] = {}
+
+    # ------------------------------------------------------------------ numbers
+
+    def number(
+        self, value: Any, name: str, unit: str, text: str = "", positive: bool = False
+    ) -> Expr:
+        """The symbol of a Parameter, the expression, or that of a number, which becomes one called `name`."""
+        if isinstance(value, Parameter):
+            self.parameters[value.symbol] = value
+            return value.symbol
+        if isinstance(value, sp.Basic) and value.free_symbols:
+            return value
+        if not is_number(value):
+            self.problems.append(
+                f"{name} is {value!r}, expected a finite number in {unit}, a Parameter, or an expression of "
+                "parameters"
+            )
+            return sp.S.One
+        if float(value) == 0 and not positive:
+            return sp.S.Zero
+        symbol = sp.Symbol(name, positive=True) if positive else sp.Symbol(name, real=True)
+        self.parameters[symbol] = Parameter(symbol, float(value), unit, text)
+        return symbol
+
+    def vector(self, values: Any, name: str, unit: str, text: str = "") -> Vector:
+        """Three components of as many values as the space has dimensions."""
+        if values is None:
+            return ZERO
+        count = len(self.components)
+        if isinstance(values, str) or not isinstance(values, Sequence) or len(values) != count:
+            self.problems.append(
+                f"{name} is {values!r}, expected {count} components ({', '.join(self.components)})"
+            )
+            return ZERO
+        found = [
+            self.number(value, f"{name}.{x}", unit, f"{text}, {x} component" if text else "")
+            for value, x in zip(values, self.components, strict=True)
+        ]
+        return tuple([*found, sp.S.Zero][:3])  # type: ignore[return-value]
+
+    # ------------------------------------------------------------------ places
+
+    def place(self, marker: Marker, name: str) -> Placed:
+        """A marker in the ground's axes; its numbers are called after the first that uses it, `name`."""
+        if marker not in self.placed:
+            point = self.vector(marker.point, name, "m", f"marker {name} on {marker.body.name}")
+            self.placed[marker] = self.motions[marker.body].placed(marker, point)
+        return self.placed[marker]
+
+    # ------------------------------------------------------------------ forces
+
+    def push(self, body: Body | Ground, point: Vector, force: Vector) -> None:
+        """A force [N] on a body at a point, both in the ground's axes."""
+        motion = self.motions[body]
+        self.turn(body, cross(minus(point, motion.position), force))
+        for speed, component in zip(motion.velocity_speeds, force, strict=False):
+            self.forces[speed] += component
+
+    def turn(self, body: Body | Ground, torque: Vector) -> None:
+        """A torque [N.m] on a body, in the ground's axes."""
+        motion = self.motions[body]
+        for speed, component in motion.torque_on(torque):
+            self.forces[speed] += component
+
+    def pull_together(self, a: Placed, b: Placed, point: Vector, force: Vector) -> None:
+        """A force at a point on the second body, and its reaction there on the first."""
+        self.push(b.body, point, force)
+        self.push(a.body, point, times(-1, force))
+
+    # ------------------------------------------------------------------ outputs
+
+    def report(self, name: str, expression: Expr, unit: str, text: str) -> None:
+        """An output of the FMU."""
+        self.outputs.append(Output(name, expression, unit, text))
+
+    def wrench(self, name: str) -> Wrench:
+        """What the second body receives through that joint."""
+        return self.wrenches.setdefault(name, Wrench())
+
+    def report_wrenches(self) -> None:
+        """force.A.x, ..., torque.A.z of each joint."""
+        planar = len(self.components) == 2
+        for name, wrench in self.wrenches.items():
+            of = f"that the second body receives through {name}"
+            for kind, values, unit, axes in (
+                ("force", wrench.force, "N", self.components),
+                ("torque", wrench.torque, "N.m", "z" if planar else AXES),
+            ):
+                parts = [values[AXES.index(x)] for x in axes]
+                for x, value in zip(axes, parts, strict=True):
+                    text = f"{kind} {of}, {x} axis of the first marker"
+                    self.report(f"{kind}.{name}.{x}", value, unit, text)
+                if len(parts) > 1:
+                    norm = sp.sqrt(sp.Add(*(p**2 for p in parts)))
+                    self.report(f"{kind}.{name}.norm", norm, unit, f"magnitude of the {kind} {of}")
