@@ -98,7 +98,7 @@ from .study.stress import runs, worker
 from .study.stress.bench import Bench, Finding
 from .study.stress.closed_forms import judged, magnitude
 from .study.stress.facts import facts_of
-from .study.stress.judge import Check, first_landing
+from .study.stress.judge import Check
 from .study.stress.lagrange import lagrange, lay_beside
 from .study.stress.player import Run, clear
 from .study.stress.player import opened as session_of
@@ -135,4 +135,4 @@ from .verification.evaluate import Compiled
 from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
-from .verification.verify import RECORD, applies, check_closed_form
+from .verification.verify import RECORD, applies, check_closed_form, landed

@@ -44,7 +44,7 @@ from lagfmu.testing import (
     applies,
     attempt,
     facts_of,
-    first_landing,
+    landed,
     lay_beside,
     load,
     magnitude,
@@ -53,7 +53,6 @@ from lagfmu.testing import (
     probes,
     stress,
     verdict,
-    worker,
     write,
 )
 from lagfmu.testing import judged as judged_forms
@@ -230,7 +229,7 @@ def test_a_landing_between_two_points_is_seen(lawful):
         energy = run.rows["energy.total"]
         hit = int(np.argmax(np.abs(np.diff(energy)) > 0.1 * energy[0])) + 1
         assert not run.rows["contact.floor"][: hit + 3].any()
-        before = first_landing(one.facts, run)
+        before = ~landed(run.rows)
         assert before[:hit].all()
         assert not before[hit:].any()
 
@@ -319,24 +318,19 @@ def test_a_refusal_needs_a_cause():
 @pytest.fixture
 def four_probes(monkeypatch, tmp_path):
     """In place of all: one that is right, one that crashes, one that hangs, one that is right."""
-    program = tmp_path / "worker.py"
-    program.write_text(
-        "import os, sys, time\n"
+    (tmp_path / "four.py").write_text(
+        "import os, time\n"
         "from lagfmu.testing import Check, Finding, Probe, worker as w\n"
         "good = Finding((Check('x', 0.0, 1.0),))\n"
         "w.probes = lambda *_: [Probe('f', 'good', lambda b: good),\n"
         "    Probe('f', 'crash', lambda b: os.abort()), Probe('f', 'hang', lambda b: time.sleep(99)),\n"
         "    Probe('f', 'last', lambda b: good)]\n"
-        "w.main(*sys.argv[1:])\n"
+        "w.serve(w.probing())\n"
     )
-    popen = command.subprocess.Popen
-
-    def start(arguments, **named):
-        if worker.__name__ in arguments:
-            arguments = [arguments[0], str(program), *arguments[3:]]
-        return popen(arguments, **named)
-
-    monkeypatch.setattr(command.subprocess, "Popen", start)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(command, "WORKER", "four")
+    named = [Probe("f", name, None) for name in ("good", "crash", "hang", "last")]
+    monkeypatch.setattr(command, "probes", lambda *_: named)
 
 
 @pytest.mark.thorough

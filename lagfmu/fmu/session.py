@@ -147,14 +147,14 @@ class Session:
             self.instance.freeInstance()
         self.instance = None
 
-    def prepare(
+    def begin(
         self,
         values: Mapping[str, Any] | None = None,
         tolerance: float | None = None,
         stop: float | None = None,
         start: float = 0.0,
     ) -> None:
-        """Reset if it was used; set up (times in s), enter the initialization mode, set `values`."""
+        """Reset if it was used; set up (times in s), set `values`, initialize."""
         given = dict(values or {})
         driven = {n: given.pop(n) for n in self.inputs if n in given}
         if self.used:
@@ -164,16 +164,6 @@ class Session:
         self.give(given)
         self.call("enterInitializationMode")
         self.give(driven)
-
-    def begin(
-        self,
-        values: Mapping[str, Any] | None = None,
-        tolerance: float | None = None,
-        stop: float | None = None,
-        start: float = 0.0,
-    ) -> None:
-        """The same, and initialize."""
-        self.prepare(values, tolerance, stop, start)
         self.call("exitInitializationMode")
 
     # ------------------------------------------------------------------ calls
@@ -250,33 +240,10 @@ class Session:
 
         return read
 
-    # ------------------------------------------------------------------ steps and states
-
     def step(self, size: float) -> None:
         """A communication step [s] from where it stands."""
         self.call("doStep", self.time, size)
         self.time += size
-
-    def save(self) -> Any:
-        """The whole state, to be restored, or freed by call("freeFMUstate", state)."""
-        return self.call("getFMUstate")
-
-    def restore(self, state: Any, time: float) -> None:
-        """The instance stands in a saved state, at `time` [s], again."""
-        self.call("setFMUstate", state)
-        self.time = time
-
-    def hand(self, other: Session, state: Any = None, time: float | None = None) -> None:
-        """By the bytes of a saved state, else of the present one, the other goes on from there."""
-        kept = self.save() if state is None else state
-        data = self.call("serializeFMUstate", kept)
-        if state is None:
-            self.call("freeFMUstate", kept)
-        taken = other.call("deSerializeFMUstate", data)
-        other.restore(taken, self.time if time is None else time)
-        other.call("freeFMUstate", taken)
-
-    # ------------------------------------------------------------------ the loop
 
     def run(
         self,

@@ -13,8 +13,8 @@ import fmpy
 
 from .. import names
 from ..fmu.archive import pack
-from ..fmu.read import experiment_of
-from ..model.rule import MESSAGES
+from ..fmu.read import described_rules, experiment_of
+from ..model.rule import MESSAGES, Rule
 from ..model.units import for_reading
 from ..page.preset import SETTABLE
 
@@ -49,7 +49,8 @@ def facts(
     given = preset or {"sliders": [], "curves": [], "ranges": {}}
     settable = {v.name for v in read.modelVariables if _role(v) in SETTABLE}
     columns = {v.name for v in read.modelVariables if _is_column(v)}
-    variables = [_variable(v, named) for v in read.modelVariables]
+    rules = described_rules(read)
+    variables = [_variable(v, rules[v.name], named) for v in read.modelVariables]
     return {
         "name": read.modelName,
         "description": read.description or "",
@@ -77,7 +78,7 @@ def lean(found: dict[str, Any]) -> dict[str, Any]:
     return {**found, "variables": told, "blank": BLANK}
 
 
-def _variable(v: Any, named: set[str]) -> dict[str, Any]:
+def _variable(v: Any, rule: Rule, named: set[str]) -> dict[str, Any]:
     """One variable.  `column`: a run records it; `event`: the count of an event whose time is known;
     `counted`: the count without which it says nothing (names.counted)."""
     role = _role(v)
@@ -89,9 +90,9 @@ def _variable(v: Any, named: set[str]) -> dict[str, Any]:
         "group": _group(v, role, named),
         "unit": for_reading(v.unit),
         "start": _number(v),
-        "items": _items(v),
-        "min": None if v.min is None else float(v.min),
-        "max": None if v.max is None else float(v.max),
+        "items": [{"name": item, "value": number} for item, number in rule.items.items()],
+        "min": rule.minimum,
+        "max": rule.maximum,
         "description": v.description or "",
         "column": _is_column(v),
         "discrete": v.variability == "discrete",
@@ -119,12 +120,6 @@ def _number(v: Any) -> float | str | None:
     if v.type == "Boolean":
         return float(str(v.start).lower() in ("true", "1"))
     return float(v.start)
-
-
-def _items(v: Any) -> list[dict[str, Any]]:
-    """The names and values of an enumeration."""
-    items = getattr(v.declaredType, "items", None) or []
-    return [{"name": i.name, "value": int(i.value)} for i in items]
 
 
 def _group(v: Any, role: str, named: set[str]) -> str:

@@ -330,7 +330,7 @@ def applies(
 
     chosen = np.ones(len(result), dtype=bool)
     if closed_form.lasts_until_landing:
-        chosen &= ~_landed(result)
+        chosen &= ~landed(result)
     if closed_form.while_closed is not None:
         chosen &= closed(closed_form.while_closed)
     if closed_form.while_open is not None:
@@ -349,22 +349,22 @@ def applies(
     return chosen
 
 
-def _landed(result: Trajectory) -> NDArray[np.bool_]:
+def landed(result: Trajectory) -> NDArray[np.bool_]:
     """From the first point on at which a contact is seen to have closed, or to have opened again, since the
-    start."""
+    start: an impact takes energy, and a start's closed forms end."""
     known = result.dtype.names or ()
-    landed = np.zeros(len(result), dtype=bool)
+    found = np.zeros(len(result), dtype=bool)
     for contact in names.constraints(known, names.CONTACT):
         closed = np.asarray(result[names.name(names.CONTACT, contact)], dtype=bool)
-        landed[1:] |= closed[1:] & ~closed[:-1]
+        found[1:] |= closed[1:] & ~closed[:-1]
         count = names.name(names.DEPARTURES, contact)
         if (
             count in known
         ):  # one that opens twice between two points, or while it was open, had closed
-            landed[1:] |= np.diff(np.asarray(result[count], dtype=float)) > closed[:-1]
+            found[1:] |= np.diff(np.asarray(result[count], dtype=float)) > closed[:-1]
         if (impacts := names.name(names.CLOSINGS, contact)) in known:  # a bounce, too
-            landed |= np.asarray(result[impacts]) > 0
-    return np.logical_or.accumulate(landed)
+            found |= np.asarray(result[impacts]) > 0
+    return np.logical_or.accumulate(found)
 
 
 def _departures(closed_form: CarriedForm) -> list[str]:

@@ -46,16 +46,18 @@ class Finding:
 
 
 class Bench:
-    """An FMU unpacked, with one instance for runs.  Use it in a `with` statement."""
+    """An FMU unpacked (`folder`: where it was already), with one instance for runs.  Use it in a `with`
+    statement."""
 
-    def __init__(self, path: Path, quick: bool) -> None:
+    def __init__(self, path: Path, quick: bool, folder: Path | None = None) -> None:
         self.facts: Facts = facts_of(path)
         self.quick = quick
         self.forms = (
             *judged(self.facts.closed_forms, {i.name for i in self.facts.inputs}),
             *laws(self.facts.laws),
         )
-        self.folder = Path(unpack(path))
+        self._unpacked = "" if folder is not None else unpack(path)
+        self.folder = folder or Path(self._unpacked)
         self._session: Session | None = None
 
     def __enter__(self) -> Bench:
@@ -64,7 +66,7 @@ class Bench:
     def __exit__(self, *_: object) -> None:
         if self._session is not None:
             self._session.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        shutil.rmtree(self._unpacked, ignore_errors=True)
 
     @property
     def session(self) -> Session:

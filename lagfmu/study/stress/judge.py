@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import names
+from ...verification.verify import landed
 from .closed_forms import JudgedForm
 from .facts import Facts
 from .player import Run
@@ -63,7 +64,7 @@ def invariants(facts: Facts, run: Run, forms: Sequence[JudgedForm], elapsed: Col
     checks += _contacts(facts, run, sizes)
     checks = [replace(c, instant=True) for c in checks]
     digits = not lost(facts, run)
-    before, floors = first_landing(facts, run), magnitudes(facts, run)
+    before, floors = ~landed(run.rows), magnitudes(facts, run)
     for form in forms:
         if run.driven and not form.pointwise:  # it says something of the motion without inputs
             continue
@@ -99,26 +100,6 @@ def wound(facts: Facts, run: Run) -> Column:
         if facts.dimensions[q][-1] == 1:
             largest = np.maximum(largest, np.maximum.accumulate(np.abs(run.rows[q])))
     return largest
-
-
-def first_landing(facts: Facts, run: Run) -> NDArray[np.bool_]:
-    """The points before a contact closes again: an impact takes energy, and a start's closed forms end.
-
-    One that closes and opens again between two points is seen by its departure; one that is thrown back
-    at once, by f, which was on the way through 0 and is positive.
-    """
-    before = np.diff(run.rows["time"])[:-1]
-    after = np.diff(run.rows["time"])[1:]
-    landed = np.zeros(len(run.rows), dtype=bool)
-    for c in facts.contacts:
-        closed = np.asarray(run.rows[names.name(names.CONTACT, c)], dtype=bool)
-        departed = np.diff(run.rows[names.name(names.DEPARTURES, c)])
-        landed[1:] |= (closed[1:] & ~closed[:-1]) | (departed > closed[:-1])
-        f = run.rows[names.name(names.RESIDUAL, c)]
-        with np.errstate(all="ignore"):
-            ahead = f[1:-1] + np.diff(f)[:-1] * (after / before)
-        landed[2:] |= ~closed[:-2] & ~closed[1:-1] & ~closed[2:] & (ahead < 0)
-    return ~np.logical_or.accumulate(landed)
 
 
 def magnitudes(facts: Facts, run: Run) -> dict[str, float]:

@@ -9,7 +9,6 @@ from ...fmu.session import RefusalError
 from .bench import Bench, Finding
 from .player import clear
 
-NO_ROOM = 28  # exit status of the process that probes: temporary files cannot be written
 RIGHT, REFUSED, WRONG, UNFINISHED = "right", "refused", "wrong", "unfinished"
 CONSISTENT = "consistent"  # right at each instant; nothing could be said of the motion's course
 

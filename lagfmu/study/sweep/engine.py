@@ -24,8 +24,9 @@ from typing import Any
 from ...errors import SimulationError
 from ...fmu.archive import version
 from ...fmu.batch import Outcome, Plan
+from ..host import EndedError
 from .design import Values
-from .process import EndedError, SessionProcess
+from .process import SessionProcess
 
 PATIENCE = 15  # [s] for a scheduler to answer, and to have a worker
 TRIES = 20  # of a chunk whose workers die, after Dask's own

@@ -1,58 +1,33 @@
-"""The process in which an FMU runs for a study: a crash takes it down, and nothing else.
-
-`python -m lagfmu.study.sweep.process` reads pickled orders from its standard input and answers on what was
-its standard output; what an FMU prints goes to standard error.  `SessionProcess` is the other end.
-"""
+"""The process in which an FMU runs for a sweep: it keeps a session, and answers plans and rows of values with
+outcomes.  `SessionProcess` is the other end."""
 
 from __future__ import annotations
 
-import contextlib
-import os
-import pickle
-import subprocess
-import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import LagfmuError, SimulationError
+from ...errors import SimulationError
 from ...fmu.batch import Outcome, Plan, run_batch
 from ...fmu.session import RefusalError, Session
+from ..host import DiedError, Host, LateError, serve
 
 CRASHED, TIMED_OUT = 6, 7  # status of a run whose process died, was killed; those of FMI end at 5
 SLICE = 0.5  # [s] of work in one order: how far it has come is known in between
 
 
-class DiedError(Exception):
-    """The process ended while it was at work; how, in words."""
-
-    status = CRASHED
-
-
-class LateError(DiedError):
-    """The process was ended, because it worked longer than it may."""
-
-    status = TIMED_OUT
-
-
-class EndedError(Exception):
-    """Nobody waits for the answer any more."""
-
-
-class SessionProcess:
-    """A process with a session of the FMU that lies unpacked in `folder`; started when it is first needed,
-    and again after a crash, or after a run that took longer than `limit` [s]."""
+class SessionProcess(Host):
+    """A process with a session of the FMU that lies unpacked in `folder`; started again after a crash, or
+    after a run that took longer than `limit` [s]."""
 
     def __init__(self, folder: str | Path, limit: float | None = None) -> None:
+        super().__init__("lagfmu.study.sweep.process", str(folder))
         self.folder, self.limit = folder, limit
-        self.process: subprocess.Popen[bytes] | None = None
         self.pace = np.inf  # [s] that a run took
-        self.ended = False
 
     def run(
         self, plan: Plan, values: NDArray[np.float64], tell: Callable[[int], None] = lambda _: None
@@ -75,76 +50,18 @@ class SessionProcess:
         try:
             return self._ask(plan, values)
         except DiedError as died:
+            if len(values) == 1 and isinstance(died, LateError):
+                told = f"the run took longer than the {self.limit:g} s of --timeout"
+                return _failed(plan, TIMED_OUT, told)
             if len(values) == 1:
-                return _failed(plan, died)
+                return _failed(plan, CRASHED, f"the FMU took its process down ({died})")
         return joined([self._runs(plan, row[None, :]) for row in values])
 
-    def end(self) -> None:
-        """End the process for good, from another thread than that which waits for it."""
-        self.ended = True
-        if self.process is not None:
-            self.process.kill()
-
-    def close(self) -> None:
-        """End the process."""
-        if self.process is not None:
-            self.process.kill()
-            with contextlib.suppress(OSError), self.process:
-                pass  # waits, and closes the pipes
-        self.process = None
-
     def _ask(self, plan: Plan, values: NDArray[np.float64]) -> Outcome:
-        if self.process is None:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "lagfmu.study.sweep.process"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
-                start_new_session=True,  # Ctrl-C is for the client, which keeps what is finished
-            )
-            self._exchange(str(self.folder))
+        self.start()
         begun = time.monotonic()
-        answer: Outcome = self._exchange((plan, values), self.limit)
+        answer: Outcome = self.ask((plan, values), self.limit)
         self.pace = (time.monotonic() - begun) / max(len(values), 1)
-        return answer
-
-    def _exchange(self, order: Any, limit: float | None = None) -> Any:
-        process, late = self.process, threading.Event()
-
-        def stop() -> None:
-            late.set()
-            if process is not None:
-                process.kill()
-
-        timer = threading.Timer(limit, stop) if limit is not None else None
-        assert process is not None
-        assert process.stdin is not None
-        assert process.stdout is not None
-        try:
-            if self.ended:
-                raise EOFError
-            if timer is not None:
-                timer.start()
-            pickle.dump(order, process.stdin)
-            process.stdin.flush()
-            answer = pickle.load(process.stdout)
-        except (OSError, EOFError, pickle.UnpicklingError):
-            if self.ended:
-                self.close()
-                raise EndedError from None
-            code = process.wait()
-            self.close()
-            if late.is_set():
-                raise LateError(f"the run took longer than the {limit:g} s of --timeout") from None
-            how = f"signal {-code}" if code < 0 else f"exit code {code}"
-            raise DiedError(f"the FMU took its process down ({how})") from None
-        finally:
-            if timer is not None:
-                timer.cancel()
-        if isinstance(answer, SimulationError):
-            self.close()
-            raise answer
         return answer
 
 
@@ -167,38 +84,27 @@ def joined(outcomes: list[Outcome]) -> Outcome:
     )
 
 
-def _failed(plan: Plan, how: DiedError) -> Outcome:
+def _failed(plan: Plan, status: int, reason: str) -> Outcome:
     whole = np.full((1, len(plan.times), len(plan.keep)), np.nan) if plan.whole else None
-    status, reached = np.array([how.status], dtype=np.int32), np.array([np.nan])
-    return Outcome(np.full((1, len(plan.keep)), np.nan), whole, status, reached, {0: str(how)})
+    statuses, reached = np.array([status], dtype=np.int32), np.array([np.nan])
+    return Outcome(np.full((1, len(plan.keep)), np.nan), whole, statuses, reached, {0: reason})
 
 
-def main(orders: BinaryIO, answers: BinaryIO) -> None:
-    """Serve until the orders end."""
-    session: Session | None = None
-    while True:
+def answering() -> Callable[[Any], Outcome | None]:
+    """What answers orders: a folder is loaded, a plan and values are run."""
+    sessions: list[Session] = []
+
+    def answer(order: Any) -> Outcome | None:
+        if not isinstance(order, str):
+            return run_batch(sessions[0], *order)
         try:
-            order = pickle.load(orders)
-        except EOFError:
-            break
-        answer: Any = None
-        if isinstance(order, str):
-            try:
-                session = Session(order, "sweep")
-            except RefusalError as error:
-                answer = SimulationError(f"the FMU cannot be instantiated: {error.message}")
-            except LagfmuError as error:
-                answer = SimulationError(str(error))
-        else:
-            assert session is not None
-            answer = run_batch(session, *order)
-        pickle.dump(answer, answers)
-        answers.flush()
+            sessions.append(Session(order, "sweep"))
+        except RefusalError as error:
+            raise SimulationError(f"the FMU cannot be instantiated: {error.message}") from None
+        return None
+
+    return answer
 
 
 if __name__ == "__main__":
-    own = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
-        main(sys.stdin.buffer, own)
-    os._exit(0)  # an FMU's libraries may not survive the interpreter's end
+    serve(answering())
