@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from ctypes import byref, c_double, c_int
-from functools import cache
 
 import numpy as np
 import pytest
 from fmi2 import EXCHANGE, EventInfo, Library, Single
-from sympy import Heaviside, Rational, sin, symbols
+from sympy import Rational, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from test_jumps import lifted
 
-from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu
-from lagfmu.testing import find_compiler
-
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+from lagfmu import Contact, Holonomic, Input, Model, Parameter
 
 G, RADIUS = 10.0, 0.2
 t = dynamicsymbols._t
@@ -71,34 +68,10 @@ def table() -> Model:
     )
 
 
-def lifted() -> Model:
-    """A block on a floor that a force of three times its weight begins to pull up at t = 0.5 s."""
-    T = symbols("T", positive=True)
-    pull = 3 * m * g * Heaviside(dynamicsymbols._t - T)
-    return Model(
-        name="Lifted",
-        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
-        coordinates={z: "m"},
-        forces={z: pull},
-        constraints=[Contact("floor", z)],
-        parameters=[MASS, GRAVITY, Parameter(T, 0.5, "s")],
-        start={z: 0.0},
-    )
-
-
-@pytest.fixture(scope="module")
-def of(tmp_path_factory) -> Callable[[Callable[[], Model]], Library]:
+@pytest.fixture
+def of(built, library) -> Callable[[Callable[[], Model]], Library]:
     """of(MODEL): its binary."""
-    folder = tmp_path_factory.mktemp("exchange")
-
-    @cache
-    def build(model: Callable[[], Model]) -> Library:
-        made = model()
-        scene = Scene(made.name, stop_time=10.0)
-        path = build_fmu(made, folder, scene, target="native", check=False)
-        return Library(path, folder / made.name)
-
-    return build
+    return lambda model: library(built(model()))
 
 
 def continuous(library: Library, **values: float) -> Single:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import pytest
 from instance import instance
 from runs import simulate_fmu
@@ -23,9 +21,9 @@ from sympy import (
 )
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Input, Model, Parameter, Scene, build_fmu, derive, simulate
+from lagfmu import Contact, Input, Model, Parameter, derive, simulate
 from lagfmu.errors import ModelError
-from lagfmu.testing import Form, find_compiler, jumps_of, prepare, with_jumps
+from lagfmu.testing import Form, jumps_of, prepare, with_jumps
 
 G = 9.81
 x, y, u = dynamicsymbols("x y u")
@@ -102,17 +100,10 @@ MODELS = {
 }
 
 
-@pytest.fixture(scope="module")
-def own(tmp_path_factory):
+@pytest.fixture
+def own(built):
     """own(NAME): the FMU of one of the models above."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine: native FMUs are not tested")
-    folder = tmp_path_factory.mktemp("own")
-
-    def build(name):
-        return build_fmu(MODELS[name](), folder, Scene(name), target="native", check=False)
-
-    return cache(build)
+    return lambda name: built(MODELS[name]())
 
 
 @pytest.mark.parametrize("step", [0.13, 4.0])
@@ -196,11 +187,10 @@ def test_a_gate_of_a_millimetre_is_not_flown_through(own):
 
 
 @pytest.mark.parametrize("begin", [0.0, 0.4])
-def test_a_gate_that_an_input_moves_is_not_flown_through(tmp_path, begin):
+def test_a_gate_that_an_input_moves_is_not_flown_through(own, begin):
     """x = t flies ahead of u = b t + a t^2/2 by up to (1 - b)^2/2 a at t = (1 - b)/a = 0.625 s; L is a part
     0.004 less: for 2 sqrt(0.004) 0.625 s, between two quarters of one step of 1 s, it feels 2 N."""
-    path = build_fmu(chased(), tmp_path, Scene("Chased"), target="native", check=False)
-    with instance(path) as one:
+    with instance(own("Chased")) as one:
         rise = 1 - begin
         a = rise / 0.625
         one.start({"der(x)": 1.0, "L": rise**2 / (2 * a) * 0.996}, tolerance=1e-8)
@@ -210,11 +200,10 @@ def test_a_gate_that_an_input_moves_is_not_flown_through(tmp_path, begin):
         assert one.get("der(y)") == pytest.approx(4 * 0.625 * 0.004**0.5, rel=1e-6)
 
 
-def test_what_a_departure_switches_on_is_read_with_it(tmp_path):
+def test_what_a_departure_switches_on_is_read_with_it(own):
     """20 N are set on the first block: it lifts off, which pulls the second one up with 2 m g; read at once,
     both floors carry nothing, and both blocks accelerate."""
-    path = build_fmu(hung(), tmp_path, Scene("Hung"), target="native", check=False)
-    with instance(path) as one:
+    with instance(own("Hung")) as one:
         one.start({"u": 0.0}, tolerance=1e-8)
         one.step(0.1)
         one.set("u", 20.0)
@@ -258,21 +247,26 @@ def test_model_exchange_stops_at_the_jumps(own, name, stop, velocity):
 # --------------------------------------------------------------------------- at build time
 
 
+DRY = ("force on x", "velocity der(x)", "Friction", "tanh")
+
+
 @pytest.mark.parametrize(
-    "force",
+    ("force", "lagrangian", "parts"),
     [
-        -F * sign(v),
-        Piecewise((-F, v > 0), (F, v < 0), (0, True)),
-        -F * (2 * Heaviside(v) - 1) * Heaviside(x),
-        -F * sign(v - L / T),
-        F * floor(v * T / L),
+        (-F * sign(v), 0, DRY),
+        (Piecewise((-F, v > 0), (F, v < 0), (0, True)), 0, DRY),
+        (-F * (2 * Heaviside(v) - 1) * Heaviside(x), 0, DRY),
+        (-F * sign(v - L / T), 0, DRY),
+        (F * floor(v * T / L), 0, DRY),
+        (0, -F * L * Heaviside(x), ("energy jumps", "force on x is infinite", "Contact")),
     ],
 )
-def test_a_jump_in_a_velocity_is_refused_by_name(force):
-    """Dry friction written as a force: the message names the force, the velocity and the remedy."""
+def test_a_jump_in_a_velocity_or_an_energy_is_refused_by_name(force, lagrangian, parts):
+    """Dry friction written as a force; V = F L H(x), which would give an infinite force at x = 0: the message
+    names the force, the velocity and the remedy."""
     with pytest.raises(ModelError) as caught:
-        prepare(cart("Dry", force))
-    for part in ("force on x", "velocity der(x)", "Friction", "tanh"):
+        prepare(cart("Refused", force, lagrangian))
+    for part in parts:
         assert part in str(caught.value)
 
 
@@ -313,19 +307,13 @@ def test_surfaces_of_jumps_are_found(force, surfaces):
     assert {h if h in expected else -h for h in found} == expected
 
 
-def test_an_energy_that_jumps_is_refused():
-    """V = F L H(x) would give an infinite force at x = 0: a Contact is what is meant."""
-    with pytest.raises(ModelError, match=r"energy jumps.*force on x is infinite.*Contact"):
-        prepare(cart("Cliff", 0, -F * L * Heaviside(x)))
-
-
 def test_the_equations_are_shown_as_they_were_written():
     """The page says sign(x), not what stands for it in the code."""
     [force] = prepare(cart("Signs", F * sign(x))).equations.F
     assert str(force) == "F*sign(x)"
 
 
-def test_a_pulse_shorter_than_a_step_needs_a_word(tmp_path):
+def test_a_pulse_shorter_than_a_step_needs_a_word(built):
     """A smooth pulse of w = 1e-4 s gives a cart at rest F w sqrt(pi)/m, with solver.maximum_step = w as
     docs/events.md says; one that begins and ends by jumps arrives in full by itself."""
     w = symbols("w", positive=True)
@@ -343,14 +331,13 @@ def test_a_pulse_shorter_than_a_step_needs_a_word(tmp_path):
             ],
             start={x: 0.0},
         )
-        fmu = build_fmu(model, tmp_path, target="native", check=False)
-        with instance(fmu) as one:
+        with instance(built(model)) as one:
             one.start({"solver.maximum_step": step})
             one.step(1.0)
             assert one.get("der(x)") == pytest.approx(2.0 * 1e-4 * float(expected), rel=1e-6)
 
 
-def test_a_symbol_without_assumptions_may_say_when(tmp_path):
+def test_a_symbol_without_assumptions_may_say_when(built):
     """symbols("T") says nothing of T: the force F from T on moves the mass by F (t - T)^2/(2 m)."""
     x, (m, F, T) = dynamicsymbols("x"), symbols("m F T")
     model = Model(
@@ -360,5 +347,4 @@ def test_a_symbol_without_assumptions_may_say_when(tmp_path):
         forces={x: F * Heaviside(dynamicsymbols._t - T)},
         parameters=[Parameter(m, 1.0, "kg"), Parameter(F, 2.0, "N"), Parameter(T, 0.5, "s")],
     )
-    path = build_fmu(model, tmp_path, target="native", check=False)
-    assert simulate(path, 1.0)["x"][-1] == pytest.approx(0.25, rel=1e-12)
+    assert simulate(built(model), 1.0)["x"][-1] == pytest.approx(0.25, rel=1e-12)
