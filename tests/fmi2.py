@@ -116,6 +116,12 @@ class Library:
     def __call__(self, **options: Any) -> Single:
         return Single(self, **options)
 
+    def continuous(self, **values: float) -> Single:
+        """An instance for model exchange in continuous-time mode, the events of its start over."""
+        one = self(kind=EXCHANGE).start(values, tolerance=1e-8)
+        one.goes_on()
+        return one
+
 
 class Single:
     """One instance; `log` holds (status, category, message), `blocks` what it has allocated."""
@@ -184,18 +190,25 @@ class Single:
 
     # ------------------------------------------------------------------ whole steps of a life
 
-    def start(
+    def initializing(
         self,
         values: dict[str, float] | None = None,
         tolerance: float = 1e-10,
         stop: float | None = None,
+        begin: float = 0.0,
     ) -> Single:
-        self.does("SetupExperiment", 1, c_double(tolerance), c_double(0), *self.stop(stop))
+        """Set up, `values` set, and in initialization mode."""
+        self.does("SetupExperiment", 1, c_double(tolerance), c_double(begin), *self.stop(stop))
         for name, value in (values or {}).items():
             self.set(name, value)
         self.does("EnterInitializationMode")
+        self.time = begin
+        return self
+
+    def start(self, *arguments: Any, **named: Any) -> Single:
+        """The same, and initialized."""
+        self.initializing(*arguments, **named)
         self.does("ExitInitializationMode")
-        self.time = 0.0
         return self
 
     @staticmethod
@@ -210,6 +223,23 @@ class Single:
         info = EventInfo()
         self.does("NewDiscreteStates", byref(info))
         return info
+
+    def goes_on(self) -> EventInfo:
+        """What an event brings, after which it is in continuous-time mode."""
+        info = self.events()
+        self.does("EnterContinuousTimeMode")
+        return info
+
+    def meets_event(self) -> EventInfo:
+        """The same, from continuous-time mode."""
+        self.does("EnterEventMode")
+        return self.goes_on()
+
+    def asks_for_event(self) -> bool:
+        """Whether an event is to be met at the end of an integrator's step."""
+        event, end = c_int(), c_int()
+        self.does("CompletedIntegratorStep", 1, byref(event), byref(end))
+        return bool(event.value)
 
     def references(self, names: Sequence[str]) -> Any:
         found = [self.library.variables[n].valueReference for n in names]
@@ -242,6 +272,11 @@ class Single:
         else:
             self.does("SetReal", *self.set_call(name, value))
 
+    def push(self, name: str, order: int, value: float) -> None:
+        """The derivative of an input."""
+        which = self.references([name]), c_size_t(1), byref(c_int(order))
+        self.does("SetRealInputDerivatives", *which, byref(c_double(value)))
+
     def outputs(self) -> list[float]:
         """All Real outputs."""
         names = [
@@ -270,6 +305,11 @@ class Single:
         buffer = ctypes.create_string_buffer(size.value)
         self.does("SerializeFMUstate", state, buffer, size)
         return buffer.raw
+
+    def takes_over(self, other: Single) -> None:
+        """It goes on from where the other is."""
+        self.does("SetFMUstate", self.loaded(other.bytes_of(other.saved())))
+        self.time = other.time
 
     def loaded(self, data: bytes) -> c_void_p:
         state = c_void_p()

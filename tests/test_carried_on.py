@@ -11,23 +11,15 @@ from fmi2 import CO_SIMULATION, EXCHANGE, OK, Library
 from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene, build_fmu, derive
-from lagfmu.testing import find_compiler
-
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+from lagfmu import Contact, Holonomic, Input, Model, Parameter, derive
 
 t = dynamicsymbols._t
 x, y, F = dynamicsymbols("x y F")
 m, g, k, c = symbols("m g k c", positive=True)
 
 
-def native(model: Model, folder) -> Library:
-    path = build_fmu(model, folder, Scene(model.name, stop_time=10.0), target="native", check=False)
-    return Library(path, folder / "unpacked")
-
-
-@pytest.fixture(scope="module")
-def pushed(tmp_path_factory) -> Library:
+@pytest.fixture
+def pushed(built, library) -> Library:
     """m x'' = F."""
     model = Model(
         name="Pushed",
@@ -37,11 +29,11 @@ def pushed(tmp_path_factory) -> Library:
         inputs=[Input(F, "N")],
         parameters=[Parameter(m, 2.0, "kg")],
     )
-    return native(model, tmp_path_factory.mktemp("pushed"))
+    return library(built(model))
 
 
-@pytest.fixture(scope="module")
-def ledges(tmp_path_factory) -> Library:
+@pytest.fixture
+def ledges(built, library) -> Library:
     """Two balls over ground at 0, of e = 0 and e = 1: each falls freely and lands at its own time."""
     model = Model(
         name="Ledges",
@@ -51,17 +43,7 @@ def ledges(tmp_path_factory) -> Library:
         parameters=[Parameter(m, 2.0, "kg"), Parameter(g, 10.0, "m/s^2")],
         start={x: 0.21, y: 0.2},
     )
-    return native(model, tmp_path_factory.mktemp("ledges"))
-
-
-def push(one, order: int, value: float) -> None:
-    one.does(
-        "SetRealInputDerivatives",
-        one.references(["F"]),
-        c_size_t(1),
-        byref(c_int(order)),
-        byref(c_double(value)),
-    )
+    return library(built(model))
 
 
 def run_of_a_cubic(at: float) -> tuple[float, float]:
@@ -77,16 +59,14 @@ def test_an_input_goes_on_by_both_of_its_derivatives(pushed, restored):
     since it was set belongs to the state."""
     one = pushed().start(tolerance=1e-12)
     one.set("F", 3.0)
-    push(one, 1, 4.0)
-    push(one, 2, 5.0)
+    one.push("F", 1, 4.0)
+    one.push("F", 2, 5.0)
     for step in (0.3, 0.25):
         one.step(step)
     if restored:
-        data, moment = one.bytes_of(one.saved()), one.time
-        one = pushed().start(tolerance=1e-9)
+        before, one = one, pushed().start(tolerance=1e-9)
         one.step(0.1)
-        one.does("SetFMUstate", one.loaded(data))
-        one.time = moment
+        one.takes_over(before)
     one.step(0.45)
     place, speed = run_of_a_cubic(1.0)
     assert one.get("x") == pytest.approx(place, rel=1e-11)
@@ -98,8 +78,8 @@ def test_a_force_set_anew_forgets_its_derivatives(pushed):
     """F = 3 + 4 t + 5 t^2/2, then F = 1 from t = 0.5 on: from there m x'' = 1."""
     one = pushed().start(tolerance=1e-12)
     one.set("F", 3.0)
-    push(one, 1, 4.0)
-    push(one, 2, 5.0)
+    one.push("F", 1, 4.0)
+    one.push("F", 2, 5.0)
     one.step(0.5)
     before = one.get("der(x)")
     one.set("F", 1.0)
@@ -112,7 +92,7 @@ def test_an_acceleration_grows_with_the_force(pushed):
     set anew."""
     one = pushed().start(tolerance=1e-12)
     one.set("F", 3.0)
-    push(one, 1, 4.0)
+    one.push("F", 1, 4.0)
     one.step(0.5)
     found = c_double()
     which = one.references(["der(x,2)"]), c_size_t(1), byref(c_int(1)), byref(found)
@@ -141,13 +121,9 @@ def test_tolerance_and_mode_belong_to_a_state_saved_before_the_start(library):
     it initializes, runs from 0 s at 1e-4 past a second, with the bits of the one that it was saved in."""
     pendulum = library("PendulumCartesian")
     one, other = pendulum(), pendulum()
-    one.does("SetupExperiment", 1, c_double(1e-4), c_double(0), 0, c_double(0))
-    other.does("SetupExperiment", 1, c_double(1e-12), c_double(5), 1, c_double(6))
-    for each in (one, other):
-        each.does("EnterInitializationMode")
-    other.does("ExitInitializationMode")
-    other.does("SetFMUstate", other.loaded(one.bytes_of(one.saved())))
-    other.time = 0.0
+    one.initializing(tolerance=1e-4)
+    other.start(tolerance=1e-12, begin=5.0, stop=6.0)
+    other.takes_over(one)
     for each in (one, other):
         each.does("ExitInitializationMode")
         each.step(2.0)
@@ -168,8 +144,7 @@ def test_of_several_events_in_a_step_the_earliest_is_met_first(ledges):
 def test_what_was_read_in_initialization_does_not_outlive_what_is_set(pushed, ledges, kind):
     """lambda and the energy are read, the start is moved, and they are read again: those of the new start."""
     one = ledges(kind=kind)
-    one.does("SetupExperiment", 1, c_double(1e-9), c_double(0), 0, c_double(0))
-    one.does("EnterInitializationMode")
+    one.initializing()
     assert one.get("energy.potential") == pytest.approx(2 * 10 * 0.41)
     one.set("y", 0.7)
     assert one.get("energy.potential") == pytest.approx(2 * 10 * 0.91)
@@ -204,20 +179,9 @@ def test_the_pull_of_a_rod_changes_as_its_closed_form_does(library):
 # ------------------------------------------------------------------ model exchange
 
 
-def continuous(library: Library):
-    """An instance in continuous-time mode, its events over."""
-    one = library(kind=EXCHANGE)
-    one.does("SetupExperiment", 1, c_double(1e-8), c_double(0), 0, c_double(0))
-    one.does("EnterInitializationMode")
-    one.does("ExitInitializationMode")
-    one.events()
-    one.does("EnterContinuousTimeMode")
-    return one
-
-
 def test_drift_dies_out_as_fast_as_it_can_without_ringing(library):
     """f'' = -2 alpha f' - alpha^2 f of f = x^2 + y^2 - L^2: critically damped, (f''/f')^2 = 4 (-f''/f)."""
-    one = continuous(library("PendulumCartesian"))
+    one = library("PendulumCartesian").continuous()
     px, vx, py, vy = one.array("GetContinuousStates", 4)
 
     def bend(*state: float) -> float:
@@ -236,7 +200,7 @@ def test_drift_dies_out_as_fast_as_it_can_without_ringing(library):
 def test_a_body_that_touches_has_not_passed_its_ground(ledges):
     """The indicator of an open contact is positive where f = 0 to rounding, and negative a nanometre of
     its drop below: the importer finds the landing behind the touch, never before."""
-    one = continuous(ledges)
+    one = ledges.continuous()
     for height, sign in ((0.1, 1), (0.0, 1), (-1e-6, -1)):
         one.states((height, -1.0, 0.2, 0.0))
         first, second = one.array("GetEventIndicators", 2)
@@ -246,11 +210,9 @@ def test_a_body_that_touches_has_not_passed_its_ground(ledges):
 
 def test_a_body_that_lies_below_its_ground_is_lifted(ledges):
     """An importer's step ends at rest under the ground: the event lifts it to f >= 0, where it stays."""
-    one = continuous(ledges)
+    one = ledges.continuous()
     one.states((-1e-6, 0.0, 0.2, 0.0))
-    one.does("EnterEventMode")
-    info = one.events()
-    assert info.values
+    assert one.meets_event().values
     height, speed, *_ = one.array("GetContinuousStates", 4)
     assert height == pytest.approx(0, abs=1e-12)
     assert speed == 0

@@ -7,7 +7,7 @@ from ctypes import byref, c_double, c_int
 
 import numpy as np
 import pytest
-from fmi2 import EXCHANGE, EventInfo, Library, Single
+from fmi2 import EventInfo, Library, Single
 from sympy import Rational, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_jumps import lifted
@@ -74,32 +74,17 @@ def of(built, library) -> Callable[[Callable[[], Model]], Library]:
     return lambda model: library(built(model()))
 
 
-def continuous(library: Library, **values: float) -> Single:
-    """An instance in continuous-time mode, the events of its start over."""
-    one = library(kind=EXCHANGE)
-    one.does("SetupExperiment", 1, c_double(1e-8), c_double(0), 0, c_double(0))
-    for name, value in values.items():
-        one.set(name, value)
-    one.does("EnterInitializationMode")
-    one.does("ExitInitializationMode")
-    one.events()
-    one.does("EnterContinuousTimeMode")
-    return one
-
-
 def landed(library: Library) -> Single:
     """The ball, let down onto the floor at x = 0.5 m and phi = 0.3."""
-    one = continuous(library)
+    one = library.continuous()
     one.states((0.5, 0.0, RADIUS - 1e-7, -1.0, 0.3, 0.0))
-    one.does("EnterEventMode")
-    one.events()
-    one.does("EnterContinuousTimeMode")
+    one.meets_event()
     return one
 
 
 def test_a_force_is_that_of_the_time(of):
     """m y'' = A sin(w t) - m g at each time that is set, the state left as it is."""
-    one = continuous(of(shaken))
+    one = of(shaken).continuous()
     for time in (0.3, 0.8, 0.3):
         one.does("SetTime", c_double(time))
         _, acceleration = one.array("GetDerivatives", 2)
@@ -109,7 +94,7 @@ def test_a_force_is_that_of_the_time(of):
 def test_a_motion_is_where_the_importer_has_set_it(of):
     """The table is at u whatever der(u) and der(u,2) are: an importer sets all three at each time, and none
     is carried on from an earlier one."""
-    one = continuous(of(shaken))
+    one = of(shaken).continuous()
     for time in (0.25, 1.0):
         one.does("SetTime", c_double(time))
         for name, value in {"u": 0.1, "der(u)": 0.4, "der(u,2)": -0.3}.items():
@@ -121,12 +106,10 @@ def test_a_motion_is_where_the_importer_has_set_it(of):
 
 def test_a_restored_state_has_its_contacts(of):
     """In flight y'' = -g, on the floor y'' = 0, whichever was saved first and restored last."""
-    one = continuous(of(ball))
+    one = of(ball).continuous()
     flight = one.saved()
     one.states((0.5, 0.0, RADIUS - 1e-7, -1.0, 0.3, 0.0))
-    one.does("EnterEventMode")
-    one.events()
-    one.does("EnterContinuousTimeMode")
+    one.meets_event()
     rolling = one.saved()
     for state, expected in ((rolling, 0.0), (flight, -G), (rolling, 0.0)):
         one.does("SetFMUstate", state)
@@ -137,21 +120,19 @@ def test_a_ball_that_has_landed_rolls_from_where_it_is(of):
     """x - R phi keeps the level at which it landed: nothing turns the ball back to x = R phi, and no step
     needs a projection."""
     one = landed(of(ball))
-    event, end = c_int(), c_int()
     for way in (0.0, 0.7):
         speed = 1.0
         one.states((0.5 + way, speed, RADIUS, 0.0, 0.3 + way / RADIUS, speed / RADIUS))
         found = one.array("GetDerivatives", 6)
         assert found == pytest.approx([speed, 0, 0, 0, speed / RADIUS, 0], abs=1e-9)
         assert one.get("residual.rolling") == pytest.approx(0, abs=1e-12)
-        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
-        assert not event.value
+        assert not one.asks_for_event()
 
 
 def test_looking_at_the_indicators_changes_no_derivative(of):
     """A plate on five legs, a little beside its floor as an integrator leaves it: the accelerations are the
     same bits whether or not the indicators were read."""
-    one = continuous(of(table))
+    one = of(table).continuous()
     for height in (0.0, 1e-7, -1e-7):
         one.states((height, 1e-6, 1e-7, 0.0, -2e-7, 1e-6))
         before = one.array("GetDerivatives", 6)
@@ -166,7 +147,7 @@ def test_time_has_no_unit(library):
     alphas, speeds, sizes = [], [], []
     for factor in (1.0, 1e6):
         gravity = 9.81 * factor
-        one = continuous(library("PendulumCartesian"), g=gravity)
+        one = library("PendulumCartesian").continuous(g=gravity)
         px, _, py, _ = one.array("GetContinuousStates", 4)
         nominals = one.array("GetNominalsOfContinuousStates", 4)
         sizes.append(nominals[0])
@@ -183,30 +164,25 @@ def test_time_has_no_unit(library):
 def test_a_skate_that_slips_sideways_is_set_straight(library):
     """Its place being right, a hundredth of its speed across the blade asks for an event, in which
     x' sin phi = y' cos phi is met again, and the importer is told that its states were moved."""
-    one = continuous(library("KnifeEdge"))
+    one = library("KnifeEdge").continuous()
     along, across = np.array([np.cos(0.5), np.sin(0.5)]), np.array([-np.sin(0.5), np.cos(0.5)])
-    event, end = c_int(), c_int()
     for slip in (0.0, 0.02):
         vx, vy = 2 * along + slip * across
         one.states((0.0, vx, 0.0, vy, 0.5, 0.3))
-        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
-        assert bool(event.value) == (slip > 0)
-    one.does("EnterEventMode")
-    assert one.events().values
-    one.does("EnterContinuousTimeMode")
+        assert one.asks_for_event() == (slip > 0)
+    assert one.meets_event().values
     _, vx, _, vy, _, turning = one.array("GetContinuousStates", 6)
     assert vx * np.sin(0.5) - vy * np.cos(0.5) == pytest.approx(0, abs=1e-14)
     assert np.hypot(vx, vy) == pytest.approx(2, rel=1e-3)
     assert turning == 0.3
-    one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
-    assert not event.value
+    assert not one.asks_for_event()
 
 
 @pytest.mark.parametrize("e", [0.3, 1.0])
 def test_a_bounce_returns_its_part_of_the_speed_at_the_floor(library, e):
     """An importer's step ends d below the floor with the speed s, which was sqrt(s^2 - 2 g d) at y = 0: the
     ball goes up from there with e times that."""
-    one = continuous(library("BouncingBall"), e=e)
+    one = library("BouncingBall").continuous(e=e)
     depth, speed = 1e-5, 2.0
     one.states((-depth, -speed))
     one.does("EnterEventMode")
@@ -221,13 +197,11 @@ def test_a_bounce_returns_its_part_of_the_speed_at_the_floor(library, e):
 def test_a_force_that_has_come_is_said_and_lifts_off(of):
     """At the end of an importer's step past t = 0.5 s a pull of 3 m g has come, whether or not it has looked:
     an event is asked for, in which the block leaves the floor; it goes up with 2 g."""
-    event, end = c_int(), c_int()
-    one = continuous(of(lifted))
+    one = of(lifted).continuous()
     for time in (0.4, 0.6):
         one.does("SetTime", c_double(time))
         one.states((0.0, 0.0))
-        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
-        assert event.value == (time > 0.5)
+        assert one.asks_for_event() == (time > 0.5)
     one.does("EnterEventMode")
     one.events()
     assert one.integer("departure.floor.count") == 1
@@ -238,24 +212,21 @@ def test_a_force_that_has_come_is_said_and_lifts_off(of):
 def test_what_an_importer_has_not_seen_is_said(library, of):
     """At the end of its step a ball has gone through the floor, or a surface pulls: an event is asked for,
     whether or not the importer has looked at the indicators; above, and on the surface, none is."""
-    event, end = c_int(), c_int()
-    one = continuous(of(ball))
+    one = of(ball).continuous()
     for height, speed, expected in ((0.3, -1.0, 0), (RADIUS - 1e-6, -1.0, 1)):
         one.states((0.5, 0.0, height, speed, 0.3, 0.0))
-        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
-        assert event.value == expected
-    one = continuous(library("Hemisphere"))
+        assert one.asks_for_event() == expected
+    one = library("Hemisphere").continuous()
     r, _, theta, _ = one.array("GetContinuousStates", 4)
     for rate, expected in ((0.1, 0), (50.0, 1)):
         one.states((r, 0.0, theta, rate))
-        one.does("CompletedIntegratorStep", 1, byref(event), byref(end))
-        assert event.value == expected
+        assert one.asks_for_event() == expected
 
 
 def test_an_event_that_cannot_be_met_asks_for_no_other(library):
     """After an error fmi2NewDiscreteStates wants no further call, and fmi2CompletedIntegratorStep no
     event: importers go on by what stands there."""
-    one = continuous(library("PendulumCartesian"))
+    one = library("PendulumCartesian").continuous()
     event, end = c_int(1), c_int(1)
     one.states((0.0, 1.0, 0.0, 0.0))  # both ends of the rod in one place: no direction pulls
     one.refuses("CompletedIntegratorStep", 1, byref(event), byref(end))
@@ -268,7 +239,7 @@ def test_an_event_that_cannot_be_met_asks_for_no_other(library):
 def test_what_has_drifted_off_a_table_still_lies_on_it(of):
     """A block that an integrator has carried half a millimetre above a table that nobody moved is put back at
     an event and does not leave; one whose table then drops by as much does."""
-    one = continuous(of(shaken))
+    one = of(shaken).continuous()
     one.states((-1e-7, -1.0))
     for height, drop, shut in ((0.0, 0.0, 1), (5e-4, 0.0, 1), (0.0, -5e-4, 0)):
         if height:

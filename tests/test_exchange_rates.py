@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from ctypes import c_double
 
 import numpy as np
 import pytest
 from conftest import EVERY
 from fixed_step import euler, rk4, run
-from fmi2 import EXCHANGE, Single
+from fmi2 import Single
 from numpy.typing import NDArray
 
 from lagfmu import simulate
@@ -21,12 +20,7 @@ Vector = NDArray[np.float64]
 
 def started(library) -> tuple[Single, list[str], Vector, Vector]:
     """In continuous-time mode: coordinates and velocities by name, their values and nominal values."""
-    one = library(kind=EXCHANGE)
-    one.does("SetupExperiment", 1, c_double(1e-8), c_double(0), 0, c_double(0))
-    one.does("EnterInitializationMode")
-    one.does("ExitInitializationMode")
-    one.events()
-    one.does("EnterContinuousTimeMode")
+    one = library.continuous()
     rates = [v for v in library.variables.values() if v.derivative is not None]
     names = [v.derivative.name for v in rates]
     count = len(names)

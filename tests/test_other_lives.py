@@ -3,10 +3,10 @@ not after a reset."""
 
 from __future__ import annotations
 
-from ctypes import byref, c_double, c_int, c_size_t
+from ctypes import c_double
 
 import pytest
-from fmi2 import ERROR, OK, Single
+from fmi2 import ERROR, Single
 from test_ahead import candle
 
 from lagfmu.testing import find_compiler
@@ -19,17 +19,6 @@ LIVES = {  # when the state is saved [s], and another life: its parameters and h
     "CartPendulum": (0.4, {"L": 2.0}, 0.9),
     "SlippingSphere": (0.3, {"theta": 0.6}, 1.0),
 }
-
-
-def push(one: Single, name: str, order: int, value: float) -> None:
-    which = one.references([name]), c_size_t(1), byref(c_int(order))
-    one.does("SetRealInputDerivatives", *which, byref(c_double(value)))
-
-
-def taken_over(one: Single, other: Single) -> None:
-    """The other instance goes on from where this one is."""
-    other.does("SetFMUstate", other.loaded(one.bytes_of(one.saved())))
-    other.time = one.time
 
 
 def warnings(one: Single) -> int:
@@ -47,7 +36,7 @@ def test_a_state_goes_on_alike_wherever_it_is_taken_over(library, name):
     one.outputs()
     other.step(age)
     other.outputs()
-    taken_over(one, other)
+    other.takes_over(one)
     for _ in range(10):
         assert other.outputs() == one.outputs()
         for each in (one, other):
@@ -60,7 +49,7 @@ def test_a_run_that_must_not_pass_its_stop_time_does_so_nowhere(built, library):
     one, other = burning().start(None, 1e-9, 1.0), burning().start(None, 1e-9, 100.0)
     for each in (one, other):
         each.step(0.25)
-    taken_over(one, other)
+    other.takes_over(one)
     for _ in range(3):
         for each in (one, other):
             each.step(0.25)
@@ -74,10 +63,10 @@ def test_half_an_inputs_polynomial_is_completed_where_its_state_is(library):
     for each in (one, right):
         each.step(0.2)
         each.set("F", 3.0)
-        push(each, "F", 1, 4.0)
-    taken_over(one, other)
+        each.push("F", 1, 4.0)
+    other.takes_over(one)
     for each in (one, other, right):
-        push(each, "F", 2, 5.0)
+        each.push("F", 2, 5.0)
         each.step(0.4)
     assert one.outputs() == right.outputs()
     assert other.outputs() == right.outputs()
@@ -101,7 +90,7 @@ def test_a_warning_that_was_given_belongs_to_the_state(library):
     move(one, rates=False)
     move(one, rates=False)
     assert warnings(one) == 1
-    taken_over(one, fresh)
+    fresh.takes_over(one)
     move(fresh, rates=False)
     assert warnings(fresh) == 0
     one.does("SetFMUstate", before)
@@ -112,7 +101,7 @@ def test_a_warning_that_was_given_belongs_to_the_state(library):
     right, other = (library("Crane")().start({"l": 1.0, "der(l)": 0.1}) for _ in range(2))
     move(right, rates=True)
     move(right, rates=True)
-    taken_over(right, other)
+    other.takes_over(right)
     move(other, rates=True)
     assert warnings(right) == warnings(other) == 0
 
@@ -121,7 +110,7 @@ def test_settings_that_were_set_belong_to_the_state(library):
     """solver.tolerance and solver.step read as they were where the state was saved."""
     one = library("PendulumCartesian")().start({"solver.tolerance": 1e-4, "solver.step": 0.01})
     other = library("PendulumCartesian")().start({"solver.tolerance": 1e-9})
-    taken_over(one, other)
+    other.takes_over(one)
     assert other.reals(["solver.tolerance", "solver.step"]) == [1e-4, 0.01]
 
 
@@ -156,8 +145,7 @@ def test_an_input_set_after_a_look_moves_the_start(library):
     found = []
     for look in (False, True):
         one = library("Crane")()
-        one.does("SetupExperiment", 1, c_double(1e-9), c_double(0), 0, c_double(0))
-        one.does("EnterInitializationMode")
+        one.initializing()
         if look:
             one.outputs()
         one.set("l", 1.4)
@@ -172,11 +160,10 @@ def test_an_input_goes_on_from_the_start_of_the_experiment(library):
     ends = []
     for begin in (0.0, 5.0):
         one = library("CartPendulum")()
-        one.does("SetupExperiment", 1, c_double(1e-10), c_double(begin), 0, c_double(0))
-        one.does("EnterInitializationMode")
+        one.initializing(begin=begin)
         one.set("F", 3.0)
-        push(one, "F", 1, 4.0)
+        one.push("F", 1, 4.0)
         one.does("ExitInitializationMode")
-        assert one.call("DoStep", c_double(begin), c_double(0.5), 1) == OK
+        one.step(0.5)
         ends.append(one.outputs())
     assert ends[1] == pytest.approx(ends[0], rel=1e-8, abs=1e-8)
