@@ -88,7 +88,7 @@ int bench_motion(Bench *b, const double *q, const double *v, const int *active) 
 
 int bench_project(Bench *b, double *q, double *v, const int *active) {
     State *x = &b->solver.state;
-    return mechanism_project(&b->solver.stepped, instant(b), q, v, active, x->offset, x->size);
+    return mechanism_project(&b->solver.stepped, instant(b), q, v, active, x->offset, x->span);
 }
 
 int bench_modes(Bench *b, const double *q, const double *v, int *closed, const int *touching,

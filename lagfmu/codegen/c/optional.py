@@ -29,6 +29,9 @@ NO_RUNGS = """
 
 SHARED_VALUE const Dependent *const DEPENDENT = NULL;
 """
+NO_KINEMATICS = """
+SHARED_VALUE const Kinematics *const KINEMATICS = NULL;
+"""
 BEHIND_EVENTS, BEHIND_CONTACTS = (
     ("event_search.c", "interval.c", "minimum_gap.c", "root.c"),
     ("complementarity.c",),
@@ -78,6 +81,7 @@ def optional_source(
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""
     rungs = "" if system.is_constrained else NO_RUNGS
+    rungs += "" if _moves(system) else NO_KINEMATICS
     return HEAD.format(name=scene.name, what=what, rungs=rungs) + "".join(rows) + "};\n"
 
 
@@ -114,12 +118,19 @@ def files_left_out(
         gone |= {*AT_CONTACTS.values(), *BEHIND_CONTACTS}
     if not system.is_constrained:
         gone |= {*AT_CONSTRAINTS}
+    if not _moves(system):
+        gone.add("kinematics.c")
     return frozenset(gone)
 
 
 def _may_pass(system: System) -> bool:
     """True if constraints may depend on each other for an instant; with frictions it is not looked for."""
     return len(system.rows) > 1 and not system.frictions
+
+
+def _moves(system: System) -> bool:
+    """True if coordinates move by other speeds than their own rates."""
+    return getattr(system, "kinematics", None) is not None
 
 
 def _own(found: tuple[str, ...]) -> list[tuple[str, str]]:

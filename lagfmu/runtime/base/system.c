@@ -4,13 +4,11 @@
  * every other row always acts. */
 #include "system.h"
 
-#include <stddef.h>
-
 StateName system_state_name(const System *s, int j) {
     const int i = j - s->nq;
     if (i < 0) return (StateName){"", s->coordinates[j], ""};
-    if (s->own_speed != NULL && s->own_speed[i]) return (StateName){"", s->speeds[i], ""};
-    return (StateName){"der(", s->speeds[i], ")"};
+    if (s->kinematics != NULL) return (StateName){"", s->speeds[i], ""};
+    return (StateName){"der(", s->coordinates[i], ")"};
 }
 
 void system_active(const System *s, const int *closed, int *active) {

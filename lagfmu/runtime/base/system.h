@@ -2,12 +2,16 @@
  *
  *   M(q,t) vdot = F(q,v,t,u) + G^T lambda ,  G v = nu(q,t,u) ,  G vdot = gamma(q,v,t,u) ,  f(q,t) = 0
  *
+ *   q' = v , or  q' = B(q,t) v + b(q,t)  with nv <= nq
+ *
  * nq coordinates q, nv speeds v, m constraint rows.  M and G are passed as the lists of their structurally non-zero
  * values: M's lower triangle (row >= column), G row by row, both sorted by (row, column).  That
  * layout is decided by the code printer (codegen/c/) and described by the patterns below.  SI units.
  * model.c, which is generated, defines one `const System`. */
 #ifndef LAGFMU_SYSTEM_H
 #define LAGFMU_SYSTEM_H
+
+#include <stddef.h>
 
 #include "interval.h"
 #include "linkage.h"
@@ -42,8 +46,7 @@ struct System {
     const int *at_integers;   /* (switches) 1: it switches wherever h is a whole number; 0: where h = 0 */
     int masses, entries;      /* structural non-zeros of M's lower triangle and of G */
     const char *const *coordinates; /* (nq) names */
-    const char *const *speeds;  /* (nv) names; of a coordinate where the speed is its rate */
-    const int *own_speed;       /* (nv) 1: a speed of its own, and no coordinate's rate; NULL: none is */
+    const char *const *speeds;      /* (nv) names, where kinematics say how these move the coordinates */
     const Row *rows;          /* (m) */
     const int *contact;       /* (contacts) rows that are contacts, ascending */
     const int *mass_row, *mass_column;   /* (masses) */
@@ -74,6 +77,18 @@ struct System {
 
     void (*dynamics)(double t, const double *q, const double *v, const double *u, const double *p,
                      double *M, double *F, double *G, double *nu, double *gamma);
+    /* How q moves by v: B (rates), listed by row, then column, and b (nq); and their change along a direction,
+     * NULL where nobody asks for derivatives.  0 and NULL where q' = v; then nq = nv. */
+    int rates;
+    const int *rate_row, *rate_column;
+    void (*kinematics)(double t, const double *q, const double *u, const double *p, double *B, double *b);
+    void (*kinematics_tangent)(double t, const double *q, const double *u, const double *p, double dt,
+                               const double *dq, const double *du, double *dB, double *db);
+    /* Unit quaternions: four places in q each, of e0 to e3.  Angles that equal `angle` (unwrapped_count) modulo
+     * 2 pi: their places in q.  0 and NULL without. */
+    int quaternions, unwrapped_count;
+    const int *quaternion, *unwrapped;
+    void (*unwrapped_angles)(double t, const double *q, const double *u, const double *p, double *angle);
     /* f (m), 0 for a nonholonomic row */
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
     /* h (switches): the surfaces at which forces jump; NULL where there are none */
@@ -150,6 +165,11 @@ typedef struct {
 } StateName;
 
 SHARED StateName system_state_name(const System *s, int j);
+
+/* What speed i moves by its force and mass: a coordinate, or in words of the speed. */
+static inline const char *system_moved_name(const System *s, int i) {
+    return s->kinematics == NULL ? s->coordinates[i] : s->speeds[i];
+}
 
 /* 1 where a row acts while the contacts stand as in `closed` (one entry a contact); 0 for rows that hold by
  * friction alone, which sliding.c adds where they stick. */

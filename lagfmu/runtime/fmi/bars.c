@@ -187,7 +187,16 @@ static Status observe_both(Instance *x) {
     return OK;
 }
 
-/* Below what it rounds: of a state the scale of the motion, of a force that of the forces that may cancel in
+/* What the scales of the speeds make of the rate of coordinate j. */
+static double size_of_rate(const Instance *x, int j) {
+    const System *s = x->solver.system;
+    double size = 0;
+    for (int e = 0; e < s->rates; e++)
+        if (s->rate_row[e] == j) size += fabs(x->solver.stepped.B[e]) * x->bars->scale[s->nq + s->rate_column[e]];
+    return size;
+}
+
+/* Below what it rounds: of a state or its rate the scale of the motion, of a force that of the forces that may cancel in
  * it, of a multiplier that of all that acts on a coordinate on which it does. */
 static double natural_size(const Instance *x, const Variable *of) {
     const System *own = x->solver.system, *full = own->full != NULL ? own->full : own;
@@ -195,6 +204,7 @@ static double natural_size(const Instance *x, const Variable *of) {
     const double *push = x->bars->push;
     double size = HUGE_VAL;
     if (of->state >= 0) return x->bars->scale[of->state];
+    if (of->place == AT_QDOT) return size_of_rate(x, of->index);
     if (of->place == AT_FORCE) return push[of->index];
     if (of->place == AT_SHARE) return push[full->entry_column[of->index]];
     if (of->place != AT_LAMBDA) return 0;

@@ -39,8 +39,11 @@ void exchange_set_time(Instance *x, double t) {
     s->state.now.t = s->drive.since = t;
 }
 
-/* Where an importer has y[j]: each coordinate with its speed. */
-static int place_of(const System *s, int j) { return j < s->nq ? 2 * j : 2 * (j - s->nq) + 1; }
+/* Where an importer has y[j]: each coordinate with its rate, or first all coordinates and then the speeds. */
+static int place_of(const System *s, int j) {
+    if (s->kinematics != NULL) return j;
+    return j < s->nq ? 2 * j : 2 * (j - s->nq) + 1;
+}
 
 Status exchange_get_states(Instance *x, double *states) {
     const Solver *s = &x->solver;
@@ -52,22 +55,23 @@ Status exchange_get_states(Instance *x, double *states) {
     return OK;
 }
 
-void exchange_set_states(Instance *x, const double *states) {
+Status exchange_set_states(Instance *x, const double *states) {
     Solver *s = &x->solver;
     const int nq = s->system->nq, nv = s->system->nv;
     if (EXCHANGE_LOST) s->state.now.lost = states[nq + nv];
     for (int j = 0; j < nq; j++) s->state.q[j] = states[place_of(s->system, j)];
     for (int i = 0; i < nv; i++) s->state.v[i] = states[place_of(s->system, nq + i)];
     x->observed = x->evaluated = 0;
+    return mechanism_settle(&s->stepped, segment_instant(s, s->state.now.t), s->state.q);
 }
 
-/* Kinetic energy [J] of coordinates that move through their sizes at the natural rate. */
+/* Kinetic energy [J] of what moves through its size at the natural rate. */
 static double nominal_energy(const Solver *s) {
     const System *system = s->system;
     double energy = 0;
     for (int e = 0; e < system->masses; e++) {
         const int j = system->mass_row[e];
-        const double speed = fmax(s->state.size[j] * s->state.now.rate, fabs(s->state.v[j]));
+        const double speed = fmax(s->state.span[j] * s->state.now.rate, fabs(s->state.v[j]));
         if (system->mass_column[e] == j) energy += s->stepped.M[e] * speed * speed / 2;
     }
     return energy;
@@ -107,7 +111,7 @@ Status exchange_multipliers(Instance *x) {
     segment_begin(s);
     x->evaluated = 0;
     return mechanism_motion_near(&s->stepped, segment_instant(s, s->state.now.t), s->state.q, s->state.v,
-                                 s->active, s->state.offset, s->state.size);
+                                 s->active, s->state.offset, s->state.span);
 }
 
 /* What frictions dissipate [W], of the latest motion. */
@@ -141,8 +145,10 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
     const System *system = s->system;
+    double *rate = s->work_advance;
     if (exchange_evaluate(x) != OK) return FAILED;
-    for (int j = 0; j < system->nq; j++) derivatives[place_of(system, j)] = s->state.v[j];
+    mechanism_rates(b, s->state.v, rate);
+    for (int j = 0; j < system->nq; j++) derivatives[place_of(system, j)] = rate[j];
     for (int i = 0; i < system->nv; i++) derivatives[place_of(system, system->nq + i)] = b->vdot[i];
     if (EXCHANGE_LOST) derivatives[system_states(system)] = friction_power(b);
     return stabilize(x, derivatives);

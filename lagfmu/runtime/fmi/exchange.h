@@ -14,7 +14,8 @@ SHARED void exchange_begin(Instance *x);
 
 SHARED void exchange_set_time(Instance *x, double t);
 SHARED Status exchange_get_states(Instance *x, double *states);
-SHARED void exchange_set_states(Instance *x, const double *states);
+/* Quaternions in them are normalized.  FAILED: one of them is no rotation. */
+SHARED Status exchange_set_states(Instance *x, const double *states);
 SHARED Status exchange_derivatives(Instance *x, double *derivatives);
 SHARED Status exchange_indicators(Instance *x, double *indicators);
 SHARED Status exchange_nominals(Instance *x, double *nominals);

@@ -28,7 +28,7 @@ static Status choose_rows(Instance *x) {
     segment_begin(s);
     x->evaluated = 0;
     if (mechanism_motion_near(&s->stepped, segment_instant(s, s->state.now.t), s->state.q, s->state.v,
-                              s->active, s->state.offset, s->state.size) != OK)
+                              s->active, s->state.offset, s->state.span) != OK)
         return FAILED;
     segment_choose_rows(s);
     return OK;
@@ -49,8 +49,8 @@ static Status drift(Instance *x, double *worst) {
         if (!active[k]) continue;
         for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++) {
             const int j = system->entry_column[e];
-            size += fabs(b->G[e]) * s->state.size[j];
-            speed += fabs(b->G[e]) * fmax(fabs(s->state.v[j]), s->state.size[j] * s->state.now.rate);
+            size += fabs(b->G[e]) * s->state.span[j];
+            speed += fabs(b->G[e]) * fmax(fabs(s->state.v[j]), s->state.span[j] * s->state.now.rate);
         }
         if (system->rows[k].kind != NONHOLONOMIC && size > 0)
             *worst = fmax(*worst, fabs(b->f[k] - s->state.offset[k]) / size);

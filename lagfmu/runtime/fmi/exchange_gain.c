@@ -28,14 +28,15 @@ static const double PART = 0x1p-20; /* of the coordinates' sizes: how far they a
 /* The state that is displaced: sizes and direction (states), in which direction[j] = 1 is one size. */
 typedef struct {
     Solver *s;
-    double *size, *direction, *vdot; /* vdot (nv): where nothing is displaced */
+    double *size, *direction, *rate; /* rate (states): where nothing is displaced */
 } Tried;
 
-static Status move(Solver *s, double *vdot) {
+static Status move(Solver *s, double *rate) {
     s->stepped.stage = 1;
     const Status status = segment_motion(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v);
     s->stepped.stage = 0;
-    memcpy(vdot, s->stepped.vdot, (size_t)s->system->nv * sizeof *vdot);
+    mechanism_rates(&s->stepped, s->state.v, rate);
+    memcpy(rate + s->system->nq, s->stepped.vdot, (size_t)s->system->nv * sizeof *rate);
     return status;
 }
 
@@ -43,15 +44,17 @@ static Status move(Solver *s, double *vdot) {
 static Status multiply(const Tried *x, double *length) {
     Solver *s = x->s;
     const int nq = s->system->nq, nv = s->system->nv;
-    double *y = s->work_advance, *vdot = y + nq + nv;
+    double *y = s->work_advance, *rate = y + nq + nv;
     state_gather(s->system, s->state.q, s->state.v, y);
     for (int j = 0; j < nq; j++) s->state.q[j] += PART * x->size[j] * x->direction[j];
     for (int i = 0; i < nv; i++) s->state.v[i] += PART * x->size[nq + i] * x->direction[nq + i];
-    const Status status = move(s, vdot);
+    const Status status = move(s, rate);
     state_scatter(s->system, y, s->state.q, s->state.v);
     if (status != OK) return FAILED;
-    for (int j = 0; j < nq; j++) x->direction[j] = x->size[nq + j] / x->size[j] * x->direction[nq + j];
-    for (int i = 0; i < nv; i++) x->direction[nq + i] = (vdot[i] - x->vdot[i]) / (PART * x->size[nq + i]);
+    for (int j = 0; j < nq && s->system->kinematics == NULL; j++)
+        x->direction[j] = x->size[nq + j] / x->size[j] * x->direction[nq + j];
+    for (int j = s->system->kinematics == NULL ? nq : 0; j < nq + nv; j++)
+        x->direction[j] = (rate[j] - x->rate[j]) / (PART * x->size[j]);
     *length = largest(nq + nv, x->direction);
     for (int j = 0; j < nq + nv && *length > 0; j++) x->direction[j] /= *length;
     return OK;
@@ -69,33 +72,35 @@ static double own_rate(const Tried *x) {
     return exp(logarithm / (ROUNDS - GAIN_SETTLED));
 }
 
-/* The largest rate that an acceleration gives to a coordinate whose size a parameter tells; an angle's is 1 rad. */
+/* The largest rate that an acceleration gives to what has a size that a parameter tells; an angle's is 1 rad. */
 static double sized_rate(Solver *s, const double *vdot) {
     const System *system = s->system;
     double *least = s->work_initial, rate = 0;
     nominals_extents(system, s->p, least);
-    for (int j = 0; j < system->nv; j++) {
-        const double size = system->dimension[j] == system->angles ? 1 : least[j];
-        if (size > 0) rate = fmax(rate, sqrt(fabs(vdot[j]) / size));
+    for (int i = 0; i < system->nv; i++) {
+        const double own = mechanism_reach(&s->stepped, least, i);
+        const double size = system->speed_dimension[i] == system->angles ? 1 : own;
+        if (size > 0) rate = fmax(rate, sqrt(fabs(vdot[i]) / size));
     }
     return rate;
 }
 
-/* The largest rate at which a row turns as the motion goes on, coordinates being measured by their sizes. */
-static double turning_rate(Solver *s, const double *size) {
+/* The largest rate at which a row turns as the motion goes on, what moves being measured by its span (nv). */
+static double turning_rate(Solver *s, const double *span) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
     double *G = s->sensitivity.dG, *q = s->work_advance, rate = 0;
     const double ahead = PART / s->state.now.rate;
     const Instant at = segment_instant(s, s->state.now.t);
     memcpy(G, b->G, (size_t)system->entries * sizeof *G);
-    for (int j = 0; j < system->nq; j++) q[j] = s->state.q[j] + ahead * s->state.v[j];
+    mechanism_rates(b, s->state.v, q);
+    for (int j = 0; j < system->nq; j++) q[j] = s->state.q[j] + ahead * q[j];
     if (mechanism_evaluate(b, at, q, s->state.v) != OK) return 0;
     for (int k = 0; k < system->m; k++) {
         double turned = 0;
         for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++)
-            turned += fabs(b->G[e] - G[e]) * size[system->entry_column[e]];
-        const double whole = mechanism_row_size(b, k, size);
+            turned += fabs(b->G[e] - G[e]) * span[system->entry_column[e]];
+        const double whole = mechanism_row_size(b, k, span);
         if (whole > 0) rate = fmax(rate, turned / (ahead * whole));
     }
     return rate;
@@ -111,10 +116,14 @@ Status exchange_find_gain(Instance *x) {
     if (s->system->m == 0) return OK;
     segment_begin(s);
     x->evaluated = 0;
-    if (move(s, tried.vdot) != OK) return FAILED;
+    if (move(s, tried.rate) != OK) return FAILED;
     for (int j = 0; j < nq; j++) size[j] = s->state.size[j] > 0 ? s->state.size[j] : 1;
-    for (int i = 0; i < nv; i++) size[nq + i] = size[i] * natural;
-    const double turning = turning_rate(s, size); /* of the G that was evaluated last */
-    x->gain = GAIN * fmin(natural, fmax(turning, fmax(own_rate(&tried), sized_rate(s, tried.vdot))));
+    for (int i = 0; i < nv; i++) {
+        const double span = s->state.span[i] > 0 ? s->state.span[i] : 1;
+        size[nq + i] = span * natural;
+        tried.direction[i] = span;
+    }
+    const double turning = turning_rate(s, tried.direction); /* of the G that was evaluated last */
+    x->gain = GAIN * fmin(natural, fmax(turning, fmax(own_rate(&tried), sized_rate(s, tried.rate + nq))));
     return OK;
 }

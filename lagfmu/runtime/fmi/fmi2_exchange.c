@@ -86,8 +86,7 @@ fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real x[], 
             component_message(c, fmi2Discard, LOG_DISCARDS, text.text);
             return fmi2Discard;
         }
-    exchange_set_states(&c->instance, x);
-    return fmi2OK;
+    return exchange_set_states(&c->instance, x) == OK ? fmi2OK : component_failed(c, fmi2Discard);
 }
 
 /* Reads an array of Model Exchange. */

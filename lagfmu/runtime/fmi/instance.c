@@ -201,6 +201,7 @@ Status instance_value(Solver *s, const Observed *o, const Variable *v, double *v
         case AT_Q: *value = o->q[v->index]; break;
         case AT_V: *value = o->v[v->index]; break;
         case AT_VDOT: *value = o->vdot[v->index]; break;
+        case AT_QDOT: *value = o->rate[v->index]; break;
         case AT_SDDOT: *value = o->sddot[v->index]; break;
         case AT_LAMBDA: *value = o->lambda[v->index]; break;
         case AT_UNIQUE: *value = o->unique[v->index]; break;
@@ -600,7 +601,7 @@ Status instance_differentiate(Instance *x, Direction d) {
     const Instant at = segment_instant(s, s->state.now.t);
     segment_begin(s);
     if (mechanism_motion_near(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                              s->state.size) != OK)
+                              s->state.span) != OK)
         return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
         return FAILED;
@@ -641,6 +642,7 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_Q: *change = dq[v->index]; break;
         case AT_V: *change = dv[v->index]; break;
         case AT_VDOT: *change = w->dvdot[v->index]; break;
+        case AT_QDOT: *change = w->drate[v->index]; break;
         case AT_S: *change = d.dq[v->index]; break;
         case AT_SDOT: *change = d.dv[v->index]; break;
         case AT_SDDOT: *change = s->sensitivity.dvdot[v->index]; break;
@@ -672,7 +674,7 @@ Status instance_rates(Instance *x, Direction *d) {
     Sensitivity *w = &s->sensitivity;
     if (instance_observe(x) != OK) return FAILED;
     const double *vdot = system->full == NULL ? x->seen.vdot : x->seen.sddot;
-    memcpy(w->dq, s->state.v, (size_t)system->nq * sizeof *w->dq);
+    memcpy(w->dq, system->kinematics == NULL ? s->state.v : x->seen.rate, (size_t)system->nq * sizeof *w->dq);
     memcpy(w->dv, vdot, (size_t)system->nv * sizeof *w->dv);
     for (int k = 0; k < system->inputs; k++) {
         const int order = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);

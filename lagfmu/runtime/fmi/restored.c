@@ -89,6 +89,7 @@ static const Saved OF_SOLVER[] = {
     SOLVER("offsets", state.offset, FINITE, ROWS),
     SOLVER("scales", state.scale, SIZE, STATES),
     SOLVER("sizes", state.size, SIZE, COORDINATES),
+    SOLVER("sizes", state.span, SIZE, SPEEDS),
     SOLVER("gaps", state.gap, SIZE, CONTACTS),
     SOLVER("rank of the constraints", state.basis, FLAG, ROWS),
     SOLVER("modes", state.closed, FLAG, CONTACTS),

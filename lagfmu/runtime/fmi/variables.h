@@ -16,7 +16,8 @@ typedef enum {
     AT_PARAMETER,      /* p[index] */
     AT_METHOD, AT_TOLERANCE, AT_STEP, AT_MAXIMUM_STEP, AT_MAXIMUM_STEPS,
     AT_INPUT,          /* u[index] */
-    AT_Q, AT_V, AT_VDOT,       /* full coordinates */
+    AT_Q, AT_V, AT_VDOT,       /* full coordinates, speeds */
+    AT_QDOT,                   /* the rate of a full coordinate that is none of the speeds */
     AT_S, AT_SDOT, AT_SDDOT,   /* stepped coordinates of an embedding that are not full ones */
     AT_LAMBDA, AT_UNIQUE, AT_RESIDUAL, /* row index */
     AT_FORCE,          /* Q[index] */

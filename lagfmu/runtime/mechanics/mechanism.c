@@ -23,6 +23,7 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
     b->dq = arena_doubles(arena, s->nv);
     b->trial = arena_doubles(arena, s->nq);
     b->fixed = arena_ints(arena, s->m);
+    if (s->kinematics != NULL) KINEMATICS->layout(b, arena);
     linear_layout(&b->linear, arena, s, why);
     b->sliding = s->frictions > 0 ? sliding : NULL;
     if (b->sliding != NULL) b->sliding->layout(b, arena);
@@ -46,6 +47,8 @@ static Status not_evaluated(Mechanism *b, Instant at, const char *what) {
 
 static Status check_values(Mechanism *b, Instant at) {
     const System *s = b->system;
+    if (s->kinematics != NULL && !(holds_no_nan(s->rates, b->B) & holds_no_nan(s->nq, b->drift)))
+        return not_evaluated(b, at, "a rate of a coordinate is");
     if (zero(s->masses, b->M) + zero(s->nv, b->F) + zero(s->entries, b->G) + zero(s->m, b->nu) +
             zero(s->m, b->gamma) ==
         0)
@@ -57,6 +60,7 @@ static Status check_values(Mechanism *b, Instant at) {
 
 static void evaluate_functions(Mechanism *b, Instant at, const double *q, const double *v) {
     b->system->dynamics(at.t, q, v, at.u, at.p, b->M, b->F, b->G, b->nu, b->gamma);
+    mechanism_kinematics(b, at, q);
 }
 
 Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v) {
@@ -104,7 +108,7 @@ void mechanism_at_work(const Mechanism *b, double *forces, double *reach) {
 
 /* The largest |f - offset| of the rows, relative to the terms of G size. */
 static Status find_off(Mechanism *b, Instant at, const double *q, const int *active,
-                       const double *offset, const double *size, double *off) {
+                       const double *offset, const double *span, double *off) {
     const System *s = b->system;
     *off = 0;
     if (mechanism_residual(b, at, q, b->f) != OK) return FAILED;
@@ -112,8 +116,8 @@ static Status find_off(Mechanism *b, Instant at, const double *q, const int *act
         if (!active[k] || s->rows[k].kind == NONHOLONOMIC) continue;
         double reach = 0;
         for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
-            const int j = s->entry_column[e];
-            reach += fabs(b->G[e]) * fmax(fabs(q[j]), size[j]);
+            const int i = s->entry_column[e];
+            reach += fabs(b->G[e]) * fmax(mechanism_reach(b, q, i), span[i]);
         }
         if (reach > 0) *off = fmax(*off, fabs(b->f[k] - offset[k]) / reach);
     }
@@ -121,11 +125,11 @@ static Status find_off(Mechanism *b, Instant at, const double *q, const int *act
 }
 
 Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
-                             const int *active, const double *offset, const double *size) {
+                             const int *active, const double *offset, const double *span) {
     double off;
     if (!b->dependent) return mechanism_motion(b, at, q, v, active);
     if (mechanism_evaluate(b, at, q, v) != OK) return FAILED;
-    if (find_off(b, at, q, active, offset, size, &off) != OK) return FAILED;
+    if (find_off(b, at, q, active, offset, span, &off) != OK) return FAILED;
     b->linear.off = off;
     const Status status = mechanism_motion(b, at, q, v, active);
     b->linear.off = 0;

@@ -5,12 +5,14 @@
 #define LAGFMU_MECHANISM_H
 
 #include "arena.h"
+#include "kinematics.h"
 #include "linear.h"
 #include "linkage.h"
 #include "status.h"
 #include "system.h"
 
 #include <math.h>
+#include <string.h>
 
 struct FrictionForces;
 typedef struct Mechanism Mechanism;
@@ -35,6 +37,9 @@ struct Mechanism {
     const System *system;
     Linear linear;
     double *M, *F, *G, *nu, *gamma; /* values at the state that was evaluated last */
+    double *B, *drift;              /* of q' = B v + b, the same; with them, for kinematics.c: */
+    int *column_start, *column_rate; /* (nv + 1), (rates) */
+    double *angle;                  /* (unwrapped_count) scratch */
     double *vdot, *lambda;          /* of the latest motion(): (nv), (m) */
     double *f;                      /* (m) scratch for residuals */
     double *dq, *trial;             /* (nv), (nq) scratch of project(): what moves, q where it is tried */
@@ -73,7 +78,43 @@ static inline double mechanism_row_size(const Mechanism *b, int k, const double 
     return sum;
 }
 
-/* M, F, G, nu, gamma at a state.  FAILED if one is not finite. */
+/* B and b at q; what the four below take. */
+static inline void mechanism_kinematics(Mechanism *b, Instant at, const double *q) {
+    if (b->system->kinematics != NULL) KINEMATICS->evaluate(b, at.t, q, at.u, at.p);
+}
+
+/* q' (nq) = B v + b. */
+static inline void mechanism_rates(const Mechanism *b, const double *v, double *rate) {
+    if (b->system->kinematics != NULL)
+        KINEMATICS->rates(b, v, rate);
+    else
+        memcpy(rate, v, (size_t)b->system->nq * sizeof *rate);
+}
+
+/* q (nq) <- q + part B w. */
+static inline void mechanism_move(const Mechanism *b, double part, const double *w, double *q) {
+    if (b->system->kinematics != NULL)
+        KINEMATICS->move(b, part, w, q);
+    else
+        for (int j = 0; j < b->system->nq; j++) q[j] += part * w[j];
+}
+
+/* The displacement along speed i that moves coordinates by x (nq) of theirs. */
+static inline double mechanism_reach(const Mechanism *b, const double *x, int i) {
+    return b->system->kinematics != NULL ? KINEMATICS->reach(b, x, i, 1) : fabs(x[i]);
+}
+
+/* The same without turns that angles have made. */
+static inline double mechanism_place(const Mechanism *b, const double *x, int i) {
+    return b->system->kinematics != NULL ? KINEMATICS->reach(b, x, i, 0) : fabs(x[i]);
+}
+
+/* Unit quaternions of norm 1, angles on what they equal modulo 2 pi.  FAILED: a quaternion is no rotation. */
+static inline Status mechanism_settle(const Mechanism *b, Instant at, double *q) {
+    return b->system->kinematics != NULL ? KINEMATICS->settle(b, at.t, q, at.u, at.p) : OK;
+}
+
+/* M, F, G, nu, gamma, B, b at a state.  FAILED if one is not finite. */
 SHARED Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v);
 
 /* f (m).  FAILED if one is not finite. */
@@ -84,9 +125,9 @@ SHARED Status mechanism_motion(Mechanism *b, Instant at, const double *q, const 
                                const int *active);
 
 /* The same for a state off the constraints: what depends on each other on them does so here, and is not
- * asked to agree.  `offset` (m), `size` (nq) as below. */
+ * asked to agree.  `offset` (m), `span` (nv) as below. */
 SHARED Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const double *v,
-                                    const int *active, const double *offset, const double *size);
+                                    const int *active, const double *offset, const double *span);
 
 /* Of the latest motion, for each speed all forces at work (nv), those of constraint included, and its
  * acceleration, or the one that these could give it if they did not balance: what |vdot| is the rounding of. */
@@ -94,9 +135,9 @@ SHARED void mechanism_at_work(const Mechanism *b, double *forces, double *reach)
 
 /* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
  * v are moved in place.  For states that are nearly consistent; initialization.c deals with the others.
- * `size` (nq) are the coordinates' magnitudes, which say what rounding is.  On failure q and v are
+ * `span` (nv) are the magnitudes of what each speed moves, which say what rounding is.  On failure q and v are
  * untouched. */
 SHARED Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,
-                                const double *offset, const double *size);
+                                const double *offset, const double *span);
 
 #endif

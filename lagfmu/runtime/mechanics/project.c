@@ -1,7 +1,7 @@
 /* project.c -- the nearest state on the constraints, in the metric of M.  Positions by Newton's
  * method,
  *
- *   M dq = G^T mu ,  G dq = offset - f      until f - offset is rounding,
+ *   M w = G^T mu ,  G w = offset - f ,  q <- q + B w      until f - offset is rounding,
  *
  * then velocities, which are linear, with G and nu of the projected positions:
  *
@@ -35,7 +35,7 @@ typedef struct {
 
 /* b->f <- offset - f on the fixed rows, and how large that is. */
 static Status measure(Mechanism *b, Instant at, const double *q, const double *offset,
-                      const double *size, Miss *miss) {
+                      const double *span, Miss *miss) {
     const System *s = b->system;
     *miss = (Miss){0, 0, 1};
     if (mechanism_residual(b, at, q, b->f) == FAILED) return FAILED;
@@ -43,10 +43,10 @@ static Status measure(Mechanism *b, Instant at, const double *q, const double *o
         if (!b->fixed[k]) continue;
         double steepness = 0, reach = 0;
         for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
-            int j = s->entry_column[e];
-            double g = fabs(b->G[e]), x = fabs(q[j]);
-            steepness += g * x;
-            reach += g * (x > size[j] ? x : size[j]);
+            int i = s->entry_column[e];
+            double g = fabs(b->G[e]), x = mechanism_reach(b, q, i);
+            steepness += g * mechanism_place(b, q, i);
+            reach += g * (x > span[i] ? x : span[i]);
         }
         b->f[k] = offset[k] - b->f[k];
         double off = fabs(b->f[k]);
@@ -75,11 +75,11 @@ static Status no_arrival(Mechanism *b, Instant at, const Miss *miss, double befo
 
 /* f = offset on the fixed rows: q is moved, `moved` says whether.  M and G are those of q. */
 static Status project_positions(Mechanism *b, Instant at, double *q, const double *v,
-                                const double *offset, const double *size, int *moved) {
+                                const double *offset, const double *span, int *moved) {
     double before = HUGE_VAL;
     for (int count = 0;; count++) {
         Miss miss;
-        if (measure(b, at, q, offset, size, &miss) == FAILED) return FAILED;
+        if (measure(b, at, q, offset, span, &miss) == FAILED) return FAILED;
         *moved = count > 0;
         if (miss.rounding || miss.error < DBL_EPSILON * DBL_EPSILON) return OK;
         if (miss.error > before / 2 && miss.error < PROJECTION_SMALL) return OK; /* rounding in f is left */
@@ -92,7 +92,8 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
             linear_factor(&b->linear, b->M, b->G, b->fixed) == FAILED)
             return FAILED;
         if (linear_nearest(&b->linear, b->f, b->dq) == FAILED) return FAILED;
-        for (int j = 0; j < b->system->nv; j++) q[j] += b->dq[j];
+        mechanism_move(b, 1, b->dq, q);
+        if (mechanism_settle(b, at, q) == FAILED) return FAILED;
         before = miss.error;
     }
 }
@@ -114,7 +115,7 @@ static Status project_velocities(Mechanism *b, double *v, const int *active) {
 }
 
 Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,
-                         const double *offset, const double *size) {
+                         const double *offset, const double *span) {
     const System *s = b->system;
     int acting = 0, fixed = 0, moved = 0;
     if (b->sliding != NULL) active = b->sliding->acting(b, active);
@@ -123,11 +124,15 @@ Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const i
         acting |= active[k];
         fixed |= b->fixed[k];
     }
-    if (!acting) return OK;
-    if (mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
     memcpy(b->trial, q, (size_t)s->nq * sizeof *q);
+    if (mechanism_settle(b, at, b->trial) == FAILED) return FAILED;
+    if (!acting) {
+        memcpy(q, b->trial, (size_t)s->nq * sizeof *q);
+        return OK;
+    }
+    if (mechanism_evaluate(b, at, b->trial, v) == FAILED) return FAILED;
     const Status status =
-        fixed ? project_positions(b, at, b->trial, v, offset, size, &moved) : OK;
+        fixed ? project_positions(b, at, b->trial, v, offset, span, &moved) : OK;
     b->linear.off = 0;
     if (status != OK) return FAILED;
     if (moved && mechanism_evaluate(b, at, b->trial, v) == FAILED) return FAILED;

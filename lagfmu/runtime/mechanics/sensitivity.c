@@ -1,11 +1,11 @@
 /* sensitivity.c -- the equations of motion, differentiated along a direction.
  *
- *   M vdot = F + G^T lambda ,  G vdot = gamma
+ *   M vdot = F + G^T lambda ,  G vdot = gamma ,  q' = B v + b
  *
  * gives, with the changes dM, dF, dG, dgamma of the coefficients (system->tangent, symbolic),
  *
  *   M dvdot = b + G^T dlambda ,  G dvdot = c ,
- *   b = dF + dG^T lambda - dM vdot ,  c = dgamma - dG vdot
+ *   b = dF + dG^T lambda - dM vdot ,  c = dgamma - dG vdot ,  dq' = B dv + dB v + db
  *
  * a further solve with the factors that gave vdot and lambda (implicit function theorem; Hairer &
  * Wanner II, sect. VII.1, for index-1 equations). */
@@ -21,6 +21,8 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dnu = arena_doubles(arena, s->m);
     w->dgamma = arena_doubles(arena, s->m);
     w->df = arena_doubles(arena, s->m);
+    w->dB = arena_doubles(arena, s->rates);
+    w->drate = arena_doubles(arena, s->nq);
     w->dvdot = arena_doubles(arena, s->nv);
     w->dlambda = arena_doubles(arena, s->m);
     w->b = arena_doubles(arena, s->nv);
@@ -54,11 +56,15 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
     const System *s = b->system;
     s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dM, w->dF, w->dG, w->dnu,
                w->dgamma, w->df, w->denergy);
+    if (s->kinematics != NULL)
+        KINEMATICS->change(b, at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dB, w->drate);
+    else
+        memcpy(w->drate, d.dv, (size_t)s->nq * sizeof *w->drate);
     right_sides(w, b);
     for (int j = 0; j < s->nv; j++)
         if (!isfinite(w->b[j]))
             return fail(b->why, "the derivative of the force on %s is not finite at t = %.17g s",
-                        s->speeds[j], at.t);
+                        system_moved_name(s, j), at.t);
     for (int k = 0; k < s->m; k++)
         if (!isfinite(w->c[k]))
             return fail(b->why, "the derivative of constraint %s is not finite at t = %.17g s",
@@ -102,19 +108,18 @@ Status sensitivity_jacobian(Sensitivity *w, Mechanism *b, Instant at, const int 
     memset(w->dq, 0, (size_t)nq * sizeof *w->dq);
     memset(w->dv, 0, (size_t)nv * sizeof *w->dv);
     memset(w->du, 0, (size_t)b->system->inputs * sizeof *w->du);
-    memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
-    memset(dfdt, 0, (size_t)nq * sizeof *dfdt);
     for (int j = 0; j < ny; j++) {
         double *seed = j < nq ? &w->dq[j] : &w->dv[j - nq];
         *seed = 1;
         const Status status = sensitivity_along(w, b, at, q, v, d);
         *seed = 0;
         if (status != OK) return FAILED;
-        if (j >= nq) J[(j - nq) * ny + j] = 1;
+        for (int i = 0; i < nq; i++) J[i * ny + j] = w->drate[i];
         for (int i = 0; i < nv; i++) J[(nq + i) * ny + j] = w->dvdot[i];
     }
     d.dt = 1;
     if (sensitivity_along(w, b, at, q, v, d) != OK) return FAILED;
+    memcpy(dfdt, w->drate, (size_t)nq * sizeof *dfdt);
     memcpy(dfdt + nq, w->dvdot, (size_t)nv * sizeof *dfdt);
     return OK;
 }

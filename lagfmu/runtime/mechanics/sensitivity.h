@@ -16,6 +16,7 @@ typedef struct {
 typedef struct {
     double *dM, *dF, *dG, *dnu, *dgamma, *df, denergy[2];
     double *dvdot, *dlambda; /* (nv), (m) */
+    double *dB, *drate;      /* (rates), (nq) of q' = B v + b */
     double *b, *c;           /* (nv), (m) right sides */
     double *dq, *dv, *du;    /* (nq), (nv), (inputs): a direction, for whoever asks */
     double *dforce;          /* (nv) change of Q, where there are outputs of the model's own */

@@ -11,6 +11,14 @@
 
 static const double LITTLE_EASE = 0x1p-5; /* ... and where there is no solution for extreme masses */
 
+void priority_moves(const System *s, const Priority *coordinates, Priority *moves) {
+    for (int i = 0; i < s->nv; i++) moves[i] = s->kinematics != NULL ? OMITTED : coordinates[i];
+    for (int e = 0; e < s->rates; e++) {
+        Priority *highest = &moves[s->rate_column[e]];
+        if (coordinates[s->rate_row[e]] > *highest) *highest = coordinates[s->rate_row[e]];
+    }
+}
+
 int priority_stage(const System *s, const Priority *priority, int stage) {
     for (; stage < PRIORITIES; stage++)
         for (int j = 0; j < s->nv; j++)

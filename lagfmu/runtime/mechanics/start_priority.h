@@ -11,6 +11,10 @@
 typedef enum { OMITTED, GIVEN, SET } Priority;
 enum { PRIORITIES = 3 };
 
+/* moves (nv): the highest priority of the coordinates that a speed moves; for positions, which move along
+ * speeds. */
+SHARED void priority_moves(const System *s, const Priority *coordinates, Priority *moves);
+
 /* The first priority from `stage` on that a coordinate has, of `priority` (nv); PRIORITIES if there is none. */
 SHARED int priority_stage(const System *s, const Priority *priority, int stage);
 

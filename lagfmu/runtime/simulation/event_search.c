@@ -26,7 +26,7 @@ static Status top_of_rebound(Solver *s, double t, const double *y, const double 
         departed |= !s->state.closed[c] && values[c] <= s->state.gap[c];
     if (!departed) return OK;
     if (mechanism_motion_near(b, segment_instant(s, t), y, y + system->nq, s->active, s->state.offset,
-                              s->state.size) != OK)
+                              s->state.span) != OK)
         return FAILED;
     for (int c = 0; c < system->contacts; c++) {
         const int k = system->contact[c];

@@ -15,7 +15,7 @@ static Status carry(Solver *s) {
         return FAILED;
     const Instant at = segment_instant(s, s->state.now.t);
     return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                             s->state.size);
+                             s->state.span);
 }
 
 static Status follow_contacts(Solver *s) {

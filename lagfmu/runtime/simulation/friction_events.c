@@ -20,7 +20,7 @@ static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     for (int e = 0; e < system->masses; e++) {
         const int j = system->mass_row[e];
         if (system->mass_column[e] == j && b->M[e] > 0)
-            speed[j] = fmax(speed[j], sqrt(s->state.size[j]) * sqrt(fabs(b->F[j]) / b->M[e]));
+            speed[j] = fmax(speed[j], sqrt(s->state.span[j]) * sqrt(fabs(b->F[j]) / b->M[e]));
     }
     for (int i = 0; i < system->frictions; i++)
         s->state.stick_slip[i] = (StickSlip){0, 1, {1, 0}, 0};

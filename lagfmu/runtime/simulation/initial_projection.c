@@ -1,6 +1,6 @@
 /* initial_projection.c -- start values onto the constraints, from however far, by start priority.
  *
- *   M dq = G^T mu ,  G dq = -f     damped Newton's method (Deuflhard, Newton Methods for
+ *   M w = G^T mu ,  G w = -f ,  q <- q + B w     damped Newton's method (Deuflhard, Newton Methods for
  *                                  Nonlinear Problems, sect. 3.1), the step halved until |f| falls
  *   M dv = G^T mu ,  G dv = nu - G v
  *
@@ -25,9 +25,9 @@ Status initial_refused(Solver *s) {
 static void find_allowed(const Start *x, const double *q, const double *least, double factor,
                          double *reach, double *allowed) {
     const System *s = x->s->system;
-    for (int j = 0; j < s->nv; j++) reach[j] = fmax(fabs(q[j]), least[j]);
-    for (int k = 0; k < s->m; k++)
-        allowed[k] = factor * DBL_EPSILON * mechanism_row_size(&x->s->stepped, k, reach);
+    const Mechanism *b = &x->s->stepped;
+    for (int i = 0; i < s->nv; i++) reach[i] = fmax(mechanism_reach(b, q, i), mechanism_reach(b, least, i));
+    for (int k = 0; k < s->m; k++) allowed[k] = factor * DBL_EPSILON * mechanism_row_size(b, k, reach);
 }
 
 static int arrived(const System *s, const int *rows, const double *f, const double *allowed) {
@@ -87,7 +87,7 @@ static Status newton_at_start(const Start *x, int stage, double *q, const int *r
     double *trial = x->s->work_initial, *least = trial + s->nq, *f = least + s->nq;
     double *f_trial = f + s->m, *allowed = f_trial + s->m;
     int *own = x->s->iwork_initial + s->m;
-    const int all = priority_rows(s, x->priority_q, stage, rows, own);
+    const int all = priority_rows(s, x->moves, stage, rows, own);
     nominals_extents(s, x->at.p, least);
     if (mechanism_residual(b, x->at, q, f) == FAILED) return initial_refused(x->s);
     for (int count = 0;; count++) {
@@ -99,13 +99,15 @@ static Status newton_at_start(const Start *x, int stage, double *q, const int *r
         if (!all && arrived(s, own, f, allowed)) break; /* what is left is not for these coordinates */
         for (int k = 0; k < s->m; k++) f_trial[k] = -f[k];
         b->linear.off = find_far_off(s, own, f, allowed);
-        const Status status = priority_nearest(b, x->priority_q, stage, own, f_trial);
+        const Status status = priority_nearest(b, x->moves, stage, own, f_trial);
         b->linear.off = 0;
         if (status == FAILED) break;
         double damping = 1;
         int halvings = 0;
         for (; halvings < STEP_HALVINGS; halvings++, damping /= 2) {
-            for (int j = 0; j < s->nv; j++) trial[j] = q[j] + damping * b->dq[j];
+            memcpy(trial, q, (size_t)s->nq * sizeof *q);
+            mechanism_move(b, damping, b->dq, trial);
+            if (mechanism_settle(b, x->at, trial) == FAILED) continue;
             if (mechanism_residual(b, x->at, trial, f_trial) == FAILED) continue;
             if (norm_of_misses(s, own, f_trial, allowed, f) <
                 (1 - 0.1 * damping) * norm_of_misses(s, own, f, allowed, f))
@@ -118,14 +120,16 @@ static Status newton_at_start(const Start *x, int stage, double *q, const int *r
     return arrived(s, rows, f, allowed) ? OK : cannot_be_projected(x, rows, f, allowed);
 }
 
-/* Whether G_kj is not 0 where the coordinate j is put aside. */
+/* Whether G_ki is not 0 where what speed i moves is put aside. */
 static int depends_elsewhere(const Start *x, const double *q, int entry, double aside) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
-    double *elsewhere = x->s->work_initial;
+    double *elsewhere = x->s->work_initial, *along = elsewhere + s->nq;
     memcpy(elsewhere, q, (size_t)s->nq * sizeof *q);
-    elsewhere[s->entry_column[entry]] += aside;
-    return mechanism_evaluate(b, x->at, elsewhere, x->v0) == OK && b->G[entry] != 0;
+    for (int i = 0; i < s->nv; i++) along[i] = i == s->entry_column[entry] ? aside : 0;
+    mechanism_kinematics(b, x->at, q);
+    mechanism_move(b, 1, along, elsewhere);
+    return mechanism_settle(b, x->at, elsewhere) == OK && mechanism_evaluate(b, x->at, elsewhere, x->v0) == OK && b->G[entry] != 0;
 }
 
 /* Refuses, naming the coordinate, where an omitted value's 0 is singular: the row k is missed by f, none
@@ -137,14 +141,17 @@ static Status check_omissions(const Start *x, const double *q, int k, double f) 
     if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return initial_refused(x->s);
     for (int j = 0; j < s->nq; j++) aside = fmax(aside, fabs(q[j]));
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
-        if (x->priority_q[s->entry_column[e]] == OMITTED && b->G[e] != 0) return OK;
+        if (x->moves[s->entry_column[e]] == OMITTED && b->G[e] != 0) return OK;
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
-        const char *name = s->coordinates[s->entry_column[e]];
-        if (x->priority_q[s->entry_column[e]] != OMITTED) continue;
+        const char *name = system_moved_name(s, s->entry_column[e]);
+        if (x->moves[s->entry_column[e]] != OMITTED) continue;
         if (!depends_elsewhere(x, q, e, aside > 0 ? aside : 1)) continue;
         return fail(&x->s->why,
-                    "the start is refused: %s has no start value, and at 0 constraint '%s', missed by "
-                    "%.3g, does not depend on it to first order: give %s a start value",
+                    s->kinematics == NULL
+                        ? "the start is refused: %s has no start value, and at 0 constraint '%s', missed by "
+                          "%.3g, does not depend on it to first order: give %s a start value"
+                        : "the start is refused: what %s moves has no start values, and at 0 constraint '%s', "
+                          "missed by %.3g, does not depend on it to first order: give what %s moves start values",
                     name, s->rows[k].name, f, name);
     }
     return OK;
@@ -170,7 +177,7 @@ Status initial_positions(const Start *x, double *q, int *rows) {
     }
     if (!any) return OK;
     memcpy(given, q, bytes);
-    for (int stage = 0; (stage = priority_stage(s, x->priority_q, stage)) < PRIORITIES; stage++) {
+    for (int stage = 0; (stage = priority_stage(s, x->moves, stage)) < PRIORITIES; stage++) {
         memcpy(q, given, bytes);
         if (newton_at_start(x, stage, q, rows) == OK) return OK;
         if (stage == OMITTED && check_all_omissions(x, given, rows) == FAILED) return FAILED;

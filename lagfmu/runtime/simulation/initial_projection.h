@@ -10,7 +10,8 @@ typedef struct {
     Solver *s;
     Instant at;
     const double *q0, *v0;
-    const Priority *priority_q, *priority_v; /* (nq), (nv) */
+    const Priority *priority_q, *moves; /* (nq), (nv) of coordinates, and of what moves them */
+    const Priority *priority_v;         /* (nv) of the speeds */
 } Start;
 
 /* "the start is refused: " before the cause. */

@@ -38,7 +38,7 @@ static Status check_masses(const Start *x) {
         return fail(&x->s->why,
                     "the start is refused: the mass of %s is %s, expected 0 or at least %.3g (in SI "
                     "units), below which numbers lose their digits: choose larger units of mass",
-                    s->speeds[s->mass_row[e]], digits(b->M[e]).text, DBL_MIN);
+                    system_moved_name(s, s->mass_row[e]), digits(b->M[e]).text, DBL_MIN);
     }
     return OK;
 }
@@ -51,13 +51,14 @@ static Status find_positions(const Start *x) {
     double *moved = x->s->work_initial + 3 * s->nq + 3 * s->m, *unit = moved + s->nq;
     int *rows = x->s->iwork_initial;
     memcpy(state->q, x->q0, (size_t)s->nq * sizeof *state->q);
+    if (mechanism_settle(b, x->at, state->q) == FAILED) return initial_refused(x->s);
     memset(state->closed, 0, (size_t)s->contacts * sizeof *state->closed);
     system_active(s, state->closed, rows);
     if (initial_positions(x, state->q, rows) == FAILED) return FAILED;
     for (int count = 0; count <= s->contacts; count++) {
         if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return initial_refused(x->s);
         if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return initial_refused(x->s);
-        for (int j = 0; j < s->nq; j++) unit[j] = fmax(fabs(state->q[j]), state->size[j]);
+        for (int i = 0; i < s->nv; i++) unit[i] = fmax(mechanism_reach(b, state->q, i), state->span[i]);
         for (int c = 0; c < s->contacts; c++) {
             int k = s->contact[c];
             state->gap[c] = TOUCH * mechanism_row_size(b, k, unit);
@@ -73,11 +74,11 @@ static Status find_positions(const Start *x) {
         memcpy(state->q, moved, (size_t)s->nq * sizeof *moved);
     }
     if (check_angles(x) == FAILED) return FAILED;
-    nominals_sizes(x->s, state->q);
+    nominals_sizes(x->s, x->at, state->q);
     return OK;
 }
 
-/* natural (nv): the speeds that the forces give within the coordinates' size, sqrt(size |F| / M). */
+/* natural (nv): the speeds that the forces give within what they move, sqrt(span |F| / M). */
 static void natural_speeds(const Start *x, double *natural) {
     const Mechanism *b = &x->s->stepped;
     const System *s = b->system;
@@ -85,7 +86,7 @@ static void natural_speeds(const Start *x, double *natural) {
     for (int e = 0; e < s->masses; e++) {
         int j = s->mass_row[e];
         if (s->mass_column[e] == j && b->M[e] > 0)
-            natural[j] = sqrt(x->s->state.size[j]) * sqrt(fabs(b->F[j]) / b->M[e]);
+            natural[j] = sqrt(x->s->state.span[j]) * sqrt(fabs(b->F[j]) / b->M[e]);
     }
 }
 
@@ -143,7 +144,7 @@ static Status move_velocities(const Start *x, int *active, const double *natural
     Mechanism *b = &x->s->stepped;
     system_active(x->s->system, state->closed, active);
     if (initial_velocities(x, state->q, natural, active, state->v) == FAILED) return FAILED;
-    return mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->size);
+    return mechanism_project(b, x->at, state->q, state->v, active, state->offset, state->span);
 }
 
 /* Velocities on G v = nu; a contact that is already departing (df/dt > 0) is open, unless so slowly
@@ -187,7 +188,7 @@ static Status find_modes(const Start *x) {
         return initial_refused(x->s);
     system_active(s, state->closed, x->s->active);
     if (mechanism_project(b, x->at, state->q, state->v, x->s->active, state->offset,
-                          state->size) == FAILED)
+                          state->span) == FAILED)
         return initial_refused(x->s);
     if (mechanism_motion(b, x->at, state->q, state->v, x->s->active) == FAILED)
         return initial_refused(x->s);
@@ -246,11 +247,12 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
                     Moved moved, void *context) {
     if (check_start_finite(s, q0, v0) == FAILED) return FAILED;
     solver_clear(s, t);
-    const Start x = {s, segment_instant(s, t), q0, v0, priority, priority + s->system->nq};
+    const Start x = {s, segment_instant(s, t), q0, v0, priority, s->moves, priority + s->system->nq};
+    priority_moves(s->system, priority, s->moves);
     if (s->system->switches > 0) OPTIONAL.switches->settle(s, x.at, q0, v0, NULL, NULL);
     if (s->system->contacts > 0 && OPTIONAL.impact_check(s) != OK) return FAILED;
     s->stepped.dependent = 1; /* it is not known yet */
-    nominals_sizes(s, q0);
+    nominals_sizes(s, x.at, q0);
     if (find_positions(&x) == FAILED) return FAILED;
     if (s->system->switches > 0) OPTIONAL.switches->settle(s, x.at, s->state.q, v0, NULL, NULL);
     if (find_velocities(&x) == FAILED) return FAILED;

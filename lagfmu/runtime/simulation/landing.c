@@ -45,7 +45,7 @@ Status landing_bring_back(Solver *s, const int *happened, const double *pull) {
     }
     if (!any) return OK;
     memcpy(v, s->state.v, (size_t)system->nv * sizeof *v);
-    if (mechanism_project(b, at, s->state.q, v, acting, s->state.offset, s->state.size) != OK)
+    if (mechanism_project(b, at, s->state.q, v, acting, s->state.offset, s->state.span) != OK)
         return FAILED; /* the positions; velocities may change only in an impact */
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     set_changes(s, happened, pull, depth, change);

@@ -17,7 +17,7 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->offset = arena_doubles(saved, s->m);
     x->scale = arena_doubles(saved, nq + nv);
     x->size = arena_doubles(saved, nq);
-    x->span = x->size;
+    x->span = s->kinematics != NULL ? arena_doubles(saved, nv) : x->size;
     x->gap = arena_doubles(saved, contacts);
     x->basis = arena_ints(saved, s->m);
     x->closed = arena_ints(saved, contacts);
@@ -58,6 +58,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
                      OPTIONAL.friction != NULL ? OPTIONAL.friction->sliding : NULL);
     if (s->stepped.friction != NULL) s->stepped.friction->stick_slip = s->state.stick_slip;
     sensitivity_layout(&s->sensitivity, scratch, system);
+    s->moves = arena_take(scratch, (size_t)nv, sizeof *s->moves);
     s->active_full = NULL;
     if (system->embed != NULL && system->full->dynamics != NULL) {
         mechanism_layout(&s->full, scratch, system->full, &s->why, NULL);
@@ -67,7 +68,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->scale = arena_doubles(scratch, states);
     s->push = arena_doubles(scratch, contacts);
     s->u = arena_doubles(scratch, system->inputs + system->switches);
-    s->work_switches = arena_doubles(scratch, system->switches > 0 ? 2 * system->switches + nq : 0);
+    s->work_switches = arena_doubles(scratch, system->switches > 0 ? 2 * system->switches + states + nq : 0);
     s->work_initial = arena_doubles(scratch, 6 * nq + 3 * m);
     s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
     s->work_contacts = arena_doubles(scratch, 2 * nv + 3 * m);
@@ -85,7 +86,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_frictional = arena_take(scratch, some ? OPTIONAL.friction->doubles(system) : 0, sizeof(double));
     s->iwork_frictional = arena_take(scratch, some ? OPTIONAL.friction->ints(system) : 0, sizeof(int));
     s->trial_modes = arena_take(scratch, (size_t)frictions, sizeof *s->trial_modes);
-    s->work_friction = arena_doubles(scratch, some * (2 * frictions + 2 * states));
+    s->work_friction = arena_doubles(scratch, some * (2 * frictions + 3 * states));
     s->iwork_friction = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
     s->iwork_events = arena_ints(scratch, 6 * contacts);
     s->work_modes = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + nv);
@@ -98,6 +99,7 @@ void observed_layout(Observed *o, Arena *arena, const System *system) {
     const int nq = full->nq, nv = full->nv, m = full->m, stepped = system->embed != NULL ? system->nq : 0;
     o->q = arena_doubles(arena, nq);
     o->v = arena_doubles(arena, nv);
+    o->rate = arena_doubles(arena, full->kinematics != NULL ? nq : 0);
     o->vdot = arena_doubles(arena, nv);
     o->lambda = arena_doubles(arena, m);
     o->residual = arena_doubles(arena, m);

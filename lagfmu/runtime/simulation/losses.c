@@ -22,7 +22,7 @@ Status losses_project(Solver *s, Instant at, int drifted) {
     double lost = drifted ? losses_energy(s, at) : 0;
     memcpy(before, s->state.v, bytes);
     if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                          s->state.size) != OK)
+                          s->state.span) != OK)
         return FAILED;
     memcpy(after, s->state.v, bytes);
     memcpy(s->state.v, before, bytes);

@@ -13,7 +13,10 @@
  * alone give that rate (a place may be far away, and says nothing), and V/A the forces before they
  * cancel.
  *
- * A displacement of each coordinate in turn tells what holds it: dvdot, were it displaced by its
+ * Speeds that are no rates of coordinates move several of these: what such a speed moves is as large as the
+ * largest of its own dimension (mechanism_reach()), and its span takes the place of the size.
+ *
+ * A displacement along each speed in turn tells what holds it: dvdot, were it displaced by its
  * size.  The rate of small oscillations is omega = sqrt(|dvdot| / size), and rounding of q shakes v by
  * eps |dvdot| (|q| / size) / omega: on stiff springs that is more than rounding of v itself, and no step
  * could be small enough to resolve it.  At rest on springs that balance, what is left of the
@@ -46,7 +49,13 @@ void nominals_extents(const System *s, const double *p, double *least) {
     }
 }
 
-void nominals_sizes(Solver *s, const double *q) {
+static void find_spans(Solver *s) {
+    const System *system = s->system;
+    for (int i = 0; i < system->nv && system->kinematics != NULL; i++)
+        s->state.span[i] = mechanism_reach(&s->stepped, s->state.size, i);
+}
+
+void nominals_sizes(Solver *s, Instant at, const double *q) {
     const System *system = s->system;
     double *size = s->state.size, *least = s->work_initial;
     double turn = 0;
@@ -59,6 +68,8 @@ void nominals_sizes(Solver *s, const double *q) {
     if (!(turn > 0 && turn < 1)) turn = 1;
     for (int j = 0; j < system->nq; j++)
         if (system->dimension[j] == system->angles) size[j] = turn;
+    mechanism_kinematics(&s->stepped, at, q);
+    find_spans(s);
 }
 
 static void share_largest(double *shared, int j, double value) { shared[j] = larger(shared[j], value); }
@@ -68,42 +79,83 @@ static double own_nominal(const Solver *s, const double *y, int i) {
     return larger(s->state.scale[i], fabs(y[i]));
 }
 
-/* Among the coordinates of row k that have the dimension of its entry e: each gets the largest. */
+/* Of what speed i moves the coordinates that share with others: all of its dimension, but angles of a model with
+ * kinematics: there they are parts of quaternions, or count turns. */
+static int shares(const Solver *s, int i, int j) {
+    const System *system = s->system;
+    if (system->kinematics == NULL) return i == j;
+    return system->dimension[j] == system->speed_dimension[i] && system->dimension[j] != system->angles;
+}
+
+/* What the coordinates that speed i moves have, for others. */
+static double moved_nominal(const Solver *s, const double *y, int i) {
+    const Mechanism *b = &s->stepped;
+    double most = 0;
+    if (s->system->kinematics == NULL) return own_nominal(s, y, i);
+    for (int c = b->column_start[i]; c < b->column_start[i + 1]; c++) {
+        const int j = s->system->rate_row[b->column_rate[c]];
+        if (shares(s, i, j)) most = larger(most, own_nominal(s, y, j));
+    }
+    return most;
+}
+
+static void share_moved(const Solver *s, int i, double value, double *shared) {
+    const Mechanism *b = &s->stepped;
+    if (s->system->kinematics == NULL) {
+        share_largest(shared, i, value);
+        return;
+    }
+    for (int c = b->column_start[i]; c < b->column_start[i + 1]; c++) {
+        const int j = s->system->rate_row[b->column_rate[c]];
+        if (shares(s, i, j)) share_largest(shared, j, value);
+    }
+}
+
+/* Among the speeds of row k that have the dimension of its entry e, and what they move: each gets the largest. */
 static void share_row(const Solver *s, const double *y, int k, int e, double *shared) {
     const System *system = s->system;
-    const int n = system->nq, first = system->entry_column[e];
+    const int *dimension = system->speed_dimension;
+    const int nq = system->nq, first = system->entry_column[e];
     double q = 0, v = 0;
     for (int d = system->row_start[k]; d < system->row_start[k + 1]; d++) {
         const int i = system->entry_column[d];
-        if (system->dimension[i] != system->dimension[first]) continue;
+        if (dimension[i] != dimension[first]) continue;
         if (d < e) return; /* they have it already */
-        q = larger(q, own_nominal(s, y, i));
-        v = larger(v, own_nominal(s, y, n + i));
+        q = larger(q, moved_nominal(s, y, i));
+        v = larger(v, own_nominal(s, y, nq + i));
     }
     for (int d = e; d < system->row_start[k + 1]; d++) {
         const int i = system->entry_column[d];
-        if (system->dimension[i] != system->dimension[first]) continue;
-        share_largest(shared, i, q);
-        share_largest(shared, n + i, v);
+        if (dimension[i] != dimension[first]) continue;
+        share_moved(s, i, q, shared);
+        share_largest(shared, nq + i, v);
     }
+}
+
+/* The four parts of a quaternion turn into each other by another choice of axes. */
+static void share_quaternion(const Solver *s, const double *y, const int *e, double *shared) {
+    double most = 0;
+    for (int k = 0; k < 4; k++) most = larger(most, own_nominal(s, y, e[k]));
+    for (int k = 0; k < 4; k++) share_largest(shared, e[k], most);
 }
 
 void nominals_shared(const Solver *s, const double *y, double *shared) {
     const System *system = s->system;
-    const int n = system->nq;
+    const int *dimension = system->speed_dimension, nq = system->nq;
     memcpy(shared, s->state.scale, (size_t)system_states(system) * sizeof *shared);
     for (int k = 0; k < system->m; k++)
         for (int e = system->row_start[k]; e < system->row_start[k + 1]; e++)
             share_row(s, y, k, e, shared);
     for (int e = 0; e < system->masses; e++) {
         const int i = system->mass_row[e], j = system->mass_column[e];
-        if (i == j || system->dimension[i] != system->dimension[j]) continue;
-        if (system->dimension[i] == system->angles) continue;
-        share_largest(shared, i, own_nominal(s, y, j));
-        share_largest(shared, j, own_nominal(s, y, i));
-        share_largest(shared, n + i, own_nominal(s, y, n + j));
-        share_largest(shared, n + j, own_nominal(s, y, n + i));
+        if (i == j || dimension[i] != dimension[j]) continue;
+        if (dimension[i] == system->angles) continue;
+        share_moved(s, i, moved_nominal(s, y, j), shared);
+        share_moved(s, j, moved_nominal(s, y, i), shared);
+        share_largest(shared, nq + i, own_nominal(s, y, nq + j));
+        share_largest(shared, nq + j, own_nominal(s, y, nq + i));
     }
+    for (int k = 0; k < system->quaternions; k++) share_quaternion(s, y, system->quaternion + 4 * k, shared);
 }
 
 double nominals_natural(const Solver *s, int j) {
@@ -139,28 +191,27 @@ static void find_felt(const Mechanism *b, double *felt) {
 /* A rate whose square is a double too. */
 static double bounded(double rate) { return rate < FASTEST ? rate : FASTEST; }
 
-/* |v| / size and sqrt(pull / size) of one coordinate, the larger; an angle's speed by 1 rad. */
-static double rate_of_coordinate(const Solver *s, int j, double v, double pull) {
-    const double size = s->state.size[j];
-    const double unit = s->system->dimension[j] == s->system->angles ? 1 : size;
+/* |v| / span and sqrt(pull / span) of one speed, the larger; an angle's speed by 1 rad. */
+static double rate_of_speed(const Solver *s, int i, double v, double pull) {
+    const double size = s->state.span[i];
+    const double unit = s->system->speed_dimension[i] == s->system->angles ? 1 : size;
     return size > 0 ? bounded(larger(fabs(v) / unit, sqrt(fabs(pull) / size))) : 0;
 }
 
 double nominals_pace(const Solver *s) {
     const Integrator *i = &s->integrator;
-    const int n = s->system->nq;
-    const double *v = i->y + n, *before = i->y_old + n;
+    const double *v = i->y + s->system->nq, *before = i->y_old + s->system->nq;
     double pace = s->state.now.rate;
-    for (int j = 0; j < n; j++)
-        pace = larger(pace, rate_of_coordinate(s, j, v[j], (v[j] - before[j]) / (i->t - i->t_old)));
+    for (int j = 0; j < s->system->nv; j++)
+        pace = larger(pace, rate_of_speed(s, j, v[j], (v[j] - before[j]) / (i->t - i->t_old)));
     return pace;
 }
 
-/* The largest magnitude of x (n) among the coordinates of the dimension of j. */
-static double largest_alike(const System *s, int j, const double *x) {
+/* The largest magnitude of x (nv) among the speeds of a dimension. */
+static double largest_alike(const System *s, int dimension, const double *x) {
     double largest = 0;
     for (int i = 0; i < s->nv; i++)
-        if (s->dimension[i] == s->dimension[j]) largest = larger(largest, fabs(x[i]));
+        if (s->speed_dimension[i] == dimension) largest = larger(largest, fabs(x[i]));
     return largest;
 }
 
@@ -171,42 +222,42 @@ void nominals_motion_speeds(const Mechanism *b, const double *speed, double *sha
         if (s->mass_row[e] == s->mass_column[e] && b->M[e] > 0)
             momentum = larger(momentum, sqrt(b->M[e]) * speed[s->mass_row[e]]);
     for (int j = 0; j < s->nv; j++) shared[j] = 0;
-    for (int e = 0; e < s->masses; e++) /* the heaviest of each coordinate's dimension */
+    for (int e = 0; e < s->masses; e++) /* the heaviest of each speed's dimension */
         if (s->mass_row[e] == s->mass_column[e])
             for (int j = 0; j < s->nv; j++)
-                if (s->dimension[j] == s->dimension[s->mass_row[e]])
+                if (s->speed_dimension[j] == s->speed_dimension[s->mass_row[e]])
                     shared[j] = larger(shared[j], b->M[e]);
     for (int j = 0; j < s->nv; j++) {
         const double own = shared[j] > 0 ? momentum / sqrt(shared[j]) : 0;
-        shared[j] = larger(own, largest_alike(s, j, speed));
+        shared[j] = larger(own, largest_alike(s, s->speed_dimension[j], speed));
     }
 }
 
-/* The least rate at which a coordinate that has a size moves through it; 0 if none does. */
+/* The least rate at which what has a size moves through it; 0 if none does. */
 static double slowest_rate(const Solver *s) {
     double slowest = 0;
     for (int j = 0; j < s->system->nv; j++) {
-        const double rate = rate_of_coordinate(s, j, s->state.v[j], 0);
+        const double rate = rate_of_speed(s, j, s->state.v[j], 0);
         if (rate > 0 && !(slowest > 0 && slowest <= rate)) slowest = rate;
     }
     return slowest;
 }
 
-/* own (n): the rate by which a coordinate takes its size from the motion; 0 for those that have one.  One that
+/* own (nq): the rate by which a coordinate takes its size from the motion; 0 for those that have one.  One that
  * is hardly pushed moves no farther than the others do.  The largest rate that the motion itself gives is
  * returned. */
 static double find_own(Solver *s, double span, const double *felt, double *own) {
     const System *system = s->system;
     double *least = s->work_initial, steady = 0, natural = 0;
     nominals_extents(system, s->p, least);
-    for (int j = 0; j < system->nv; j++)
-        if (least[j] > 0 || system->dimension[j] == system->angles)
-            steady = larger(steady, rate_of_coordinate(s, j, s->state.v[j], felt[j]));
-    for (int j = 0; j < system->nv; j++) {
+    for (int i = 0; i < system->nv; i++)
+        if (mechanism_reach(&s->stepped, least, i) > 0 || system->speed_dimension[i] == system->angles)
+            steady = larger(steady, rate_of_speed(s, i, s->state.v[i], felt[i]));
+    for (int j = 0; j < system->nq; j++) {
         own[j] = 0;
         if (s->state.size[j] > 0) continue;
-        const double speed = largest_alike(system, j, s->state.v);
-        own[j] = larger(steady, speed > 0 ? largest_alike(system, j, felt) / speed : 0);
+        const double speed = largest_alike(system, system->dimension[j], s->state.v);
+        own[j] = larger(steady, speed > 0 ? largest_alike(system, system->dimension[j], felt) / speed : 0);
         if (own[j] > 0) own[j] = larger(own[j], slowest_rate(s));
         own[j] = bounded(own[j]);
         natural = larger(natural, own[j]);
@@ -215,32 +266,44 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
     return natural;
 }
 
-/* back (n): accelerations with which the state comes back if each coordinate in turn is displaced by
- * its size, linearly; shaken (n): the speeds by which rounding of the coordinates shakes it.  Both 0 at
+/* q moved along speed i alone. */
+static void displace(const Mechanism *b, int i, double by, double *q) {
+    if (b->system->kinematics == NULL) q[i] += by;
+    for (int c = 0; b->system->kinematics != NULL && c < b->column_start[i + 1] - b->column_start[i]; c++) {
+        const int e = b->column_rate[b->column_start[i] + c];
+        q[b->system->rate_row[e]] += b->B[e] * by;
+    }
+}
+
+/* back (nv): accelerations with which the state comes back if it is displaced along each speed in turn by
+ * its span, linearly; shaken (nv): the speeds by which rounding of the coordinates shakes it.  Both 0 at
  * the edge of what the equations describe.  `stepped` is at the state before and after. */
 static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
-    const int n = s->system->nq;
+    const int nv = s->system->nv;
     State *state = &s->state;
     Mechanism *b = &s->stepped;
-    double *vdot = s->work_initial, omega = 0;
+    double *vdot = s->work_initial, *q = shaken + nv, omega = 0;
     int evaluated = 1;
-    memcpy(vdot, b->vdot, (size_t)n * sizeof *vdot);
-    for (int i = 0; i < n; i++) back[i] = shaken[i] = 0;
-    for (int j = 0; j < n && evaluated; j++) {
-        const double q = state->q[j], size = state->size[j];
-        if (!(size > 0)) continue;
-        state->q[j] += DISPLACED * size;
+    memcpy(vdot, b->vdot, (size_t)nv * sizeof *vdot);
+    memcpy(q, state->q, (size_t)s->system->nq * sizeof *q);
+    for (int i = 0; i < nv; i++) back[i] = shaken[i] = 0;
+    for (int j = 0; j < nv && evaluated; j++) {
+        const double span = state->span[j];
+        if (!(span > 0)) continue;
+        mechanism_kinematics(b, at, q);
+        const double place = mechanism_place(b, q, j);
+        displace(b, j, DISPLACED * span, state->q);
         evaluated = mechanism_motion(b, at, state->q, state->v, solver_rows(s)) == OK;
-        state->q[j] = q;
-        for (int i = 0; i < n; i++) {
+        memcpy(state->q, q, (size_t)s->system->nq * sizeof *q);
+        for (int i = 0; i < nv; i++) {
             const double change = fabs(b->vdot[i] - vdot[i]) / DISPLACED;
             back[i] += change;
-            shaken[i] += DBL_EPSILON * change * (fabs(q) / size);
+            shaken[i] += DBL_EPSILON * change * (place / span);
         }
     }
-    for (int i = 0; i < n; i++)
-        if (state->size[i] > 0) omega = larger(omega, sqrt(back[i] / state->size[i]));
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < nv; i++)
+        if (state->span[i] > 0) omega = larger(omega, sqrt(back[i] / state->span[i]));
+    for (int i = 0; i < nv; i++) {
         if (!evaluated) back[i] = shaken[i] = 0;
         if (omega > 0) shaken[i] /= omega;
     }
@@ -262,8 +325,8 @@ static double find_natural_rate(const Solver *s, double span, const double *felt
     double rate = natural, forced = 0;
     for (int j = 0; j < s->system->nv; j++) {
         const double returns = back[j] > LOST / DISPLACED * felt[j] ? back[j] : 0;
-        rate = larger(rate, rate_of_coordinate(s, j, s->state.v[j], resting ? returns : s->stepped.vdot[j]));
-        forced = larger(forced, rate_of_coordinate(s, j, s->state.v[j], felt[j]));
+        rate = larger(rate, rate_of_speed(s, j, s->state.v[j], resting ? returns : s->stepped.vdot[j]));
+        forced = larger(forced, rate_of_speed(s, j, s->state.v[j], felt[j]));
     }
     if (!(rate > 0)) rate = forced;
     return rate > 0 ? rate : span > 0 ? 1 / span : 0;
@@ -275,17 +338,18 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
     const Mechanism *b = &s->stepped;
     double *reach = s->work_initial;
     int taken = 0;
-    for (int j = 0; j < system->nv; j++) {
+    for (int j = 0; j < system->nq; j++) {
         if (!(own[j] > 0)) continue;
-        const double speed = largest_alike(system, j, s->state.v);
-        double acceleration = largest_alike(system, j, b->vdot);
-        const double pull = largest_alike(system, j, felt);
+        const double speed = largest_alike(system, system->dimension[j], s->state.v);
+        double acceleration = largest_alike(system, system->dimension[j], b->vdot);
+        const double pull = largest_alike(system, system->dimension[j], felt);
         if (acceleration <= LOST * pull) acceleration = pull; /* at rest: the rest is rounding */
         s->state.size[j] = larger(speed / own[j], acceleration / own[j] / own[j]);
         taken = 1;
     }
     if (!taken) return;
-    for (int j = 0; j < system->nq; j++) reach[j] = larger(fabs(s->state.q[j]), s->state.size[j]);
+    find_spans(s);
+    for (int i = 0; i < system->nv; i++) reach[i] = larger(mechanism_reach(b, s->state.q, i), s->state.span[i]);
     for (int c = 0; c < system->contacts; c++)
         s->state.gap[c] =
             larger(s->state.gap[c], TOUCH * mechanism_row_size(b, system->contact[c], reach));
@@ -293,19 +357,21 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
 
 /* No smaller than what rounding in values of the coordinate's size allows at this tolerance. */
 static Status find_scales(Solver *s, const double *own, const double *shaken) {
-    const int n = s->system->nq;
+    const int nq = s->system->nq;
     State *state = &s->state;
     const double floor = larger(1e-8, 10 * DBL_EPSILON / s->settings.tolerance);
     const double roundings = fmin(larger(SHAKEN * s->settings.tolerance, 0.01), 10);
-    for (int j = 0; j < n; j++) {
-        const double least = floor * state->size[j];
-        const double rate = own[j] > 0 ? own[j] : state->now.rate;
-        state->scale[j] = positive(larger(state->scale[j], least));
-        const double speed = larger(least * rate, roundings / s->settings.tolerance * shaken[j]);
-        state->scale[n + j] = positive(larger(state->scale[n + j], speed));
-        if (!(state->size[j] <= DBL_MAX && state->scale[j] <= DBL_MAX && state->scale[n + j] <= DBL_MAX))
-            return fail(&s->why, "the start is refused: the scale of %s is not finite",
-                        s->system->coordinates[j]);
+    for (int j = 0; j < nq; j++) state->scale[j] = positive(larger(state->scale[j], floor * state->size[j]));
+    for (int i = 0; i < s->system->nv; i++) {
+        const double taken = mechanism_reach(&s->stepped, own, i), rate = taken > 0 ? taken : state->now.rate;
+        const double shakes = roundings / s->settings.tolerance * shaken[i];
+        const double speed = larger(floor * state->span[i] * rate, shakes);
+        state->scale[nq + i] = positive(larger(state->scale[nq + i], speed));
+    }
+    for (int j = 0; j < system_states(s->system); j++) {
+        const StateName of = system_state_name(s->system, j);
+        if (!(state->scale[j] <= DBL_MAX && (j >= nq || state->size[j] <= DBL_MAX)))
+            return fail(&s->why, "the start is refused: the scale of %s%s%s is not finite", of.head, of.name, of.tail);
     }
     return OK;
 }

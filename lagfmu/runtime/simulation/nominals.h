@@ -8,8 +8,8 @@
 /* least (nq): for each coordinate the largest parameter of its dimension; 0 for an angle. */
 SHARED void nominals_extents(const System *s, const double *p, double *least);
 
-/* state.size at q; 0 where there is none.  Before: the sizes before q was projected, or 0. */
-SHARED void nominals_sizes(Solver *s, const double *q);
+/* state.size and state.span at q; 0 where there is none.  Before: the sizes before q was projected, or 0. */
+SHARED void nominals_sizes(Solver *s, Instant at, const double *q);
 
 /* shared (nv): what speeds a whole motion has that moves each coordinate at `speed` (nv) >= 0: the largest of
  * its dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its

@@ -66,6 +66,7 @@ static Status observe_stepped(Solver *s, Instant at, Observed *o) {
 static void observe_forces(const Mechanism *b, Observed *o) {
     const System *s = b->system;
     memcpy(o->vdot, b->vdot, (size_t)s->nv * sizeof *o->vdot);
+    if (s->kinematics != NULL) mechanism_rates(b, o->v, o->rate);
     memcpy(o->lambda, b->lambda, (size_t)s->m * sizeof *o->lambda);
     memcpy(o->unique, b->linear.unique, (size_t)s->m * sizeof *o->unique);
     memcpy(o->applied, b->F, (size_t)s->nv * sizeof *o->applied);
@@ -110,7 +111,7 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
         active = s->active_full;
     }
     const Status status = b->dependent ? mechanism_motion_near(b, at, o->q, o->v, active, s->state.offset,
-                                                               s->state.size)
+                                                               s->state.span)
                                        : mechanism_motion(b, at, o->q, o->v, active);
     if (status == FAILED) return FAILED;
     observe_forces(b, o);
@@ -133,7 +134,7 @@ static void observe_events(const Solver *s, EventKind kind, Observed *o) {
 }
 
 /* What some values belong to: in this order two names each, the second "" where there is one. */
-typedef enum { OF_NONE, OF_COORDINATE, OF_STEPPED, OF_ROW, OF_ENTRY, OF_CONTACT, OF_SLIP, OF_FRICTION } Owner;
+typedef enum { OF_NONE, OF_COORDINATE, OF_SPEED, OF_STEPPED, OF_ROW, OF_ENTRY, OF_CONTACT, OF_SLIP, OF_FRICTION } Owner;
 
 static void names(const Solver *s, const System *full, Owner of, int i, const char *name[2]) {
     const System *own = s->system;
@@ -141,11 +142,12 @@ static void names(const Solver *s, const System *full, Owner of, int i, const ch
     switch (of) {
         case OF_NONE: break;
         case OF_COORDINATE: name[0] = full->coordinates[i]; break;
+        case OF_SPEED: name[0] = system_moved_name(full, i); break;
         case OF_STEPPED: name[0] = own->coordinates[i]; break;
         case OF_ROW: name[0] = full->rows[i].name; break;
         case OF_ENTRY:
             name[0] = full->rows[full->entry_row[i]].name;
-            name[1] = full->coordinates[full->entry_column[i]];
+            name[1] = system_moved_name(full, full->entry_column[i]);
             break;
         case OF_CONTACT:
             name[0] = own->rows[own->contact[i / full->nq]].name;
@@ -159,7 +161,7 @@ static void names(const Solver *s, const System *full, Owner of, int i, const ch
 /* FAILED if a value is not finite; the cause names them as the FMU's variables are named. */
 static Status check_observed_finite(Solver *s, const System *full, const Observed *o) {
     const System *own = s->system;
-    const int n = full->nq, stepped = own->embed != NULL ? own->nq : 0;
+    const int n = full->nq, nv = full->nv, plain = full->kinematics == NULL, stepped = own->embed != NULL ? own->nq : 0;
     const int kept = stepped > 0 ? own->contacts * n : 0; /* with an embedding there are no frictions */
     const double total = o->energy[0] + o->energy[1];
     const struct {
@@ -169,9 +171,10 @@ static Status check_observed_finite(Solver *s, const System *full, const Observe
         const char *format;
     } list[] = {
         {o->q, n, OF_COORDINATE, "%s"},
-        {o->v, n, OF_COORDINATE, "der(%s)"},
-        {o->vdot, n, OF_COORDINATE, "der(%s,2)"},
-        {o->force, n, OF_COORDINATE, "Q.%s"},
+        {o->v, nv, OF_SPEED, plain ? "der(%s)" : "%s"},
+        {o->rate, plain ? 0 : n, OF_COORDINATE, "der(%s)"},
+        {o->vdot, nv, OF_SPEED, plain ? "der(%s,2)" : "der(%s)"},
+        {o->force, nv, OF_SPEED, "Q.%s"},
         {o->s, stepped, OF_STEPPED, "%s"},
         {o->sdot, stepped, OF_STEPPED, "der(%s)"},
         {o->sddot, stepped, OF_STEPPED, "der(%s,2)"},

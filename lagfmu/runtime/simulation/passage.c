@@ -50,11 +50,14 @@ static Status factor_there(Solver *s, double t, const double *y, double off) {
 
 /* How fast the angle falls [1/s] at the state where a step begins; y is left to the scratch. */
 static double falling(Solver *s, double t, const double *y, double apart) {
-    const int nq = s->system->nq, nv = s->system->nv;
+    const int nq = s->system->nq;
+    Mechanism *b = &s->stepped;
     const double ahead = LOOK_AHEAD / s->state.now.rate;
     double *there = s->work_passage;
-    for (int j = 0; j < nq; j++) there[j] = y[j] + ahead * y[nq + j];
-    memcpy(there + nq, y + nq, (size_t)nv * sizeof *y);
+    mechanism_kinematics(b, segment_instant(s, t), y);
+    mechanism_rates(b, y + nq, there);
+    for (int j = 0; j < nq; j++) there[j] = y[j] + ahead * there[j];
+    memcpy(there + nq, y + nq, (size_t)s->system->nv * sizeof *y);
     if (factor_there(s, t + ahead, there, DBL_MIN) != OK) return 0;
     return (apart - linear_apart(&s->stepped.linear)) / ahead;
 }

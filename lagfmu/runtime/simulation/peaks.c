@@ -201,7 +201,8 @@ static void cubic(const Integrator *i, double t, double *y) {
 static void begin_step(Solver *s) {
     Integrator *i = &s->integrator;
     state_gather(s->system, s->state.q, s->state.v, i->y);
-    state_gather(s->system, s->state.v, s->stepped.vdot, i->f);
+    mechanism_rates(&s->stepped, s->state.v, i->f);
+    memcpy(i->f + s->system->nq, s->stepped.vdot, (size_t)s->system->nv * sizeof *i->f);
     i->t = s->state.now.t_integrator = s->state.now.t;
 }
 

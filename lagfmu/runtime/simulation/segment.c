@@ -40,8 +40,17 @@ Instant segment_instant(Solver *s, double t) {
 
 Status segment_motion(Solver *s, Instant at, const double *q, const double *v) {
     return s->system->frictions > 0 ? mechanism_motion_near(&s->stepped, at, q, v, s->active,
-                                                            s->state.offset, s->state.size)
+                                                            s->state.offset, s->state.span)
                                     : mechanism_motion(&s->stepped, at, q, v, solver_rows(s));
+}
+
+/* q' of the latest evaluation; quicker than memcpy for a few coordinates. */
+static inline void find_rates(const Solver *s, const double *y, double *dydt) {
+    const int nq = s->system->nq;
+    if (s->system->kinematics != NULL)
+        KINEMATICS->rates(&s->stepped, y + nq, dydt);
+    else
+        for (int j = 0; j < nq; j++) dydt[j] = y[nq + j];
 }
 
 static Status rate_of_state(void *context, double t, const double *y, double *dydt) {
@@ -53,7 +62,7 @@ static Status rate_of_state(void *context, double t, const double *y, double *dy
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
     if (OPTIONAL.passage != NULL) s->narrowest = fmin(s->narrowest, s->apart = linear_apart(&s->stepped.linear));
-    for (int j = 0; j < nq; j++) dydt[j] = y[nq + j]; /* quicker than memcpy for a few coordinates */
+    find_rates(s, y, dydt);
     for (int i = 0; i < nv; i++) dydt[nq + i] = s->stepped.vdot[i];
     return OK;
 }
@@ -64,7 +73,8 @@ static Status plain_rate(void *context, double t, const double *y, double *dydt)
     const int nq = s->system->nq;
     if (!s->system->accelerate(t, y, y + nq, s->u, s->p, dydt + nq)) return rate_of_state(context, t, y, dydt);
     s->apart = 1;
-    for (int j = 0; j < nq; j++) dydt[j] = y[nq + j];
+    mechanism_kinematics(&s->stepped, (Instant){t, s->u, s->p}, y);
+    find_rates(s, y, dydt);
     return OK;
 }
 
@@ -136,7 +146,7 @@ static Status accept(Solver *s, Integrator *i) {
         return FAILED;
     segment_choose_rows(s);
     if (OPTIONAL.passage != NULL) OPTIONAL.passage->look(s, i->t, y);
-    memcpy(i->f, y + nq, (size_t)nq * sizeof *y);
+    mechanism_rates(&s->stepped, y + nq, i->f);
     memcpy(i->f + nq, s->stepped.vdot, (size_t)nv * sizeof *y);
     i->fresh = 0;
     return OK;
@@ -168,20 +178,32 @@ Status segment_prepare_dense(Solver *s, Integrator *i) {
 
 Status segment_project(Solver *s, double t, double *y) {
     return mechanism_project(&s->stepped, segment_instant(s, t), y, y + s->system->nq, s->active,
-                             s->state.offset, s->state.size);
+                             s->state.offset, s->state.span);
+}
+
+/* What rounding of the force on speed i makes of its acceleration. */
+static double rounding_of_force(const Solver *s, int i) {
+    const System *system = s->system;
+    for (int e = 0; e < system->masses; e++) {
+        if (system->mass_row[e] != i || system->mass_column[e] != i) continue;
+        const double mass = s->stepped.M[e], force = fabs(s->stepped.F[i]);
+        return mass > 0 ? BALANCED * force / mass : 0;
+    }
+    return 0;
 }
 
 /* Is that much of a step rounding of the forces, which others balance? */
 static int is_balanced(const Solver *s, int j, double moved) {
     const System *system = s->system;
-    const int nq = system->nq, i = j < nq ? j : j - nq;
+    const int nq = system->nq;
     const double h = s->integrator.t - s->integrator.t_old;
-    for (int e = 0; e < system->masses; e++) {
-        if (system->mass_row[e] != i || system->mass_column[e] != i) continue;
-        const double mass = s->stepped.M[e], force = fabs(s->stepped.F[i]);
-        return mass > 0 && moved <= BALANCED * force / mass * h * (j < nq ? h : 1);
-    }
-    return 0;
+    double most = 0;
+    if (j >= nq) return moved <= rounding_of_force(s, j - nq) * h;
+    if (system->kinematics == NULL) return moved <= rounding_of_force(s, j) * h * h;
+    for (int e = 0; e < system->rates; e++)
+        if (system->rate_row[e] == j)
+            most += fabs(s->stepped.B[e]) * rounding_of_force(s, system->rate_column[e]);
+    return moved <= most * h * h;
 }
 
 Status segment_check_projection(Solver *s, double t, const double *y, const double *projected) {

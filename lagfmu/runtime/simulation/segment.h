@@ -1,6 +1,6 @@
 /* segment.h -- the smooth motion between two events, over which the modes do not change.
  *
- *   y = [q; v] ,  q' = v ,  v' = vdot   with   M vdot = F + G^T lambda ,  G vdot = gamma
+ *   y = [q; v] ,  q' = B v + b ,  v' = vdot   with   M vdot = F + G^T lambda ,  G vdot = gamma
  *
  * is integrated for the rows that act, and projected onto f = offset and G v = nu. */
 #ifndef LAGFMU_SEGMENT_H

@@ -58,7 +58,7 @@ static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.56888
 /* The motion at a state that may lie off the constraints. */
 static Status move_near(Solver *s, double t, const double *y) {
     return mechanism_motion_near(&s->stepped, segment_instant(s, t), y, y + s->system->nq, s->active,
-                                 s->state.offset, s->state.size);
+                                 s->state.offset, s->state.span);
 }
 
 Status slip_work(Solver *s, double t0, double t1, double *lost) {
@@ -80,32 +80,33 @@ Status slip_work(Solver *s, double t0, double t1, double *lost) {
     return OK;
 }
 
-static Status rate(Solver *s, double t, const double *y, double *vdot) {
-    const size_t bytes = (size_t)s->system->nv * sizeof *vdot;
+static Status rate(Solver *s, double t, const double *y, double *dydt) {
+    const int nq = s->system->nq;
     if (move_near(s, t, y) != OK) return FAILED;
-    memcpy(vdot, s->stepped.vdot, bytes);
+    mechanism_rates(&s->stepped, y + nq, dydt);
+    memcpy(dydt + nq, s->stepped.vdot, (size_t)s->system->nv * sizeof *dydt);
     return OK;
 }
 
 Status slip_jacobian(Solver *s, double t, const double *y, double *J, double *dfdt) {
     const double part = 1.4901161193847656e-8; /* 2^-26: half of a double's digits */
-    const int nq = s->system->nq, nv = s->system->nv, ny = nq + nv;
-    double *moved = s->work_friction + 2 * s->system->frictions, *at = moved + ny, *there = at + nv;
+    const int nq = s->system->nq, ny = system_states(s->system), own = s->system->kinematics == NULL;
+    double *moved = s->work_friction + 2 * s->system->frictions, *at = moved + ny, *there = at + ny;
     if (rate(s, t, y, at) != OK) return FAILED;
     memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
     memset(dfdt, 0, (size_t)nq * sizeof *dfdt);
     memcpy(moved, y, (size_t)ny * sizeof *y);
     for (int j = 0; j < ny; j++) {
         const double step = part * fmax(fabs(y[j]), nominals_natural(s, j));
-        if (j >= nq) J[(j - nq) * ny + j] = 1;
+        if (own && j >= nq) J[(j - nq) * ny + j] = 1; /* q' = v */
         if (!(step > 0)) continue;
         moved[j] = y[j] + step;
         if (rate(s, t, moved, there) != OK) return FAILED;
-        for (int i = 0; i < nv; i++) J[(nq + i) * ny + j] = (there[i] - at[i]) / (moved[j] - y[j]);
+        for (int i = own ? nq : 0; i < ny; i++) J[i * ny + j] = (there[i] - at[i]) / (moved[j] - y[j]);
         moved[j] = y[j];
     }
     const double step = part / s->state.now.rate;
     if (rate(s, t + step, y, there) != OK) return FAILED;
-    for (int i = 0; i < nv; i++) dfdt[nq + i] = (there[i] - at[i]) / step;
+    for (int i = own ? nq : 0; i < ny; i++) dfdt[i] = (there[i] - at[i]) / step;
     return OK;
 }

@@ -11,6 +11,7 @@
 /* What an importer can read at a state; arrays of the full system (nq, nv, m, entries). */
 typedef struct {
     double *q, *v, *vdot;          /* (nq), (nv), (nv) of the full system */
+    double *rate;                  /* q' (nq) where it is not v */
     double *lambda, *residual;     /* (m) */
     int *unique;                   /* (m) */
     double *force, *share;         /* Q (nv); one constraint's part of it (entries) */
@@ -36,6 +37,7 @@ typedef struct Solver {
     Mechanism stepped, full;   /* full: of an embedding; otherwise unused */
     Integrator integrator, probe; /* probe: integrates again from the last accepted point */
     int *active;               /* (m) rows that act in the present modes */
+    Priority *moves;           /* (nv) of the start: priority_moves() */
     double *scale;             /* (states) of errors, in the present step */
     double *u;                 /* (inputs, then switches) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
@@ -49,7 +51,7 @@ typedef struct Solver {
     int *iwork_initial;        /* (2 m + contacts) */
     double *work_contacts;     /* (2 nv + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */
-    double *work_switches;     /* (2 switches + nq) of switches.c */
+    double *work_switches;     /* (2 switches + states + nq) of switches.c */
     double apart, narrowest;   /* linear_apart() at the latest stage, and the least of a step */
     double *work_passage;      /* (states) of passage.c */
     double *work_advance;      /* (2 states) of advance.c and exchange.c */
@@ -60,7 +62,7 @@ typedef struct Solver {
     double *work_frictional;   /* of frictional_impact.c */
     int *iwork_frictional;
     StickSlip *trial_modes;    /* (frictions) of stick_slip.c, with */
-    double *work_friction;     /* (2 frictions + 2 states) */
+    double *work_friction;     /* (2 frictions + 3 states) */
     int *iwork_friction;       /* (4 frictions + 2 contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and modes.c */
     double *work_modes;        /* (m + nv) of modes.c */

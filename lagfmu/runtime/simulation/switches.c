@@ -16,8 +16,11 @@ static void look_ahead(Solver *s, Instant at, const double *q, const double *v, 
     const System *system = s->system;
     const double soon = fmax(SOON / (s->state.now.rate > 0 ? s->state.now.rate : 1), SOON * SOON * fabs(at.t));
     double *later = ahead + system->switches;
-    for (int j = 0; j < system->nq; j++)
-        later[j] = q[j] + soon * (v[j] + (vdot == NULL ? 0 : soon * vdot[j] / 2));
+    double *speed = later + system->nq, *rate = speed + system->nv;
+    for (int i = 0; i < system->nv; i++) speed[i] = v[i] + (vdot == NULL ? 0 : soon * vdot[i] / 2);
+    mechanism_kinematics(&s->stepped, at, q);
+    mechanism_rates(&s->stepped, speed, rate);
+    for (int j = 0; j < system->nq; j++) later[j] = q[j] + soon * rate[j];
     system->surfaces(at.t + soon, later, at.u, at.p, ahead);
 }
 
