@@ -5,6 +5,7 @@ from .errors import LagfmuError, VerificationError
 from .live.command import play
 from .mechanics.equations import EquationsOfMotion, derive
 from .mechanics.integrability.classify import classify
+from .model.attitude import rotation_matrix
 from .model.closed_form import ClosedForm, Conserved, departure, initial, output
 from .model.convert import from_lagranges_method
 from .model.model import (
@@ -67,6 +68,7 @@ __all__ = [
     "multiplier",
     "output",
     "play",
+    "rotation_matrix",
     "show",
     "simulate",
     "sweep",

@@ -10,8 +10,9 @@ import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 from tops import E, W, reference, top, turning
 
-from lagfmu import Holonomic, Model, Nonholonomic, Parameter, simulate
+from lagfmu import Holonomic, Model, Nonholonomic, Parameter, derive, rotation_matrix, simulate
 from lagfmu.errors import ModelError
+from lagfmu.testing import Form, lower, written_out
 
 X, Y, PHI, R, S, U = dynamicsymbols("x y phi vr vt u")
 m, k = sp.symbols("m k", positive=True)
@@ -165,3 +166,43 @@ def test_kinematics_that_restrict_the_motion_are_refused() -> None:
     )
     with pytest.raises(ModelError, match="which so restrict the motion"):
         simulate(model, target="python", stop_time=0.1)
+
+
+def test_rotation_matrices_closed_or_written_out_are_the_same_equations() -> None:
+    """R' = R [w]x is the derivative of R's polynomials along a unit quaternion: G, nu, gamma and F of a body
+    that turns about a point of its own, with its weight, are the same numbers either way."""
+    R, g = rotation_matrix(E), sp.Symbol("g")
+    place = sp.Matrix(dynamicsymbols("x y z"))
+    pin = place + R * sp.Matrix([0, 0, -k])
+    turn = (R.T * sp.Matrix([0, 1, 0]))[0]
+
+    def model(change: Any) -> Model:
+        """With its conditions and its energy as they come, or changed."""
+        kinetic = sum(c.diff() ** 2 for c in place) * m / 2 + m * k**2 * sum(w**2 for w in W) / 2
+        return Model(
+            "Pinned",
+            coordinates={**dict.fromkeys(place, "m"), **dict.fromkeys(E, "1")},
+            speeds=dict.fromkeys(W, "rad/s"),
+            kinematics=turning(),
+            lagrangian=kinetic - m * g * change((pin + R * sp.Matrix([k, 0, k]))[2]),
+            constraints=[
+                *(Holonomic(f"pin_{c}", change(f)) for c, f in zip("xyz", pin, strict=True)),
+                Holonomic("turn", change(turn)),
+            ],
+            parameters=[
+                Parameter(m, 2.0, "kg"),
+                Parameter(k, 0.3, "m"),
+                Parameter(sp.Symbol("g"), 9.81, "m/s2"),
+            ],
+        )
+
+    generator = np.random.default_rng(3)
+    e = generator.normal(size=4)
+    q = np.array([*generator.normal(size=3), *(e / np.linalg.norm(e))])
+    v, p = generator.normal(size=6), [2.0, 0.3, 9.81]
+    found = [
+        lower(Form(derive(model(change)))).assemble(0.0, q, v, [], p)
+        for change in (lambda x: x, written_out)
+    ]
+    for closed, written in zip(*found, strict=True):
+        np.testing.assert_allclose(closed, written, rtol=0, atol=1e-13)

@@ -21,6 +21,7 @@ from ..mechanics.equations import TIME, EquationsOfMotion, formulas_of
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.jumps import NONE, Jumps
+from ..model.attitude import written_out
 from ..model.elements import Expr
 from ..model.model import Constraint, Contact, Nonholonomic
 from ..model.units import ONE, SECOND, Unit
@@ -366,7 +367,7 @@ def parts_of(
 
     `form` and `jumps` as jumps.with_switch_states gives them; `time`: the symbol in them.
     """
-    eom, reduction = form.equations, form.reduction
+    eom, reduction = form.equations.mapped(written_out), form.reduction
     more: dict[str, Any] = {"tangents": tangents, "time": time}
     if reduction is None:
         return (Parts(eom, "", form.formulation, eom.constraints, jumps, **more),)

@@ -29,6 +29,7 @@ from ..model.speeds import quaternions
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
 from ..names import derivative, rate_of, read
+from .attitudes import attitudes
 from .formulations.multipliers import multipliers
 from .kinematics import Kinematics
 
@@ -357,11 +358,12 @@ def derive(model: Model) -> EquationsOfMotion:
     u, rates = _inputs(model, table)
     angles = {table[s] for s in model.unwrapped}
     places = frozenset(j for j, s in enumerate(q) if s in angles)
-    moving = Kinematics(q, v, qdot, TIME, rates, places)
-    clock = _Clock(q, qdot, rates)
+    closed = attitudes(model, table)
+    moving = Kinematics(q, v, qdot, TIME, rates, places).beside(closed.rates)
+    clock = _Clock(moving.q, moving.rates, rates)
     problems: list[str] = []
 
-    energy = model.energy_expression.xreplace(table)
+    energy = model.energy_expression.xreplace(table).xreplace(closed.symbols)
     M, F = _left_hand_side(list(_terms(energy)), moving, clock, problems)
     for direction, force in model.forces.items():
         F[model.directions.index(direction)] += sp.sympify(force).xreplace(table)
@@ -371,7 +373,7 @@ def derive(model: Model) -> EquationsOfMotion:
     gamma: list[Expr] = []
     f: list[Expr | None] = []
     for k, constraint in enumerate(model.constraints):
-        expression = sp.sympify(constraint.expression).xreplace(table)
+        expression = sp.sympify(constraint.expression).xreplace(table).xreplace(closed.symbols)
         if isinstance(constraint, Nonholonomic):
             row, drift = _pfaffian(constraint, expression, v, problems)
             f.append(None)
@@ -387,7 +389,7 @@ def derive(model: Model) -> EquationsOfMotion:
     if problems:
         raise ModelError(model.name, problems)
     kinetic, potential = _energies(model, energy, M, v, table)
-    return EquationsOfMotion(
+    made = EquationsOfMotion(
         model=model,
         q=q,
         v=v,
@@ -408,6 +410,8 @@ def derive(model: Model) -> EquationsOfMotion:
         frictions=tuple(_friction(f, table) for f in model.frictions),
         outputs=tuple(_changed(o, lambda e: e.xreplace(table)) for o in model.outputs),
     )
+    back = {s: a for a, s in closed.symbols.items()}
+    return made.mapped(lambda e: e.xreplace(back)) if back else made
 
 
 def _friction(f: Friction, table: dict[Expr, Expr]) -> FrictionLaw:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import sympy as sp
@@ -32,7 +32,7 @@ class Kinematics:
     """q' = B v + b of coordinates q (nq) and speeds v (nv), in plain symbols.
 
     `rates` (nq) are the expressions of q', `time` is the symbol of time, `drift` the rates of prescribed
-    inputs. `unwrapped` are the places of angles that follow from other coordinates.
+    inputs. `unwrapped` are the places of what follows from other coordinates.
     """
 
     q: tuple[Expr, ...]
@@ -41,6 +41,14 @@ class Kinematics:
     time: Expr
     drift: Mapping[Expr, Expr]
     unwrapped: frozenset[int] = frozenset()
+
+    def beside(self, more: Mapping[Expr, Expr]) -> Kinematics:
+        """The same with quantities that follow from the coordinates as further coordinates: their rates."""
+        if not more:
+            return self
+        follow = frozenset(range(len(self.q), len(self.q) + len(more)))
+        q, rates = (*self.q, *more), (*self.rates, *more.values())
+        return replace(self, q=q, rates=rates, unwrapped=self.unwrapped | follow)
 
     @cached_property
     def B(self) -> dict[tuple[int, int], Expr]:

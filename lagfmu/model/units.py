@@ -25,6 +25,7 @@ from sympy.functions.elementary.trigonometric import (
 from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
+from .attitude import Attitude
 from .elements import Expr
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
@@ -408,6 +409,8 @@ class _Walker:
             return self._spline(expr)
         if isinstance(expr, sp.atan2):
             self._agree(expr.args, None, expr)
+        elif isinstance(expr, Attitude):
+            self._pure(expr.quaternion, "quaternion", expr)
         elif isinstance(expr, (sp.sign, sp.Heaviside)):
             self.walk(expr.args[0])
         elif isinstance(expr, _PURE):

@@ -1,0 +1,61 @@
+"""Rotation matrices in a model's expressions, as quantities with rates of their own: R' = R [w]x.
+
+w is the angular velocity in the frame of the body, of which the kinematics of the unit quaternion are made
+(Goldstein, Classical Mechanics, sect. 4.9).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from ..model.attitude import Attitude
+from ..model.elements import Expr
+from ..model.model import Model
+
+
+@dataclass(frozen=True)
+class Closed:
+    """Elements of rotation matrices -> symbols, and the rates of these."""
+
+    symbols: Mapping[Expr, Expr]
+    rates: Mapping[Expr, Expr]
+
+
+def attitudes(model: Model, table: Mapping[Expr, Expr]) -> Closed:
+    """Of the quaternions whose rotation matrix stands in the energy or in a constraint, and whose kinematics
+    are e' = (0, w) e / 2 from the right; `table`: dynamicsymbols -> plain symbols."""
+    expressions = [model.energy_expression, *(sp.sympify(c.expression) for c in model.constraints)]
+    found = {a.quaternion: None for e in expressions for a in e.atoms(Attitude)}
+    symbols: dict[Expr, Expr] = {}
+    rates: dict[Expr, Expr] = {}
+    for k, four in enumerate(sorted(found, key=str)):
+        w = _angular_velocity(model, four)
+        if w is None:
+            continue
+        e, x, y, z = [s.xreplace(table) for s in four], *(s.xreplace(table) for s in w)
+        R = [[sp.Symbol(f"R{i}{j} of {k}", real=True) for j in range(3)] for i in range(3)]
+        for i, row in enumerate(R):
+            symbols |= {Attitude(i, j, *e): s for j, s in enumerate(row)}
+            turned = row[1] * z - row[2] * y, row[2] * x - row[0] * z, row[0] * y - row[1] * x
+            rates |= dict(zip(row, turned, strict=True))
+    return Closed(symbols, rates)
+
+
+def _angular_velocity(model: Model, four: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
+    """w (3) in the frame of the body; None if the kinematics are others."""
+    if not all(s in model.kinematics for s in four):
+        return None
+    e0, e1, e2, e3 = four
+    given = [sp.expand(model.kinematics[s]) for s in four]
+    x, y, z = (2 * given[k].diff(e0) for k in (1, 2, 3))
+    expected = (
+        -(e1 * x + e2 * y + e3 * z) / 2,
+        (e0 * x + e2 * z - e3 * y) / 2,
+        (e0 * y + e3 * x - e1 * z) / 2,
+        (e0 * z + e1 * y - e2 * x) / 2,
+    )
+    alike = all(sp.expand(a - b) == 0 for a, b in zip(given, expected, strict=True))
+    return (x, y, z) if alike else None
