@@ -12,11 +12,9 @@ from .cli.terminal import console
 from .codegen.c import elimination
 from .codegen.c import function as c_function
 from .codegen.c.elimination import Elimination, eliminate, plan
-from .codegen.c.elimination import Plan as EliminationPlan
 from .codegen.c.equations import model_source
 from .codegen.c.printer import identifiers, number, string
 from .codegen.c.solve import solve_source
-from .codegen.c.variables import variables_source
 from .codegen.py.equations import lower
 from .fmu import compiler
 from .fmu import target as targets
@@ -79,7 +77,7 @@ from .numeric import thresholds
 from .numeric.failure import StepFailureError
 from .numeric.initialization import Stage
 from .numeric.linear import solve as solve_at_start
-from .numeric.start_priority import GIVEN, OMITTED, SET
+from .numeric.start_priority import GIVEN, OMITTED
 from .numeric.system import System
 from .page.documentation import page as documentation_page
 from .page.documentation import with_figures
@@ -103,7 +101,6 @@ from .study.stress.judge import Check
 from .study.stress.lagrange import lagrange, lay_beside
 from .study.stress.player import Run, clear
 from .study.stress.player import opened as session_of
-from .study.stress.player import play as play_of
 from .study.stress.probe import (
     CONSISTENT,
     REFUSED,
@@ -126,7 +123,7 @@ from .study.sweep.table import happened
 from .study.tradeoff.choose import bisected, choose
 from .study.tradeoff.held_out import other_values
 from .study.tradeoff.measure import Plan as TradeoffPlan
-from .study.tradeoff.measure import Point, Tradeoff, measure, take_turns
+from .study.tradeoff.measure import Point, Tradeoff, measure
 from .study.tradeoff.observe import observe, opened
 from .study.tradeoff.quantities import OWN, quantities
 from .study.tradeoff.reference import refer

@@ -549,32 +549,6 @@ def test_the_archive_holds_what_it_needs_and_no_more(name, path, target):
     assert not [e for e, data in content.items() for p in own if p.encode() in data]
 
 
-def test_the_documentation_stands_by_itself(name, path):
-    """A page about this model, with nothing fetched from elsewhere."""
-    with zipfile.ZipFile(path) as archive:
-        page = archive.read("documentation/index.html").decode()
-    assert name in page
-    assert "<math" in page
-    assert not re.search(r"(src|href)=[\"']https?://", page)
-    assert "<script" not in page
-
-
-@pytest.mark.parametrize("case", PYTHON, ids="-".join)
-def test_the_slave_script_is_numeric(path):
-    """No SymPy, no lagfmu in the resources but in names of the FMU's own package."""
-    with zipfile.ZipFile(path) as archive:
-        for entry in archive.namelist():
-            if (
-                entry.startswith("resources/")
-                and entry.endswith(".py")
-                and "pythonfmu" not in entry
-            ):
-                text = archive.read(entry).decode()
-                assert not re.search(r"^\s*(import|from)\s+(sympy|pint|lagfmu)\b", text, re.M), (
-                    entry
-                )
-
-
 BUILD = """
 import sys
 from lagfmu.testing import load, prepare, write
@@ -716,17 +690,6 @@ def test_the_tolerance_of_the_experiment_is_obeyed_and_the_parameter_goes_first(
     assert rough < default < fine
     assert steps({"solver.tolerance": 1e-12}, 1e-4) == fine
     assert steps({}, 1e-8) == default
-
-
-def test_only_the_independent_coordinate_of_an_embedding_can_be_set(native_fmu):
-    """theta is set, x and y follow: x = L sin(theta)."""
-    description = read_model_description(str(native_fmu("PendulumAngle")))
-    starts = {v.name for v in description.modelVariables if v.initial in ("exact", "approx")}
-    assert {"theta", "der(theta)"} <= starts
-    assert not {"x", "y", "der(x)", "der(y)"} & starts
-    with instance(native_fmu("PendulumAngle")) as one:
-        one.start({"theta": 0.5, "L": 2.0})
-        assert one.get("x") == pytest.approx(2 * 0.479425538604203, rel=1e-15)
 
 
 def test_an_input_is_read_back_and_its_effect_is_there_at_once(fmu):

@@ -114,24 +114,6 @@ def check_parabola(result, radius, theta0, speed, g=9.81):
     assert np.abs(r * np.cos(theta) - z).max() < 1e-11
 
 
-def test_a_start_inside_the_sphere_is_moved_onto_its_surface(native_fmu):
-    """A particle put at r = 1.5 inside a sphere of a = 2 is put on its surface, r = 2, with a warning
-    that names the value, and slides from there."""
-    with instance(native_fmu("Hemisphere")) as one:
-        one.start({"a": 2.0, "r": 1.5, "theta": 0.3}, tolerance=1e-12)
-        assert one.get("r") == 2.0
-        assert one.get("theta") == 0.3
-        assert one.get("contact.surface")
-        assert one.get("lambda.surface") == pytest.approx(9.81 * np.cos(0.3), rel=1e-14)
-        assert [(status, category) for status, category, _ in one.log] == [(1, "logStatusWarning")]
-        message = one.log[0][2]
-        assert "start value r = 1.5" in message
-        assert "projected to 2.0" in message
-        one.step(3.0)
-        angle = one.get("departure.surface.theta")
-        assert np.cos(angle) == pytest.approx(2 / 3 * np.cos(0.3), abs=1e-11)
-
-
 def test_a_start_above_the_sphere_is_in_flight(native_fmu):
     """r = 1.25 over a sphere of a = 0.5: the particle is in free flight from the start, nothing is moved,
     lambda is 0, and no departure is counted."""

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import sympy as sp
 from conftest import EVERY
 
-from lagfmu import Model, derive, simulate, verify
+from lagfmu import simulate, verify
 from lagfmu.errors import SimulationError
 from lagfmu.testing import ModelFile, carried, check_closed_form, load, prepare, read_description
 
@@ -278,20 +276,6 @@ def test_outputs_equal_the_closed_forms(name: str, tolerance: float, native_fmu:
 def test_the_table_above_names_every_scene() -> None:
     """But the falling rod, which has a file of its own."""
     assert set(CHANGED) == set(FILES) == set(EVERY) - {"FallingRod"}
-
-
-def test_kinetic_energy_with_all_forces_gives_the_equations_of_the_lagrangian() -> None:
-    """ME 6590: eq. (2), K and F_q, against eq. (3), L and Q_nc."""
-    model: Model = FILES["CartPendulum"][0].model
-    s, _, y = model.coordinates
-    m, gravity = (p.symbol for p in model.parameters if str(p.symbol) in "mg")
-    lagrangian = model.kinetic_energy - m * gravity * y
-    other = replace(model, kinetic_energy=None, lagrangian=lagrangian, forces={s: model.forces[s]})
-    first, second = derive(model), derive(other)
-    assert first.M == second.M
-    assert first.G == second.G
-    assert all(sp.expand(a - b) == 0 for a, b in zip(first.F, second.F, strict=True))
-    assert sp.expand(first.potential - second.potential) == 0
 
 
 @pytest.mark.thorough

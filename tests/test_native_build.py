@@ -328,28 +328,6 @@ def test_the_sources_link_into_an_importer(everywhere, native_fmu, tmp_path):
 # ---------------------------------------------------------------------------- fmpy
 
 
-@pytest.mark.parametrize("name", ["PendulumCartesian", "Hemisphere"])
-def test_model_exchange_with_cvode_follows_co_simulation(native_fmu, name):
-    """fmpy's CVODE on the derivatives and event indicators; drift stays in proportion to its tolerance."""
-    path, outputs = (
-        native_fmu(name),
-        {"PendulumCartesian": ("x", "lambda.rod"), "Hemisphere": COLUMNS},
-    )
-    run = {"stop_time": 2.0, "output_interval": 0.1, "output": [*outputs[name]]}
-    exact = simulate_fmu(str(path), fmi_type="CoSimulation", relative_tolerance=1e-12, **run)
-    errors = []
-    for tolerance in (1e-6, 1e-9):
-        found = simulate_fmu(
-            str(path), fmi_type="ModelExchange", relative_tolerance=tolerance, **run
-        )
-        times = [int(np.argmin(abs(found["time"] - t))) for t in exact["time"]]
-        errors.append(
-            max(abs(found[n][times] - exact[n]).max() for n in outputs[name] if "time" not in n)
-        )
-    assert errors[0] < 3e-3
-    assert errors[1] < 1e-5
-
-
 def test_the_drift_of_model_exchange_is_bounded(native_fmu):
     """A pendulum for 200 s with CVODE at 1e-6: the rod's length to 1e-4, without a single event."""
     found = simulate_fmu(

@@ -178,24 +178,6 @@ def test_a_run_is_held_against_a_reference(hemisphere, tmp_path):
     assert run(*off, *loose)[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("t,r\n0,1\n", "there is no column 'time'"),
-        ("time,r\n0,1\n2,1\n1,1\n", "not sorted"),
-        ("time,r\n0,1\n1,nan\n", "no finite number"),
-        ("time,r\n0,1\n1,1,3\n", "no table of numbers"),
-    ],
-)
-def test_a_bad_table_is_told(hemisphere, tmp_path, text, message):
-    """What is wrong with it, as wrong usage."""
-    path = tmp_path / "bad.csv"
-    path.write_text(text)
-    code, output = run("verify", hemisphere, "--reference", path)
-    assert code == 2
-    assert message in output
-
-
 def test_a_column_that_the_fmu_does_not_have_is_told(hemisphere, tmp_path):
     """With the names that it has."""
     path = tmp_path / "other.csv"

@@ -214,29 +214,6 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped(hemisphere, tmp_path):
     assert len(facts["fmu_sha256"]) == 64
 
 
-@pytest.mark.thorough
-def test_ctrl_c_says_where_the_rest_is_and_how_to_go_on(hemisphere, tmp_path):
-    """What a user does: an interrupt in the middle of a long sweep, then the same command with --resume."""
-    import pyarrow.parquet as pq
-
-    out = tmp_path / "runs.parquet"
-    command = [sys.executable, "-m", "lagfmu", "sweep", str(hemisphere), "--vary", "theta=0.05:1:1000",
-               "--keep", KEEP[0], "--out", str(out)]  # fmt: skip
-    client = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    parts = out.with_name("runs.parquet.parts")
-    while client.poll() is None and len(list(parts.glob("part_*"))) < 3:
-        time.sleep(0.02)
-    client.send_signal(signal.SIGINT)
-    said = " ".join(client.communicate(timeout=60)[0].split())
-    assert client.returncode == 130
-    assert "interrupted: what is finished is in" in said
-    assert "go on with the same command and --resume" in said
-    done = subprocess.run([*command, "--resume"], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    assert pq.read_table(out)["run"].to_pylist() == list(range(1000))
-    assert not parts.exists()
-
-
 def test_what_was_refused_before_an_interruption_counts(hemisphere, tmp_path):
     """The first run has no radius; the client stops after it and goes on."""
     values, out = {"a": [-1.0, *np.linspace(0.5, 1, 9)]}, tmp_path / "runs.nc"
@@ -429,14 +406,6 @@ def test_a_table_as_csv_has_every_bit_and_its_units_beside_it(hemisphere, tmp_pa
     assert (again["lambda.surface:max"].values[::2] == found["lambda.surface:max"][::2]).all()
 
 
-def test_the_help_fits_a_terminal(monkeypatch):
-    """Nothing that stands for a value is broken at 80 columns."""
-    monkeypatch.setenv("COLUMNS", "80")
-    said = CliRunner().invoke(app, ["sweep", "--help"]).output
-    for word in ("NAME=RANGE", "'NAME ~ LAW'", "NAME:HOW", "ADDRESS", "<float>", "<path>"):
-        assert f" {word} " in said, word
-
-
 def test_a_model_file_is_built_first(tmp_path):
     """One command from a model to a table."""
     path = MODELS / "atwood.py"
@@ -495,20 +464,6 @@ def test_an_optimizer_finds_the_damping_at_which_the_spring_just_holds(dist):
     assert (np.diff(found["body.acceleration:max"]) > 0).all()
     allowed = np.interp(-0.06, -travel, found.c)
     assert names["study"].best_params["c"] == pytest.approx(allowed, rel=0.1)
-
-
-@pytest.mark.thorough
-def test_the_client_never_loads_the_binary(hemisphere):
-    """Host processes do: a crash of the FMU is none of the client's."""
-    code = (
-        "import lagfmu, sys\n"
-        f"lagfmu.sweep({str(hemisphere)!r}, {{'theta': [0.1, 0.2]}})\n"
-        "maps = open('/proc/self/maps').read()\n"
-        "assert 'Hemisphere' not in maps, 'loaded'\n"
-    )
-    if not Path("/proc/self/maps").exists():
-        pytest.skip("no /proc on this machine")
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
 
 
 OTHER = """

@@ -118,6 +118,7 @@ def test_the_client_alone_is_interrupted(hemisphere, tmp_path):
     said = client.communicate(timeout=60)[1]  # pipes that a worker holds would keep it waiting
     assert client.returncode == 130, said
     assert "what is finished is in" in said
+    assert "go on with the same command and --resume" in " ".join(said.split())
     assert [p.name for p in parts.glob("part_*")] == ["part_00000000.parquet"]
     assert list(Path(place["TMPDIR"]).iterdir()) == []
 

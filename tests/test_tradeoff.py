@@ -34,7 +34,6 @@ from lagfmu.testing import (
     prepare,
     print_whole,
     refer,
-    take_turns,
     write,
 )
 from lagfmu.testing import TradeoffPlan as Plan
@@ -146,23 +145,6 @@ def test_a_missed_event_is_an_infinite_error(native_fmu):
 
 
 # ------------------------------------------------------------------ measuring
-
-
-def test_settings_take_turns():
-    """Each round does every piece of work once, and no round all in the order of another."""
-    order: list[int] = []
-
-    def piece(k: int) -> float:
-        order.append(k)
-        return 1.0
-
-    found = take_turns(
-        [lambda k=k: piece(k) for k in range(6)], Plan(0.1, repeats=5), lambda *_: None
-    )
-    rounds = [tuple(order[6 * k : 6 * k + 6]) for k in range(1, 6)]  # the first warms up
-    assert all(sorted(r) == list(range(6)) for r in rounds)
-    assert len(set(rounds)) == 5
-    assert [len(s) for s in found] == [5] * 6
 
 
 def test_a_refused_method_is_reported_and_the_others_are_measured(wire):

@@ -22,7 +22,6 @@ from lagfmu.testing import (
     generalized_force_unit,
     multiplier_unit,
     parse_unit,
-    plain,
 )
 
 t = dynamicsymbols._t
@@ -188,16 +187,6 @@ def test_joule_and_newton_metre_share_a_dimension() -> None:
 
 
 @pytest.mark.parametrize(
-    ("position", "velocity", "acceleration"),
-    [("m", "m/s", "m/s2"), ("rad", "rad/s", "rad/s2"), ("1", "1/s", "1/s2")],
-)
-def test_derivative_units(position: str, velocity: str, acceleration: str) -> None:
-    """Each time derivative divides the unit by a second."""
-    assert unit(position).per_second() == unit(velocity)
-    assert unit(position).per_second().per_second() == unit(acceleration)
-
-
-@pytest.mark.parametrize(
     ("constraint", "nonholonomic", "name"),
     [
         ("m", False, "N"),
@@ -328,12 +317,6 @@ def test_undeclared_symbols_are_named_once() -> None:
     assert dimension_of(expr, UNITS, "f", report_unknown=False).name == "N"
 
 
-def test_dimension_of_raises_on_disagreement() -> None:
-    """A sum of unlike terms has no unit."""
-    with pytest.raises(UnitError, match=r"constraint 'f': .*differ in dimension"):
-        dimension_of(x + m, UNITS, "constraint 'f'")
-
-
 @pytest.mark.parametrize(
     ("expr", "name"),
     [
@@ -355,20 +338,3 @@ def test_fractional_exponents_have_no_fmi_base_unit() -> None:
     """FMI's base unit exponents are integers, so that the root of a length has none."""
     with pytest.raises(UnitError, match=r"'m\^\(1/2\)' has fractional exponents"):
         _ = dimension_of(sp.sqrt(x), UNITS, "f").base
-
-
-@pytest.mark.parametrize(
-    ("expr", "text"),
-    [
-        (m * g * r, "g*m*r"),
-        (theta.diff(t), "der(theta)"),
-        (x.diff(t, 2) + g, "der(x,2) + g"),
-        (sp.Derivative(sp.cos(theta), t), "der(cos(theta))"),
-        (sp.Derivative(k * x**2, x), "der(k*x**2,x)"),
-        (sp.Function("f")(x), "f(x)"),
-        (0, "0"),
-    ],
-)
-def test_plain_text(expr: object, text: str) -> None:
-    """Coordinates and velocities are printed without their argument t."""
-    assert plain(expr) == text
