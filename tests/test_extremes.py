@@ -27,7 +27,7 @@ from instance import Instance, instance
 from sympy import cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Model, Parameter, names, simulate
+from lagfmu import Holonomic, Input, Model, Parameter, names, simulate
 
 pytestmark = pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
 g0 = 9.81  # m/s^2
@@ -274,6 +274,31 @@ def test_a_stiff_system_scales_as_far_as_its_spring_lets_it(native_fmu):
     for units in DECADES:
         worst = apart(plain, rescaled(path, units, 0.5))
         assert max(worst.values()) < 10 * rounding
+
+
+def test_a_motion_is_as_quick_as_doubles_can_say(built):
+    """x = cos(w t) at w = 1e150 /s, whose accelerations squared are beyond a double.  From t = 1 s on, where
+    no double is that near to another, the step is refused, and the reason names it (it said: shorter)."""
+    k, u = symbols("k", positive=True), dynamicsymbols("u")
+    spring = Model(
+        name="Spring",
+        forces={x: u},
+        inputs=[Input(u, "N")],
+        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
+        coordinates={x: "m"},
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1e300, "N/m")],
+        start={x: 1.0},
+    )
+    with instance(built(spring)) as one:
+        one.start(tolerance=1e-9)
+        seen, _ = walk(one, 0.7e-150, 5)
+        expected = [math.cos(0.7 * n) for n in range(6)]
+        assert [a["x"] for a in seen] == pytest.approx(expected, abs=1e-7)
+    with instance(built(spring)) as one:
+        one.start(start_time=1.0)
+        _, reason = walk(one, 0.1, 1)
+    assert "step size underflow: the motion is so quick that a step of" in reason
+    assert "measure time in a smaller unit" in reason
 
 
 # ---------------------------------------------------------------------------- dependent constraints

@@ -37,14 +37,15 @@ Status step_size_rate(Integrator *i, const Ode *ode) {
     return OK;
 }
 
-/* |x| in units of tolerance * max(|y|, scale), root-mean-square. */
+/* |x| in units of tolerance * max(|y|, scale), root-mean-square; the largest where squares are beyond a double. */
 static double weighted_norm(const Integrator *i, const Control *control, const double *x) {
-    double tolerance = step_size_tolerance(control), sum = 0;
+    double tolerance = step_size_tolerance(control), sum = 0, largest = 0;
     for (int j = 0; j < i->ny; j++) {
         double ratio = x[j] / step_size_weight(tolerance, i->y[j], 0, control->scale[j]);
         sum += ratio * ratio;
+        largest = fmax(largest, fabs(ratio));
     }
-    return sqrt(sum / i->ny);
+    return sum < HUGE_VAL ? sqrt(sum / i->ny) : largest;
 }
 
 /* |f(t + h, y + h f) - f(t, y)| / h, an estimate of the second derivative; h is made smaller until
@@ -53,10 +54,10 @@ static double second_derivative(Integrator *i, const Ode *ode, const Control *co
     double *y = i->scratch, *f = i->scratch + i->ny;
     for (int count = 0; count < MOST_TRIALS; count++, *h /= 10) {
         for (int j = 0; j < i->ny; j++) y[j] = i->y[j] + *h * i->f[j];
-        if (ode->rate(ode->context, i->t + *h, y, f) != OK) continue;
+        if (ode->rate(ode->context, i->t + *h, y, f) != OK || !step_size_finite(i->ny, f)) continue;
         for (int j = 0; j < i->ny; j++) f[j] = (f[j] - i->f[j]) / *h;
         double size = weighted_norm(i, control, f);
-        if (isfinite(size)) return size;
+        return isfinite(size) ? size : 0;
     }
     return 0;
 }
@@ -101,7 +102,11 @@ Status trial_begin(Trial *trial, Integrator *i, const Ode *ode, const Control *c
     trial->t_bound = t_bound;
     trial->rejected = trial->unevaluated = 0;
     fit(trial, i->t, h);
-    return OK;
+    if (trial->h > 0) return OK;
+    return fail(ode->why,
+                "the integration stops at t = %s s, step size underflow: the motion is so quick that a step "
+                "of %.3g s leads to no later time (measure time in a smaller unit)",
+                digits(i->t).text, h);
 }
 
 Status trial_reject(Trial *trial, const Integrator *i, const Ode *ode, double factor) {
