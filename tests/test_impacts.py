@@ -15,29 +15,16 @@ from runs import simulate_fmu
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Model, Parameter, Scene, build_fmu, simulate
+from lagfmu import Contact, Model, Parameter, simulate
 from lagfmu.errors import LagfmuError
-from lagfmu.testing import (
-    find_compiler,
-    prepare,
-    write,
-)
 
-Run = Callable[..., Any]
 pytestmark = pytest.mark.filterwarnings("ignore:.*follows? from the others")
 
 
 @pytest.fixture
-def run() -> Run:
-    """run(model, stop, step, ...) of its native FMU."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine")
-
-    def simulated(model: Model, stop: float, step: float, values: Any = None) -> Any:
-        scene = Scene(model.name, stop_time=stop)
-        return simulate(model, stop, step, 1e-10, values, scene=scene)
-
-    return simulated
+def run(built: Any) -> Callable[..., Any]:
+    """run(model, stop, step, values) of its native FMU."""
+    return lambda model, *times, **values: simulate(built(model), *times, 1e-10, values)
 
 
 def top(result: Any) -> Any:
@@ -74,21 +61,16 @@ def test_a_table_dropped_flat_on_four_legs_stays_level(run, order):
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_a_plastic_particle_stays_at_the_bottom_of_a_v(run, order):
-    """e = 0: it falls to the bottom of a symmetric V and climbs neither side; each wall then carries
-    m g/(2 sin(angle))."""
+def test_a_particle_that_falls_into_a_v_climbs_neither_side(run, order):
+    """e = 0: it stays at the bottom of a symmetric V, and each wall then carries m g/(2 sin(angle)); with
+    e = 1/2 on both walls it rises on the axis to e^2 h."""
     result = run(wedge(order), 1.0, 0.05)
     assert np.abs(result["x"]).max() < 1e-15
     rests = result["time"] > np.sqrt(2 / G)
     assert np.abs(result["z"][rests]).max() < 1e-15
     for wall in ("left", "right"):
         assert result[f"lambda.{wall}"][-1] == pytest.approx(G / 2 / np.sin(1.0), rel=1e-13)
-
-
-@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_a_particle_bounces_straight_up_in_a_v(run, order):
-    """With e = 1/2 on both walls it rises on the axis of the V to e^2 h."""
-    result = run(wedge(order, 0.5), 0.8, 0.05)
+    result = run(wedge(order), 0.8, 0.05, e=0.5)
     assert np.abs(result["x"]).max() < 1e-14
     assert top(result)[-1] == pytest.approx(0.25, rel=1e-9)
 
@@ -100,20 +82,19 @@ def test_a_ball_flies_out_of_a_corner_the_way_it_came(run, order, tilt):
     model = corner(order, 0.8, tilt)
     values = {"x": np.cos(np.pi / 4 + tilt), "z": np.sin(np.pi / 4 + tilt)}
     values |= {f"der({q})": -x for q, x in values.items()}
-    result = run(model, 2.0, 0.5, values)
+    result = run(model, 2.0, 0.5, **values)
     for q in ("x", "z"):
         assert result[f"der({q})"][-1] == pytest.approx(-0.8 * values[f"der({q})"], rel=1e-12)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
-def test_a_cradle_whose_balls_touch_is_the_same_from_both_sides(tmp_path, order, mirrored):
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0)])
+def test_a_cradle_whose_balls_touch_is_the_same_from_both_sides(run, order, mirrored):
     """n equal balls: by Newton's law and complementarity those at rest move on together with
     (1 + e)/n, whatever their order and whether the first or the last is struck."""
     count = 4
-    fmu = build_fmu(cradle(count, order, 0.5, mirrored), tmp_path, target="native", check=False)
     for value in (0.0, 0.5, 1.0):
-        last = simulate(fmu, 1.0, 0.25, 1e-10, {"e": value})[-1]
+        last = run(cradle(count, order, 0.5, mirrored), 1.0, 0.25, e=value)[-1]
         v = np.array([last[f"der(x{k})"] for k in range(count)])
         if mirrored:
             v = -v[::-1]
@@ -125,7 +106,7 @@ def test_a_cradle_with_gaps_passes_the_motion_on(run):
     """Balls a micrometre apart strike one after another: with e = 1 the last flies off alone."""
     model = cradle(4)
     gaps = {f"x{k}": 0.1 * k + 1e-6 * k for k in range(1, 4)}
-    last = run(model, 1.0, 0.25, gaps)[-1]
+    last = run(model, 1.0, 0.25, **gaps)[-1]
     v = [last[f"der(x{k})"] for k in range(4)]
     np.testing.assert_allclose(v, [0, 0, 0, 1], atol=1e-12)
 
@@ -195,12 +176,12 @@ def test_a_restitution_outside_0_to_1_is_refused(run, value):
         start={x: 1.0},
     )
     with pytest.raises(LagfmuError, match=r"restitution of 'floor' is .*expected 0 .* to 1"):
-        run(model, 1.0, 0.5, {"e_free": value})
+        run(model, 1.0, 0.5, e_free=value)
 
 
 # --------------------------------------------------------------------------- model exchange
 
-TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
+TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)
 
 
 def exchanged(path: Path, stop: float, interval: float = 0.02, **more: Any) -> Any:
@@ -210,7 +191,7 @@ def exchanged(path: Path, stop: float, interval: float = 0.02, **more: Any) -> A
     )
 
 
-@pytest.mark.parametrize("value", [0.0, 0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("value", [0.0, 0.3, 0.7, 0.9])
 def test_an_importers_integrator_leaves_the_ball_above_the_floor(native_fmu, value):
     """Under CVODE at every tolerance the ball bounces, comes to rest on the floor and stays there:
     y >= -1e-5 m, and after sqrt(2 h/g) (1 + e)/(1 - e) lambda = m g."""
@@ -246,14 +227,11 @@ def test_a_fixed_step_carries_no_ball_through_the_floor(native_fmu, step):
         assert result["y"][-1] >= 0
 
 
-@pytest.fixture(scope="module")
-def lander(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def lander() -> Model:
     """A particle that slides down a hemisphere and lands on the floor around it."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine")
     r, theta = dynamicsymbols("r theta")
     a, g = symbols("a g", positive=True)
-    model = Model(
+    return Model(
         name="Lander",
         lagrangian=m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2 - m * g * r * cos(theta),
         coordinates={r: "m", theta: "rad"},
@@ -266,17 +244,15 @@ def lander(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ],
         start={r: 1.0, theta: 0.1},
     )
-    folder = tmp_path_factory.mktemp("lander")
-    return write(prepare(model, Scene("Lander", stop_time=6.0)), folder, [], target="native")
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5, 0.9])
-def test_a_particle_that_left_a_hemisphere_lands_in_model_exchange(lander, value):
+def test_a_particle_that_left_a_hemisphere_lands_in_model_exchange(built, value):
     """It leaves at cos theta = (2/3) cos theta0, lands on the floor and stays above it for 6 s, whatever
     tolerance CVODE has; x'' = 0 and energy only falls after the departure, within the tolerance."""
     for tolerance in TOLERANCES:
         values = {"e": value}
-        result = exchanged(lander, 6.0, relative_tolerance=tolerance, start_values=values)
+        result = exchanged(built(lander()), 6.0, relative_tolerance=tolerance, start_values=values)
         height = result["r"] * np.cos(result["theta"])
         assert height.min() >= -1e-5
         assert result["r"].min() >= 1 - 1e-3
@@ -289,13 +265,9 @@ def test_a_particle_that_left_a_hemisphere_lands_in_model_exchange(lander, value
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_a_rod_dropped_flat_lies_flat_in_model_exchange(tmp_path, order):
+def test_a_rod_dropped_flat_lies_flat_in_model_exchange(built, order):
     """Both feet are struck together under an importer's integrator too."""
-    if find_compiler() is None:
-        pytest.skip("no C compiler on this machine")
-    path = write(
-        prepare(rod(order, 0.7), Scene("Rod", stop_time=6.0)), tmp_path, [], target="native"
-    )
+    path = built(rod(order, 0.7))
     for tolerance in TOLERANCES:
         result = exchanged(path, 6.0, relative_tolerance=tolerance)
         assert np.abs(result["theta"]).max() < 1e-8
