@@ -94,6 +94,12 @@ def of_each_kind(
     ]
 
 
+def model_file(name: str) -> ModelFile:
+    """A file of models/, or of benchmarks/."""
+    path = MODELS / f"{name}.py"
+    return load(path if path.exists() else MODELS.parent / "benchmarks" / path.name)
+
+
 def scene_of(name: str) -> tuple[ModelFile, Scene]:
     """The model file and the scene of an FMU of models/."""
     file = load(MODELS / f"{EVERY[name]}.py")
