@@ -17,18 +17,14 @@ from ..names import METHOD
 Names = list[str] | None
 
 
-OUTPUTS = (
-    "Only these variables as outputs, e.g. lambda.surface,Q.* or 'der(x)'; all else is removed."
-)
-FIXED = "Parameters that become numbers: m,g at the model's values, g=1.62 at another; * all."
-INPUTS = "Only these inputs are driven; the others keep their start values. '' for none."
-CONTACTS = "Only these contacts may open; the others hold. '' for none."
-FRICTIONS = "Only these frictions may slip; what the others limit sticks. '' for none."
-METHODS = "Methods that solver.method can be set to (default with --outputs: one)."
+def _needed(text: str, *flags: str, metavar: str | None = None) -> Any:
+    """An option that says what the scene needs."""
+    panel = "What the scene needs"
+    return typer.Option(*flags, metavar=metavar, help=text, rich_help_panel=panel)
 
 
-def _option(text: str) -> Any:
-    return typer.Option(metavar="NAME,...", help=text, rich_help_panel="What the scene needs")
+def _listed(text: str) -> Any:
+    return Annotated[Names, _needed(text, metavar="NAME,...")]
 
 
 Arguments = Annotated[
@@ -39,58 +35,49 @@ Arguments = Annotated[
         help="An argument of the file's function 'family', e.g. -p n=8; repeatable.",
     ),
 ]
-Outputs = Annotated[Names, _option(OUTPUTS)]
-Fixed = Annotated[Names, _option(FIXED)]
-Inputs = Annotated[Names, _option(INPUTS)]
-Contacts = Annotated[Names, _option(CONTACTS)]
-Frictions = Annotated[Names, _option(FRICTIONS)]
-Methods = Annotated[Names, _option(METHODS)]
-Method = Annotated[
-    str | None,
-    typer.Option(help="The default method.", rich_help_panel="What the scene needs"),
-]
-Formulation = Annotated[
-    str | None,
-    typer.Option(help="multipliers, nullspace or minimal.", rich_help_panel="What the scene needs"),
-]
+Outputs = _listed(
+    "Only these variables as outputs, e.g. lambda.surface,Q.* or 'der(x)'; all else is removed."
+)
+Fixed = _listed(
+    "Parameters that become numbers: m,g at the model's values, g=1.62 at another; * all."
+)
+Inputs = _listed("Only these inputs are driven; the others keep their start values. '' for none.")
+Contacts = _listed("Only these contacts may open; the others hold. '' for none.")
+Frictions = _listed("Only these frictions may slip; what the others limit sticks. '' for none.")
+Methods = _listed("Methods that solver.method can be set to (default with --outputs: one).")
+Method = Annotated[str | None, _needed("The default method.")]
+Formulation = Annotated[str | None, _needed("multipliers, nullspace or minimal.")]
 Derivatives = Annotated[
     bool | None,
-    typer.Option(
+    _needed(
+        "Directional derivatives in a native FMU (default: unless --outputs).",
         "--derivatives/--no-derivatives",
-        help="Directional derivatives in a native FMU (default: unless --outputs).",
-        rich_help_panel="What the scene needs",
     ),
 ]
 AddOutput = Annotated[
     Names,
-    typer.Option(
+    _needed(
+        "A further output, in the FMU's variable names: "
+        "'tension = -2*L*lambda.rod \\[N]'; repeatable.",
         "--add-output",
         metavar="'NAME = EXPRESSION [UNIT]'",
-        help="A further output, in the FMU's variable names: "
-        "'tension = -2*L*lambda.rod \\[N]'; repeatable.",
-        rich_help_panel="What the scene needs",
     ),
 ]
 RealsOnly = Annotated[
     bool | None,
-    typer.Option(
+    _needed(
+        "Reals for Booleans and counts, and no solver.method: for importers that know Reals alone.",
         "--reals-only",
-        help="Reals for Booleans and counts, and no solver.method: for importers that know Reals alone.",
-        rich_help_panel="What the scene needs",
     ),
 ]
 ErrorBars = Annotated[
     bool | None,
-    typer.Option(
+    _needed(
+        "Outputs error.NAME: an estimate of how far a run is off. Co-simulation only.",
         "--error-bars",
-        help="Outputs error.NAME: an estimate of how far a run is off. Co-simulation only.",
-        rich_help_panel="What the scene needs",
     ),
 ]
-Name = Annotated[
-    str | None,
-    typer.Option(help="Another name for the FMU.", rich_help_panel="What the scene needs"),
-]
+Name = Annotated[str | None, _needed("Another name for the FMU.")]
 
 Target = Annotated[
     str | None,

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from .. import names
 from ..methods import described
@@ -128,12 +129,12 @@ class VariableTable:
 
     def offering(self, methods: Collection[str]) -> VariableTable:
         """The same, where `solver.method` can only be one of these."""
-        variables = [
-            replace(v, description=described(methods), items=tuple(methods))
-            if v.of.quantity == names.METHOD
-            else v
-            for v in self.variables
-        ]
+        offered = {"description": described(methods), "items": tuple(methods)}
+        return self._changed({v.name: offered for v in self.those(names.METHOD)})
+
+    def _changed(self, fields: Mapping[str, Mapping[str, Any]]) -> VariableTable:
+        """The same, where variables of these names have other fields."""
+        variables = (replace(v, **fields.get(v.name, {})) for v in self.variables)
         return replace(self, variables=tuple(variables))
 
     def as_reals(self) -> VariableTable:
@@ -150,10 +151,7 @@ class VariableTable:
 
     def with_nominals(self, sizes: Mapping[str, float]) -> VariableTable:
         """The same with nominal values, SI."""
-        variables = [
-            replace(v, nominal=sizes[v.name]) if v.name in sizes else v for v in self.variables
-        ]
-        return replace(self, variables=tuple(variables))
+        return self._changed({name: {"nominal": size} for name, size in sizes.items()})
 
     def without_local_derivatives(self) -> VariableTable:
         """What co-simulation needs: derivatives that are no outputs serve model exchange only."""

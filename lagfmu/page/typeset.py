@@ -244,6 +244,15 @@ def _joined(factors: Sequence[Printed]) -> Printed:
     )
 
 
+def _put(latex: str, text: str, of: Printed) -> Printed:
+    """What is printed, within these two."""
+    return latex.format(of[0]), text.format(of[1])
+
+
+def _magnitude(of: Printed) -> Printed:
+    return _put("\\left|{}\\right|", "|{}|", of)
+
+
 def _total(terms: Sequence[Printed]) -> Printed:
     """Terms joined by + and -."""
     if not terms:
@@ -312,47 +321,31 @@ class _Typesetter:
     def frictions(self) -> Section:
         """Coulomb's law: |lambda| <= static |N| where it sticks, lambda = -kinetic |N| s/|s| where not."""
         show, factor = self.notation.show, self.notation.factor
-        rows = [c.name for c in self.eom.constraints]
+        rows = {c.name: k for k, c in enumerate(self.eom.constraints)}
 
         def vector(expressions: Sequence[Expr]) -> Printed:
-            latex, text = zip(*map(show, expressions), strict=True)
-            return (", ".join(latex), ", ".join(text))
+            """In brackets, if it has several components."""
+            latex, text = (", ".join(parts) for parts in zip(*map(show, expressions), strict=True))
+            several = len(expressions) > 1
+            return _put("\\left({}\\right)", "({})", (latex, text)) if several else (latex, text)
 
         equations: list[tuple[str, Sequence[Printed]]] = []
         for law in self.eom.frictions:
             normal = sp.Add(law.load, *(c * multiplier(k) for k, c in law.normal.items()))
-            forces = vector([multiplier(k) for k in law.of])
-            places = [rows.index(k) for k in law.of]
+            force, size = vector([multiplier(k) for k in law.of]), _magnitude(show(normal))
             slip = [
                 sp.Add(*(self.eom.G[k, j] * v for j, v in enumerate(self.eom.v))) - self.eom.nu[k]
-                for k in places
+                for k in map(rows.__getitem__, law.of)
             ]
             speed = vector([_tidy(s) for s in slip])
             s = ("s", "s") if len(slip) > 1 else speed
-            bound = ("\\left|{}\\right|", "|{}|")
-            size = tuple(b.format(f) for b, f in zip(bound, show(normal), strict=True))
-            many = len(slip) > 1
-            vectors = ("\\left({}\\right)", "({})") if many else ("{}", "{}")
-            force = tuple(v.format(f) for v, f in zip(vectors, forces, strict=True))
-            length = tuple(b.format(f) for b, f in zip(bound, force, strict=True))
-            stick: list[Printed] = [(length[0], length[1]), ("\\le", "≤"), factor(law.static)]
-            equations.append((f"{law.name} sticks", [*stick, (size[0], size[1])]))
-            sign = (
-                f"\\frac{{{s[0]}}}{{\\left|{s[0]}\\right|}}",
-                f"({s[1]})/|{s[1]}|" if " " in s[1] else f"{s[1]}/|{s[1]}|",
-            )
-            kinetic = factor(law.kinetic)
-            slide: list[Printed] = [
-                (force[0], force[1]),
-                ("=", "="),
-                ("-" + kinetic[0], "-" + kinetic[1]),
-            ]
-            slide += [(size[0], size[1]), sign]
-            if many:
-                slide += [
-                    ("\\text{with } s =", "with s ="),
-                    (vectors[0].format(speed[0]), vectors[1].format(speed[1])),
-                ]
+            stick = [_magnitude(force), ("\\le", "≤"), factor(law.static), size]
+            equations.append((f"{law.name} sticks", stick))
+            text = "({0})/|{0}|" if " " in s[1] else "{0}/|{0}|"
+            sign = _put("\\frac{{{0}}}{{\\left|{0}\\right|}}", text, s)
+            slide = [force, ("=", "="), _put("-{}", "-{}", factor(law.kinetic)), size, sign]
+            if len(slip) > 1:
+                slide += [("\\text{with } s =", "with s ="), speed]
             equations.append((f"{law.name} slips", slide))
         remark = (
             "What a friction limits holds as long as it sticks; where it slips this is its force."
