@@ -8,7 +8,7 @@ for, of the full equations only the coordinates that are read remain.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -55,7 +55,7 @@ def needed(form: Form, outputs: Collection[str]) -> tuple[Indices, Indices]:
     speeds: set[int] = set()
     rows: set[int] = set()
     for name in outputs:
-        more, more_rows = of.get(name, (NONE, NONE))
+        more, more_rows = of(name)
         speeds |= more
         rows |= more_rows
     groups = [(c, r, _positions(eom, _behind(eom, c, r))) for c, r in coupled(eom)]
@@ -79,42 +79,44 @@ def needed(form: Form, outputs: Collection[str]) -> tuple[Indices, Indices]:
     return frozenset(speeds), frozenset(rows)
 
 
-def subjects(form: Form) -> dict[str, tuple[Indices, Indices]]:
+def subjects(form: Form) -> Callable[[str], tuple[Indices, Indices]]:
     """Name of an output -> the speeds and rows that it is of."""
     eom, reduction = form.equations, form.reduction
-    found: dict[str, tuple[Indices, Indices]] = {}
-    moved = _moved(eom)
-    for q, speeds in zip(eom.q, moved, strict=True):
-        found |= dict.fromkeys(_motion(q), (speeds, NONE))
-    for i, (v, direction) in enumerate(zip(eom.v, eom.directions, strict=True)):
-        of = (str(v), names.rate_of(str(v)), names.name(names.FORCE, "", direction))
-        found |= dict.fromkeys(of, (frozenset({i}), NONE))
-    of_rows = (names.MULTIPLIER, names.UNIQUE, names.RESIDUAL, names.CONTACT)
-    for k, c in enumerate(eom.constraints):
-        row = frozenset({k})
-        found |= {names.name(quantity, c.name): (NONE, row) for quantity in of_rows}
-        found |= _event(eom, names.DEPARTURE, c.name, row)
-        found |= _event(eom, names.CLOSING, c.name, row)
-        found[names.name(names.IMPULSE, c.name)] = NONE, row
-        for i, direction in enumerate(eom.directions):
-            found[names.name(names.FORCE, c.name, direction)] = frozenset({i}), row
-    for o in eom.outputs:
-        found[o.name] = _of_output(eom, o)
-    found |= _of_frictions(eom)
-    for name, parts in (
-        (names.KINETIC, [eom.kinetic]),
-        (names.POTENTIAL, [eom.potential]),
-        (names.TOTAL, [eom.kinetic, eom.potential]),
-    ):
-        symbols = set().union(*(e.free_symbols for e in parts if e is not None))
-        found[name] = _positions(eom, symbols), NONE
-    if reduction is None:
-        return found
-    for s in reduction.s:
-        behind = frozenset(j for j, phi in enumerate(reduction.phi) if s in phi.free_symbols)
-        for name in _motion(s):
-            found.setdefault(name, (behind, NONE))
-    return found
+    moved = dict(zip(map(str, eom.q), _moved(eom), strict=True))
+    moved |= {names.read(str(v)).coordinate: frozenset({i}) for i, v in enumerate(eom.v)}
+    if reduction is not None:
+        for s in reduction.s:
+            behind = frozenset(j for j, phi in enumerate(reduction.phi) if s in phi.free_symbols)
+            moved.setdefault(str(s), behind)
+    forced = {direction: frozenset({i}) for i, direction in enumerate(eom.directions)}
+    rows = {c.name: frozenset({k}) for k, c in enumerate(eom.constraints)}
+    slipping: dict[str, Indices] = {}  # of a friction, and of each row that it limits, all of these
+    for law in eom.frictions:
+        of_law = NONE.union(*(rows[name] for name in law.of))
+        slipping |= dict.fromkeys((law.name, *law.of), of_law)
+    losing = NONE.union(
+        *slipping.values(), *(rows[c.name] for c in eom.constraints if isinstance(c, Contact))
+    )
+    energies = {names.KINETIC: [eom.kinetic], names.POTENTIAL: [eom.potential]}
+    energies[names.TOTAL] = [eom.kinetic, eom.potential]
+    own = {o.name: o for o in eom.outputs}
+
+    def subject(name: str) -> tuple[Indices, Indices]:
+        of = names.read(name)
+        if name in own:
+            return _of_output(eom, own[name])
+        if of.quantity in energies:
+            parts = (e.free_symbols for e in energies[of.quantity] if e is not None)
+            return _positions(eom, set().union(*parts)), NONE
+        if of.quantity == names.DISSIPATED:
+            return NONE, losing
+        if of.quantity in (names.ERROR, *names.PEAKS):  # what they are of is asked for besides
+            return NONE, NONE
+        speeds = forced if of.quantity == names.FORCE else moved
+        acting = slipping if of.head in names.OF_FRICTION else rows
+        return speeds.get(of.coordinate, NONE), acting.get(of.constraint, NONE)
+
+    return subject
 
 
 def _moved(eom: EquationsOfMotion) -> list[Indices]:
@@ -125,37 +127,6 @@ def _moved(eom: EquationsOfMotion) -> list[Indices]:
 def _motion(q: Expr) -> list[str]:
     """A coordinate, its velocity, its acceleration."""
     return [derivative(str(q), k) for k in range(3)]
-
-
-def _event(
-    eom: EquationsOfMotion, quantity: str, of: str, rows: Indices
-) -> dict[str, tuple[Indices, Indices]]:
-    """What is kept of what happens to a contact or a friction."""
-    found = {names.name(f"{quantity}.{what}", of): (NONE, rows) for what in ("count", "time")}
-    for q, speeds in zip(eom.q, _moved(eom), strict=True):
-        found[names.name(quantity, of, str(q))] = speeds, rows
-    for i, v in enumerate(eom.v):
-        state = names.read(str(v))
-        found[names.name(quantity, of, state.coordinate, state.order)] = frozenset({i}), rows
-    return found
-
-
-def _of_frictions(eom: EquationsOfMotion) -> dict[str, tuple[Indices, Indices]]:
-    """What frictions show: all of it is of the rows that they limit."""
-    position = {c.name: k for k, c in enumerate(eom.constraints)}
-    found: dict[str, tuple[Indices, Indices]] = {}
-    every = NONE
-    for law in eom.frictions:
-        rows = frozenset(position[name] for name in law.of)
-        every |= rows
-        own = [names.name(head, law.name) for head in (names.STICKS, names.MARGIN, names.POWER)]
-        own += [names.name(names.SLIP, name) for name in law.of]
-        found |= dict.fromkeys(own, (NONE, rows)) | _event(eom, names.SLIPPING, law.name, rows)
-        found |= _event(eom, names.STICKING, law.name, rows)
-    every |= {k for k, c in enumerate(eom.constraints) if isinstance(c, Contact)}
-    if every:
-        found[names.DISSIPATED] = NONE, every
-    return found
 
 
 def _of_output(eom: EquationsOfMotion, o: Output) -> tuple[Indices, Indices]:
@@ -266,7 +237,7 @@ def read_only(form: Form, outputs: Collection[str]) -> Form:
     of = subjects(form)
     wanted: set[int] = set()
     for name in set(outputs) - of_s:
-        wanted |= of.get(name, (NONE, NONE))[0]
+        wanted |= of(name)[0]
     js = sorted(wanted)
     if not js:
         own = replace(reduction.reduced, constraints=reduction.constraints, outputs=eom.outputs)
