@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -130,11 +129,9 @@ def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
     fit = [n for n, j in known.items() if j.measure]
     for joint in map(name_of_joint, named):
         if joint not in known:
-            near = difflib.get_close_matches(joint, fit, 1)
             yield (
                 f"{_kind(part)} {part.name!r}: no joint is called {joint!r}, expected one of "
                 f"{', '.join(fit) or 'none: no joint turns or slides'}"
-                + (f"; did you mean {near[0]!r}?" if near else "")
             )
         elif joint not in fit:
             yield (

@@ -17,7 +17,7 @@ from .joints import places, rolling
 class Contact:
     """The second marker (with `radius` [m]: a wheel about it) stays above the x axis of the first.
 
-    lambda.NAME [N] pushes and never pulls; `restitution` is Newton's.  With `friction` (static, or static and
+    NAME.y [N] pushes and never pulls; `restitution` is Newton's.  With `friction` (static, or static and
     kinetic coefficient) NAME.x [N] is the force along the line: it sticks or slips by Coulomb's law.
     """
 
@@ -35,9 +35,10 @@ class Contact:
         r = draft.number(self.radius, f"{name}.radius", "m", f"radius of {name}")
         e = draft.number(self.restitution, f"{name}.restitution", "1", f"restitution of {name}")
         gap, slip = rolling(a, b, r)
-        draft.constraints.append(elements.Contact(name, gap, f"{name} touches the line", e))
+        closed, row = f"{name}.y", f"{name}.x"
+        draft.constraints.append(elements.Contact(closed, gap, f"{name} touches the line", e))
         wrench = draft.wrench(name)
-        wrench.force[1] += multiplier(name)
+        wrench.force[1] += multiplier(closed)
         if self.friction is None:
             return
         given = self.friction if isinstance(self.friction, tuple) else (self.friction,)
@@ -46,10 +47,10 @@ class Contact:
             draft.number(mu, f"{name}.{word}", "1", f"coefficient of friction of {name}, {word}")
             for mu, word in zip(given, words, strict=True)
         ]
-        row, text = f"{name}.x", f"{name} does not slip"
+        text = f"{name} does not slip"
         draft.constraints += [
-            elements.Nonholonomic(row, slip, text, while_closed=name),
-            elements.Friction(name, [row], multiplier(name), *coefficients),
+            elements.Nonholonomic(row, slip, text, while_closed=closed),
+            elements.Friction(name, [row], multiplier(closed), *coefficients),
         ]
         wrench.force[0] += multiplier(row)
         wrench.torque[2] += r * multiplier(row) if r != 0 else sp.S.Zero

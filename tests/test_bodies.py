@@ -1,0 +1,522 @@
+"""Bodies and joints in the plane: the wrench in each joint, against what Newton says by hand."""
+
+from __future__ import annotations
+
+import warnings
+from math import acos, cos, hypot, pi, sin, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sympy import symbols
+from sympy.physics.vector import dynamicsymbols
+
+from lagfmu import Parameter, Scene, simulate, verify
+from lagfmu.bodies import (
+    Body,
+    Contact,
+    Distance,
+    Fixed,
+    Force,
+    Gear,
+    Gravity,
+    Ground,
+    Motor,
+    PointOnPlane,
+    Prismatic,
+    Revolute,
+    Rolling,
+    SpringDamper,
+    Torque,
+    Torsion,
+    mechanism,
+)
+from lagfmu.errors import ModelError
+from lagfmu.testing import load, prepare, write
+
+g = 9.81  # m/s^2
+t = dynamicsymbols._t
+ground = Ground()
+MODELS = Path(__file__).parent.parent / "models"
+
+
+def moved(model, stop=1.0, **options):
+    """A run at a fine tolerance, in this process unless the target is another."""
+    given = {"target": "python", "tolerance": 1e-11, **options}
+    return simulate(model, stop, stop / 20, **given)
+
+
+def plane(*, bodies, name="M", **parts):
+    return mechanism(name, plane="xy", bodies=bodies, **parts)
+
+
+def test_the_forces_of_a_slider_crank_are_those_of_d_alembert(tmp_path):
+    """Both targets; and with another crank, a heavier piston and a longer rod."""
+    file = load(MODELS / "slider_crank_bodies.py")
+    (scene,) = file.scenes
+    for target in ("native", "python"):
+        fmu = write(prepare(file.model, scene), tmp_path, file.closed_forms, target=target)
+        assert verify(fmu).passed
+    changed = {"A.second.x": -0.07, "B.first.x": 0.12, "piston.mass": 2.0, "C.first.x": 0.4}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert verify(fmu, changed).passed
+
+
+def test_a_pin_carries_a_compound_pendulum():
+    """m = 2 kg, J = 0.03 kg m^2, the pin 0.4 m from the centre: J_A phi'' = -m g d sin phi, and the force of
+    the pin, along the rod and across, is m g cos phi + m d phi'^2 and m g sin phi + m d phi''."""
+    m, J, d, start = 2.0, 0.03, 0.4, 1.2
+    bob = Body("bob", m, J)
+    model = plane(
+        bodies=[bob],
+        joints=[Revolute("A", ground.at((0, 0), rotation=-pi / 2), bob.at((-d, 0)))],
+        loads=[Gravity((0, -g))],
+        start={"angle.A": start, "der(angle.A)": -0.7},
+    )
+    run = moved(model)
+    phi, rate, acceleration = (run[n] for n in ("angle.A", "der(angle.A)", "der(angle.A,2)"))
+    assert (phi[0], rate[0]) == pytest.approx((start, -0.7), rel=1e-14)
+    assert acceleration == pytest.approx(-m * g * d * np.sin(phi) / (J + m * d**2), rel=1e-9)
+    across, along = m * d * acceleration, -m * d * rate**2
+    down, right = (  # the marker's x axis points down, its y axis to the right
+        along * np.cos(phi) - across * np.sin(phi) - m * g,
+        along * np.sin(phi) + across * np.cos(phi),
+    )
+    scale = m * g
+    np.testing.assert_allclose(run["force.A.x"], down, atol=1e-9 * scale)
+    np.testing.assert_allclose(run["force.A.y"], right, atol=1e-9 * scale)
+    np.testing.assert_allclose(run["force.A.norm"], np.hypot(down, right), rtol=1e-9)
+    assert not run["torque.A.z"].any()
+    assert run["unique.A.x"].all()
+    assert run["unique.A.y"].all()
+    assert run["bob.omega.z"] == pytest.approx(rate, rel=1e-14)
+
+
+def test_a_bracket_carries_what_hangs_on_it():
+    """A welded body of 3 kg, its centre 0.2 m beside the weld: 3 g upwards and 0.6 g N m about the marker."""
+    part = Body("part", 3.0, 0.1, center=(0.2, 0.05))
+    run = moved(
+        plane(
+            bodies=[part],
+            joints=[Fixed("W", ground.at((1, 2)), part.at((0, 0)))],
+            loads=[Gravity((0, -g))],
+        )
+    )
+    assert run["force.W.y"] == pytest.approx(3 * g, rel=1e-13)
+    assert run["torque.W.z"] == pytest.approx(0.6 * g, rel=1e-13)
+    assert run["part.position.x"] == pytest.approx(1.2, rel=1e-14)
+
+
+def test_a_slide_on_an_incline_takes_the_moment_of_an_eccentric_body():
+    """A block slides down a line at 30 degrees with g/2; the rail carries m g cos 30 and, though its centre
+    is 0.1 m above it, no moment: that of gravity along the line is what the mass itself needs."""
+    block = Body("block", 2.0, 0.02, center=(0, 0.1))
+    run = moved(
+        plane(
+            bodies=[block],
+            joints=[Prismatic("D", ground.at((0, 0), rotation=-pi / 6), block.at((0, 0)))],
+            loads=[Gravity((0, -g))],
+        ),
+        stop=0.5,
+    )
+    assert run["der(position.D,2)"] == pytest.approx(g / 2, rel=1e-12)
+    assert run["position.D"] == pytest.approx(g / 4 * run["time"] ** 2, rel=1e-9)
+    assert run["force.D.y"] == pytest.approx(2 * g * cos(pi / 6), rel=1e-12)
+    np.testing.assert_allclose(run["force.D.x"], 0)
+    moment = (
+        0.1 * 2 * g * sin(pi / 6) - 0.1 * 2 * g / 2
+    )  # of gravity and of the inertia, at the marker
+    np.testing.assert_allclose(run["torque.D.z"], moment, atol=1e-12)
+
+
+def test_a_rod_without_mass_pulls_along_itself():
+    """A bob at rest, aside by 0.5 rad, on a rod: it pulls with m g cos(0.5), towards the ground's marker."""
+    bob = Body("bob", 1.5, 0.01)
+    tilted = (sin(0.5), -cos(0.5))
+    model = plane(
+        bodies=[bob],
+        joints=[Distance("L", ground.at((0, 0)), bob.at((0, 0)), 1.0)],
+        loads=[Gravity((0, -g))],
+        start={"bob.position": tilted},
+    )
+    first = moved(model, stop=0.1)[0]
+    pull = 1.5 * g * cos(0.5)
+    assert first["lambda.L"] == pytest.approx(-pull, rel=1e-12)
+    expected = [-pull * x for x in tilted]
+    assert [first["force.L.x"], first["force.L.y"]] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_point_on_a_line_is_held_across_it():
+    """A rod of 2 m leans in a corner, free of friction: both walls push by right angles, as its two freedoms
+    less two rows demand; its power balance holds."""
+    rod = Body("rod", 3.0, 1.0)
+    model = plane(
+        bodies=[rod],
+        joints=[
+            PointOnPlane("floor", ground.at((0, 0)), rod.at((1, 0))),
+            PointOnPlane("wall", ground.at((0, 0)), rod.at((-1, 0)), axis="x"),
+        ],
+        loads=[Gravity((0, -g))],
+        start={"rod.orientation.z": -1.0},
+    )
+    first = moved(model, stop=0.2)[0]
+    # x = cos a, y = sin a of the centre, (J + m) a'' = -m g cos a
+    acceleration = -3 * g * cos(1.0) / (1.0 + 3.0)
+    assert first["rod.position.x"] == pytest.approx(cos(1.0), rel=1e-13)
+    assert first["force.wall.x"] == pytest.approx(-3 * sin(1.0) * acceleration, rel=1e-12)
+    assert first["force.floor.y"] == pytest.approx(3 * (g + cos(1.0) * acceleration), rel=1e-12)
+
+
+def test_a_wheel_rolls_down_an_incline():
+    """J = m r^2/2: it rolls with (2/3) g sin(alpha); the line gives -m g sin(alpha)/3 along, m g cos(alpha)
+    across, and the moment of the force along it about the wheel's centre turns the wheel."""
+    m, r, alpha = 2.0, 0.3, 0.4
+    wheel = Body("wheel", m, m * r**2 / 2)
+    run = moved(
+        plane(
+            bodies=[wheel],
+            joints=[Rolling("R", ground.at((0, 0), rotation=-alpha), wheel.at((0, 0)), r)],
+            loads=[Gravity((0, -g))],
+        )
+    )
+    along = run["der(wheel.position.x,2)"] / cos(alpha)
+    assert along == pytest.approx(2 / 3 * g * sin(alpha), rel=1e-11)
+    assert run["force.R.x"] == pytest.approx(-m * g * sin(alpha) / 3, rel=1e-11)
+    assert run["force.R.y"] == pytest.approx(m * g * cos(alpha), rel=1e-11)
+    assert run["torque.R.z"] == pytest.approx(m * r**2 / 2 * run["der(wheel.orientation.z,2)"])
+
+
+def test_a_gear_divides_a_torque():
+    """Wheels on a 7:3 gear: (J1 + (3/7)^2 J2) a = tau, and the teeth hand on J2 (3/7)^2 a of it."""
+    one, two = Body("one", 1.0, 0.5), Body("two", 1.0, 2.0)
+    run = moved(
+        plane(
+            bodies=[one, two],
+            joints=[
+                Gear("teeth", "A", "B", ratio=-7 / 3),
+                Revolute("A", ground.at((0, 0)), one.at((0, 0))),
+                Revolute("B", ground.at((1, 0)), two.at((0, 0))),
+            ],
+            loads=[Motor("motor", "A", torque=1.4)],
+        ),
+        stop=20.0,
+    )
+    a = 1.4 / (0.5 + (3 / 7) ** 2 * 2.0)
+    assert run["der(angle.A,2)"] == pytest.approx(a, rel=1e-12)
+    assert run["angle.A"] == pytest.approx(a * run["time"] ** 2 / 2, rel=1e-10)
+    assert run["angle.B"] == pytest.approx(-3 / 7 * run["angle.A"], rel=1e-12, abs=1e-12)
+    assert run["angle.A"][-1] > 40 * 2 * pi
+    assert run["lambda.teeth"] == pytest.approx(-((3 / 7) ** 2) * 2.0 * a, rel=1e-12)
+    assert run["torque.A.z"] == pytest.approx(1.4)  # the motor; the teeth are no part of the joint
+    assert run["motor.power"] == pytest.approx(1.4 * run["der(angle.A)"], rel=1e-14)
+
+
+def test_a_motor_that_prescribes_an_angle_supplies_the_torque_for_it():
+    """phi = 0.3 sin(5 t): tau = J phi'' on a wheel, from a law and from an input with its derivatives."""
+    wheel = Body("wheel", 1.0, 0.2)
+
+    def model(motion):
+        from sympy import sin as sine
+
+        law = symbols("amplitude") * sine(symbols("rate") * t)
+        return plane(
+            bodies=[wheel],
+            joints=[Revolute("A", ground.at((0, 0)), wheel.at((0, 0)))],
+            loads=[Motor("motor", "A", motion=motion or law, rate=1.5)],
+            parameters=[]
+            if motion
+            else [
+                Parameter(symbols("amplitude"), 0.3, "rad"),
+                Parameter(symbols("rate"), 5.0, "rad/s"),
+            ],
+        )
+
+    run = moved(model(None))
+    torque = -0.2 * 0.3 * 25 * np.sin(5 * run["time"])
+    np.testing.assert_allclose(run["torque.A.z"], torque, atol=1e-10)
+    power = torque * 1.5 * np.cos(5 * run["time"])
+    np.testing.assert_allclose(run["motor.power"], power, atol=1e-9)
+
+    time = np.linspace(0, 1, 2001)
+    names = ("motor.angle", "der(motor.angle)", "der(motor.angle,2)")
+    drive = np.zeros(len(time), [(n, float) for n in ("time", *names)])
+    drive["time"] = time
+    for k, n in enumerate(names):
+        drive[n] = 0.3 * 5**k * np.sin(5 * time + k * pi / 2)
+    run = moved(model(True), inputs=drive, tolerance=1e-9)
+    np.testing.assert_allclose(run["lambda.motor"][1:], torque[:-1], atol=1e-6)  # inputs are held
+
+
+def test_a_spring_and_its_damper_pull_along_their_line():
+    """Between a wall and a block on a rail: m x'' = -k (x - l) - c x' - preload."""
+    block = Body("block", 2.0, 1.0)
+    run = moved(
+        plane(
+            bodies=[block],
+            joints=[Prismatic("D", ground.at((0, 0)), block.at((0, 0)))],
+            loads=[SpringDamper("S", ground.at((0, 0)), block.at((0, 0)), 50.0, 0.6, 3.0, 1.0)],
+            start={"position.D": 0.9},
+        )
+    )
+    x, v, a = (run[n] for n in ("position.D", "der(position.D)", "der(position.D,2)"))
+    assert run["force.S"] == pytest.approx(50 * (x - 0.6) + 3 * v + 1.0, rel=1e-12)
+    assert -2 * a == pytest.approx(run["force.S"], rel=1e-12)
+    rest, w, s = 0.6 - 1 / 50, sqrt(50 / 2), 3.0 / 4
+    wd = sqrt(w**2 - s**2)
+    time = run["time"]
+    swing = np.exp(-s * time) * (np.cos(wd * time) + s / wd * np.sin(wd * time))
+    np.testing.assert_allclose(x, rest + (0.9 - rest) * swing, atol=1e-9)
+    assert not run["force.D.x"].any()  # springs are no part of a joint
+
+
+def test_a_torsion_spring_turns_back():
+    """J phi'' = -k (phi - slack) + preload about a pin at the centre, for many turns from the start."""
+    wheel = Body("wheel", 1.0, 0.5)
+    run = moved(
+        plane(
+            bodies=[wheel],
+            joints=[Revolute("A", ground.at((0, 0)), wheel.at((0, 0)))],
+            loads=[Torsion("S", "A", stiffness=2.0, angle=0.25, preload=0.1)],
+            start={"angle.A": 30.0},
+        ),
+        stop=10.0,
+    )
+    rest = 0.25 + 0.05
+    expected = rest + (30 - rest) * np.cos(2 * run["time"])
+    np.testing.assert_allclose(run["angle.A"], expected, atol=1e-8)
+    assert run["torque.S"] == pytest.approx(0.5 * run["der(angle.A,2)"], abs=1e-9)
+
+
+def test_forces_and_torques_act_where_they_are_said_to():
+    """A free body of 2 kg and 0.5 kg m^2: a force (3, 0) at 0.2 m above the centre gives 1.5 m/s^2 and
+    -0.6/0.5 rad/s^2; one that follows the marker goes on in its axes; a torque of 1 N m adds 2 rad/s^2."""
+    part = Body("part", 2.0, 0.5)
+
+    def first(*loads):
+        row = moved(plane(bodies=[part], loads=loads, start={"part.orientation.z": pi / 2}), 0.01)[
+            0
+        ]
+        found = [f"der(part.{x},2)" for x in ("position.x", "position.y", "orientation.z")]
+        return [float(row[n]) for n in found]
+
+    above = part.at((0.2, 0))  # the body stands upright: its x axis is the ground's y axis
+    assert first(Force("F", above, (3, 0))) == pytest.approx([1.5, 0, -1.2], abs=1e-14)
+    assert first(Force("F", above, (3, 0), follows=True)) == pytest.approx([0, 1.5, 0], abs=1e-14)
+    assert first(Torque("T", part, 1.0)) == pytest.approx([0, 0, 2], abs=1e-14)
+    pushed = plane(bodies=[part], loads=[Force("F", above), Torque("T", part)])
+    assert [i.symbol.name for i in pushed.inputs] == ["F.x", "F.y", "T.z"]
+
+
+def test_a_joint_stops_at_its_limits():
+    """A flap of 2 kg falls from the level to its stop at -0.5 rad and rests there on m g d cos(0.5)."""
+    flap = Body("flap", 2.0, 0.05)
+    run = moved(
+        plane(
+            bodies=[flap],
+            joints=[Revolute("A", ground.at((0, 0)), flap.at((-0.3, 0)), limits=(-0.5, 2.0))],
+            loads=[Gravity((0, -g))],
+        )
+    )
+    last = run[-1]
+    assert last["contact.A.lower"]
+    assert not last["contact.A.upper"]
+    assert last["angle.A"] == pytest.approx(-0.5, rel=1e-12)
+    assert last["torque.A.z"] == pytest.approx(2 * g * 0.3 * cos(0.5), rel=1e-12)
+    J = 0.05 + 2 * 0.3**2
+    speed = sqrt(2 * 2 * g * 0.3 * sin(0.5) / J)  # rad/s, by the energy
+    assert last["closing.A.lower.impulse"] == pytest.approx(J * speed, rel=1e-8)
+
+
+def test_a_wheel_on_a_rough_line_rolls_or_slips():
+    """J = m r^2/2 on an incline: it rolls where tan(alpha) <= 3 mu, else a = g (sin - mu cos)."""
+    m, r = 2.0, 0.3
+
+    def run(alpha, mu):
+        wheel = Body("wheel", m, m * r**2 / 2)
+        line = ground.at((0, 0), rotation=-alpha)
+        model = plane(
+            bodies=[wheel],
+            contacts=[Contact("C", line, wheel.at((0, 0)), r, friction=mu)],
+            loads=[Gravity((0, -g))],
+            start={"wheel.position": (r * sin(alpha), r * cos(alpha))},
+        )
+        return moved(model, target="native", scene=Scene("M", stop_time=1.0))
+
+    rolls, slips = run(0.4, 0.2), run(0.8, 0.2)
+    assert rolls["sticks.C"].all()
+    assert not slips["sticks.C"][1:].any()
+    assert rolls["force.C.x"] == pytest.approx(-m * g * sin(0.4) / 3, rel=1e-9)
+    normal = m * g * cos(0.8)
+    assert slips["force.C.y"] == pytest.approx(normal, rel=1e-9)
+    assert slips["force.C.x"][1:] == pytest.approx(-0.2 * normal, rel=1e-9)
+    assert slips["torque.C.z"][1:] == pytest.approx(-0.2 * normal * r, rel=1e-9)
+
+
+def test_a_parameter_that_two_parts_share_is_one():
+    """Two arms of one length, given once: the FMU has it once, in its own unit."""
+    L = Parameter(symbols("arm", positive=True), 250.0, "mm")
+    one, two = Body("one", 1.0, 0.1), Body("two", 1.0, 0.1)
+    model = plane(
+        bodies=[one, two],
+        joints=[
+            Revolute("A", ground.at((0, 0)), one.at((0, 0))),
+            Revolute("B", one.at((L, 0)), two.at((0, 0))),
+            Revolute("C", ground.at((0, L)), two.at((0, L.symbol))),
+        ],
+    )
+    assert [p.value for p in model.parameters if p.symbol == L.symbol] == [0.25]
+    first = moved(model, stop=0.01)[0]
+    x, y, angle = (first[f"two.{q}"] for q in ("position.x", "position.y", "orientation.z"))
+    assert hypot(x, y) == pytest.approx(0.25, rel=1e-13)  # the end of the first arm
+    assert (x - 0.25 * sin(angle), y + 0.25 * cos(angle)) == pytest.approx((0, 0.25), abs=1e-13)
+
+
+def test_a_mechanism_is_assembled_from_the_joint_coordinates_that_are_given():
+    """A four-bar linkage, drawn as one line: the crank's angle and rate stay, the rest closes, velocities
+    too; the angle between coupler and rocker is that of the cosine law."""
+    names, lengths = ("crank", "coupler", "rocker"), (0.2, 0.5, 0.4)
+    parts = [Body(n, 1.0, 0.01) for n in names]
+    ends = [(b.at((-x / 2, 0)), b.at((x / 2, 0))) for b, x in zip(parts, lengths, strict=True)]
+    (a1, a2), (b1, b2), (c1, c2) = ends
+    joints = [
+        Revolute("A", ground.at((0, 0)), a1),
+        Revolute("B", a2, b1),
+        Revolute("C", b2, c1),
+        Revolute("D", c2, ground.at((0.45, 0))),
+    ]
+    model = plane(bodies=parts, joints=joints, start={"angle.A": 1.1, "der(angle.A)": -3.0})
+    first = moved(model, stop=0.001)[0]
+    assert (first["angle.A"], first["der(angle.A)"]) == pytest.approx((1.1, -3.0), rel=1e-13)
+    assert max(abs(first[f"residual.{j.name}.{x}"]) for j in joints for x in "xy") < 1e-15
+    diagonal2 = 0.2**2 + 0.45**2 - 2 * 0.2 * 0.45 * cos(1.1)
+    between = (0.5**2 + 0.4**2 - diagonal2) / (2 * 0.5 * 0.4)
+    assert -cos(first["angle.C"]) == pytest.approx(between, rel=1e-12)
+
+
+def test_a_given_start_that_cannot_be_moves_and_is_told_with_both_numbers():
+    """A rocker of 0.4 m on a crank of 0.2 m and a coupler of 0.5 m reaches angles up to a limit only."""
+    parts = [Body(n, 1.0, 0.01) for n in ("crank", "coupler", "rocker")]
+    one, two, three = parts
+    joints = [
+        Revolute("A", ground.at((0, 0)), one.at((-0.1, 0))),
+        Revolute("B", one.at((0.1, 0)), two.at((-0.25, 0))),
+        Revolute("C", two.at((0.25, 0)), three.at((0.2, 0))),
+        Revolute("D", ground.at((0.45, 0)), three.at((-0.2, 0))),
+    ]
+    with pytest.warns(
+        UserWarning, match=r"angle\.D = 0\.1 is 1\.2\d+: the joints cannot be"
+    ) as told:
+        model = plane(bodies=parts, joints=joints, start={"angle.D": 0.1})
+    assert len(told) == 1
+    reach = (0.7**2 - 0.45**2 - 0.4**2) / (2 * 0.45 * 0.4)  # crank and coupler in line
+    angle = model.start[next(q for q in model.coordinates if q.name == "rocker.orientation.z")]
+    assert acos(reach) < angle < acos(reach) + 0.05
+
+
+def test_what_cannot_be_closed_says_which_joint_misses():
+    """A link of 1 m between pins that are 3 m apart misses by at least 2 m."""
+    link = Body("link", 1.0, 0.1)
+    joints = [
+        Revolute("A", ground.at((0, 0)), link.at((0, 0))),
+        Revolute("B", ground.at((3, 0)), link.at((1, 0))),
+    ]
+    with pytest.raises(ModelError) as caught:
+        plane(bodies=[link], joints=joints)
+    for part in (
+        "'A' cannot be closed",
+        "'B' cannot be closed",
+        "misses it by 1",
+        "correct a length",
+    ):
+        assert part in str(caught.value)
+
+
+arm = Body("arm", 1.0, 0.1)
+pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
+
+
+@pytest.mark.parametrize(
+    ("parts", "told"),
+    [
+        (
+            {"bodies": [Body("b", 0, 0.1)]},
+            "body 'b' has the mass 0, expected a positive number in kg",
+        ),
+        ({"bodies": [Body("b", 1, -0.1)]}, "body 'b' has the inertia -0.1"),
+        (
+            {"bodies": [Body("b", "heavy", 0.1)]},
+            "b.mass is 'heavy', expected a finite number in kg",
+        ),
+        (
+            {"bodies": [Body("b", 1, 0.1), Body("b", 1, 0.1)]},
+            "'b' is used twice, by a Body and a Body",
+        ),
+        ({"bodies": [Body("my body", 1, 0.1)]}, "the name 'my body', expected one word"),
+        ({"bodies": [Body("lambda", 1, 0.1)]}, "'lambda': this name is reserved"),
+        ({"bodies": ["arm"]}, "bodies hold 'arm', expected Body(...)"),
+        ({"joints": ["A"]}, "joints and loads hold 'A', expected one of Joint"),
+        ({"joints": [pin, pin]}, "'A' is used twice, by a Revolute and a Revolute"),
+        (
+            {"joints": [Revolute("A", arm.at((0, 0)), arm.at((1, 0)))]},
+            "Revolute 'A': both markers are on 'arm', expected two bodies",
+        ),
+        (
+            {"joints": [Revolute("A", ground.at((0, 0)), Body("x", 1, 1).at((0, 0)))]},
+            "its second marker is on 'x', which is not among the bodies (arm)",
+        ),
+        (
+            {"joints": [Revolute("A", ground, arm)]},
+            "first is Ground(name='ground'), expected a marker",
+        ),
+        (
+            {"joints": [Prismatic("D", ground.at((0, 0)), arm.at((0, 0)), axis="z")]},
+            "Prismatic 'D': axis is 'z', expected 'x' or 'y' in the plane xy",
+        ),
+        (
+            {"joints": [Revolute("A", ground.at((0, 0, 0)), arm.at((0, 0)))]},
+            "A.first is (0, 0, 0), expected 2 components (x, y)",
+        ),
+        (
+            {"joints": [Revolute("A", ground.at((0, 0)), arm.at((0, 0)), limits=(1, -1))]},
+            "limits are (1, -1), expected the smaller value first",
+        ),
+        (
+            {"joints": [Fixed("A", ground.at((0, 0)), arm.at((0, 0)), limits=(0, 1))]},
+            "no angle or position to be limited",
+        ),
+        (
+            {"joints": [pin], "loads": [Motor("motor", "a")]},
+            "no joint is called 'a', expected one of A",
+        ),
+        (
+            {
+                "joints": [Fixed("W", ground.at((0, 0)), arm.at((0, 0)))],
+                "loads": [Torsion("S", "W")],
+            },
+            "Torsion 'S': Fixed 'W' has no angle or position, expected one of none",
+        ),
+        ({"joints": [pin, Gear("G", "A", "A", 2.0)]}, "Gear 'G' ties 'A' to itself"),
+        ({"plane": "yz"}, "plane = 'yz', expected 'xy'"),
+        ({"start": {"angle.B": 1.0}}, "start names 'angle.B', which does not begin anywhere"),
+        ({"start": {"arm.position": 1.0}}, "start of 'arm.position' is 1.0, expected 2 numbers"),
+        ({"start": {"arm.position.x": "left"}}, "is 'left', expected finite numbers"),
+    ],
+)
+def test_what_is_wrong_with_a_mechanism_is_told_by_name(parts, told):
+    """Each thing by its name, its value, and what was expected."""
+    given = {"plane": "xy", "bodies": [arm], **parts}
+    with pytest.raises(ModelError) as caught:
+        mechanism("M", **given)
+    assert told in str(caught.value)
+
+
+def test_all_that_is_wrong_is_told_at_once():
+    """A massless body, a joint on a body that is not there, a motor of no joint."""
+    with pytest.raises(ModelError) as caught:
+        plane(
+            bodies=[Body("b", 0, 0.1)],
+            joints=[pin],
+            loads=[Motor("motor", "Z")],
+        )
+    assert len(caught.value.problems) == 3
