@@ -90,7 +90,7 @@ def test_a_test_imports_no_room() -> None:
     """A test knows what users know and what lagfmu.testing hands on: no room that moves breaks it."""
     known = {
         "lagfmu",
-        *(f"lagfmu.{name}" for name in ("cli", "errors", "methods", "names", "testing")),
+        *(f"lagfmu.{name}" for name in ("bodies", "cli", "errors", "methods", "names", "testing")),
     }
     for path in sorted(Path(__file__).parent.glob("*.py")):
         text = path.read_text(encoding="utf-8")
