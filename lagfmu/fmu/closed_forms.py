@@ -26,6 +26,8 @@ LARGEST_RECORD = 1 << 24  # bytes
 EXPRESSIONS = ("actual", "expected", "scale", "when")
 CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
 
+TEXTS, NUMBERS = ("name", *CONDITIONS, *EXPRESSIONS), ("within", "rounding", "accuracy")
+
 
 @dataclass(frozen=True)
 class CarriedForm(ClosedForm):
@@ -163,9 +165,8 @@ def pack_closed_forms(
     tables = sorted({*tables, *used}, key=lambda s: s.name)
     packed, functions = [], functions_of(tables)
     for form in kept:
-        entry: dict[str, Any] = {
-            key: getattr(form, key) for key in ("name", *CONDITIONS, "within", "rounding")
-        }
+        plain = ("name", *CONDITIONS, "within", "rounding")
+        entry: dict[str, Any] = {key: getattr(form, key) for key in plain}
         short_of: dict[Expr, str] = {}
         for key in EXPRESSIONS:
             e = getattr(form, key)
@@ -235,33 +236,24 @@ def _spline(entry: Any) -> Spline:
 
 def _form(entry: Any, tables: Mapping[str, Any]) -> CarriedForm:
     """One entry of the record.  Raises ValueError with what is wrong in it."""
-    texts = {"name", *CONDITIONS, *EXPRESSIONS}
-    numbers = {"within", "rounding"}
-    if not isinstance(entry, dict) or {*entry, "accuracy"} != {
-        *texts,
-        *numbers,
-        "symbols",
-        "accuracy",
-    }:
+    if not isinstance(entry, dict) or {*entry, "accuracy"} != {*TEXTS, *NUMBERS, "symbols"}:
         raise ValueError("a closed form with other fields than this version of lagfmu knows")
-    for key in texts:
+    for key in TEXTS:
         optional = key not in ("name", "actual")
         if not isinstance(entry[key], str) and not (optional and entry[key] is None):
             raise ValueError(f"{key!r} of a closed form is {entry[key]!r}, expected text")
-    for key in ("within", "rounding", "accuracy"):
+    fields: dict[str, Any] = {key: entry[key] for key in ("name", *CONDITIONS)}
+    for key in NUMBERS:
         number = entry.get(key)
         if key == "accuracy" and number is None:
             continue
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not number >= 0:
             raise ValueError(f"{key!r} of {entry['name']!r} is {number!r}, expected a number >= 0")
+        fields[key] = float(number)
     named = entry["symbols"]
     if not isinstance(named, dict) or not all(isinstance(n, str) for n in named.values()):
         raise ValueError(f"the symbols of {entry['name']!r} are not names")
     symbols = {short: output(name) for short, name in named.items()}
-    fields: dict[str, Any] = {key: entry[key] for key in ("name", *CONDITIONS)}
-    fields |= {key: float(entry[key]) for key in numbers}
-    if entry.get("accuracy") is not None:
-        fields["accuracy"] = float(entry["accuracy"])
     for key in EXPRESSIONS:
         text = entry[key]
         fields[key] = None if text is None else read_formula(text, symbols, tables)
