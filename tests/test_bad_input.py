@@ -614,13 +614,12 @@ def test_a_temporary_folder_that_cannot_be_written_is_told(tmp_path, monkeypatch
 @pytest.mark.parametrize(
     ("command", "kept"),
     [
-        ("build MODEL --target python --out KEPT", "Atwood.fmu"),
+        ("verify FMU --json KEPT", "all.json"),
         *(
             pytest.param(words, kept, marks=pytest.mark.thorough)
             for words, kept in (
                 ("simulate FMU --csv KEPT", "runs.csv"),
                 ("sweep FMU --vary m1=1,2 --out KEPT", "runs.csv"),
-                ("verify FMU --json KEPT", "all.json"),
                 ("tradeoff FMU --json KEPT", "all.json"),
                 ("stress FMU --quick --json KEPT", "all.json"),
             )
@@ -634,7 +633,6 @@ def test_a_full_disk_is_told_with_its_folder_and_the_remedy(native_fmu, tmp_path
     temporary.mkdir()
     good.write_text("good")
     words = command.replace("FMU", str(native_fmu("Atwood"))).replace("KEPT", str(good))
-    words = words.replace("MODEL", str(MODELS / "atwood.py"))
     done = subprocess.run(
         [sys.executable, "-c", SMALL_FILES, *words.split()],
         capture_output=True,

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import re
-import sys
-import tempfile
-import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib.resources import files
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
-from pythonfmu.builder import FmuBuilder
+import pythonfmu
 
 from .. import names
 from ..errors import BuildError
@@ -100,24 +96,24 @@ def build(prepared: Prepared, extra: Mapping[str, bytes]) -> bytes:
         {"CoSimulation": {"modelIdentifier": scene.name, **CAPABILITIES}},
         text.encode(),
     )
-    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        script = Path(folder, f"{module}.py")
-        script.write_text(text, encoding="utf-8")
-        for name, content in runtime.items():
-            path = Path(folder, package, name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-        archive = Path(folder, f"{scene.name}.fmu")
-        with _imports_undone(module, package):
-            try:
-                FmuBuilder.build_FMU(script, dest=archive, project_files=[Path(folder, package)])
-            except OSError:
-                raise  # of the disk, not of pythonfmu
-            except Exception as error:
-                raise BuildError(f"pythonfmu cannot build {scene.name!r}: {error}") from error
-        contents = _read(archive)
-    contents |= {"modelDescription.xml": description, **extra}
-    return pack(contents)
+    contents = {
+        "modelDescription.xml": description,
+        "resources/slavemodule.txt": module.encode(),
+        f"resources/{module}.py": text.encode(),
+        **{f"resources/{package}/{name}": content for name, content in runtime.items()},
+        **_of_pythonfmu(scene.name),
+    }
+    return pack(contents | dict(extra))
+
+
+def _of_pythonfmu(name: str) -> dict[str, bytes]:
+    """What its builder puts into each FMU: its own Python files, and its binaries by the name of the FMU."""
+    home = Path(pythonfmu.__file__).parent
+    found = {f"resources/pythonfmu/{file.name}": file.read_bytes() for file in home.glob("*.py")}
+    for file in home.glob("resources/binaries/*/*"):
+        if file.suffix in (".dll", ".so", ".dylib"):
+            found[f"binaries/{file.parent.name}/{name}{file.suffix}"] = file.read_bytes()
+    return found
 
 
 def refusals(prepared: Prepared) -> list[str]:
@@ -212,24 +208,3 @@ def _digest(*parts: bytes) -> str:
     for part in parts:
         digest.update(len(part).to_bytes(8, "big") + part)
     return digest.hexdigest()[:16]
-
-
-def _read(archive: Path) -> dict[str, bytes]:
-    contents = {}
-    with zipfile.ZipFile(archive) as packed:
-        for name in packed.namelist():
-            if "__pycache__" not in PurePosixPath(name).parts and not name.endswith("/"):
-                contents[name] = packed.read(name)
-    return contents
-
-
-@contextlib.contextmanager
-def _imports_undone(*names: str) -> Iterator[None]:
-    """pythonfmu imports the slave to build it; leave sys.path and sys.modules as they were."""
-    path = list(sys.path)
-    try:
-        yield
-    finally:
-        sys.path[:] = path
-        for module in [m for m in sys.modules if m.split(".")[0] in names]:
-            del sys.modules[module]
