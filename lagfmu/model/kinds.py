@@ -177,7 +177,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
                     f"{kind} {q} is no function of time: write it as dynamicsymbols('{q}')"
                 )
                 continue
-            named.append((kind, name_of(q)))
+            named.append(("unwrapped angle" if q in model.unwrapped else kind, name_of(q)))
     if not model.coordinates:
         problems.append("there is no coordinate: a model needs at least one")
     named += [("parameter", name_of(p.symbol)) for p in model.parameters]
@@ -233,9 +233,9 @@ def check_name(kind: str, name: Any, problems: list[str]) -> None:
             "not beginning with a digit"
             + ("" if kind == "model" else ", in words with a dot between them, as 'crank.mass'")
         )
-    elif kind == "coordinate" and len(words) not in COORDINATE_WORDS:
+    elif kind in ("coordinate", "speed") and len(words) not in COORDINATE_WORDS:
         problems.append(
-            f"coordinate name {name!r} has {len(words)} words, expected one as 'theta' or three as "
+            f"{kind} name {name!r} has {len(words)} words, expected one as 'theta' or three as "
             "'crank.position.x': with others 'Q.A.B' could be the share of a constraint"
         )
     elif kind == "model" and keyword.iskeyword(name):
