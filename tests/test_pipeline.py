@@ -200,7 +200,9 @@ def test_inputs_come_from_a_file(native_fmu, tmp_path):
     assert run("verify", cart, "--stop-time", 1, "--input", path)[0] == 0
 
 
-@pytest.mark.parametrize("name", ["hemisphere", "pendulum", "half_car"])
+@pytest.mark.parametrize(
+    "name", ["hemisphere", "half_car", pytest.param("pendulum", marks=pytest.mark.thorough)]
+)
 def test_the_results_that_an_fmu_carries_are_replayed(name, tmp_path):
     """A script that knows the layered standard and fmpy alone finds what it says: lambda, Q, coordinates and
     departures within 1e-9, at 200 points or fewer and in at most 20 kB."""

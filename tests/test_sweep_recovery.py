@@ -27,6 +27,12 @@ def hemisphere(native_fmu) -> Path:
     return native_fmu("Hemisphere")
 
 
+@pytest.fixture(scope="module")
+def alone(hemisphere):
+    """The sweep that is never interrupted."""
+    return lagfmu.sweep(hemisphere, VALUES, keep=KEEP, workers=1)
+
+
 def stopped(hemisphere: Path, out: Path, after: int) -> Path:
     """The folder of a sweep that ends itself after some of its ten chunks of one run."""
 
@@ -58,20 +64,19 @@ def copy(place: Path) -> None:
 
 @pytest.mark.parametrize("ending", ["parquet", "npz"])
 @pytest.mark.parametrize("spoil", [halve, flip, copy, Path.unlink])
-def test_a_part_that_cannot_be_used_is_done_again(hemisphere, tmp_path, ending, spoil):
+def test_a_part_that_cannot_be_used_is_done_again(hemisphere, alone, tmp_path, ending, spoil):
     """What stands in the parts of a sweep that goes on is not believed: the result is that of one that was
     never interrupted, and which chunk was done again is said (one that is not there is no matter)."""
     out = tmp_path / "runs.nc"
-    folder = stopped(hemisphere, out, 4)
+    folder = stopped(hemisphere, out, 8)
     place = folder / f"part_00000002.{ending}"
     assert place.exists()
     spoil(place)
     if spoil is Path.unlink and ending == "parquet":
-        found = lagfmu.sweep(hemisphere, VALUES, keep=KEEP, out=out, resume=True)
+        found = lagfmu.sweep(hemisphere, VALUES, keep=KEEP, out=out, resume=True, workers=1)
     else:
         with pytest.warns(PartWarning, match=r"part_00000002\.parquet.*done again"):
-            found = lagfmu.sweep(hemisphere, VALUES, keep=KEEP, out=out, resume=True)
-    alone = lagfmu.sweep(hemisphere, VALUES, keep=KEEP)
+            found = lagfmu.sweep(hemisphere, VALUES, keep=KEEP, out=out, resume=True, workers=1)
     for name in KEEP:
         np.testing.assert_array_equal(found[name].values, alone[name].values)
 
