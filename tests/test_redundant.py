@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,53 +10,40 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+from conftest import of_each_kind
 from linkages import rods
 from redundant import SYSTEMS
 from runs import simulate_fmu
 
 from lagfmu import Scene, simulate
-from lagfmu.testing import (
-    RedundantConstraintWarning,
-    Stage,
-    StartMovedWarning,
-    find_compiler,
-    prepare,
-    write,
-)
+from lagfmu.testing import Stage, prepare
 
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning"),
+    pytest.mark.filterwarnings("ignore::lagfmu.testing.StartMovedWarning"),
+]
 SPAN = 1.0  # s
 Pair = tuple[Path, Path]
+EACH = pytest.mark.parametrize(
+    "name", of_each_kind(SYSTEMS, kinds=("platform", "truss", "ball", "trammel"))
+)
 
 
-@pytest.fixture(scope="module")
-def pair(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Pair]:
+@pytest.fixture
+def pair(built: Any) -> Callable[[str], Pair]:
     """pair(NAME): the system without redundant constraints, and with them."""
-    folder = tmp_path_factory.mktemp("redundant")
-    made: dict[str, Pair] = {}
 
     def get(name: str) -> Pair:
-        if find_compiler() is None:
-            pytest.skip("no C compiler on this machine")
-        if name not in made:
-            models = [SYSTEMS[name](redundant) for redundant in (False, True)]
-            scenes = [Scene(m.name, stop_time=SPAN, step_size=SPAN / 20) for m in models]
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RedundantConstraintWarning)
-                warnings.simplefilter("ignore", StartMovedWarning)
-                paths = [
-                    write(prepare(m, s), folder / name / str(k), target="native")
-                    for k, (m, s) in enumerate(zip(models, scenes, strict=True))
-                ]
-            made[name] = (paths[0], paths[1])
-        return made[name]
+        models = (SYSTEMS[name](redundant) for redundant in (False, True))
+        scene = {"stop_time": SPAN, "step_size": SPAN / 20}
+        plain, redundant = (built(m, Scene(m.name, **scene)) for m in models)
+        return plain, redundant
 
     return get
 
 
 def run(fmu: Path, method: str, tolerance: float) -> Any:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", StartMovedWarning)
-        return simulate(fmu, tolerance=tolerance, start_values={"solver.method": method})
+    return simulate(fmu, tolerance=tolerance, start_values={"solver.method": method})
 
 
 def compare(fmus: Pair, method: str, tolerance: float) -> None:
@@ -69,7 +55,7 @@ def compare(fmus: Pair, method: str, tolerance: float) -> None:
             assert np.abs(redundant[name] - plain[name]).max() < max(1e4 * tolerance, 1e-9), name
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@EACH
 def test_redundant_constraints_cost_no_steps(name, pair):
     """Stages lie off the constraints, where rows that depend on each other ask for different accelerations:
     as many as are independent on the constraints say what acts."""
@@ -80,7 +66,7 @@ def test_redundant_constraints_cost_no_steps(name, pair):
     compare(pair(name), "rk4", 1e-6)
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@EACH
 def test_redundant_constraints_cost_no_accuracy(name, pair):
     """Q is what it is without them within two tolerances, at points inside steps too: the angle between rows
     that depend on each other everywhere is rounding, and tells of no singular configuration, next to
@@ -93,7 +79,7 @@ def test_redundant_constraints_cost_no_accuracy(name, pair):
         assert np.abs(redundant[n] - plain[n]).max() < 2 * tolerance * largest, n
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@EACH
 def test_an_importers_integrator_does_not_meet_them_either(name, pair, monkeypatch):
     """Model exchange: as many evaluations of the derivatives as without the redundancy, within 1.5."""
     count = 0
