@@ -70,11 +70,10 @@ def test_the_laws_hold_at_every_instant(crossed):
     with a force that jumps, which is read before the FMU steps on."""
     _, bench = crossed
     checks = [*runs.started({}, bench).checks]
-    for size in (1.0, 1e3):
-        checks += runs.driven("F", "jumps", size, bench).checks
-        checks += runs.driven("P", "jumps", 0.03 * size, bench).checks
+    for force, size in (("F", 1e3), ("P", 30.0)):
+        checks += runs.driven(force, "jumps", size, bench).checks
     assert [c for c in checks if not c.ratio <= 1] == []
-    assert len(checks) > 60
+    assert len(checks) > 30
 
 
 def test_energy_is_neither_made_nor_lost(crossed):

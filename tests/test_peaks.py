@@ -9,46 +9,29 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import EVERY, MODELS
+from conftest import model_file, scene_of
 from instance import Instance, instance
 from runs import simulate_fmu
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import (
-    Contact,
-    Friction,
-    Input,
-    Model,
-    Nonholonomic,
-    Output,
-    Parameter,
-    Peak,
-    multiplier,
-)
+from lagfmu import Input, Model, Output, Parameter, Peak
 from lagfmu.errors import BuildError, ModelError
-from lagfmu.testing import load, prepare, write
+from lagfmu.testing import prepare, write
 
 Peaked = Callable[..., Path]
 G = 9.81
-UNIT, GRAVITY = symbols("m g", positive=True)
 STEPS = pytest.mark.parametrize("step", [0.5, 0.005])
 
 
-@pytest.fixture(scope="module")
-def peaked(tmp_path_factory: pytest.TempPathFactory) -> Peaked:
+@pytest.fixture
+def peaked(built: Any) -> Peaked:
     """peaked(NAME, outputs): the native FMU of a scene of models/ whose model has these outputs besides."""
-    folder, made = tmp_path_factory.mktemp("peaked"), {}
 
     def get(name: str, *outputs: Output | Peak, **scene: Any) -> Path:
-        key = name, outputs, *scene.items()
-        if str(key) not in made:
-            file = load(MODELS / f"{EVERY[name]}.py")
-            (asked,) = (s for s in file.scenes if s.name == name)
-            model = replace(file.model, outputs=(*file.model.outputs, *outputs))
-            one = prepare(model, replace(asked, **scene))
-            made[str(key)] = write(one, folder / f"{len(made)}.fmu", target="native")
-        return made[str(key)]
+        file, asked = scene_of(name)
+        model = replace(file.model, outputs=(*file.model.outputs, *outputs))
+        return built(model, replace(asked, **scene))
 
     return get
 
@@ -148,37 +131,23 @@ def test_friction_is_largest_just_before_the_block_slips(peaked: Peaked) -> None
         assert peaks(one, "energy.dissipated")[0] == one.get("energy.dissipated") > 0
 
 
-def test_a_slide_in_two_directions_ends_without_a_peak_of_its_direction(tmp_path: Path) -> None:
+def test_a_slide_in_two_directions_ends_without_a_peak_of_its_direction(built: Any) -> None:
     """A puck slides straight on: the components of its friction stay what they are until it stands, although
     the direction of its velocity is but rounding's just before."""
-    x, y, z = dynamicsymbols("x y z")
-    puck = Model(
-        "Puck",
-        kinetic_energy=(x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) * UNIT / 2,
-        coordinates={x: "m", y: "m", z: "m"},
-        forces={z: -UNIT * GRAVITY},
-        constraints=[
-            Contact("ice", z),
-            Nonholonomic("along", x.diff(), while_closed="ice"),
-            Nonholonomic("across", y.diff(), while_closed="ice"),
-            Friction("grip", of=["along", "across"], normal=multiplier("ice"), static=0.2),
-        ],
-        parameters=[Parameter(UNIT, 1.0, "kg"), Parameter(GRAVITY, G, "m/s^2")],
-        outputs=[Peak("lambda.a*")],
-    )
-    fmu = write(prepare(puck), tmp_path, target="native")
+    fmu = built(replace(model_file("puck").model, outputs=[Peak("lambda.a*")]))
+    level = {"alpha": 0.0, "mu_s": 0.2, "mu_k": 0.2}
     with instance(fmu) as one:
         for speed in (0.7, 1.0, 1.5, 2.0, 3.0):
             for angle in (0.1, 0.3, 0.5235987, 0.9, 1.2):
                 way = speed * np.array([np.cos(angle), np.sin(angle)])
-                one.start({"der(x)": way[0], "der(y)": way[1]})
+                one.start({**level, "der(x)": way[0], "der(y)": way[1]})
                 run(one, 2.0, 0.01)
                 least = [peaks(one, "lambda.along")[1], peaks(one, "lambda.across")[1]]
                 assert least == pytest.approx(list(-0.2 * G * way / speed), rel=1e-8)
                 one.fmu.reset()
 
 
-def test_both_sides_of_an_inputs_jump_count(tmp_path: Path) -> None:
+def test_both_sides_of_an_inputs_jump_count(built: Any) -> None:
     """A force that pushes for one communication step: its acceleration has been there when the step began,
     though no point shows it; the one before it was none."""
     m, k = symbols("m k", positive=True)
@@ -192,7 +161,7 @@ def test_both_sides_of_an_inputs_jump_count(tmp_path: Path) -> None:
         parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1e4, "N/m")],
         outputs=[Peak("der(x,2)"), Peak("x")],
     )
-    with instance(write(prepare(model), tmp_path, target="native")) as one:
+    with instance(built(model)) as one:
         one.start()
         one.step(0.01)
         assert peaks(one, "acceleration.x")[:2] == [0, 0]
