@@ -27,7 +27,7 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.testing import OWN, lagrange, prepare, quantities, with_outputs
+from lagfmu.testing import OWN, prepare, quantities, with_outputs
 from lagfmu.testing import documentation_page as page
 
 t = dynamicsymbols._t
@@ -65,29 +65,6 @@ def hemisphere(*outputs: Output) -> Model:
         start={r: 1.0, theta: 0.3},
         outputs=outputs,
     )
-
-
-def test_reactions_have_the_unit_that_their_constraint_gives_them():
-    """[lambda] = J/[f]: N/m for a squared length; Q on a length is a force."""
-    units = pendulum().reactions
-    assert units[multiplier("rod")].name == "N/m"
-    assert units[force_of_constraint(x)].name == "N"
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"forces": {x: -multiplier("rod") * x.diff() / L}},
-        {"lagrangian": m * x.diff() ** 2 - force_of_constraint(y) * x},
-        {"constraints": [Holonomic("rod", x - L * cos(multiplier("rod")))]},
-    ],
-)
-def test_what_is_solved_for_cannot_stand_in_the_equations(changes):
-    """lambda in a force, in L or in a constraint is refused: Friction and Output are named."""
-    with pytest.raises(ModelError) as refused:
-        pendulum(**changes)
-    for part in ("solved for", "Friction", "Output"):
-        assert part in str(refused.value)
 
 
 # ---------------------------------------------------------------------------- values
@@ -212,17 +189,6 @@ def test_what_an_output_depends_on_is_told(prepared):
     assert "F" in table["drive.power"].depends_initially
 
 
-def test_the_judge_derives_an_output_from_the_model(prepared):
-    """Lagrange's equations of a model also say what each of its own outputs must be."""
-    made = prepared("PendulumCartesian")
-    names = frozenset(v.name for v in made.table.variables)
-    forms = {f.name: f for f in lagrange(made.model, names)}
-    assert forms["tension"].expected == TENSION.expression.xreplace(
-        {L: made.model.parameters[2].symbol}
-    )
-    assert "bob.height" in forms
-
-
 def test_the_page_shows_what_an_output_is_made_of(prepared):
     """The expression among the equations, the variable with unit and description in the table."""
     text = page(prepared("PendulumCartesian"))
@@ -232,36 +198,59 @@ def test_the_page_shows_what_an_output_is_made_of(prepared):
 
 # ---------------------------------------------------------------------------- what is refused
 
+SOLVED_FOR = ("solved for", "Friction", "Output")
+OUTPUTS = [  # of the driven pendulum, and what is wrong
+    (Output("tension", -2 * multiplier("rod"), "N"), ("'tension'", "N/m", "expected N")),
+    (Output("h", y + m, "m"), ("output 'h'", "'m' (unit kg)", "unit m")),
+    (Output("h", y + L, ""), ("output 'h' has no unit", "give one")),
+    (Output("h", y + L, "degC"), ("output 'h'", "an offset or logarithmic scale")),
+    (Output("tension", multiplier("rope"), "N/m"), ("lambda.rope", "constraint", "rod")),
+    (Output("f", force_of_constraint(r), "N"), ("Q.r", "coordinate", "x, y")),
+    (Output("f", symbols("k") * y, "N"), ("output 'f'", "k is neither", "declare")),
+    (Output("jerk", x.diff(t, 3), "m/s^3"), ("output 'jerk'", "der(x,3)", "at most 2")),
+    (Output("rate", F.diff(), "W"), ("output 'rate'", "der(F)", "prescribed")),
+    (Output("x", y, "m"), ("'x' is used twice", "rename")),
+    (Output("x.high", y, "m"), ("'x' would be a variable", "x.high", "group")),
+    (Output("energy.mine", m * g * y, "J"), ("'energy'", "reserved", "choose")),
+    (Output("bob height", y, "m"), ("'bob height'", "not a name that FMI allows", "bob.height")),
+    (Output("h", "y", "m"), ("output 'h'", "no SymPy expression")),
+    (Output("h", y, "m", description=3), ("output 'h'", "expected a text")),
+    (Output("h", y, "m", otherwise=m), ("output 'h', otherwise", "kg", "m")),
+    (y + L, ("outputs hold", "Output")),
+]
+
 
 @pytest.mark.parametrize(
-    ("output", "parts"),
+    ("changes", "parts"),
     [
-        (Output("tension", -2 * multiplier("rod"), "N"), ("'tension'", "N/m", "expected N")),
-        (Output("h", y + m, "m"), ("output 'h'", "'m' (unit kg)", "unit m")),
-        (Output("h", y + L, ""), ("output 'h' has no unit", "give one")),
-        (Output("h", y + L, "degC"), ("output 'h'", "an offset or logarithmic scale")),
-        (Output("tension", multiplier("rope"), "N/m"), ("lambda.rope", "constraint", "rod")),
-        (Output("f", force_of_constraint(r), "N"), ("Q.r", "coordinate", "x, y")),
-        (Output("f", symbols("k") * y, "N"), ("output 'f'", "k is neither", "declare")),
-        (Output("jerk", x.diff(t, 3), "m/s^3"), ("output 'jerk'", "der(x,3)", "at most 2")),
-        (Output("rate", F.diff(), "W"), ("output 'rate'", "der(F)", "prescribed")),
-        (Output("x", y, "m"), ("'x' is used twice", "rename")),
-        (Output("x.high", y, "m"), ("'x' would be a variable", "x.high", "group")),
-        (Output("energy.mine", m * g * y, "J"), ("'energy'", "reserved", "choose")),
-        (
-            Output("bob height", y, "m"),
-            ("'bob height'", "not a name that FMI allows", "bob.height"),
+        *(({"outputs": [output]}, parts) for output, parts in OUTPUTS),
+        ({"outputs": [HEIGHT, HEIGHT]}, ("'bob.height' is used twice",)),
+        ({"outputs": TENSION}, ("outputs = ", "expected a list")),
+        # lambda and Q in a force, in L or in a constraint
+        ({"forces": {x: -multiplier("rod") * x.diff() / L}}, SOLVED_FOR),
+        ({"lagrangian": m * x.diff() ** 2 - force_of_constraint(y) * x}, SOLVED_FOR),
+        ({"constraints": [Holonomic("rod", x - L * cos(multiplier("rod")))]}, SOLVED_FOR),
+        *(  # lambda of a contact is 0 in the open: a quotient by it needs a value there
+            (
+                {
+                    "constraints": [Contact("rod", L**2 - x**2 - y**2)],
+                    "outputs": [Output("ratio", expression, unit)],
+                },
+                ("output 'ratio'", "while the contact 'rod' is open", "otherwise=0"),
+            )
+            for expression, unit in (
+                (1 / multiplier("rod"), "m/N"),
+                (force_of_constraint(x) / (2 * force_of_constraint(y)), "1"),
+                (log(Abs(multiplier("rod"))), "1"),
+            )
         ),
-        (Output("h", "y", "m"), ("output 'h'", "no SymPy expression")),
-        (Output("h", y, "m", description=3), ("output 'h'", "expected a text")),
-        (Output("h", y, "m", otherwise=m), ("output 'h', otherwise", "kg", "m")),
-        (y + L, ("outputs hold", "Output")),
     ],
 )
-def test_an_output_that_cannot_be_is_told(output, parts):
-    """The output, what is wrong with it, what was expected and what to do."""
+def test_what_an_output_cannot_be_is_told(changes, parts):
+    """The output, what is wrong with it, what was expected and what to do; what is solved for cannot stand in
+    the equations."""
     with pytest.raises(ModelError) as refused:
-        pendulum(outputs=[output], inputs=[Input(F, "N")], forces={x: F})
+        pendulum(**({"inputs": [Input(F, "N")], "forces": {x: F}} | changes))
     for part in parts:
         assert part in str(refused.value)
 
@@ -306,32 +295,4 @@ def test_a_formula_that_cannot_be_read_is_told(text, parts):
     with pytest.raises(ModelError) as refused:
         with_outputs(pendulum(), [text])
     for part in parts:
-        assert part in str(refused.value)
-
-
-def test_two_outputs_of_one_name_are_told():
-    """Both are named, and a list is asked for where there is none."""
-    with pytest.raises(ModelError, match=r"'bob\.height' is used twice"):
-        pendulum(outputs=[HEIGHT, HEIGHT])
-    with pytest.raises(ModelError, match=r"outputs = .*expected a list"):
-        pendulum(outputs=TENSION)
-
-
-@pytest.mark.parametrize(
-    "expression",
-    [
-        1 / multiplier("surface"),
-        force_of_constraint(theta) / (2 * force_of_constraint(r)),
-        log(Abs(multiplier("surface"))),
-    ],
-)
-def test_a_quotient_by_what_vanishes_in_the_open_needs_a_value(expression):
-    """lambda of a contact is 0 in the open: the model is refused, and `otherwise` named."""
-    unit = {"1": "1/N", "f": "m", "l": "1"}
-    kind = (
-        "l" if expression.has(log) else "f" if expression.has(force_of_constraint(theta)) else "1"
-    )
-    with pytest.raises(ModelError) as refused:
-        hemisphere(Output("ratio", expression, unit[kind]))
-    for part in ("output 'ratio'", "while the contact 'surface' is open", "otherwise=0"):
         assert part in str(refused.value)
