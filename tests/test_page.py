@@ -12,24 +12,22 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import Page
+from conftest import MODELS
 from typer.testing import CliRunner
 
 from lagfmu.testing import Playable, app, render, wasm
 from lagfmu.testing import playable as playable_of
 
 
-def test_the_particle_leaves_at_two_thirds(opened: Callable[..., Page]) -> None:
-    """cos(theta) = (2/3) cos(theta0) at the departure, for the start that a script asks for."""
-    run = opened("Hemisphere").run({"start": {"theta": 0.3}, "parameters": {"m": 2.5}})
+def test_a_script_runs_the_page_or_is_told_why_not(opened: Callable[..., Page]) -> None:
+    """cos(theta) = (2/3) cos(theta0) at the departure, for the start that it asks for; a mass of zero is
+    refused in the FMU's words, and names that it does not have, all at once."""
+    page = opened("Hemisphere")
+    run = page.run({"start": {"theta": 0.3}, "parameters": {"m": 2.5}})
     angle = run["values"]["departure.surface.theta"][-1]
     assert np.cos(angle) == pytest.approx(2 * np.cos(0.3) / 3, rel=1e-8)
     assert run["values"]["lambda.surface"][0] == pytest.approx(2.5 * 9.81 * np.cos(0.3), rel=1e-14)
     assert any("opened at" in m["message"] for m in run["log"])
-
-
-def test_a_refused_run_shows_the_reason(opened: Callable[..., Page]) -> None:
-    """A mass of zero is refused in the FMU's words; names that it does not have, all at once."""
-    page = opened("Hemisphere")
     assert "'m' = 0" in page.refusal({"parameters": {"m": 0}})
     told = page.refusal({"parameters": {"q": 1}, "start": {"m": 2}, "method": "euler"})
     assert all(part in told for part in ("'q'", "'m'", "'euler'", "theta", "dop853"))
@@ -78,7 +76,7 @@ def test_a_python_fmu_has_no_sources_to_compile(
 def test_a_page_shows_what_is_asked_for(native_fmu: Callable[[str], Path], tmp_path: Path) -> None:
     """--add-output and --outputs as in build: the pull of the rod m (g cos(theta) + L omega^2) beside lambda,
     of which it is -2 L lambda; of an FMU they are refused."""
-    model = str(Path(__file__).parent.parent / "models" / "pendulum.py")
+    model = str(MODELS / "pendulum.py")
     out = tmp_path / "pull.html"
     words = ["--add-output", "pull = -2*L*lambda.rod [N]", "--outputs", "pull,lambda.rod"]
     result = CliRunner().invoke(app, ["page", model, *words, "--out", str(out)])
@@ -95,7 +93,7 @@ def test_a_page_shows_what_is_asked_for(native_fmu: Callable[[str], Path], tmp_p
 
 def test_a_start_off_the_constraints_gets_no_page(tmp_path: Path) -> None:
     """A rod of 1 m and a bob at 1.6 m: refused as build refuses it, with the nearest start that there is."""
-    source = (Path(__file__).parent.parent / "models" / "pendulum.py").read_text(encoding="utf-8")
+    source = (MODELS / "pendulum.py").read_text(encoding="utf-8")
     file, out = tmp_path / "off.py", tmp_path / "off.html"
     file.write_text(
         source + "\nfrom dataclasses import replace\n"
@@ -123,7 +121,7 @@ def test_a_page_is_the_same_from_model_and_fmu(
     playable: Callable[[str], Playable], native_fmu: Callable[[str], Path], tmp_path: Path
 ) -> None:
     """lagfmu page MODEL.py and lagfmu page of the FMU built of it: one page, byte for byte."""
-    model = Path(__file__).parent.parent / "models" / "hemisphere.py"
+    model = MODELS / "hemisphere.py"
     pages = []
     for target in (model, native_fmu("Hemisphere")):
         out = tmp_path / f"{target.suffix[1:]}.html"
@@ -134,26 +132,18 @@ def test_a_page_is_the_same_from_model_and_fmu(
 
 
 @pytest.mark.parametrize("target", ["native", pytest.param("python", marks=pytest.mark.thorough)])
-def test_the_page_travels_in_the_fmu(target: str, tmp_path: Path, browser: Any) -> None:
+def test_the_page_travels_in_the_fmu(
+    target: str, tmp_path: Path, browser: Any, request: pytest.FixtureRequest
+) -> None:
     """lagfmu build --page: the page lies beside the documentation, which has a link to it, and the FMU
     grows by 250 kB at most; without the option it is as it was."""
-    model = str(Path(__file__).parent.parent / "models" / "rolling_sphere.py")
-    options = [
-        "build",
-        model,
-        "--scene",
-        "RollingSphere",
-        "--target",
-        target,
-        "--no-check",
-        "--out",
-    ]
-    for out, extra in (("with", ["--page"]), ("without", [])):
-        result = CliRunner().invoke(app, [*options, str(tmp_path / out), *extra])
-        assert result.exit_code == 0, result.output
+    model = str(MODELS / "rolling_sphere.py")
+    words = f"--scene RollingSphere --target {target} --no-check --page --out {tmp_path}"
+    result = CliRunner().invoke(app, ["build", model, *words.split()])
+    assert result.exit_code == 0, result.output
+    plain = request.getfixturevalue(f"{target}_fmu")("RollingSphere")
     contents, sizes = [], []
-    for out in ("with", "without"):
-        path = tmp_path / out / target / "RollingSphere.fmu"
+    for path in (tmp_path / target / "RollingSphere.fmu", plain):
         sizes.append(path.stat().st_size)
         with zipfile.ZipFile(path) as archive:
             contents.append({n: archive.read(n) for n in archive.namelist()})

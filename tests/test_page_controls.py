@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -45,17 +45,112 @@ def go_to_end(page: Page) -> None:
     page.tab.keyboard.press("End")
 
 
-def test_the_departure_is_marked_at_its_time(opened: Opened, native_fmu: Fmu) -> None:
-    """The particle leaves at 1.641 s: so it stands among what happened, and a press goes there."""
-    page = opened("Hemisphere")
-    page.until("lagfmu.runs")
+@pytest.fixture(scope="module")
+def seen(browser: Any, page_file: Any) -> Iterator[Callable[[str], Page]]:
+    """seen(NAME): its page with its first run, opened once for all who only look."""
+    pages: dict[str, Page] = {}
+
+    def get(name: str) -> Page:
+        if name not in pages:
+            pages[name] = Page(browser, page_file(name))
+            pages[name].until("lagfmu.runs")
+        return pages[name]
+
+    yield get
+    for page in pages.values():
+        page.close()
+        assert page.problems == []
+
+
+def events_of(page: Page) -> dict[str, tuple[float, str]]:
+    """What is listed first of each kind: when [s], and all that is said of it."""
+    found: dict[str, tuple[float, str]] = {}
+    for text in page.tab.locator("#events li").all_inner_texts():
+        time, _, what = text.partition(" s")
+        found.setdefault(what.split()[0].split(",")[0], (float(time), what))
+    return found
+
+
+def test_the_departure_is_marked_at_its_time(seen: Any, native_fmu: Fmu) -> None:
+    """The particle leaves at 1.641 s: so it stands among what happened, and a press goes there; before it is
+    on the hemisphere, and among all values its departure is none yet."""
+    page = seen("Hemisphere")
     time = simulate(native_fmu("Hemisphere"))["departure.surface.time"][-1]
+    page.tab.locator("#scrub").focus()
+    page.tab.keyboard.press("Home")
+    assert page.tab.evaluate(VALUE, "departure.surface.time") == "none yet"
     mark = page.tab.locator("#events button")
     assert mark.count() == 1
     assert float(mark.inner_text().removesuffix(" s")) == pytest.approx(time, rel=1e-9)
     mark.click()
     assert float(page.tab.locator("#scrub").input_value()) == pytest.approx(time, abs=0.01)
     assert value(page, "lambda.surface") == pytest.approx(0.0, abs=0.3)
+    go_to_end(page)
+    assert value(page, "departure.surface.time") == pytest.approx(time, rel=1e-5)
+
+
+def test_bounces_slips_and_sticks_are_told(seen: Any) -> None:
+    """A ball that falls 1 m strikes the floor at 0.4515 s with m sqrt(2 g h) (1 + e) = 7.53 N s.  A block on
+    a belt rides until k x = mu_s m g, x = speed t, and sticks again after its slide.  The FMU says so, and
+    the page shows what it says."""
+    page = seen("BouncingBall")
+    first = page.tab.locator("#log li").all_text_contents()[0]
+    words = first.replace(",", "").split()
+    assert first.startswith("contact floor was struck at t = ")
+    assert float(words[7]) == pytest.approx((2 / 9.81) ** 0.5, rel=1e-8)
+    assert float(words[10]) == pytest.approx((2 * 9.81) ** 0.5 * 1.7, rel=1e-8)
+    landed, said = events_of(page)["closing.floor"]
+    assert landed == pytest.approx((2 / 9.81) ** 0.5, rel=1e-8)
+    assert said.endswith("closing.floor, impulse 7.53006 N·s")
+    told = events_of(seen("Belt"))
+    slips = 0.5 * 9.81 / (100 * 0.2)
+    assert told["slipping.grip"][0] == pytest.approx(slips, rel=1e-6)
+    slide = (np.pi - np.arctan(0.981)) / 5  # (2/w)(pi - atan(d w/v)), d = (mu_s - mu_k) m g/k
+    assert told["sticking.grip"][0] == pytest.approx(slips + slide, rel=1e-6)
+
+
+KINDS = "Multipliers λ [N]; Outputs [W]; Energies [J]; Generalized forces of constraint [N]"
+FRICTION = "Friction [m/s]; Friction [yes or no]; Gaps of contacts [m]"
+
+
+def test_what_is_drawn_has_its_headings(seen: Any) -> None:
+    """Multipliers, own outputs, forces of constraint, energies, friction and gaps, which are no residuals,
+    with units; the equations; and the library that draws, with its licence."""
+    page = seen("Belt")
+    page.tab.evaluate(TICK_ALL)
+    told = page.tab.locator("#charts figcaption").all_inner_texts()
+    assert {*KINDS.split("; "), *FRICTION.split("; ")} <= set(told)
+    assert page.tab.locator("math").count() >= 8
+    assert "MIT" in page.tab.content()
+    assert "Copyright (c)" in page.tab.content()
+    assert "Residuals" not in seen("Hemisphere").tab.locator("#chart-choices").inner_text()
+
+
+@pytest.mark.parametrize("name", ["Hemisphere", "Belt"])
+def test_every_control_has_a_name(name: str, seen: Any) -> None:
+    """What cannot be seen is told: sliders by name and value with unit, charts and picture in a sentence."""
+    page = seen(name)
+    assert page.tab.evaluate(UNNAMED) == []
+    slider = page.tab.locator("#dials input[data-name]").first
+    assert slider.get_attribute("aria-valuetext")
+    told = page.tab.locator("#charts [role=img]").first.get_attribute("aria-label")
+    assert "over time" in str(told)
+    page.until("document.getElementById('status').textContent.includes('steps')")
+
+
+def test_the_file_holds_the_run(seen: Any, tmp_path: Path) -> None:
+    """The CSV file has a row a communication point, with every digit."""
+    page = seen("Hemisphere")
+    with page.tab.expect_download() as download:
+        page.tab.locator("#csv").click()
+    path = tmp_path / "run.csv"
+    download.value.save_as(path)
+    run = page.run()
+    with path.open(encoding="utf-8", newline="") as file:
+        names, *rows = csv.reader(file)
+    assert [float(r[0]) for r in rows] == run["time"]
+    at = names.index("lambda.surface")
+    assert [float(r[at]) for r in rows] == run["values"]["lambda.surface"]
 
 
 def test_time_runs_and_stops_by_the_keyboard(opened: Opened) -> None:
@@ -112,57 +207,6 @@ def test_a_refused_value_is_told_and_the_curves_stay(opened: Opened) -> None:
     page.slide("m", 1.5)
     assert not refused.is_visible()
     page.until(f"{status}.startsWith('Run to 2 s')")
-
-
-def test_bounces_are_told_with_time_and_impulse(opened: Opened) -> None:
-    """A ball that falls 1 m strikes the floor at 0.4515 s with m sqrt(2 g h) (1 + e) = 7.53 N s: the FMU says
-    so, and the page shows what it says."""
-    page = opened("BouncingBall")
-    page.until("lagfmu.runs")
-    first = page.tab.locator("#log li").all_text_contents()[0]
-    words = first.replace(",", "").split()
-    assert first.startswith("contact floor was struck at t = ")
-    assert float(words[7]) == pytest.approx((2 / 9.81) ** 0.5, rel=1e-8)
-    assert float(words[10]) == pytest.approx((2 * 9.81) ** 0.5 * 1.7, rel=1e-8)
-    landing = page.tab.locator("#events li").all_inner_texts()[0]
-    assert float(landing.split(" s")[0]) == pytest.approx((2 / 9.81) ** 0.5, rel=1e-8)
-    assert landing.endswith("closing.floor, impulse 7.53006 N·s")
-
-
-def test_a_departure_that_has_not_been_has_no_time(opened: Opened) -> None:
-    """Before 1.641 s the particle is on the hemisphere: among all values its departure is none yet."""
-    page = opened("Hemisphere")
-    page.until("lagfmu.runs")
-    assert page.tab.evaluate(VALUE, "departure.surface.time") == "none yet"
-    go_to_end(page)
-    assert float(value(page, "departure.surface.time")) == pytest.approx(1.641, abs=1e-3)
-
-
-def test_the_gap_of_a_contact_is_no_residual(opened: Opened) -> None:
-    """r - a grows to 0.5 m after the departure: a heading of its own says what it is."""
-    page = opened("Hemisphere")
-    page.until("lagfmu.runs")
-    page.tab.evaluate(TICK_ALL)
-    told = page.tab.locator("#charts figcaption").all_inner_texts()
-    assert "Gaps of contacts [m]" in told
-    assert not any(t.startswith("Residuals") for t in told)
-    assert "Residuals" not in page.tab.locator("#chart-choices").inner_text()
-
-
-def test_the_file_holds_the_run(opened: Opened, tmp_path: Path) -> None:
-    """The CSV file has a row a communication point, with every digit."""
-    page = opened("Hemisphere")
-    page.until("lagfmu.runs")
-    with page.tab.expect_download() as download:
-        page.tab.locator("#csv").click()
-    path = tmp_path / "run.csv"
-    download.value.save_as(path)
-    run = page.run()
-    with path.open(encoding="utf-8", newline="") as file:
-        names, *rows = csv.reader(file)
-    assert [float(r[0]) for r in rows] == run["time"]
-    at = names.index("lambda.surface")
-    assert [float(r[at]) for r in rows] == run["values"]["lambda.surface"]
 
 
 def test_a_link_brings_the_settings(opened: Opened, page_file: Any, browser: Any) -> None:
@@ -259,28 +303,6 @@ def test_twice_the_speed_is_half_the_time(opened: Opened) -> None:
     assert 0 < float(page.tab.locator("#scrub").input_value()) < 1.0
 
 
-def test_what_is_drawn_has_its_headings(opened: Opened) -> None:
-    """Multipliers, own outputs, forces of constraint, energies, friction and gaps, with units; the
-    equations; and the library that draws, with its licence."""
-    page = opened("Belt")
-    page.until("lagfmu.runs")
-    page.tab.evaluate(TICK_ALL)
-    told = page.tab.locator("#charts figcaption").all_inner_texts()
-    for heading in (
-        *(
-            "Multipliers λ [N]",
-            "Outputs [W]",
-            "Energies [J]",
-            "Generalized forces of constraint [N]",
-        ),
-        *("Friction [m/s]", "Friction [yes or no]", "Gaps of contacts [m]"),
-    ):
-        assert heading in told
-    assert page.tab.locator("math").count() >= 8
-    assert "MIT" in page.tab.content()
-    assert "Copyright (c)" in page.tab.content()
-
-
 def test_the_keyboard_reaches_everything_in_the_order_of_the_page(opened: Opened) -> None:
     """Tab goes from the run button through time, speed and every slider to the equations and around: each
     control that is seen has its turn, in the order of the text, and shows that it has it."""
@@ -297,30 +319,3 @@ def test_the_keyboard_reaches_everything_in_the_order_of_the_page(opened: Opened
         found.append(place)
         assert outline != "none", place
     assert found == list(range(expected))
-
-
-@pytest.mark.parametrize("name", ["Hemisphere", "SliderCrank"])
-def test_every_control_has_a_name(name: str, opened: Opened) -> None:
-    """What cannot be seen is told: sliders by name and value with unit, charts and picture in a sentence."""
-    page = opened(name)
-    page.until("lagfmu.runs")
-    assert page.tab.evaluate(UNNAMED) == []
-    slider = page.tab.locator("#dials input[data-name]").first
-    assert slider.get_attribute("aria-valuetext")
-    told = page.tab.locator("#charts [role=img]").first.get_attribute("aria-label")
-    assert "over time" in str(told)
-    page.until("document.getElementById('status').textContent.includes('steps')")
-
-
-def test_slipping_and_sticking_are_marked(opened: Opened) -> None:
-    """The block on the belt rides until k x = mu_s m g, x = speed t: it begins to slip at mu_s m g/(k speed)
-    = 0.24525 s; it sticks again after the slide, and that is told at its time too."""
-    page = opened("Belt")
-    page.until("lagfmu.runs")
-    told = page.tab.locator("#events li").all_inner_texts()
-    first = next(text for text in told if "slipping.grip" in text)
-    assert float(first.split(" s")[0]) == pytest.approx(0.5 * 9.81 / (100 * 0.2), rel=1e-6)
-    stuck = next(text for text in told if "sticking.grip" in text)
-    slide = (np.pi - np.arctan(0.981)) / 5  # (2/w)(pi - atan(d w/v)), d = (mu_s - mu_k) m g/k
-    assert float(stuck.split(" s")[0]) == pytest.approx(0.24525 + slide, rel=1e-6)
-    assert "Friction" in page.tab.locator("#chart-choices").inner_text()
