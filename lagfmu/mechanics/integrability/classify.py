@@ -206,33 +206,26 @@ class _System:
         witness: Expr,
         where: tuple[int, ...],
     ) -> str:
-        names = [str(variable.name) for variable in self.chart.variables]
         count, held = len(self.forms), len(self.all) - len(self.forms)
-        alone = count == 1
-        wedge = "omega" if alone else " ^ ".join(f"omega_{k + 1}" for k in range(count))
-        if flag[0] < count and not alone:
-            wedge = f"({flag[0]} independent ones of omega_1 ... omega_{count})"
-        if held:
-            wedge += " ^ dg" if held == 1 else "".join(f" ^ dg_{k + 1}" for k in range(held))
         if flag[0] == 0:
-            return "holonomic: the form is zero identically, and constrains nothing" + (
-                " that the holonomic constraints do not" if held else ""
-            )
+            less = " that the holonomic constraints do not" * bool(held)
+            return f"holonomic: the form is zero identically, and constrains nothing{less}"
+        alone = count == 1
+        each = "omega" if alone else "omega_k"
         if kind is Kind.HOLONOMIC:
-            return f"holonomic: d({'omega' if alone else 'omega_k'}) = 0 as the forms stand"
+            return f"holonomic: d({each}) = 0 as the forms stand"
+        factors = ["omega"] if alone else [f"omega_{k + 1}" for k in range(count)]
+        name = factors[first or 0]
+        if flag[0] < count and not alone:
+            factors = [f"({flag[0]} independent ones of omega_1 ... omega_{count})"]
+        factors += ["dg"] if held == 1 else [f"dg_{k + 1}" for k in range(held)]
+        wedge = " ^ ".join(factors)
         if kind is Kind.INTEGRABLE:
             together = "" if alone else " for each k: the set is integrable together"
-            name = "omega" if alone else "omega_k"
-            return f"integrable (Frobenius): d({name}) ^ {wedge} = 0{together}"
-        name = "omega" if first is None or alone else f"omega_{first + 1}"
-        basis = " ^ ".join(f"d{names[j]}" for j in where)
+            return f"integrable (Frobenius): d({each}) ^ {wedge} = 0{together}"
+        basis = " ^ ".join(f"d{self.chart.variables[j].name}" for j in where)
         plain = self.chart.there(witness).is_rational_function()
         how = "" if plain else f" (by {DIGITS} digits of it at random points)"
-        text = (
-            f"{kind.value}: the coefficient of {basis} in d({name}) ^ {wedge} is {witness}, "
-            f"not 0{how}"
-        )
-        if not alone:
-            ranks = " > ".join(map(str, flag))
-            text += f"; the derived flag has the ranks {ranks}"
-        return text
+        text = f"{kind.value}: the coefficient of {basis} in d({name}) ^ {wedge} is {witness}, not 0{how}"
+        ranks = " > ".join(map(str, flag))
+        return text if alone else f"{text}; the derived flag has the ranks {ranks}"
