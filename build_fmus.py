@@ -28,7 +28,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.text import Text
 
 from lagfmu import LagfmuError, Verification, verify
-from lagfmu.api import package, settled
+from lagfmu.api import package
 from lagfmu.cli.terminal import prepare_streams
 from lagfmu.fmu.compiler import HOST
 from lagfmu.fmu.native import takes_long
@@ -79,11 +79,8 @@ def build_scene(
                 if target == PYTHON and (reasons := refusals(prepared)):
                     made.append(Made(name, target, refused="; ".join(reasons)))
                     continue
-                asked, choice = settled(file.model, scene, target)
-                if prepared.asked != asked:
-                    prepared = prepare(file.model, asked)
                 folder, forms = out / target, file.closed_forms
-                fmu = package(prepared, folder, forms, target, platforms, choice, reference=True)
+                fmu = package(prepared, folder, forms, target, platforms, reference=True)
                 spent = time.perf_counter() - begun
                 found = fmu.verification or verify(fmu.path)
                 runs = [found, *(verify(fmu.path) for _ in range(RUNS - 1))]

@@ -27,7 +27,7 @@ from .model.scene import Scene
 from .page.notebook import html
 from .page.text import show as show_prepared
 from .prepare.prepare import Prepared, prepare
-from .study.tradeoff.choose import choose
+from .study.tradeoff.choose import Choice, Tick, choose
 from .study.tradeoff.page import section
 from .verification.crosscheck import layered
 from .verification.verify import Verification
@@ -36,10 +36,12 @@ from .verification.verify import verify as verify_fmu
 
 @dataclass(frozen=True)
 class Built:
-    """An FMU that stands at `path`, and what its verification found (None where it was not asked for)."""
+    """An FMU that stands at `path`; what its verification found (None where it was not asked for), and how
+    its tolerance was chosen (None where the scene names no accuracy)."""
 
     path: Path
     verification: Verification | None
+    choice: Choice | None
 
 
 def build_fmu(
@@ -74,11 +76,8 @@ def build_fmu(
     VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
     target = target_of(target)
-    scene, choice = settled(model, scene or Scene(model.name), target)
     prepared = prepare(model, scene)
-    built = package(
-        prepared, out, closed_forms, target, platforms, choice, check, reference, page, sources
-    )
+    built = package(prepared, out, closed_forms, target, platforms, check, reference, page, sources)
     found = built.verification
     if found is not None and not found.passed:
         failed = "; ".join(str(c) for c in found.checks if c.failed)
@@ -139,26 +138,23 @@ def package(
     closed_forms: Sequence[ClosedForm | Conserved] = (),
     target: str = NATIVE,
     platforms: Sequence[str] = (HOST,),
-    choice: str = "",
     check: bool = True,
     reference: bool = False,
     page: bool = False,
     sources: bool = True,
+    tick: Tick | None = None,
 ) -> Built:
-    """What `prepare` made as an FMU: built once, verified once, its figures put in."""
-    live = render(playable(prepared)) if page else ""
-    path = write(prepared, out, closed_forms, target, platforms, choice, live, sources)
+    """What `prepare` made as an FMU: with the tolerance that holds its accuracy, which `tick` hears being
+    found, built once, verified once, its figures put in."""
+    choice, asked = None, prepared.asked
+    if asked.accuracy is not None:
+        choice = choose(prepared.model, asked, parse(asked.accuracy), tick, target)
+        prepared = prepare(prepared.model, choice.scene, prepared.derived)
+    told, live = section(choice) if choice else "", render(playable(prepared)) if page else ""
+    path = write(prepared, out, closed_forms, target, platforms, told, live, sources)
     runs_here = target == PYTHON or host() in chosen(platforms)
     found = verify_fmu(path) if check and runs_here else None
     more = layered(path, found) if reference and runs_here else {}
     if found is not None or more:
         put(path, more, found.rows() if found is not None else ())
-    return Built(path, found)
-
-
-def settled(model: Model, scene: Scene, target: str) -> tuple[Scene, str]:
-    """The scene with the tolerance that holds its accuracy, and HTML on how it was chosen."""
-    if scene.accuracy is None:
-        return scene, ""
-    found = choose(model, scene, parse(scene.accuracy), target=target)
-    return found.scene, section(found)
+    return Built(path, found, choice)

@@ -15,12 +15,11 @@ from ..fmu.target import PYTHON, target_of
 from ..fmu.write import write, write_whole
 from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile
-from ..model.goal import Goal
 from ..model.scene import Scene
 from ..numeric.tolerance import tolerance_problem
 from ..page.table import print_whole
 from ..prepare.prepare import prepare
-from ..study.tradeoff.choose import Choice, choose
+from ..study.tradeoff.choose import Choice
 from ..study.tradeoff.figure import draw
 from ..study.tradeoff.measure import DECADES, Plan, Tradeoff, measure
 from ..study.tradeoff.observe import opened
@@ -99,16 +98,13 @@ def _show(one: Tradeoff, out: Path, console: Console) -> None:
     say_wrote(stem, ".json, .svg, .png", on=console)
 
 
-def chosen_for(file: ModelFile, scene: Scene, goal: Goal, target: str, console: Console) -> Choice:
-    """Bisect and say what was chosen.  Raises BuildError if nothing holds the accuracy."""
-    with progress(console, scene.name) as tick:
-        choice = choose(file.model, scene, goal, tick, target)
+def say_chosen(choice: Choice, console: Console) -> None:
+    """Which tolerance was found for an accuracy, and what it holds."""
     say(
-        f"for {goal}: {choice.trial.setting}; error {choice.trial.error:.1e} on the scene, "
+        f"for {choice.goal}: {choice.trial.setting}; error {choice.trial.error:.1e} on the scene, "
         f"{choice.held_out_error:.1e} at most on held-out values; {choice.trial.steps} steps",
         "chosen",
         on=console,
     )
     for trial, error in choice.failed:
         say(f"  refused: {trial} on the scene, {error:.1e} elsewhere", on=console)
-    return choice

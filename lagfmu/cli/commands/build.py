@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -71,12 +71,11 @@ def build(
 ) -> None:
     """Build the FMUs of a model file into OUT/native/NAME.fmu or OUT/python/NAME.fmu, and verify them."""
     from ...api import package
-    from ...model.goal import parse
     from ...prepare.prepare import prepare
-    from ...study.tradeoff.page import section
     from ..finish import print_verdicts
+    from ..progress import progress
     from ..scenes import chosen, loaded, narrowed
-    from ..tradeoff import chosen_for
+    from ..tradeoff import say_chosen
 
     failed = False
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -88,13 +87,11 @@ def build(
         kind = target_of(NATIVE if platforms else target)
         file = loaded(model, add_output, arguments)
         for s in narrowed(chosen(file, scene), {**needs, "accuracy": accuracy}):
-            choice = ""
-            if s.accuracy is not None:
-                measured = chosen_for(file, s, parse(s.accuracy), kind, console)
-                s, choice = measured.scene, section(measured)
-            with console.status(
+            what = (
                 f"building {'and verifying ' if check else ''}{s.name}{_first_time(kind, places)}"
-            ):
+            )
+            busy: Any = console.status(what) if s.accuracy is None else progress(console, s.name)
+            with busy as shown:
                 prepared = prepare(file.model, s)
                 less = any(needs[n] is not None for n in NARROWING)
                 if less and needs["name"] is None:
@@ -105,13 +102,15 @@ def build(
                     file.closed_forms,
                     kind,
                     places,
-                    choice,
                     check,
                     reference,
                     page_,
                     sources,
+                    None if s.accuracy is None else shown,
                 )
             path, found = built.path, built.verification
+            if built.choice is not None:
+                say_chosen(built.choice, console)
             say_wrote(path, kilobytes(path), "built")
             if found is not None:
                 print_verdicts(found)
