@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from instance import instance
-from runs import simulate_fmu
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Model, Nonholonomic, Parameter, build_fmu, simulate
 from lagfmu.errors import SimulationError
-
-
-def test_a_sideways_velocity_is_taken_away(native_fmu):
-    """Thrown across the blade at the start, it keeps only the part along the blade."""
-    result = simulate_fmu(
-        str(native_fmu("KnifeEdge")),
-        stop_time=0.1,
-        output_interval=0.1,
-        start_values={"phi": 0.5, "der(x)": 1.0, "der(y)": 2.0},
-    )
-    along = np.cos(0.5) + 2 * np.sin(0.5)
-    assert result["der(x)"][0] == pytest.approx(along * np.cos(0.5), rel=1e-14)
-    assert result["der(y)"][0] == pytest.approx(along * np.sin(0.5), rel=1e-14)
 
 
 def test_a_blade_parallel_to_its_wall_is_named(tmp_path):

@@ -10,7 +10,7 @@ from instance import instance
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Friction, Input, Model, Nonholonomic, Parameter, build_fmu, multiplier
+from lagfmu import Contact, Friction, Input, Model, Nonholonomic, Parameter, multiplier
 
 g = 9.81  # m/s^2
 
@@ -38,6 +38,17 @@ def test_a_skate_draws_its_cycloid_however_small(native_fmu, omega):
             assert abs(one.get("x") - x) < 1e-6 * G / omega**2
             assert abs(one.get("y") - y) < 1e-6 * G / omega**2
             assert abs(one.get("lambda.edge") + 2 * G * math.sin(phase)) < 1e-6 * G
+
+
+def test_an_incline_of_hardly_any_angle(native_fmu):
+    """At 1e-300 rad the disk's own time is 1e150 s, and the integrator stands as far ahead: at 1 s
+    y = g alpha t^2/3 all the same, to ten digits."""
+    with instance(native_fmu("InclineDisk")) as one:
+        one.start({"alpha": 1e-300})
+        for t in (0.5, 1.0):
+            one.step(0.5)
+            assert one.get("y") == pytest.approx(g * 1e-300 * t**2 / 3, rel=1e-10, abs=0)
+            assert one.get("theta") == pytest.approx(g * 1e-299 * t**2 / 3, rel=1e-10, abs=0)
 
 
 @pytest.mark.parametrize("step", [1e-12, 1e-2, 1e6])
@@ -138,11 +149,10 @@ def box() -> Model:
 
 
 @pytest.mark.parametrize("method", ["auto", "rk4"])
-def test_what_rests_has_no_natural_time(method, tmp_path):
+def test_what_rests_has_no_natural_time(method, built):
     """Held by friction under F = 2 N + 10 N/s (t - 0.1 s) it takes one step, however long; it slides from
     F = mu m g on, at t = 0.2924 s, with x' = 5 m/s^3 (t - 0.2924 s)^2."""
-    path = build_fmu(box(), tmp_path, target="native", check=False)
-    with instance(path) as one:
+    with instance(built(box())) as one:
         one.start({"solver.method": method} if method != "auto" else {})
         one.step(0.1)
         before = one.get("solver.steps")
@@ -158,7 +168,7 @@ def test_what_rests_has_no_natural_time(method, tmp_path):
         assert one.get("der(x)") == pytest.approx(5 * 0.0276**2, abs=1e-12)
 
 
-def test_headway_is_judged_by_the_motion_as_it_is(tmp_path):
+def test_headway_is_judged_by_the_motion_as_it_is(built):
     """A mass that creeps at 1e-7 m/s has a natural time of 1e7 s; a spring k x^3 / L^2 on which it is then
     pushed makes that 30 ms, and a second of it is no lack of headway: the energy of the push is kept."""
     x, F = dynamicsymbols("x F")
@@ -172,7 +182,7 @@ def test_headway_is_judged_by_the_motion_as_it_is(tmp_path):
         parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1e3, "N/m"), Parameter(L, 1.0, "m")],
         start={x.diff(): 1e-7},
     )
-    with instance(build_fmu(model, tmp_path, target="native", check=False)) as one:
+    with instance(built(model)) as one:
         one.start({"solver.maximum_steps": 50}, tolerance=1e-10)
         one.set("F", 1e3)
         one.step(1.0)
