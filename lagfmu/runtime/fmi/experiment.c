@@ -22,7 +22,7 @@ Status instance_set_up(Instance *x, const double *tolerance, double start, const
                     digits(start).text, stop != NULL ? digits(*stop).text : "not defined");
     x->tolerance = tolerance != NULL ? *tolerance : 0;
     x->start_time = start;
-    x->stop_time = stop != NULL ? *stop : HUGE_VAL;
+    x->solver.stop_time = stop != NULL ? *stop : HUGE_VAL;
     x->started = 0;
     return OK;
 }
@@ -94,8 +94,8 @@ Status instance_steppable(Instance *x, double t, double h) {
                     "the communication point is %s s, but this FMU stands at %s s: continue there, or restore "
                     "a state saved at that time",
                     digits(t).text, digits(now).text);
-    if (!(t + h <= x->stop_time + slack))
+    if (!(t + h <= x->solver.stop_time + slack))
         return fail(why, "the step ends at %s s, after the stop time %s s of the experiment", digits(t + h).text,
-                    digits(x->stop_time).text);
+                    digits(x->solver.stop_time).text);
     return OK;
 }

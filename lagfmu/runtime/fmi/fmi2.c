@@ -1,5 +1,5 @@
 /* fmi2.c -- the Functional Mock-up Interface 2.0.4, co-simulation and Model Exchange, around an
- * instance (instance.c, exchange.c): inquiry, creation, life cycle.  The rest of the interface: fmi2_*.c.
+ * instance (instance*.c, exchange.c): inquiry, creation, life cycle.  The rest of the interface: fmi2_*.c.
  *
  * Life cycle: which function may be called in which mode is what the tables of sections 2.1.6, 3.2.3
  * and 4.2.4 allow.  A call that is refused returns fmi2Error with its reason in the log and leaves the

@@ -21,7 +21,7 @@ typedef struct Instance {
     Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
     Sensitivity along;      /* of the full system, where there is an embedding */
     Settings given;         /* solver.* as they were set; tolerance 0: not set */
-    double start_time, stop_time; /* [s] of the experiment */
+    double start_time;            /* [s] of the experiment; its end is solver.stop_time */
     double tolerance;             /* of the experiment; 0: none */
     int exchange;           /* 1: an importer's integrator moves the state (exchange.h) */
     int phase;              /* for the caller, saved with the state */
@@ -111,6 +111,19 @@ SHARED Status instance_change(const Instance *x, const Variable *v, Direction d,
 
 /* The same along the motion: the derivative of a variable with respect to time. */
 SHARED Status instance_rates(Instance *x, Direction *d);
+
+/* Among the files of an instance.  The state as the importer left it: what is set next may be the rest of the
+ * motion that was looked at. */
+SHARED void instance_unfollow(Instance *x);
+
+/* The value of a variable that was set; 0 if it is none that can be. */
+SHARED int instance_was_set(const Instance *x, const Variable *v, double *value);
+
+/* 1: inputs have other values than they had come to, and more than the forces may change with them. */
+SHARED int instance_turned(const Instance *x);
+
+/* Once for each: redundant rows share a normal force, and the motion may depend on how. */
+SHARED void instance_warn_of_shares(Instance *x);
 
 /* Saved states: `instance_record_size` bytes that hold no pointer. */
 SHARED size_t instance_record_size(const Instance *x);

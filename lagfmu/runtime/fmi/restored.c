@@ -194,9 +194,7 @@ static Status together(Instance *x) {
         return restored_none(x, "method", (double)s->settings.method);
     if (x->started && !(s->settings.tolerance > 0))
         return restored_none(x, "solver.tolerance", s->settings.tolerance);
-    if (!(x->stop_time >= x->start_time)) return restored_none(x, "stop time", x->stop_time);
-    if (x->started && !(s->stop_time >= x->start_time))
-        return restored_none(x, "stop time", s->stop_time);
+    if (!(s->stop_time >= x->start_time)) return restored_none(x, "stop time", s->stop_time);
     return OK;
 }
 

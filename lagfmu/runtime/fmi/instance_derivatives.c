@@ -1,0 +1,101 @@
+/* instance_derivatives.c -- how variables change along a direction, and with time. */
+#include "instance.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "outputs.h"
+#include "prescribed.h"
+#include "segment.h"
+
+Status instance_differentiate(Instance *x, Direction d) {
+    Solver *s = &x->solver;
+    const System *full = s->system->full;
+    if (s->system->tangent == NULL)
+        return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
+    if (instance_observe(x) != OK) return FAILED;
+    const Instant at = segment_instant(s, s->state.now.t);
+    segment_begin(s);
+    if (mechanism_motion_near(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
+                              s->state.span) != OK)
+        return FAILED;
+    if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
+        return FAILED;
+    if (full == NULL) {
+        outputs_change(&s->sensitivity, &s->stepped, s->system, at, &x->seen, d);
+        return OK;
+    }
+    Sensitivity *w = &x->along;
+    s->system->embed_tangent(at.t, s->state.q, s->state.v, at.u, at.p, d.dt, d.dq, d.dv, d.du,
+                             w->dq, w->dv);
+    const Direction wide = {d.dt, w->dq, w->dv, d.du};
+    if (full->dynamics == NULL) {
+        sensitivity_of_energies(w, full, at, x->seen.q, x->seen.v, wide);
+        outputs_change(w, NULL, full, at, &x->seen, wide);
+        return OK;
+    }
+    if (mechanism_motion(&s->full, at, x->seen.q, x->seen.v, s->active_full) != OK)
+        return FAILED;
+    if (sensitivity_along(w, &s->full, at, x->seen.q, x->seen.v, wide) != OK) return FAILED;
+    outputs_change(w, &s->full, full, at, &x->seen, wide);
+    return OK;
+}
+
+/* Q = G^T lambda: the change of the share that G's value e has in it. */
+static double share_change(const Sensitivity *w, const Mechanism *b, int e) {
+    const int k = b->system->entry_row[e];
+    return w->dG[e] * b->lambda[k] + b->G[e] * w->dlambda[k];
+}
+
+Status instance_change(const Instance *x, const Variable *v, Direction d, double *change) {
+    const Solver *s = &x->solver;
+    const int embedded = s->system->full != NULL;
+    const Mechanism *b = embedded ? &s->full : &s->stepped;
+    const Sensitivity *w = embedded ? &x->along : &s->sensitivity;
+    const double *dq = embedded ? w->dq : d.dq, *dv = embedded ? w->dv : d.dv;
+    *change = 0;
+    switch (v->place) {
+        case AT_Q: *change = dq[v->index]; break;
+        case AT_V: *change = dv[v->index]; break;
+        case AT_VDOT: *change = w->dvdot[v->index]; break;
+        case AT_QDOT: *change = w->drate[v->index]; break;
+        case AT_S: *change = d.dq[v->index]; break;
+        case AT_SDOT: *change = d.dv[v->index]; break;
+        case AT_SDDOT: *change = s->sensitivity.dvdot[v->index]; break;
+        case AT_LAMBDA: *change = w->dlambda[v->index]; break;
+        case AT_RESIDUAL:
+            *change = sensitivity_residual(w, b, v->index, x->seen.v, dv);
+            break;
+        case AT_FORCE:
+            for (int e = 0; e < b->system->entries; e++)
+                if (b->system->entry_column[e] == v->index) *change += share_change(w, b, e);
+            break;
+        case AT_SHARE: *change = share_change(w, b, v->index); break;
+        case AT_KINETIC: *change = w->denergy[0]; break;
+        case AT_POTENTIAL: *change = w->denergy[1]; break;
+        case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;
+        case AT_OUTPUT: *change = w->down[v->index]; break;
+        case AT_INPUT: *change = d.du[v->index]; break;
+        case AT_ERROR: *change = NAN; break; /* it is not known */
+        default: break; /* discrete ones and parameters: none */
+    }
+    if (v->place == AT_LAMBDA && !x->seen.unique[v->index])
+        *change = NAN;
+    return isfinite(*change) ? OK : FAILED;
+}
+
+Status instance_rates(Instance *x, Direction *d) {
+    Solver *s = &x->solver;
+    const System *system = s->system;
+    Sensitivity *w = &s->sensitivity;
+    if (instance_observe(x) != OK) return FAILED;
+    const double *vdot = system->full == NULL ? x->seen.vdot : x->seen.sddot;
+    memcpy(w->dq, system->kinematics == NULL ? s->state.v : x->seen.rate, (size_t)system->nq * sizeof *w->dq);
+    memcpy(w->dv, vdot, (size_t)system->nv * sizeof *w->dv);
+    for (int k = 0; k < system->inputs; k++) {
+        const int order = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
+        w->du[k] = order < 0 ? s->drive.first[k] : PRESCRIBED->rate(x, k, order);
+    }
+    *d = (Direction){1, w->dq, w->dv, w->du};
+    return instance_differentiate(x, *d);
+}

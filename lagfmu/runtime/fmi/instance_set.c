@@ -1,0 +1,106 @@
+/* instance_set.c -- what an importer sets: start values, parameters, solver settings, inputs. */
+#include "instance.h"
+
+#include "prescribed.h"
+
+int instance_was_set(const Instance *x, const Variable *v, double *value) {
+    const Solver *s = &x->solver;
+    switch (v->place) {
+        case AT_PARAMETER: *value = s->p[v->index]; return 1;
+        case AT_METHOD: *value = (double)x->given.method; return 1;
+        case AT_TOLERANCE: *value = x->given.tolerance; return 1;
+        case AT_STEP: *value = x->given.step; return 1;
+        case AT_MAXIMUM_STEP: *value = x->given.maximum_step; return 1;
+        case AT_MAXIMUM_STEPS: *value = x->given.maximum_steps; return 1;
+        case AT_INPUT: *value = s->drive.value[v->index]; return 1;
+        default: return 0;
+    }
+}
+
+double instance_setting(const Instance *x, const Variable *v) {
+    const int nq = x->solver.system->nq;
+    double value = 0;
+    if (v->role == ROLE_START) return v->state < nq ? x->q0[v->state] : x->v0[v->state - nq];
+    (void)instance_was_set(x, v, &value);
+    return value;
+}
+
+int instance_turned(const Instance *x) {
+    const System *s = x->solver.system;
+    if (s->contacts + s->frictions + s->switches + s->prescribed_count == 0) return 0;
+    for (int k = 0; k < s->inputs; k++)
+        if (x->solver.drive.value[k] != x->expected[k]) return 1;
+    return 0;
+}
+
+void instance_inputs_changed(Instance *x) {
+    solver_inputs_changed(&x->solver);
+    if (ERROR_BARS != NULL) ERROR_BARS->inputs_changed(x);
+}
+
+/* The first setting of an input after a step replaces its polynomial, whatever is set first. */
+static void renew_input(Instance *x, int k) {
+    if (x->set[k]) return;
+    x->set[k] = 1;
+    x->solver.drive.first[k] = x->solver.drive.second[k] = 0;
+}
+
+static void set_input(Instance *x, int k, double value) {
+    instance_unfollow(x);
+    Drive *drive = &x->solver.drive;
+    const int same = drive->value[k] == value && drive->first[k] == 0 && drive->second[k] == 0;
+    renew_input(x, k);
+    drive->value[k] = value;
+    if (same) return;
+    x->observed = x->evaluated = 0;
+    if (x->started) instance_inputs_changed(x);
+}
+
+void instance_set(Instance *x, const Variable *v, double value) {
+    instance_unfollow(x);
+    const int nq = x->solver.system->nq;
+    if (v->place == AT_INPUT) {
+        set_input(x, v->index, value);
+        if (!x->running) x->started = x->observed = 0;
+        return;
+    }
+    x->started = x->observed = x->evaluated = 0;
+    if (v->role == ROLE_START) {
+        if (v->state < nq)
+            x->q0[v->state] = value;
+        else
+            x->v0[v->state - nq] = value;
+        return;
+    }
+    switch (v->place) {
+        case AT_PARAMETER: x->solver.p[v->index] = value; break;
+        case AT_METHOD: x->given.method = (MethodName)value; break;
+        case AT_TOLERANCE: x->given.tolerance = value; break;
+        case AT_STEP: x->given.step = value; break;
+        case AT_MAXIMUM_STEP: x->given.maximum_step = value; break;
+        case AT_MAXIMUM_STEPS: x->given.maximum_steps = value; break;
+        default: break;
+    }
+}
+
+void instance_set_input_derivative(Instance *x, const Variable *v, int order, double value) {
+    instance_unfollow(x);
+    Drive *drive = &x->solver.drive;
+    int k = v->index;
+    const int place = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
+    if (place >= 0 && place + order <= 2) { /* that derivative is an input itself */
+        set_input(x, k + order, value);
+        if (!x->running) x->started = x->observed = 0;
+        return;
+    }
+    if (place >= 0) { /* der(u,2) goes on by those beyond it */
+        k += 2 - place;
+        order -= 2 - place;
+    }
+    renew_input(x, k);
+    double *where = order == 1 ? &drive->first[k] : &drive->second[k];
+    if (*where == value) return;
+    *where = value;
+    x->observed = x->evaluated = 0;
+    if (x->started) instance_inputs_changed(x);
+}
