@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Model, Parameter
+from lagfmu import Holonomic, Model, Parameter, rotation_matrix
 
 E = dynamicsymbols("e0 e1 e2 e3")
 W = dynamicsymbols("wx wy wz")
@@ -71,3 +71,46 @@ def reference(stop: float) -> dict[str, float]:
     y = solve_ivp(rate, (0, stop), begin, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     names = ("e0", "e1", "e2", "e3", "wx", "wy", "wz")
     return dict(zip(names, y.tolist(), strict=True))
+
+
+def chain(n: int) -> Model:
+    """n rods in space, one hung on the other by a hinge about their third axes: three conditions on the place
+    and two on the direction each, with the multipliers lambda.A0.x [N], ..., lambda.A0.c [N m]."""
+    m, J, a, g = sp.symbols("m J a g", positive=True)
+    coordinates: dict[Any, str] = {}
+    speeds: dict[Any, str] = {}
+    kinematics: dict[Any, Any] = {}
+    start: dict[Any, float] = {}
+    rows: list[Holonomic] = []
+    energy, end, before = sp.S.Zero, sp.zeros(3, 1), sp.eye(3)
+    for i in range(n):
+        r = sp.Matrix(dynamicsymbols(f"x{i} y{i} z{i}"))
+        e = dynamicsymbols(f"e0_{i} e1_{i} e2_{i} e3_{i}")
+        w = dynamicsymbols(f"wx{i} wy{i} wz{i}")
+        R = rotation_matrix(e)
+        coordinates |= dict.fromkeys(r, "m") | dict.fromkeys(e, "1")
+        speeds |= dict.fromkeys(w, "rad/s")
+        named = dict(zip((*E, *W), (*e, *w), strict=True))
+        kinematics |= {named[s]: rate.xreplace(named) for s, rate in turning().items()}
+        energy += m * sum(c.diff() ** 2 for c in r) / 2 - m * g * r[1]
+        energy += J * (w[0] ** 2 / 5 + w[1] ** 2 + w[2] ** 2) / 2
+        gap = before.T * (r - R * sp.Matrix([a, 0, 0]) - end)
+        turn = [(R[:, 2].T * before[:, k])[0] for k in (0, 1)]
+        rows += [
+            Holonomic(f"A{i}.{name}", f) for name, f in zip("xyzbc", [*gap, *turn], strict=True)
+        ]
+        end, before = r + R * sp.Matrix([a, 0, 0]), R
+        start |= {r[0]: 0.5 + i, e[0]: 1.0}
+    return Model(
+        f"Chain{n}",
+        coordinates=coordinates,
+        speeds=speeds,
+        kinematics=kinematics,
+        lagrangian=energy,
+        constraints=rows,
+        parameters=[
+            *(Parameter(m, 1.0, "kg"), Parameter(J, 0.1, "kg.m2")),
+            *(Parameter(a, 0.5, "m"), Parameter(g, 9.81, "m/s2")),
+        ],
+        start=start,
+    )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, groupby
 from textwrap import wrap
 
 import sympy as sp
@@ -17,6 +17,7 @@ from sympy.logic.boolalg import Boolean
 
 from ...model.elements import Expr
 from ..parts import Value
+from .alike import Kind, kinds, nodes_of
 from .printer import POWER, Printer
 from .subexpressions import Names, common_subexpressions
 
@@ -54,9 +55,94 @@ def function(
     """
     statements = [s for array, group in results.items() for s in _statements(array, group)]
     blocks = list(_blocks(statements))
+    if len(blocks) > 1 and (found := kinds(arguments, results, _costly)):
+        return _in_loops(name, doc, arguments, results, found, names)
     if len(blocks) > 1:
         return _in_blocks(name, doc, arguments, list(results), blocks, names)
     return f"/* {doc} */\n{_define(name, arguments, list(results), statements, names)}"
+
+
+def _in_loops(
+    name: str,
+    doc: str,
+    arguments: Mapping[str, Sequence[Expr]],
+    results: Mapping[str, Sequence[Value]],
+    found: Sequence[Kind],
+    names: Mapping[Expr, str],
+) -> str:
+    """A function for each kind of what is alike, one for the rest, and one that calls them."""
+    told = {
+        (array, place)
+        for kind in found
+        for targets in kind.targets
+        for array, place in zip(kind.writes, targets, strict=True)
+    }
+    rest = {
+        array: [None if (array, k) in told else value for k, value in enumerate(group)]
+        for array, group in results.items()
+    }
+    statements = [s for array, group in rest.items() for s in _statements(array, group)]
+    blocks = list(_blocks(statements))
+    head = f"What is alike of no other in {name}."
+    parts = []
+    if len(blocks) > 1:
+        parts.append(_in_blocks(f"{name}_rest", head, arguments, list(results), blocks, names))
+    elif blocks:
+        text = _define(f"{name}_rest", arguments, list(results), statements, names)
+        parts.append(f"/* {head} */\n{text}")
+    calls = ""
+    if blocks:
+        calls += _lines(f"    {name}_rest(", [*arguments, *results], ", ", ");")
+    for number, kind in enumerate(found, 1):
+        title = f"{name}_kind_{number}"
+        values = [_Statement("y", k, "=", e, "") for k, e in enumerate(kind.values)]
+        local = {s: str(s) for s in kind.inputs}
+        text = _define(title, {"a": kind.inputs}, ["y"], values, local)
+        owners = " ".join(wrap(", ".join(kind.owners), 90, max_lines=1, placeholder=" ..."))
+        parts.append(f"/* Of {owners}. */\n{text}")
+        calls += _loop(title, kind, arguments, names)
+    used = {a for kind in found for a in (*kind.reads, *kind.writes)}
+    used |= {*arguments, *results} if blocks else set()
+    silence = _silence([a for a in (*arguments, *results) if a not in used])
+    signature = _signature(name, arguments, names, list(results))
+    return "\n".join([*parts, f"/* {doc} */\n{signature}{silence}{calls}}}\n"])
+
+
+def _loop(
+    title: str,
+    kind: Kind,
+    arguments: Mapping[str, Sequence[Expr]],
+    names: Mapping[Expr, str],
+) -> str:
+    """Calls of the function of a kind, for each of its owners."""
+    count, inputs, outputs = len(kind.owners), len(kind.reads), len(kind.writes)
+    tables = "".join(
+        f"        static const int {label}[{count}][{size}] = {{\n"
+        + "".join(_lines("            {", [*map(str, row)], ", ", "},", " " * 13) for row in rows)
+        + "        };\n"
+        for label, size, rows in (
+            ("from", inputs, kind.sources),
+            ("to", outputs, kind.targets),
+        )
+    )
+    gather = scatter = ""
+    for array, first, end in _runs(kind.reads):
+        source = array if _scalar(array, arguments[array], names) else f"{array}[from[k][j]]"
+        gather += f"            for (int j = {first}; j < {end}; j++) a[j] = {source};\n"
+    for array, first, end in _runs(kind.writes):
+        scatter += f"            for (int j = {first}; j < {end}; j++) {array}[to[k][j]] = y[j];\n"
+    return (
+        f"    {{\n{tables}        for (int k = 0; k < {count}; k++) {{\n"
+        f"            double a[{inputs}], y[{outputs}];\n{gather}            {title}(a, y);\n"
+        f"{scatter}        }}\n    }}\n"
+    )
+
+
+def _runs(arrays: Sequence[str]) -> Iterator[tuple[str, int, int]]:
+    """Each array with the first place of its run and the one after its last."""
+    for array, group in groupby(enumerate(arrays), key=lambda pair: pair[1]):
+        places = [k for k, _ in group]
+        yield array, places[0], places[-1] + 1
 
 
 def _define(
@@ -138,23 +224,29 @@ def _silence(unused: Sequence[str]) -> str:
 # ------------------------------------------------------------------------------- statements
 
 
-def _statements(array: str, group: Sequence[Value]) -> Iterator[_Statement]:
-    """Assignments; equal neighbours become one loop, long sums are added up in pieces."""
+def _statements(array: str, group: Sequence[Value | None]) -> Iterator[_Statement]:
+    """Assignments (None: to be left out); equal neighbours become one loop, long sums are added up in
+    pieces."""
     k = 0
     while k < len(group):
-        value = group[k].expression
+        one = group[k]
+        if one is None:
+            k += 1
+            continue
+        value = one.expression
         end = k + 1
-        while end < len(group) and group[end].expression == value:
+        while end < len(group) and (other := group[end]) and other.expression == value:
             end += 1
         if end - k >= RUN:
-            place = f"{group[k].place} ... {group[end - 1].place}"
+            last = group[end - 1]
+            place = f"{one.place} ... {last.place if last else ''}"
             yield _Statement(array, k, "=", value, place, end - k)
             k = end
             continue
         terms = sp.Add.make_args(value)
         for start in range(0, len(terms), TERMS):
             part = sp.Add(*terms[start : start + TERMS]) if len(terms) > TERMS else value
-            yield _Statement(array, k, "+=" if start else "=", part, group[k].place)
+            yield _Statement(array, k, "+=" if start else "=", part, one.place)
         k += 1
 
 
@@ -163,26 +255,14 @@ def _blocks(statements: Sequence[_Statement]) -> Iterator[list[_Statement]]:
     block: list[_Statement] = []
     seen: dict[Expr, None] = {}
     for s in statements:
-        more = _nodes(s.value, seen)
+        more = nodes_of(s.value, seen)
         if block and len(seen) + len(more) + len(block) > BLOCK:
             yield block
-            block, seen, more = [], {}, _nodes(s.value, {})
+            block, seen, more = [], {}, nodes_of(s.value, {})
         block.append(s)
         seen |= more
     if block:
         yield block
-
-
-def _nodes(e: Expr, seen: Mapping[Expr, None]) -> dict[Expr, None]:
-    """The nodes of an expression that are not among those seen, in a fixed order."""
-    stack: list[Expr] = [e]
-    found: dict[Expr, None] = {}
-    while stack:
-        node = stack.pop()
-        if node not in seen and node not in found:
-            found[node] = None
-            stack.extend(node.args)
-    return found
 
 
 def _shared(blocks: Sequence[Sequence[_Statement]]) -> list[Expr]:
@@ -191,7 +271,7 @@ def _shared(blocks: Sequence[Sequence[_Statement]]) -> list[Expr]:
     for block in blocks:
         nodes: dict[Expr, None] = {}
         for s in block:
-            nodes |= _nodes(s.value, nodes)
+            nodes |= nodes_of(s.value, nodes)
         for e in nodes:
             if _costly(e):
                 uses[e] = uses.get(e, 0) + 1
