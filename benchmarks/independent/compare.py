@@ -1,4 +1,4 @@
-"""Twenty systems against integrations written by hand, in co-simulation and in model exchange.
+"""Twenty-six systems against integrations written by hand, in co-simulation and in model exchange.
 
     python benchmarks/independent/compare.py [NAME ...]
 
@@ -20,6 +20,7 @@ from pathlib import Path
 
 import events
 import fmpy
+import mechanisms
 import smooth
 from system import System
 
@@ -71,7 +72,7 @@ def main() -> int:
     """Print the table."""
     wrong = 0
     print(f"{'':22}", *(f"{h:>12}" for h in HEADINGS))
-    for make in (*smooth.SYSTEMS, *events.SYSTEMS):
+    for make in (*smooth.SYSTEMS, *events.SYSTEMS, *mechanisms.SYSTEMS):
         if sys.argv[1:] and make.__name__ not in sys.argv[1:]:
             continue
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():

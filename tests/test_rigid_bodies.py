@@ -1,0 +1,87 @@
+"""Rigid bodies against Newton's and Euler's equations written by hand (benchmarks/independent/rigid.py)."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+import sympy as sp
+from joints import pin
+from mechanisms import LINKAGES, door
+from rigid import GROUND, Mass, Mechanism, rotation, state
+from scipy.special import ellipj, ellipkm1
+from space import Parts
+
+from lagfmu import simulate
+
+ALLOWED = 1e-9  # of a joint force, relative to the largest
+
+
+def test_a_heavy_top_rests_on_its_ball_joint_with_m_a_minus_g(built):
+    """An unsymmetric top spins on a point: its ball joint gives it the force m (a - g)."""
+    mass, tip = Mass.of(2.0, 1.0, 2.0, 2.5, 0.1, 0.05, -0.07), (0.0, 0.0, -0.3)
+    by_hand = Mechanism([mass], {"A": [partial(pin, GROUND, (0, 0, 0), 0, tip)]}, (0, 0, -9.81))
+    start = by_hand.speeds(state(((0, 0, 0.3), np.eye(3))), {0: (0.1, 0.2, 5.0)})
+    parts = Parts()
+    top = parts.body("top", mass, start)
+    parts.same("A", sp.zeros(3, 1), top.at("tip", tip))
+    model = parts.model("TopOnABall", 9.81, {top.m: top.r[2]})
+    run = simulate(built(model), stop_time=1.0, tolerance=1e-12)
+    ended = by_hand.moved(start, (0.0, 1.0))[-1]
+    acceleration, _, received = by_hand.solve(1.0, ended)
+    force = np.array([run[f"lambda.A.{x}"][-1] for x in "xyz"])
+    np.testing.assert_allclose(force, received["A"][:3], rtol=0, atol=20 * ALLOWED)
+    weight = mass.m * (acceleration[0, :3] - by_hand.gravity)
+    np.testing.assert_allclose(force, weight, rtol=0, atol=20 * ALLOWED)
+
+
+def test_a_body_near_its_middle_axis_flips_when_jacobis_functions_say(built):
+    """Near the middle axis a free body turns over each 2 K(k)/p (Landau & Lifshitz, Mechanics, sect. 37);
+    over 1,000 turns its angular momentum in space and its energy stay within 100 tolerances."""
+    A, B, C = J = np.array([1.0, 2.0, 3.0])
+    turn, lean = 5.0, 0.05  # rad/s about the middle axis, and about the third
+    energy, momentum = B * turn**2 + C * lean**2, (B * turn) ** 2 + (C * lean) ** 2
+    p = np.sqrt((C - B) * (momentum - energy * A) / (A * B * C))
+    complementary = (C - A) * C * lean**2 / (momentum - energy * A)  # 1 - k^2
+    quarter, flips, looks = ellipkm1(complementary) / p, 334, 8
+    start = state(((0, 0, 0), np.eye(3)))
+    start[10:] = 0.0, -turn, lean
+    parts = Parts()
+    parts.body("body", Mass.of(1.0, *J), start)
+    path = built(parts.model("FreeBody", 0.0, {}))
+    tolerance = 1e-10
+    run = simulate(
+        path,
+        stop_time=2 * flips * quarter,
+        step_size=quarter / looks,
+        tolerance=tolerance,
+    )
+    assert run["time"][-1] * turn > 1000 * 2 * np.pi
+    w = np.stack([run[f"body.omega.{x}"] for x in "xyz"], axis=1)
+    flip = slice(looks, None, 2 * looks)
+    late = w[flip, 1] / ((C - A) / B * w[flip, 0] * w[flip, 2])
+    assert len(late) == flips
+    np.testing.assert_allclose(late, 0, rtol=0, atol=2e-6)
+    sn, *_ = ellipj(p * run["time"] - p * quarter, 1 - complementary)
+    np.testing.assert_allclose(w[:, 1], turn * sn, rtol=0, atol=2e-5)
+    e = np.stack([run[f"body.quaternion.e{k}"] for k in range(4)], axis=1)
+    in_space = np.array([rotation(q) @ (J * v) for q, v in zip(e, w, strict=True)])
+    allowed = 100 * tolerance * np.sqrt(momentum)
+    np.testing.assert_allclose(in_space, in_space[[0]].repeat(len(w), 0), rtol=0, atol=allowed)
+    np.testing.assert_allclose(w**2 @ J, energy, rtol=100 * tolerance)
+
+
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
+@pytest.mark.parametrize(
+    "make",
+    [m if m is door else pytest.param(m, marks=pytest.mark.thorough) for m in LINKAGES],
+)
+def test_joints_hold_as_by_newton_and_euler(make, built):
+    """Hinges, balls, slides and rods, redundant ones among them: what they all do to each body is known."""
+    system = make().system(0.4)
+    run = simulate(built(system.model), stop_time=0.4, tolerance=1e-12)
+    wanted = system.expected(0.4)
+    size = max(abs(x) for x in wanted.values())
+    found = {name: float(run[name][-1]) for name in wanted}
+    assert found == pytest.approx(wanted, rel=0, abs=ALLOWED * size)
