@@ -44,9 +44,6 @@ SOURCES = [
 
 # A System and its Linear in one block of memory that the test owns.
 DOOR = """
-#include "condition.h"
-#include "doubled.h"
-#include "lu.h"
 #include "schur.h"
 #include <stdlib.h>
 #include <string.h>
@@ -124,30 +121,6 @@ const int *bench_unique(const Bench *b) { return b->linear.unique; }
 const char *bench_why(const Bench *b) { return b->why.text; }
 double bench_condition(const Bench *b) { return schur_of(&b->linear)->condition; }
 
-typedef struct {
-    int n, pivots[20];
-    double lu[400];
-} Dense;
-static void solve_dense(void *context, double *x) {
-    Dense *d = context;
-    lu_solve(d->n, d->lu, d->pivots, x);
-}
-double bench_inverse_norm(int n, const double *A) {
-    Dense d = {n, {0}, {0}};
-    double work[40];
-    memcpy(d.lu, A, (size_t)(n * n) * sizeof(double));
-    lu_factor(n, d.lu, d.pivots);
-    return inverse_norm(n, solve_dense, &d, work);
-}
-
-void bench_exact(double a, double b, double *out) {
-    Doubled sum = two_sum(a, b), product = two_product(a, b);
-    out[0] = sum.high;
-    out[1] = sum.low;
-    out[2] = product.high;
-    out[3] = product.low;
-}
-
 void bench_free(Bench *b) {
     const int *arrays[] = {b->system.mass_row, b->system.mass_column, b->system.entry_row,
                            b->system.entry_column, b->system.row_start, b->plan.mass.order,
@@ -172,7 +145,7 @@ def declare(lib):
     lib.bench_bytes.restype = ctypes.c_size_t
     lib.bench_unique.restype = POINTER(c_int)
     lib.bench_why.restype = c_char_p
-    lib.bench_condition.restype = lib.bench_inverse_norm.restype = c_double
+    lib.bench_condition.restype = c_double
     return lib
 
 

@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-from dataclasses import fields
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runtime import FLAGS, INCLUDES, compiler
 
 from lagfmu.testing import Elimination, eliminate, plan
-
-
-def chain(links):
-    """n, m and the patterns of M and G of a chain of rods between point masses in the plane."""
-    jacobian = [(k, j) for k in range(links) for j in range(max(0, 2 * k - 2), 2 * k + 2)]
-    return 2 * links, links, [(i, i) for i in range(2 * links)], jacobian
 
 
 @st.composite
@@ -156,21 +146,6 @@ def test_the_plan_assembles_the_schur_complement(system):
         assert total == pytest.approx(S[p, q], abs=1e-12)
 
 
-def test_a_coordinate_without_mass_has_no_elimination():
-    """Where M's diagonal is structurally zero the plan says so, and is empty."""
-    found = plan(2, 1, [(0, 0)], [(0, 0), (0, 1)])
-    assert found.massless == 1
-    assert found.schur.size == found.mass.size == 0
-
-
-def test_a_chain_burns_from_both_ends():
-    """A chain has a tridiagonal S: no fill, and the eliminations of its two halves alternate."""
-    found = plan(*chain(6)).schur
-    assert found.order == (0, 5, 1, 4, 2, 3)
-    assert found.forest == 1
-    assert len(found.column) == 5
-
-
 def test_a_chain_in_blocks_stays_sparse():
     """With masses coupled within each body alone (x, y, phi of a rod) nothing couples beyond the
     neighbouring joints: W and S have a fixed number of non-zeros a joint."""
@@ -189,29 +164,3 @@ def test_a_chain_in_blocks_stays_sparse():
     assert len(found.mass.column) == 3 * bodies
     assert found.w_start[-1] == len(jacobian)
     assert len(found.schur.column) <= 6 * m
-
-
-def numbers(part):
-    """How many integers a plan holds."""
-    return sum(
-        len(v) if isinstance(v, tuple) else numbers(v) if isinstance(v, Elimination) else 1
-        for v in (getattr(part, f.name) for f in fields(part))
-    )
-
-
-def test_the_plan_of_a_chain_grows_linearly():
-    """Twice the links, twice the integers."""
-    sizes = [numbers(plan(*chain(links))) for links in (128, 256, 512)]
-    assert sizes[2] - sizes[1] == 2 * (sizes[1] - sizes[0])
-
-
-@pytest.mark.parametrize("size", [(1, 0, [(0, 0)], []), chain(1), chain(40), (2, 1, [], [(0, 0)])])
-def test_the_text_is_plain_c99(tmp_path, size):
-    """It compiles without a warning, with no empty array and no line beyond 100 characters."""
-    text = plan(*size).c_text("the_plan")
-    assert max(map(len, text.splitlines())) <= 100
-    source = tmp_path / "plan.c"
-    door = "int first(void);\nint first(void) { return the_plan.schur.size; }\n"
-    source.write_text(f'#include "plan.h"\n{text}{door}', encoding="utf-8")
-    command = [compiler(), *FLAGS, "-Werror", *INCLUDES, "-c", str(source)]
-    subprocess.run([*command, "-o", str(tmp_path / "plan.o")], check=True, timeout=60)

@@ -15,8 +15,6 @@ from lagfmu import (
     Model,
     Nonholonomic,
     Parameter,
-    Scene,
-    build_fmu,
     multiplier,
     simulate,
 )
@@ -58,44 +56,41 @@ def dragged(name: str, motion, speed: float, aside: float | None = None, inputs=
 
 
 @pytest.mark.parametrize("kind", MOTIONS)
-def test_friction_turns_round_with_the_drive(kind, tmp_path):
+def test_friction_turns_round_with_the_drive(kind, built):
     """lambda.rub = -mu m g sign(x') [N], and the drive gives m x'' and what friction takes."""
     model = dragged("Dragged", *MOTIONS[kind])
-    path = build_fmu(model, tmp_path, Scene("Dragged"), target="native", check=False)
-    run = simulate(path, stop_time=3.0, step_size=0.037)
-    speed, pull = np.asarray(run["der(x)"]), np.asarray(run["lambda.rub"])
+    run = simulate(built(model), stop_time=3.0, step_size=0.037)
+    speed, pull = run["der(x)"], run["lambda.rub"]
     moving = np.abs(speed) > 1e-9
     assert (np.abs(np.diff(np.sign(speed[moving]))) > 0).sum() >= 4  # it does turn round
     assert np.abs(pull + MU * M * G * np.sign(speed))[moving].max() < 1e-12 * M * G
-    needed = M * np.asarray(run["der(x,2)"]) - pull
-    assert np.abs(np.asarray(run["lambda.drive"]) - needed).max() < 1e-12 * M * G
-    assert not np.asarray(run["sticks.grip"])[moving].any()
+    needed = M * run["der(x,2)"] - pull
+    assert np.abs(run["lambda.drive"] - needed).max() < 1e-12 * M * G
+    assert not run["sticks.grip"][moving].any()
 
 
-def test_what_is_dragged_slides_aside_more_easily(tmp_path):
+def test_what_is_dragged_slides_aside_more_easily(built):
     """Friction of two rows stands against the whole slip velocity (x', y'), at each reversal of x' too."""
     model = dragged("Aside", *MOTIONS["turns"], aside=0.4)
-    path = build_fmu(model, tmp_path, Scene("Aside"), target="native", check=False)
-    run = simulate(path, stop_time=3.0, step_size=0.037)
-    v = np.stack([np.asarray(run["der(x)"]), np.asarray(run["der(y)"])])
-    pull = np.stack([np.asarray(run["lambda.rub"]), np.asarray(run["lambda.side"])])
+    run = simulate(built(model), stop_time=3.0, step_size=0.037)
+    v = np.stack([run["der(x)"], run["der(y)"]])
+    pull = np.stack([run["lambda.rub"], run["lambda.side"]])
     moving = np.hypot(*v) > 1e-6
     want = -MU * M * G * v[:, moving] / np.hypot(*v[:, moving])
     assert np.abs(pull[:, moving] - want).max() < 1e-9 * M * G
 
 
-def test_an_input_drags_it_from_rest(tmp_path):
+def test_an_input_drags_it_from_rest(built):
     """u rests, then goes as a (t - 1)^2/2: the block sticks, then slides, and that is counted once."""
     model = dragged("Input", u, 0.0, inputs=[Input(u, "m")])
-    path = build_fmu(model, tmp_path, Scene("Input"), target="native", check=False)
     t = np.linspace(0, 2, 201)
     d = np.maximum(0, t - 1)
     columns = {"time": t, "u": 0.1 * d**2, "der(u)": 0.2 * d, "der(u,2)": np.where(d > 0, 0.2, 0.0)}
     signals = np.array(list(zip(*columns.values(), strict=True)), [(n, float) for n in columns])
-    run = simulate(path, stop_time=2.0, step_size=0.01, inputs=signals)
-    at = np.asarray(run["time"])
-    assert np.asarray(run["sticks.grip"])[at < 0.995].all()
+    run = simulate(built(model), stop_time=2.0, step_size=0.01, inputs=signals)
+    at = run["time"]
+    assert run["sticks.grip"][at < 0.995].all()
     late = at > 1.03
-    assert not np.asarray(run["sticks.grip"])[late].any()
-    assert np.asarray(run["slipping.grip.count"])[-1] == 1
-    assert np.abs(np.asarray(run["lambda.drive"])[late] - (M * 0.2 + MU * M * G)).max() < 1e-9
+    assert not run["sticks.grip"][late].any()
+    assert run["slipping.grip.count"][-1] == 1
+    assert np.abs(run["lambda.drive"][late] - (M * 0.2 + MU * M * G)).max() < 1e-9

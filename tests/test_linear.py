@@ -7,7 +7,6 @@ import itertools
 import os
 import subprocess
 import sys
-from ctypes import c_double
 from fractions import Fraction
 from pathlib import Path
 
@@ -22,13 +21,10 @@ from linear_bench import (
     Bench,
     RefusedError,
     declare,
-    doubles,
     patterns,
     solver_of,
 )
 from runtime import SANITIZE, compile_library, compiler
-
-from lagfmu.testing import plan
 
 SCHUR, KKT, ORTHOGONAL, LEAST_NORM = range(4)
 
@@ -238,17 +234,6 @@ def test_one_factorization_serves_many_right_hand_sides(library, case):
     for k, part in enumerate(("x", "lam")):
         sums = 3 * getattr(still, part) + 2 * getattr(none, part)
         np.testing.assert_allclose(getattr(two, part), sums, atol=1e-11 * size[k])
-
-
-@pytest.mark.parametrize("case", RUNGS)
-def test_lambda_need_not_be_asked_for(library, case):
-    """x is the same, bit for bit, where lambda is not wanted."""
-    (M, b, G, c), _ = RUNGS[case]
-    bench = Bench(library, len(b), len(c), *patterns(M, G))
-    bench.factor(M, G)
-    x = doubles(b)
-    bench.check(library.bench_solve(bench.handle, doubles(b), doubles(c), x, None))
-    np.testing.assert_array_equal(np.array(x), bench.solve(b, c).x)
 
 
 @pytest.mark.parametrize("case", RUNGS)
@@ -600,52 +585,6 @@ def test_the_bound_of_the_condition_number_is_never_below_it(library, seed):
     if seed < 15:
         inverse = np.linalg.inv(S * d * d[:, None])
         assert bound == pytest.approx((3 if links > 2 else 2) * np.trace(inverse), rel=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_the_estimate_of_an_inverse_norm(library, seed):
-    """Hager's estimate of the 1-norm of A^-1 is a lower bound, and within a factor of three."""
-    rng = np.random.default_rng(seed)
-    n = int(rng.integers(1, 20))
-    A = rng.normal(size=(n, n))
-    A = A + A.T
-    norm = np.abs(np.linalg.inv(A)).sum(axis=0).max()
-    estimate = library.bench_inverse_norm(n, doubles(A.ravel()))
-    assert norm / 3 <= estimate <= norm * (1 + 1e-9)
-
-
-@settings(max_examples=200, deadline=None, derandomize=True)
-@given(
-    st.floats(-1e100, 1e100, allow_subnormal=False).filter(lambda a: a == 0 or abs(a) > 1e-100),
-    st.floats(-1e100, 1e100, allow_subnormal=False).filter(lambda a: a == 0 or abs(a) > 1e-100),
-)
-def test_sums_and_products_without_rounding_error(library, a, b):
-    """high + low is a + b, and a * b, exactly, and high is the rounded result."""
-    out = (c_double * 4)()
-    library.bench_exact(c_double(a), c_double(b), out)
-    assert Fraction(out[0]) + Fraction(out[1]) == Fraction(a) + Fraction(b)
-    assert Fraction(out[2]) + Fraction(out[3]) == Fraction(a) * Fraction(b)
-    assert out[0] == a + b
-    assert out[2] == a * b
-
-
-def test_the_plan_as_printed_is_the_plan(library, tmp_path):
-    """A Plan printed as C and the same Plan filled in number by number solve alike, bit for bit."""
-    M, b, G, c = RUNGS["coupled"][0]
-    mass, jacobian = patterns(M, G)
-    text = plan(4, 2, mass, jacobian).c_text("the_plan")
-    assert max(map(len, text.splitlines())) <= 100
-    printed = compile_library(
-        tmp_path,
-        SOURCES,
-        DOOR + text + "void bench_use(Bench *b) { b->system.plan = &the_plan; }\n",
-    )
-    declare(printed)
-    one, two = Bench(library, 4, 2, mass, jacobian), Bench(printed, 4, 2, mass, jacobian)
-    printed.bench_use(two.handle)
-    one.factor(M, G)
-    two.factor(M, G)
-    np.testing.assert_array_equal(one.solve(b, c).x, two.solve(b, c).x)
 
 
 @pytest.mark.thorough

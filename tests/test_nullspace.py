@@ -3,36 +3,22 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import sympy as sp
+from conftest import scene_of
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, EquationsOfMotion, Holonomic, Model, Nonholonomic, Parameter, derive
+from lagfmu import EquationsOfMotion, Holonomic, Model, Nonholonomic, Parameter, derive
 from lagfmu.testing import lambda_free, null_space
 
 x, y, z, r, theta, phi, psi = dynamicsymbols("x y z r theta phi psi")
 m, g, L, a, R, J = symbols("m g L a R J", positive=True)
 STANDARD = [Parameter(m, 1.3, "kg"), Parameter(g, 9.81, "m/s^2")]
 
-pendulum = Model(
-    name="Pendulum",
-    lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-    coordinates={x: "m", y: "m"},
-    constraints=[Holonomic("rod", x**2 + y**2 - L**2)],
-    parameters=[*STANDARD, Parameter(L, 1.0, "m")],
-    start={x: 1.0},
-)
-hemisphere = Model(
-    name="Hemisphere",
-    lagrangian=m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2 - m * g * r * cos(theta),
-    coordinates={r: "m", theta: "rad"},
-    constraints=[Contact("surface", r - a)],
-    parameters=[*STANDARD, Parameter(a, 1.0, "m")],
-    start={r: 1.0, theta: 0.01},
-)
 coin = Model(  # upright rolling disk: two nonholonomic constraints, four coordinates
     name="Coin",
     kinetic_energy=m * (x.diff() ** 2 + y.diff() ** 2) / 2
@@ -58,6 +44,7 @@ two_links = Model(  # two particles on rods in space, tied one to the other: thr
     ],
     parameters=[*STANDARD, Parameter(L, 1.0, "m"), Parameter(a, 0.5, "m")],
 )
+pendulum, hemisphere = (scene_of(n)[0].model for n in ("PendulumCartesian", "Hemisphere"))
 MODELS = [pendulum, hemisphere, coin, two_links]
 
 
@@ -117,28 +104,8 @@ def test_motion_is_the_one_with_multipliers(model):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
-def test_free_coordinate_keeps_its_own_equation():
-    """A coordinate that no constraint touches has a unit vector: Newton's law as it stands."""
-    free = Model(
-        name="Free",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("wall", x)],
-        parameters=STANDARD,
-    )
-    eom = derive(free)
-    assert null_space(eom) == sp.Matrix([0, 1])
-    assert lambda_free(eom) == [eom.vdot[1] + g, eom.vdot[0]]
-
-
 def test_doubled_rod_is_one_rod():
     """A constraint that is given twice takes away one degree of freedom, not two."""
-    doubled = Model(
-        name="Doubled",
-        lagrangian=pendulum.lagrangian,
-        coordinates={x: "m", y: "m"},
-        constraints=[*pendulum.constraints, Holonomic("again", 2 * (x**2 + y**2 - L**2))],
-        parameters=pendulum.parameters,
-        start={x: 1.0},
-    )
+    again = Holonomic("again", 2 * (x**2 + y**2 - L**2))
+    doubled = replace(pendulum, constraints=[*pendulum.constraints, again])
     assert null_space(derive(doubled)) == null_space(derive(pendulum))

@@ -96,12 +96,3 @@ def test_a_doubled_row_shares_its_force_and_a_contrary_one_is_refused(mass):
         solve_at_start(M, b, rows, np.array([0.0, g]))
     nearest, _ = solve_at_start(M, 0 * b, rows, np.array([0.0, g]), nearest=True)
     assert nearest == pytest.approx([0, g / 2], rel=1e-12)
-
-
-def test_a_coordinate_without_mass_follows_its_constraint_or_is_refused():
-    """x2 has no mass: tied to x1 it moves with it; alone nothing says how it accelerates."""
-    M, b = np.diag([2.0, 0.0]), np.array([6.0, 0.0])
-    found, lam = solve_at_start(M, b, np.array([[1.0, -1.0]]), np.zeros(1))
-    assert (found, lam) == (pytest.approx([3, 3]), pytest.approx([0], abs=1e-12))
-    with pytest.raises(StepFailureError, match="singular on the constraint surface"):
-        solve_at_start(M, b, np.array([[1.0, 0.0]]), np.zeros(1))
