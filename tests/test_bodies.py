@@ -32,7 +32,7 @@ from lagfmu.bodies import (
     mechanism,
 )
 from lagfmu.errors import ModelError
-from lagfmu.testing import load, prepare, write
+from lagfmu.testing import load, prepare, typeset, write
 
 g = 9.81  # m/s^2
 t = dynamicsymbols._t
@@ -61,6 +61,14 @@ def test_the_forces_of_a_slider_crank_are_those_of_d_alembert(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert verify(fmu, changed).passed
+
+
+def test_a_mechanism_is_told_by_its_parts():
+    """What is read of a mechanism is a line a body and a joint, not Lagrange's equations written out."""
+    (section,) = typeset(prepare(load(MODELS / "slider_crank_bodies.py").model).form)
+    lines = {e.label: e.text for e in section.equations}
+    assert lines["crank"] == "body" and lines["B"] == "revolute: rod on crank"
+    assert lines["D"] == "prismatic: piston on ground"
 
 
 def test_a_pin_carries_a_compound_pendulum():

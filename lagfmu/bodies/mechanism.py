@@ -18,6 +18,7 @@ from .draft import Draft
 from .joints import Gear
 from .picture import picture_of
 from .plane import PlaneMotion
+from .told import lines_of
 
 
 def mechanism(
@@ -69,6 +70,7 @@ def mechanism(
         inputs=[*draft.inputs, *inputs],
         outputs=[*draft.outputs, *outputs],
         descriptions=descriptions,
+        parts=lines_of(bodies, parts),
         **{"picture": picture_of(draft), **more},
     )
     return replace(model, start=assemble(draft, model, parts, start or {}))

@@ -180,6 +180,9 @@ class ModelFields:
     speeds: Mapping[Expr, str] = field(default_factory=dict)
     kinematics: Mapping[Expr, Expr] = field(default_factory=dict)
     unwrapped: Mapping[Expr, Expr] = field(default_factory=dict)
+    parts: Sequence[
+        tuple[str, str]
+    ] = ()  # what it is made of, each with a line that says what it is
 
     @property
     def directions(self) -> tuple[Expr, ...]:

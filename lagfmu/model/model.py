@@ -69,8 +69,9 @@ class Model(ModelFields, Displayed):
     among `outputs` (it is kept in `peaks`).  `speeds` maps speeds of the model's own (dynamicsymbols) to
     their units, `kinematics` the coordinates that move by them to their rates, q' = B(q, t) v + b(q, t)
     [unit/s]; four that keep e0^2 + e1^2 + e2^2 + e3^2 are a unit quaternion.  `unwrapped` maps an angle to
-    what it equals modulo 2 pi.  Generalized forces on a speed are in W/[speed].  `author`, `version`,
-    `license` and `copyright` stand in the FMU's description.
+    what it equals modulo 2 pi.  `parts`, names with a line each, tell instead of equations what it is made
+    of.  Generalized forces on a speed are in W/[speed].  `author`, `version`, `license` and `copyright`
+    stand in the FMU's description.
 
     Raises ModelError with every problem at once: names, symbols, units, dimensions, numbers.
     """
@@ -84,7 +85,7 @@ class Model(ModelFields, Displayed):
         maps = ("coordinates", "forces", "start", "descriptions", "display_units")
         for name in (*maps, "speeds", "kinematics", "unwrapped"):
             object.__setattr__(self, name, dict(getattr(self, name)))
-        for name in ("constraints", "parameters", "inputs", "outputs", "picture"):
+        for name in ("constraints", "parameters", "inputs", "outputs", "picture", "parts"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         constraints, frictions = split(self.constraints)
         object.__setattr__(self, "constraints", constraints)

@@ -67,6 +67,8 @@ def typeset(form: Form) -> tuple[Section, ...]:
     """The equations of a model in a formulation, ready for reading."""
     eom, reduction = form.equations, form.reduction
     page = _Typesetter(eom, reduction)
+    if eom.model.parts:
+        return (page.parts(),) + ((page.frictions(),) if eom.frictions else ())
     sections = [page.energies(), page.lagrange()]
     if not eom.moves_plainly:
         sections.insert(1, page.kinematics())
@@ -305,6 +307,18 @@ class _Typesetter:
         if count > MOST:
             remark += f" The first {MOST} of {count} are shown."
         return Section(title, remark, lines)
+
+    def parts(self) -> Section:
+        """What a mechanism is made of, a line each."""
+        lines = tuple(
+            Equation(name, f"\\text{{{text}}}", text) for name, text in self.eom.model.parts
+        )
+        remark = (
+            "Of each body Newton's and Euler's equations hold, m r̈ = F and J ω̇ + ω × J ω = M. The "
+            "multipliers λ of a joint's rows are forces [N] and torques [N·m] on its second body; force.NAME "
+            "and torque.NAME are all that it receives, about its marker, in the axes of the first marker."
+        )
+        return Section("Bodies, joints and loads", remark, lines)
 
     def energies(self) -> Section:
         show = self.notation.show
