@@ -130,7 +130,7 @@ def _may_pass(system: System) -> bool:
 
 def _moves(system: System) -> bool:
     """True if coordinates move by other speeds than their own rates."""
-    return getattr(system, "kinematics", None) is not None
+    return system.kinematics is not None
 
 
 def _own(found: tuple[str, ...]) -> list[tuple[str, str]]:
