@@ -164,8 +164,12 @@ class Tables:
         rates, four, p = self.parts.rates, self.eom.quaternions, self.prefix
         text = self._integers("rate_row", [j for j, _ in rates])
         text += self._integers("rate_column", [i for _, i in rates])
+        q = {str(s) for s in self.eom.q}
+        text += self._integers("own_speed", [int(s not in q) for s in self.eom.directions])
         fields: dict[str, Any] = {"rates": len(rates), "quaternions": len(four)}
-        fields |= {name: p + name for name in ("rate_row", "rate_column", "kinematics")}
+        fields |= {
+            name: p + name for name in ("rate_row", "rate_column", "own_speed", "kinematics")
+        }
         if four:
             text += self._integers("quaternion", [j for places in four for j in places])
             fields["quaternion"] = f"{p}quaternion"
@@ -185,16 +189,16 @@ class Tables:
 
     def _sizes(self) -> tuple[str, dict[str, Any]]:
         """The dimensions of coordinates, speeds and parameters, and the largest of them that are numbers."""
-        of = self.parts.dimensions
+        of, p = self.parts.dimensions, self.prefix
         numbers = [[str(k) for k in group] for group in (of.coordinates, of.speeds)]
         text, fields = self._pair("const int", ("dimension", "speed_dimension"), numbers)
         text += self._integers("extent_dimension", of.parameters)
-        fields |= {"extent_dimension": f"{self.prefix}extent_dimension", "angles": of.angles}
-        folded, names = self.parts.folded, ("folded", "speed_folded")
-        if not any(map(any, folded)):
-            return text, fields | dict.fromkeys(names, "NULL")
-        more, found = self._pair("const double", names, [[*map(repr, group)] for group in folded])
-        return text + more, fields | found
+        fields |= {"extent_dimension": f"{p}extent_dimension", "angles": of.angles}
+        folded, _ = self.parts.folded
+        if not any(folded):
+            return text, fields | {"folded": "NULL"}
+        text += self._array("const double", "folded", [*map(repr, folded)])
+        return text, fields | {"folded": f"{p}folded"}
 
     def _pair(
         self, kind: str, names: tuple[str, str], items: Sequence[Sequence[str]]

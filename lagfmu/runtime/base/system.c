@@ -4,11 +4,17 @@
  * every other row always acts. */
 #include "system.h"
 
+static int is_own(const System *s, int i) { return s->own_speed != NULL && s->own_speed[i]; }
+
 StateName system_state_name(const System *s, int j) {
     const int i = j - s->nq;
     if (i < 0) return (StateName){"", s->coordinates[j], ""};
-    if (s->kinematics != NULL) return (StateName){"", s->speeds[i], ""};
-    return (StateName){"der(", s->coordinates[i], ")"};
+    if (is_own(s, i)) return (StateName){"", s->speeds[i], ""};
+    return (StateName){"der(", s->speeds[i], ")"};
+}
+
+StateName system_acceleration_name(const System *s, int i) {
+    return (StateName){"der(", s->speeds[i], is_own(s, i) ? ")" : ",2)"};
 }
 
 void system_active(const System *s, const int *closed, int *active) {

@@ -46,7 +46,8 @@ struct System {
     const int *at_integers;   /* (switches) 1: it switches wherever h is a whole number; 0: where h = 0 */
     int masses, entries;      /* structural non-zeros of M's lower triangle and of G */
     const char *const *coordinates; /* (nq) names */
-    const char *const *speeds;      /* (nv) names, where kinematics say how these move the coordinates */
+    const char *const *speeds;      /* (nv) names; of the coordinate where a speed is its rate */
+    const int *own_speed;           /* (nv) 1: it is no coordinate's rate; NULL: each is one */
     const Row *rows;          /* (m) */
     const int *contact;       /* (contacts) rows that are contacts, ascending */
     const int *mass_row, *mass_column;   /* (masses) */
@@ -59,8 +60,7 @@ struct System {
     const int *dimension;        /* (nq) coordinates of one physical dimension have one number */
     const double *folded;        /* (nq) the largest magnitude of the dimension among parameters that are
                                   * numbers in the code; NULL: there are none */
-    const int *speed_dimension;  /* (nv) the same of the speeds times a second, ... */
-    const double *speed_folded;  /* (nv) ... and of their displacements; NULL: there are none */
+    const int *speed_dimension;  /* (nv) the number of the dimension of each speed times a second */
     const int *extent_dimension; /* (parameters) the number of those that it compares to; -1: none */
     int angles;                  /* the number of those without dimension; -1: none */
     Formulation formulation;
@@ -166,10 +166,8 @@ typedef struct {
 
 SHARED StateName system_state_name(const System *s, int j);
 
-/* What speed i moves by its force and mass: a coordinate, or in words of the speed. */
-static inline const char *system_moved_name(const System *s, int i) {
-    return s->kinematics == NULL ? s->coordinates[i] : s->speeds[i];
-}
+/* That of vdot[i]: der(x,2), or der() of a speed of its own. */
+SHARED StateName system_acceleration_name(const System *s, int i);
 
 /* 1 where a row acts while the contacts stand as in `closed` (one entry a contact); 0 for rows that hold by
  * friction alone, which sliding.c adds where they stick. */

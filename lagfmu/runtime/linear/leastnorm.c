@@ -82,7 +82,7 @@ Status least_norm_factor(Linear *l) {
                        "neither mass nor a constraint that determines its acceleration");
             for (int i = 0; i < n; i++) {
                 if (!(fabs(w.z[i]) > VANISHES)) continue;
-                why_append(l->why, "%s%s", comma, system_moved_name(l->system, i));
+                why_append(l->why, "%s%s", comma, l->system->speeds[i]);
                 comma = ", ";
             }
             why_append(l->why, ")");

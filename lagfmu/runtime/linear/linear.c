@@ -95,7 +95,7 @@ static Status too_large(const Linear *l) {
                     "coordinates and %d constraints the model is too large (more than %d together) "
                     "for the solution that allows it: give every coordinate a mass of its own",
                     schur->doubtful_mass >= 0 ? ": coordinate " : "",
-                    schur->doubtful_mass >= 0 ? system_moved_name(s, schur->doubtful_mass) : "", s->nv,
+                    schur->doubtful_mass >= 0 ? s->speeds[schur->doubtful_mass] : "", s->nv,
                     s->m, DENSE_MOST);
     return fail(l->why,
                 "the constraints depend on each other, or nearly so, or masses differ too much, at "
@@ -118,7 +118,7 @@ static Status climb(Linear *l) {
     if (DEPENDENT != NULL) return DEPENDENT->factor(l);
     (void)fail(l->why, "the mass matrix is singular at this state: a coordinate has no mass");
     if (schur_of(l)->doubtful_mass >= 0)
-        why_append(l->why, " (%s)", system_moved_name(l->system, schur_of(l)->doubtful_mass));
+        why_append(l->why, " (%s)", l->system->speeds[schur_of(l)->doubtful_mass]);
     return FAILED;
 }
 

@@ -64,7 +64,7 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
     for (int j = 0; j < s->nv; j++)
         if (!isfinite(w->b[j]))
             return fail(b->why, "the derivative of the force on %s is not finite at t = %.17g s",
-                        system_moved_name(s, j), at.t);
+                        s->speeds[j], at.t);
     for (int k = 0; k < s->m; k++)
         if (!isfinite(w->c[k]))
             return fail(b->why, "the derivative of constraint %s is not finite at t = %.17g s",

@@ -143,7 +143,7 @@ static Status check_omissions(const Start *x, const double *q, int k, double f) 
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
         if (x->moves[s->entry_column[e]] == OMITTED && b->G[e] != 0) return OK;
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
-        const char *name = system_moved_name(s, s->entry_column[e]);
+        const char *name = s->speeds[s->entry_column[e]];
         if (x->moves[s->entry_column[e]] != OMITTED) continue;
         if (!depends_elsewhere(x, q, e, aside > 0 ? aside : 1)) continue;
         return fail(&x->s->why,

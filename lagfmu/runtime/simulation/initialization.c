@@ -38,7 +38,7 @@ static Status check_masses(const Start *x) {
         return fail(&x->s->why,
                     "the start is refused: the mass of %s is %s, expected 0 or at least %.3g (in SI "
                     "units), below which numbers lose their digits: choose larger units of mass",
-                    system_moved_name(s, s->mass_row[e]), digits(b->M[e]).text, DBL_MIN);
+                    s->speeds[s->mass_row[e]], digits(b->M[e]).text, DBL_MIN);
     }
     return OK;
 }

@@ -133,29 +133,30 @@ static void observe_events(const Solver *s, EventKind kind, Observed *o) {
     }
 }
 
-/* What some values belong to: in this order two names each, the second "" where there is one. */
-typedef enum { OF_NONE, OF_COORDINATE, OF_SPEED, OF_STEPPED, OF_ROW, OF_ENTRY, OF_CONTACT, OF_SLIP, OF_FRICTION } Owner;
+/* What some values belong to. */
+typedef enum {
+    OF_NONE, OF_COORDINATE, OF_SPEED, OF_ACCELERATION, OF_FORCE, OF_STEPPED, OF_ROW, OF_ENTRY, OF_CONTACT, OF_SLIP,
+    OF_FRICTION
+} Owner;
 
-static void names(const Solver *s, const System *full, Owner of, int i, const char *name[2]) {
+/* Its names, "" where there are fewer than three. */
+static StateName names(const Solver *s, const System *full, Owner of, int i) {
     const System *own = s->system;
-    name[0] = name[1] = "";
     switch (of) {
         case OF_NONE: break;
-        case OF_COORDINATE: name[0] = full->coordinates[i]; break;
-        case OF_SPEED: name[0] = system_moved_name(full, i); break;
-        case OF_STEPPED: name[0] = own->coordinates[i]; break;
-        case OF_ROW: name[0] = full->rows[i].name; break;
-        case OF_ENTRY:
-            name[0] = full->rows[full->entry_row[i]].name;
-            name[1] = system_moved_name(full, full->entry_column[i]);
-            break;
+        case OF_COORDINATE: return (StateName){full->coordinates[i], "", ""};
+        case OF_SPEED: return system_state_name(full, full->nq + i);
+        case OF_ACCELERATION: return system_acceleration_name(full, i);
+        case OF_FORCE: return (StateName){full->speeds[i], "", ""};
+        case OF_STEPPED: return (StateName){own->coordinates[i], "", ""};
+        case OF_ROW: return (StateName){full->rows[i].name, "", ""};
+        case OF_ENTRY: return (StateName){full->rows[full->entry_row[i]].name, full->speeds[full->entry_column[i]], ""};
         case OF_CONTACT:
-            name[0] = own->rows[own->contact[i / full->nq]].name;
-            name[1] = full->coordinates[i % full->nq];
-            break;
-        case OF_SLIP: name[0] = own->rows[own->friction[i / 2].row[i % 2]].name; break;
-        case OF_FRICTION: name[0] = own->friction[i].name; break;
+            return (StateName){own->rows[own->contact[i / full->nq]].name, full->coordinates[i % full->nq], ""};
+        case OF_SLIP: return (StateName){own->rows[own->friction[i / 2].row[i % 2]].name, "", ""};
+        case OF_FRICTION: return (StateName){own->friction[i].name, "", ""};
     }
+    return (StateName){"", "", ""};
 }
 
 /* FAILED if a value is not finite; the cause names them as the FMU's variables are named. */
@@ -171,10 +172,10 @@ static Status check_observed_finite(Solver *s, const System *full, const Observe
         const char *format;
     } list[] = {
         {o->q, n, OF_COORDINATE, "%s"},
-        {o->v, nv, OF_SPEED, plain ? "der(%s)" : "%s"},
+        {o->v, nv, OF_SPEED, "%s%s%s"},
         {o->rate, plain ? 0 : n, OF_COORDINATE, "der(%s)"},
-        {o->vdot, nv, OF_SPEED, plain ? "der(%s,2)" : "der(%s)"},
-        {o->force, nv, OF_SPEED, "Q.%s"},
+        {o->vdot, nv, OF_ACCELERATION, "%s%s%s"},
+        {o->force, nv, OF_FORCE, "Q.%s"},
         {o->s, stepped, OF_STEPPED, "%s"},
         {o->sdot, stepped, OF_STEPPED, "der(%s)"},
         {o->sddot, stepped, OF_STEPPED, "der(%s,2)"},
@@ -196,14 +197,13 @@ static Status check_observed_finite(Solver *s, const System *full, const Observe
     int bad = 0;
     for (size_t k = 0; k < sizeof list / sizeof *list; k++)
         for (int i = 0; i < list[k].count; i++) {
-            const char *name[2];
             if (fabs(list[k].values[i]) <= DBL_MAX) continue;
-            names(s, full, list[k].of, i, name);
+            const StateName of = names(s, full, list[k].of, i);
             if (bad++ == 0)
                 (void)fail(&s->why, "not finite at t = %s s: ", digits(s->state.now.t).text);
             else
                 why_append(&s->why, ", ");
-            why_append(&s->why, list[k].format, name[0], name[1]);
+            why_append(&s->why, list[k].format, of.head, of.name, of.tail);
         }
     return bad == 0 ? OK : FAILED;
 }
