@@ -14,6 +14,7 @@ from lagfmu import Holonomic, Model, Parameter, rotation_matrix
 
 E = dynamicsymbols("e0 e1 e2 e3")
 W = dynamicsymbols("wx wy wz")
+R = dynamicsymbols("x y z")
 INERTIA = (1.0, 2.0, 3.0)  # kg m2
 WEIGHT, LEVER = 9.81, 0.3  # N, m
 
@@ -28,6 +29,33 @@ def turning() -> dict[Any, Any]:
         e2: (e0 * wy + e3 * wx - e1 * wz) / 2,
         e3: (e0 * wz + e1 * wy - e2 * wx) / 2,
     }
+
+
+def body(name: str, inertia: tuple[float, float, float] = INERTIA, **more: Any) -> Model:
+    """A rigid body of 2 kg in space: position of the centre of mass and unit quaternion; in weight where
+    `held` is a point of its third axis [m] that rows hold at the origin."""
+    A, B, C, m, g, arm = sp.symbols("A B C m g l", positive=True)
+    held = more.pop("held", 0.0)
+    kinetic = m * sum(x.diff() ** 2 for x in R) / 2
+    kinetic += sum(J * w**2 / 2 for J, w in zip((A, B, C), W, strict=True))
+    parameters = [Parameter(J, x, "kg.m2") for J, x in zip((A, B, C), inertia, strict=True)]
+    parameters.append(Parameter(m, 2.0, "kg"))
+    options: dict[str, Any] = {"lagrangian": kinetic}
+    if held:
+        point = sp.Matrix(R) - arm * rotation_matrix(E)[:, 2]
+        options["constraints"] = [
+            Holonomic(f"pin.{a}", f) for a, f in zip("xyz", point, strict=True)
+        ]
+        options["lagrangian"] = kinetic - m * g * R[2]
+        parameters += [Parameter(g, 9.81, "m/s2"), Parameter(arm, held, "m")]
+    return Model(
+        name,
+        coordinates={**dict.fromkeys(R, "m"), **dict.fromkeys(E, "1")},
+        speeds=dict.fromkeys(W, "rad/s"),
+        kinematics=turning(),
+        parameters=parameters,
+        **{**options, **more},
+    )
 
 
 def top(name: str = "HeavyTop", **more: Any) -> Model:
