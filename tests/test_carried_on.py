@@ -8,7 +8,7 @@ from ctypes import byref, c_double, c_int, c_size_t
 import pytest
 import sympy as sp
 from fmi2 import CO_SIMULATION, EXCHANGE, OK, Library
-from sympy import Rational, cos, sin, symbols
+from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter, derive
@@ -222,86 +222,84 @@ def test_a_body_that_lies_below_its_ground_is_lifted(ledges):
 # ------------------------------------------------------------------ Lagrange's equations, in symbols
 
 
-def equations(**fields):
-    parameters = [Parameter(s, 1.0, u) for s, u in fields.pop("units").items()]
+MOVING = {
+    "kinetic_energy": m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+    "coordinates": {x: "m", y: "m"},
+}
+ALONE = {"kinetic_energy": m * x.diff() ** 2 / 2}
+TERMS = {  # the model, the units of its parameters, and what is zero in its equations
+    # d/dt (m + c t) x' = 0: the momentum is kept, so that (m + c t) x'' = -c x'
+    "mass that grows slows what moves": (
+        {"lagrangian": (m + c * t) * x.diff() ** 2 / 2, "coordinates": {x: "m"}},
+        {m: "kg", c: "kg/s"},
+        lambda e: [e.F[0] + c * e.v[0], e.M[0, 0] - (m + c * t)],
+    ),
+    # T = m (x' + y')^2/2 = (m x'^2 + 2 m x' y' + m y'^2)/2, whatever part of M is stored
+    "kinetic energy counts a coupling once": (
+        {"lagrangian": m * (x.diff() + y.diff()) ** 2 / 2, "coordinates": {x: "m", y: "m"}},
+        {m: "kg"},
+        lambda e: [e.kinetic - m * (e.v[0] + e.v[1]) ** 2 / 2],
+    ),
+    # L = m (x'^2 + y'^2)/2 + m cos(x - y) x' y': F_x = -m sin(x - y) y'^2, F_y = m sin(x - y) x'^2
+    "Coriolis terms of a coupling stand in both equations": (
+        {
+            "lagrangian": m * (x.diff() ** 2 + y.diff() ** 2) / 2
+            + m * cos(x - y) * x.diff() * y.diff(),
+            "coordinates": {x: "rad", y: "rad"},
+        },
+        {m: "kg*m^2"},
+        lambda e: [
+            e.F[0] + m * sin(e.q[0] - e.q[1]) * e.v[1] ** 2,
+            e.F[1] - m * sin(e.q[0] - e.q[1]) * e.v[0] ** 2,
+        ],
+    ),
+    # (-k x - k y, -k x) is the gradient of k (x^2/2 + x y)
+    "forces without a curl have a potential": (
+        {**MOVING, "forces": {x: -k * x - k * y, y: -k * x}},
+        {m: "kg", k: "N/m"},
+        lambda e: [e.potential - k * (e.q[0] ** 2 / 2 + e.q[0] * e.q[1])],
+    ),
+    # -k x - c x' has the potential k x^2/2, the damper none
+    "a force that depends on the velocity stores nothing": (
+        {**ALONE, "coordinates": {x: "m"}, "forces": {x: -k * x - c * x.diff()}},
+        {m: "kg", k: "N/m", c: "N*s/m"},
+        lambda e: [e.potential - k * e.q[0] ** 2 / 2],
+    ),
+    # f = x - y c t^2/2: f'' = x'' - c (t^2 y''/2 + 2 t y' + y), hence gamma = c (2 t y' + y)
+    "a moving constraint accelerates by all of its terms": (
+        {**MOVING, "constraints": [Holonomic("wedge", x - y * c * t**2 / 2)]},
+        {m: "kg", c: "1/s^2"},
+        lambda e: [e.gamma[0] - c * (2 * t * e.v[1] + e.q[1]), e.nu[0] - c * t * e.q[1]],
+    ),
+}
+
+
+def equations(fields, units):
+    parameters = [Parameter(s, 1.0, u) for s, u in units.items()]
     return derive(Model(name="Terms", parameters=parameters, **fields))
 
 
-def test_mass_that_grows_slows_what_moves():
-    """d/dt (m + c t) x' = 0: the momentum is kept, so that (m + c t) x'' = -c x'."""
-    eom = equations(
-        lagrangian=(m + c * t) * x.diff() ** 2 / 2,
-        coordinates={x: "m"},
-        units={m: "kg", c: "kg/s"},
-    )
-    assert sp.simplify(eom.F[0] + c * eom.v[0]) == 0
-    assert sp.simplify(eom.M[0, 0] - (m + c * t)) == 0
+@pytest.mark.parametrize("fact", TERMS)
+def test_lagranges_equations_hold_every_term(fact):
+    """Time, couplings and velocities in L, in forces and in a constraint, each by its own derivative."""
+    fields, units, zero = TERMS[fact]
+    for e in zero(equations(fields, units)):
+        assert sp.simplify(e) == 0
 
 
-def test_kinetic_energy_counts_a_coupling_once():
-    """T = m (x' + y')^2/2 = (m x'^2 + 2 m x' y' + m y'^2)/2, whatever part of M is stored."""
-    eom = equations(
-        lagrangian=m * (x.diff() + y.diff()) ** 2 / 2,
-        coordinates={x: "m", y: "m"},
-        units={m: "kg"},
-    )
-    assert sp.expand(eom.kinetic - m * (eom.v[0] + eom.v[1]) ** 2 / 2) == 0
-
-
-def test_coriolis_terms_of_a_coupling_stand_in_both_equations():
-    """L = m x'^2/2 + m y'^2/2 + m cos(x - y) x' y': F_x = -m sin(x - y) y'^2, F_y = m sin(x - y) x'^2."""
-    eom = equations(
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + m * cos(x - y) * x.diff() * y.diff(),
-        coordinates={x: "rad", y: "rad"},
-        units={m: "kg*m^2"},
-    )
-    (qx, qy), (vx, vy) = eom.q, eom.v
-    assert sp.simplify(eom.F[0] + m * sin(qx - qy) * vy**2) == 0
-    assert sp.simplify(eom.F[1] - m * sin(qx - qy) * vx**2) == 0
-
-
-def test_forces_with_a_curl_have_no_potential():
-    """(-k y, k x) does work on the way round; (-k x - k y, -k x) is the gradient of k (x^2/2 + x y)."""
-    fields = {
-        "kinetic_energy": m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        "coordinates": {x: "m", y: "m"},
-        "units": {m: "kg", k: "N/m"},
-    }
-    assert equations(**fields, forces={x: -k * y, y: k * x}).potential is None
-    eom = equations(**fields, forces={x: -k * x - k * y, y: -k * x})
-    (qx, qy) = eom.q
-    assert sp.expand(eom.potential - k * (qx**2 / 2 + qx * qy)) == 0
-
-
-def test_a_potential_without_a_formula_is_not_reported():
-    """-k exp(sin x) has an integral, but none that can be written down."""
-    eom = equations(
-        kinetic_energy=m * x.diff() ** 2 / 2,
-        coordinates={x: "rad"},
-        forces={x: -k * sp.exp(sin(x))},
-        units={m: "kg*m^2", k: "N*m"},
-    )
-    assert eom.potential is None
-
-
-def test_a_force_that_depends_on_the_velocity_stores_nothing():
-    """-k x - c x' has the potential k x^2/2, the damper none."""
-    eom = equations(
-        kinetic_energy=m * x.diff() ** 2 / 2,
-        coordinates={x: "m"},
-        forces={x: -k * x - c * x.diff()},
-        units={m: "kg", k: "N/m", c: "N*s/m"},
-    )
-    assert sp.expand(eom.potential - k * eom.q[0] ** 2 * Rational(1, 2)) == 0
-
-
-def test_a_moving_constraint_accelerates_by_all_of_its_terms():
-    """f = x - y c t^2/2: f'' = x'' - c (t^2 y''/2 + 2 t y' + y), hence gamma = c (2 t y' + y)."""
-    eom = equations(
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("wedge", x - y * c * t**2 / 2)],
-        units={m: "kg", c: "1/s^2"},
-    )
-    assert sp.expand(eom.gamma[0] - c * (2 * t * eom.v[1] + eom.q[1])) == 0
-    assert sp.expand(eom.nu[0] - c * t * eom.q[1]) == 0
+@pytest.mark.parametrize(
+    ("fields", "units"),
+    [
+        # (-k y, k x) does work on the way round
+        ({**MOVING, "forces": {x: -k * y, y: k * x}}, {m: "kg", k: "N/m"}),
+        # -k exp(sin x) has an integral, but none that can be written down
+        (
+            {**ALONE, "coordinates": {x: "rad"}, "forces": {x: -k * sp.exp(sin(x))}},
+            {m: "kg*m^2", k: "N*m"},
+        ),
+    ],
+    ids=["a curl", "no formula"],
+)
+def test_a_force_without_a_potential_has_none(fields, units):
+    """No energy is reported that a force does not store."""
+    assert equations(fields, units).potential is None

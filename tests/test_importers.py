@@ -121,23 +121,6 @@ def test_the_particle_leaves_the_hemisphere_when_and_where_it_must(native_fmu, e
         np.testing.assert_array_equal(count, ~on)
 
 
-def test_the_multiplier_of_the_pendulum_is_that_of_the_elliptic_functions(native_fmu, engine):
-    """lambda(t) = -T/(2 L), with other parameters and start values, to 1e-11 over three periods."""
-    world, phi0 = {"m": 0.7, "g": 3.7, "L": 2.0}, 2.0
-    start = {"x": world["L"] * np.sin(phi0), "y": -world["L"] * np.cos(phi0)}
-    steps, key = 200, ("bob", "lambda.rod")
-    found = run(
-        engine,
-        {"bob": native_fmu("PendulumCartesian")},
-        [key],
-        step=0.1,
-        steps=steps,
-        values={"bob": {**world, **TIGHT, **start}},
-    )[key]
-    expected = pendulum_multiplier(world, phi0, 0.1 * np.arange(1, steps + 1))
-    np.testing.assert_allclose(found, expected, atol=1e-11 * abs(expected).max(), rtol=0)
-
-
 def test_a_cart_goes_where_the_force_drives_it(native_fmu, engine):
     """F jumps at each communication point: s, x and lambda are those of the equations in s and phi,
     and the momentum grows by F's impulse, M s' + m x' + c s = sum F_k H, to rounding."""

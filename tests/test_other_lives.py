@@ -9,10 +9,6 @@ import pytest
 from fmi2 import ERROR, Single
 from test_ahead import candle
 
-from lagfmu.testing import find_compiler
-
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
-
 LIVES = {  # when the state is saved [s], and another life: its parameters and how long it lasts [s]
     "BouncingBall": (0.6, {"e": 0.0, "y": 0.2}, 2.0),  # rises again; lies on the floor
     "Hemisphere": (0.5, {"theta": 0.5}, 2.0),  # slides; has left
