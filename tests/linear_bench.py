@@ -32,7 +32,6 @@ SOURCES = [
     "leastnorm.c",
     "linear.c",
     "lu.c",
-    "nullspace.c",
     "orthogonal.c",
     "refinement.c",
     "schur.c",

@@ -89,14 +89,14 @@ void embed_tangent_of(double t, const double *s, const double *sdot, const doubl
 const int *prescribed_of(void) { return MODEL_SYSTEM->prescribed; }
 int number_of(int which) {
     const System *s = MODEL_SYSTEM;
-    const int numbers[] = {s->m, s->entries, s->prescribed_count, s->constant_mass, s->separable};
+    const int numbers[] = {s->m, s->entries, s->prescribed_count, s->separable};
     return numbers[which];
 }
 const char *coordinate_of(int full, int j) { return pick(full)->coordinates[j]; }
 const char *row_of(int full, int k) { return pick(full)->rows[k].name; }
 int gate_of(int full, int k) { return pick(full)->rows[k].while_closed; }
 """
-NUMBERS = ("m", "entries", "prescribed_count", "constant_mass", "separable")
+NUMBERS = ("m", "entries", "prescribed_count", "separable")
 
 
 def array(values: Sequence[float]) -> Any:
@@ -393,25 +393,21 @@ def test_nothing_is_multiplied_by_zero_or_computed_twice(
 
 
 @pytest.mark.parametrize(
-    ("name", "constant", "separable"),
+    ("name", "separable"),
     [
-        ("PendulumCartesian", 1, 1),
-        ("PendulumNullspace", 1, 0),  # its accelerations come without multipliers
-        ("PendulumAngle", 1, 0),  # no multipliers to keep it on the constraints, none needed
-        ("Atwood", 1, 1),
-        ("InclineDisk", 1, 1),
-        ("CartPendulum", 1, 0),  # friction depends on the velocity
-        ("Hemisphere", 0, 0),  # m r^2 is not constant
-        ("KnifeEdge", 1, 0),  # nonholonomic
+        ("PendulumCartesian", 1),
+        ("PendulumNullspace", 0),  # its accelerations come without multipliers
+        ("PendulumAngle", 0),  # no multipliers to keep it on the constraints, none needed
+        ("Atwood", 1),
+        ("InclineDisk", 1),
+        ("CartPendulum", 0),  # friction depends on the velocity
+        ("Hemisphere", 0),  # m r^2 is not constant
+        ("KnifeEdge", 0),  # nonholonomic
     ],
 )
-def test_flags_of_the_structure(
-    case: Callable[[str], Case], name: str, constant: int, separable: int
-) -> None:
-    """constant_mass: M of parameters only; separable: besides, forces of q, t, u and positions held."""
-    native = case(name).native
-    assert native.number("constant_mass") == constant
-    assert native.number("separable") == separable
+def test_what_is_separable(case: Callable[[str], Case], name: str, separable: int) -> None:
+    """M of parameters only, forces of q, t, u, and positions that are held: what `rattle` can step."""
+    assert case(name).native.number("separable") == separable
 
 
 # ------------------------------------------------------------------------------ hostile models

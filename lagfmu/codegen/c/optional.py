@@ -40,7 +40,6 @@ AT_CONSTRAINTS = (
     "dependent.c",
     "orthogonal.c",
     "leastnorm.c",
-    "nullspace.c",
     "weighted.c",
     "cod.c",
 )

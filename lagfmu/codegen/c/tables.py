@@ -107,7 +107,6 @@ class Tables:
             ),
             **measures,
             "formulation": parts.formulation.upper(),
-            "constant_mass": int(_constant_mass(eom)),
             "separable": int(not entanglements(eom, parts.formulation)),
             "plan": f"&{p}plan",
             "solve": f"{p}solve" if solve else "NULL",

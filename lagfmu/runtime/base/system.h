@@ -64,7 +64,6 @@ struct System {
     const int *extent_dimension; /* (parameters) the number of those that it compares to; -1: none */
     int angles;                  /* the number of those without dimension; -1: none */
     Formulation formulation;
-    int constant_mass;        /* M holds parameters and numbers only */
     int separable;            /* constant mass, forces without velocities, position constraints only */
     const Plan *plan;         /* sparse elimination, found when the FMU was built */
     /* x (nv) and lambda (m) of  M x = b + G^T lambda,  G x = c  with all rows acting, the plan written

@@ -5,10 +5,11 @@
 
 #include "cod.h"
 #include "leastnorm.h"
-#include "nullspace.h"
 #include "numbers.h"
 #include "orthogonal.h"
 #include "weighted.h"
+
+static const double SAFE = 1e-6; /* rows of unit norm must stand out by this much to be eliminated */
 
 static size_t doubles(int n, int m) {
     return larger_size(weighted_doubles(n, m), least_norm_doubles(n, m));
@@ -18,8 +19,16 @@ static size_t ints(int n, int m) {
     return larger_size((size_t)weighted_ints(n, m), (size_t)least_norm_ints(n, m));
 }
 
+/* lambda eliminated from M x = b + G^T lambda (ME 6590, eq. 9):  with G N = 0,
+ *
+ *   N^T (M x - b) = 0 ,   G x = c ,
+ *
+ * and lambda recovered afterwards from G^T lambda = M x - b.  The columns of N = L^-T D^-1/2 Q2 (weighted.c) are
+ * orthonormal in the metric of M, N^T M x = Q2^T z, N^T b = Q2^T y: for independent rows these are the equations
+ * that weighted_solve() solves. */
 static int factor_nullspace(Linear *l) {
-    if (!nullspace_factor(l)) return 0;
+    Weighted w;
+    if (!weighted_factor(l, SAFE, &w) || w.acting == 0 || w.cod.rank < w.acting) return 0;
     l->rung = RUNG_NULLSPACE;
     return 1;
 }
@@ -46,7 +55,7 @@ static Status factor_rows(Linear *l) {
 static Status solve_rows(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     if (l->rung == RUNG_ORTHOGONAL) return orthogonal_solve(l, b, c, x, lambda);
     if (l->rung == RUNG_LEAST_NORM) return least_norm_solve(l, b, c, x, lambda);
-    nullspace_solve(l, b, c, x, lambda);
+    weighted_solve(l, b, c, x, lambda);
     return OK;
 }
 

@@ -10,7 +10,7 @@ typedef struct {
     /* Doubles and ints that they need in Linear.dense and Linear.pivots. */
     size_t (*doubles)(int n, int m);
     size_t (*ints)(int n, int m);
-    /* nullspace.c, if it is safe at this state. */
+    /* lambda eliminated, if that is safe at this state. */
     int (*nullspace)(Linear *l);
     /* orthogonal.c, or leastnorm.c where M is singular; FAILED: so it is on the constraint surface. */
     Status (*factor)(Linear *l);

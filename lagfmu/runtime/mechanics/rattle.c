@@ -156,20 +156,10 @@ static void rattle_dense(const Integrator *i, double t, double *y) {
     }
 }
 
-static int rattle_doubles(int ny) {
-    return 2 * ny; /* y, q1 - q */
-}
-
-static int rattle_ints(int ny) {
-    (void)ny;
-    return 0;
-}
-
 SHARED_VALUE const Method rattle = {
     .name = "rattle",
     .dense_arrays = 2,
-    .scratch_doubles = rattle_doubles,
-    .scratch_ints = rattle_ints,
+    .scratch_arrays = 2, /* y, q1 - q */
     .fixed = 1,
     .prepare_dense = rattle_prepare,
     .dense = rattle_dense,

@@ -260,21 +260,11 @@ static void dop853_dense(const Integrator *i, double t, double *y) {
     }
 }
 
-static int dop853_doubles(int ny) {
-    return 14 * ny; /* y1, sum, k_2 to k_12 and the argument of k_12 */
-}
-
-static int dop853_ints(int ny) {
-    (void)ny;
-    return 0;
-}
-
 SHARED_VALUE const Method dop853 = {
     .name = "dop853",
     .dense_arrays = DENSE_STAGES + 2,
     .last_stage = DENSE_STAGES,
-    .scratch_doubles = dop853_doubles,
-    .scratch_ints = dop853_ints,
+    .scratch_arrays = 14, /* y1, sum, k_2 to k_12 and the argument of k_12 */
     .step = dop853_step,
     .prepare_dense = dop853_prepare,
     .dense = dop853_dense,

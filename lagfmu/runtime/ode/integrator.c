@@ -7,10 +7,11 @@ void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
     for (int k = 0; k < count; k++) {
         const Method *method = methods[k];
         if (method == NULL) continue;
-        int more = method->scratch_doubles(ny), more_ints = method->scratch_ints(ny);
+        const int matrices = ny <= RADAU5_MOST_STATES ? method->scratch_matrices : 0;
+        const int more = method->scratch_arrays * ny + matrices * ny * ny, pivots = matrices * ny;
         if (method->dense_arrays > dense) dense = method->dense_arrays;
         if (more > doubles) doubles = more;
-        if (more_ints > ints) ints = more_ints;
+        if (pivots > ints) ints = pivots;
     }
     i->ny = ny;
     i->y = arena_doubles(saved, ny);

@@ -50,9 +50,8 @@ typedef struct {
 struct Method {
     const char *name;
     int dense_arrays;                 /* arrays of ny doubles in `dense` */
-    int (*scratch_doubles)(int ny);
-    int (*scratch_ints)(int ny);
-    int needs_jacobian;
+    int scratch_arrays;               /* arrays of ny doubles in `scratch`, */
+    int scratch_matrices;             /* and of ny^2, with ny pivots each, where there are RADAU5_MOST_STATES at most */
     int last_stage; /* arrays in `dense` before two of a stage at t, its argument and its rate, which
                      * stay as they are; 0: they are not kept */
     int fixed;                        /* a fixed step that divides the way to t_bound evenly */

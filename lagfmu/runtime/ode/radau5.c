@@ -265,20 +265,11 @@ static void radau5_dense(const Integrator *i, double t, double *y) {
     for (int j = 0; j < i->ny; j++) y[j] = i->y_old[j] + polynomial(i, j, s, 0);
 }
 
-static int radau5_doubles(int ny) {
-    return ny > RADAU5_MOST_STATES ? 2 * ny : 4 * ny * ny + 13 * ny;
-}
-
-static int radau5_ints(int ny) {
-    return 2 * ny;
-}
-
 SHARED_VALUE const Method radau5 = {
     .name = "radau5",
     .dense_arrays = 3,
-    .scratch_doubles = radau5_doubles,
-    .scratch_ints = radau5_ints,
-    .needs_jacobian = 1,
+    .scratch_arrays = 13,
+    .scratch_matrices = 4,
     .step = radau5_step,
     .dense = radau5_dense,
 };

@@ -69,20 +69,10 @@ static void rk4_dense(const Integrator *i, double t, double *y) {
     }
 }
 
-static int rk4_doubles(int ny) {
-    return 5 * ny; /* k2, k3, k4, f1, y1 */
-}
-
-static int rk4_ints(int ny) {
-    (void)ny;
-    return 0;
-}
-
 SHARED_VALUE const Method rk4 = {
     .name = "rk4",
     .dense_arrays = ROWS_KEPT,
-    .scratch_doubles = rk4_doubles,
-    .scratch_ints = rk4_ints,
+    .scratch_arrays = 5, /* k2, k3, k4, f1, y1 */
     .fixed = 1,
     .step = rk4_step,
     .dense = rk4_dense,

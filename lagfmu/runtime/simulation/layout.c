@@ -34,11 +34,6 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->stick_slip = arena_take(saved, (size_t)s->frictions, sizeof *x->stick_slip);
     x->indicator = arena_doubles(saved, indicators);
     integrator_layout(i, saved, scratch, nq + nv, OPTIONAL.methods, METHOD_COUNT);
-    x->y = i->y;
-    x->f = i->f;
-    x->y_old = i->y_old;
-    x->f_old = i->f_old;
-    x->dense = i->dense;
     x->block_size = saved->used - begin;
 }
 

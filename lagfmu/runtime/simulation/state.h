@@ -95,7 +95,6 @@ typedef struct {
     double *impulse;          /* (contacts) [of lambda times s] of the latest closing; 0: none */
     StickSlip *stick_slip;    /* (frictions) how they stand */
     double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
-    double *y, *f, *y_old, *f_old, *dense; /* the integrator's own, shared with it */
     char *block;              /* all of the arrays above */
     size_t block_size;
 } State;
