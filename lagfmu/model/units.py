@@ -301,19 +301,11 @@ def plain(expr: Expr) -> str:
 
 
 def check_dimension(
-    expr: Expr,
-    expected: Unit | None,
-    units: Mapping[Expr, Unit],
-    what: str,
-    *,
-    report_unknown: bool = True,
+    expr: Expr, expected: Unit | None, units: Mapping[Expr, Unit], what: str
 ) -> list[str]:
-    """The dimensional problems of `expr`, [] if there are none.
-
-    With `expected` None only the terms must agree.  A symbol without a unit is a problem, or of
-    any dimension if `report_unknown` is False.
-    """
-    walker = _Walker(units, what, report_unknown)
+    """The dimensional problems of `expr`, [] if there are none.  With `expected` None only the terms must
+    agree.  A symbol without a unit is a problem."""
+    walker = _Walker(units, what)
     unit = walker.walk(sp.sympify(expr), expected)
     if unit is not None and expected is not None and not unit.same_dimension(expected):
         walker.report(
@@ -323,11 +315,9 @@ def check_dimension(
     return list(walker.problems)
 
 
-def dimension_of(
-    expr: Expr, units: Mapping[Expr, Unit], what: str, *, report_unknown: bool = True
-) -> Unit | None:
+def dimension_of(expr: Expr, units: Mapping[Expr, Unit], what: str) -> Unit | None:
     """The unit of `expr`, None if it is identically zero; UnitError if its dimensions disagree."""
-    walker = _Walker(units, what, report_unknown)
+    walker = _Walker(units, what)
     unit = walker.walk(sp.sympify(expr), None)
     if walker.problems:
         raise UnitError("\n".join(walker.problems))
@@ -366,10 +356,8 @@ _KEEPING = (sp.Abs, sp.Max, sp.Min, sp.Mod, sp.re, sp.conjugate)
 class _Walker:
     """Walks an expression and collects its dimensional problems; None stands for any dimension."""
 
-    def __init__(self, units: Mapping[Expr, Unit], what: str, report_unknown: bool) -> None:
-        self.units = units
-        self.what = what
-        self.report_unknown = report_unknown
+    def __init__(self, units: Mapping[Expr, Unit], what: str) -> None:
+        self.units, self.what = units, what
         self.problems: dict[str, None] = {}  # ordered, each once
 
     def report(self, problem: str) -> None:
@@ -383,11 +371,9 @@ class _Walker:
         if expr == dynamicsymbols._t:
             return SECOND
         if expr.is_Symbol or (isinstance(expr, AppliedUndef) and expr.args == (dynamicsymbols._t,)):
-            if self.report_unknown:
-                self.report(
-                    f"{plain(expr)!r} is neither coordinate, parameter nor input: "
-                    "declare it with its unit"
-                )
+            self.report(
+                f"{plain(expr)!r} is neither coordinate, parameter nor input: declare it with its unit"
+            )
             return None
         if expr.is_Add or isinstance(expr, _KEEPING):
             return self._agree(expr.args, expected, expr)
