@@ -13,7 +13,7 @@ from ..prepare.prepare import Prepared
 from .binary import Hear
 from .python import offered, slave_of
 from .read import Experiment
-from .slave import Refused
+from .slave.fmi2 import Refused
 
 DISCARD, ERROR = 2, 3  # statuses
 CALLS = {  # of a session -> of the slave

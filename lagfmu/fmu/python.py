@@ -16,10 +16,10 @@ from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
 from ..methods import IN_PYTHON, NUMBERS
 from ..prepare.prepare import Prepared
-from . import script
 from .archive import pack, version
 from .description import model_description
-from .slave import LagfmuSlave
+from .slave import script
+from .slave.fmi2 import LagfmuSlave
 from .target import missing_for_native
 
 SHIPPED = (
@@ -29,12 +29,7 @@ SHIPPED = (
     "numeric",
     "solver",
     "runtime/base/thresholds.h",
-    "fmu/entry.py",
-    "fmu/script.py",
-    "fmu/instance.py",
-    "fmu/rates.py",
-    "fmu/references.py",
-    "fmu/slave.py",
+    "fmu/slave",
 )  # what travels in the FMU, besides the generated script
 
 VOCABULARY = ("Cubic", "Embedding", "Lookups", "Own", "Row", "System")  # of generated equations
@@ -57,8 +52,8 @@ Nothing but equations and the variable table; the engine is the package {package
 Names are the model's: der_theta is the velocity of theta, lambda stands on the side of the forces.
 """
 
-from {package}.fmu.entry import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
-from {package}.fmu.entry import {vocabulary}
+from {package}.fmu.slave.entry import LagfmuSlave as Fmi2Slave  # pythonfmu looks for this name
+from {package}.fmu.slave.entry import {vocabulary}
 
 {equations}
 

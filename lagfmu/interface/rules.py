@@ -2,7 +2,7 @@
 
 Python callers ask `problems_of`.  The page gets MESSAGES as data, and the columns of each variable
 (live/facts.py).  The FMU itself checks what it is given by the same columns of the variable table:
-runtime/fmi/experiment.c, and by the same kind of rule fmu/instance.py, the python target.
+runtime/fmi/experiment.c, and by the same kind of rule fmu/slave/instance.py, the python target.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..numeric.system import System
+from ...numeric.system import System
 
 POINTS = 4
 APART = 0.3  # of the way that a motion went: what its rates may miss

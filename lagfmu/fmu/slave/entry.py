@@ -19,9 +19,9 @@ from .references import end_once, keep, keep_module_of
 from .script import Facts, Variable
 
 try:
-    from ..numeric.cubic import Cubic
-    from ..numeric.system import Embedding, Lookups, Own, Row, System
-    from .slave import LagfmuSlave
+    from ...numeric.cubic import Cubic
+    from ...numeric.system import Embedding, Lookups, Own, Row, System
+    from .fmi2 import LagfmuSlave
 except Exception as error:  # a NumPy of another Python, or an old one, fails in many ways
     from pythonfmu.enums import Fmi2Status
     from pythonfmu.fmi2slave import Fmi2Slave

@@ -1,8 +1,7 @@
 """FMI 2.0 co-simulation of the python target: pythonfmu's calls, handed to an Instance.
 
-This file travels inside each FMU, together with `instance.py`, `lagfmu/solver` and `lagfmu/numeric`, in a
-package whose name carries the hash of its content.  It needs NumPy and SciPy, no SymPy and no installed
-lagfmu.
+This folder travels inside each FMU, together with `lagfmu/solver` and `lagfmu/numeric`, in a package whose
+name carries the hash of its content.  It needs NumPy and SciPy, no SymPy and no installed lagfmu.
 
 Status of calls: a communication step that cannot be done returns False (fmi2Discard), with the reason
 in the log and the instance as it was before the step.  pythonfmu turns every exception into fmi2Fatal
@@ -20,7 +19,7 @@ from typing import Any, TypeVar
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from ..numeric.failure import StepFailureError
+from ...numeric.failure import StepFailureError
 from .instance import WARNING, Instance
 from .instance import Refused as Refused
 from .references import end_once, keep, keep_module_of

@@ -11,16 +11,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from .. import names
-from ..model.rule import MESSAGES
-from ..numeric.failure import StepFailureError
-from ..numeric.start import start
-from ..numeric.start_priority import GIVEN, OMITTED, SET, left_out
-from ..numeric.thresholds import SMALLEST_TOLERANCE
-from ..numeric.tolerance import tolerance_problem
-from ..solver.advance import advance, looked_at
-from ..solver.observe import observe
-from ..solver.state import Event, Settings, State, restored, restored_settings
+from ... import names
+from ...model.rule import MESSAGES
+from ...numeric.failure import StepFailureError
+from ...numeric.start import start
+from ...numeric.start_priority import GIVEN, OMITTED, SET, left_out
+from ...numeric.thresholds import SMALLEST_TOLERANCE
+from ...numeric.tolerance import tolerance_problem
+from ...solver.advance import advance, looked_at
+from ...solver.observe import observe
+from ...solver.state import Event, Settings, State, restored, restored_settings
 from .rates import Past, estimated, half_connected
 from .script import Facts, Variable
 

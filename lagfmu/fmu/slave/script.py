@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..model.rule import Rule
+from ...model.rule import Rule
 
 if TYPE_CHECKING:
-    from ..numeric.system import System
+    from ...numeric.system import System
 
 
 class Variable(NamedTuple):

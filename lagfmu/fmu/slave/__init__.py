@@ -1,0 +1,1 @@
+"""What travels in a python FMU, besides the engine: pythonfmu's slave, and the instance behind it."""
