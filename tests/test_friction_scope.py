@@ -12,13 +12,13 @@ from xml.etree.ElementTree import Element, fromstring
 import fmpy
 import numpy as np
 import pytest
+from conftest import model_file
 from instance import instance
 from runs import simulate_fmu
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from sympy import cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from test_friction_several import feet, puck
 from typer.testing import CliRunner
 
 from lagfmu import (
@@ -37,6 +37,7 @@ from lagfmu.testing import app, find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"
+FEET, PUCK = (model_file(name).model for name in ("two_feet", "puck"))
 g = 9.81  # m/s^2
 Build = Callable[..., Path]
 
@@ -131,7 +132,7 @@ def test_two_rough_feet_that_land_together_share_one_impact(friction: float) -> 
     values = {"mu": friction, "alpha": 0.0, "y": 0.5 + height, "der(x)": v}
     end = fall / g + 1e-7
     run = {"stop_time": end, "step_size": end, "start_values": values, "tolerance": 1e-10}
-    last = simulate(feet(), scene=Scene("Feet"), **run)[-1]
+    last = simulate(FEET, scene=Scene("Feet"), **run)[-1]
     assert last["contact.low"]
     assert last["contact.up"]
     assert last["der(x)"] == pytest.approx(max(0.0, v - friction * fall), abs=2e-6)
@@ -142,10 +143,10 @@ def test_two_rough_feet_that_land_together_share_one_impact(friction: float) -> 
 
 def test_model_exchange_counts_the_heat_of_impacts_and_slides(built: Build) -> None:
     """A body dropped flat that slides on: `energy.dissipated` jumps by what the impact takes, 1/2 m v_n^2 and
-    the friction's share, and grows by -power.low - power.up from there."""
-    path = built(feet())
+    the friction's share, and grows by -power.grip_low - power.grip_up from there."""
+    path = built(FEET)
     values = {"mu": 0.2, "alpha": 0.0, "y": 0.7, "der(x)": 2.0}
-    outputs = ["energy.dissipated", "energy.total", "power.low", "power.up", "der(x)"]
+    outputs = ["energy.dissipated", "energy.total", "power.grip_low", "power.grip_up", "der(x)"]
     run = {"stop_time": 0.5, "output_interval": 0.01, "start_values": values, "output": outputs}
     far = simulate_fmu(str(path), fmi_type="ModelExchange", relative_tolerance=1e-9, **run)
     fall = np.sqrt(2 * g * 0.2)
@@ -153,7 +154,7 @@ def test_model_exchange_counts_the_heat_of_impacts_and_slides(built: Build) -> N
     lost = fall**2 / 2 + 2.0**2 / 2 - after**2 / 2
     landed = np.flatnonzero(far["energy.dissipated"])[0]
     assert far["energy.dissipated"][landed] == pytest.approx(lost, rel=1e-6)
-    power = far["power.low"] + far["power.up"]
+    power = far["power.grip_low"] + far["power.grip_up"]
     rubbed = -float(np.sum(np.diff(far["time"]) * (power[1:] + power[:-1]) / 2))
     assert rubbed > 0.5  # J
     assert far["energy.dissipated"][-1] - lost == pytest.approx(rubbed, rel=1e-2)
@@ -164,7 +165,7 @@ def test_model_exchange_counts_the_heat_of_impacts_and_slides(built: Build) -> N
 def test_the_energy_dissipated_is_a_state_of_model_exchange(built: Build) -> None:
     """Where frictions rub: calculated at the start, with a derivative, both among the initial unknowns, its
     nominal value the energy of the motion, and set anew by impacts.  A scene that leaves it out has none."""
-    root = described(built(feet()))
+    root = described(built(FEET))
     entries = root.findall("ModelVariables/ScalarVariable")
     index = {e.get("name"): str(k) for k, e in enumerate(entries, 1)}
     lost, rate = (
@@ -178,14 +179,14 @@ def test_the_energy_dissipated_is_a_state_of_model_exchange(built: Build) -> Non
     for place, n in (("Derivatives", rate), ("InitialUnknowns", rate), ("InitialUnknowns", lost)):
         listed = {u.get("index") for u in root.findall(f"ModelStructure/{place}/Unknown")}
         assert index[n.get("name")] in listed
-    root = described(built(feet(), Scene("FeetX", outputs=("x",))))
+    root = described(built(FEET, Scene("FeetX", outputs=("x",))))
     assert not [e for e in root.iter("ScalarVariable") if "dissipated" in str(e.get("name"))]
     assert len(root.findall("ModelStructure/Derivatives/Unknown")) == 6
 
 
 def test_model_exchange_of_two_rows_comes_to_rest_too(built: Build) -> None:
     """The puck slides along its curve, and stops when and where it does in co-simulation."""
-    path = str(built(puck()))
+    path = str(built(PUCK))
     run = {"stop_time": 2.5, "output_interval": 0.1, "relative_tolerance": 1e-9}
     outputs = ["x", "y", "sticks.grip"]
     near, far = (
