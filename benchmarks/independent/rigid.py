@@ -138,10 +138,10 @@ class Mechanism:
             weighed[:, k, :3] *= light
             weighed[:, k, 3:] = weighed[:, k, 3:] @ easy
             free[k] = [*(light * F[k, :3]), *(easy @ F[k, 3:])]
-        A = weighed.reshape(len(rows), -1) @ G.T
+        A = weighed.reshape(len(rows), 6 * n) @ G.T
         gamma = np.array([row.gamma for row in rows])
         lam = np.linalg.lstsq(A, gamma - G @ free.ravel(), rcond=1e-11)[0]
-        a = free + (lam @ weighed.reshape(len(rows), -1)).reshape(n, 6)
+        a = free + (lam @ weighed.reshape(len(rows), 6 * n)).reshape(n, 6)
         received, k = {}, 0
         for name, each in named.items():
             received[name] = sum(
@@ -161,17 +161,11 @@ class Mechanism:
         found[:, 7:] = self.solve(t, y)[0]
         return found.ravel()
 
-    def moved(self, y: Vector, points: Sequence[float], tolerance: float = 1e-13) -> Vector:
-        """The states at these times [s], from y at the first of them."""
-        found = solve_ivp(
-            self.rate,
-            (points[0], points[-1]),
-            y,
-            "DOP853",
-            points,
-            rtol=tolerance,
-            atol=tolerance / 10,
-        )
+    def moved(self, y: Vector, points: Sequence[float], longest: float = np.inf) -> Vector:
+        """The states at these times [s], from y at the first of them, in steps of at most `longest` [s]."""
+        span = points[0], points[-1]
+        options = {"rtol": 1e-13, "atol": 1e-14, "max_step": longest}
+        found = solve_ivp(self.rate, span, y, "DOP853", points, **options)
         assert found.success, found.message
         return np.asarray(found.y.T)
 
