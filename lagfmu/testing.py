@@ -133,4 +133,5 @@ from .verification.evaluate import Compiled
 from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
+from .verification.simulate import ErrorBarWarning
 from .verification.verify import RECORD, applies, check_closed_form, landed

@@ -27,7 +27,7 @@ from typer.testing import CliRunner
 from lagfmu import Model, Output, Parameter, Scene, simulate, sweep
 from lagfmu.errors import SimulationError
 from lagfmu.names import bar as bar_of
-from lagfmu.testing import LAST, Plan, Session, app, figure_of, prepare, run_batch
+from lagfmu.testing import LAST, ErrorBarWarning, Plan, Session, app, figure_of, prepare, run_batch
 
 INFINITE = np.finfo(float).max
 Barred = Callable[[str], Path]
@@ -264,6 +264,8 @@ def test_a_finer_run_that_cannot_follow_is_told_and_the_run_goes_on(root):
         assert len(told) == 1
         assert "cannot follow" in told[0]
         assert "root" in told[0]
+    with pytest.warns(ErrorBarWarning, match=r"cannot follow to t = 1\.57\d* s"):
+        assert simulate(root)["error.x"][-1] == INFINITE
 
 
 def test_an_fmu_with_error_bars_is_for_co_simulation(barred, library):

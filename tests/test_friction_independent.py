@@ -1,5 +1,5 @@
 """Systems with friction that stand in no model file, against integrations whose modes and events are written
-by hand: a block on a wedge that is shaken, a clutch, a sledge on two runners."""
+by hand: a block on a wedge that is shaken, and a clutch."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ from lagfmu.testing import find_compiler
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 g = 9.81  # m/s^2
 t = dynamicsymbols._t
-x, y, X, phi, psi, theta = dynamicsymbols("x y X phi psi theta")
+x, y, X, phi, psi = dynamicsymbols("x y X phi psi")
 m, M, G, mu, alpha, push, omega = symbols("m M g mu alpha push omega", positive=True)
-R, J, K, P, torque, a, h = symbols("R J K P torque a h", positive=True)
-gamma = symbols("gamma", real=True)
+R, J, K, P, torque = symbols("R J K P torque", positive=True)
 
 
 @cache
@@ -72,44 +71,6 @@ def clutch() -> Model:
             Parameter(omega, 3.0, "rad/s"),
         ],
         start={phi.diff(): 30.0},
-    )
-
-
-@cache
-def sledge() -> Model:
-    """A body on two runners at -a and a, its centre h above the ground, whose slope is gamma; it is pulled
-    to and fro."""
-    rows = [
-        Contact("front", y - h * cos(theta) + a * sin(theta)),
-        Contact("rear", y - h * cos(theta) - a * sin(theta)),
-    ]
-    slide = x.diff() + h * cos(theta) * theta.diff()
-    return Model(
-        name="Sledge",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
-        + J * theta.diff() ** 2 / 2
-        - m * G * (y * cos(gamma) - x * sin(gamma)),
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[
-            *rows,
-            Nonholonomic("rear_rests", slide + a * sin(theta) * theta.diff()),
-            Nonholonomic("front_rests", slide - a * sin(theta) * theta.diff()),
-            Friction("rear_grip", of=["rear_rests"], normal=multiplier("rear"), static=mu),
-            Friction("front_grip", of=["front_rests"], normal=multiplier("front"), static=mu),
-        ],
-        forces={x: push * cos(omega * t)},
-        parameters=[
-            Parameter(m, 40.0, "kg"),
-            Parameter(J, 5.0, "kg.m^2"),
-            Parameter(a, 0.6, "m"),
-            Parameter(h, 0.3, "m"),
-            Parameter(G, g, "m/s^2"),
-            Parameter(gamma, 0.1, "rad"),
-            Parameter(mu, 0.2, "1"),
-            Parameter(push, 150.0, "N"),
-            Parameter(omega, 4.0, "rad/s"),
-        ],
-        start={y: 0.3},
     )
 
 
@@ -226,32 +187,10 @@ def clutch_by_hand(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def sledge_by_hand(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """States x, x': on both runners friction is mu m g cos(gamma) together, whatever each carries."""
-    w, slope, mu0, F0, om = 40.0, 0.1, 0.2, 150.0, 4.0
-    most = mu0 * w * g * np.cos(slope)
-
-    def driven(time: float) -> float:
-        return float(w * g * np.sin(slope) + F0 * np.cos(om * time))
-
-    def rates(mode: Mode, time: float, z: np.ndarray) -> np.ndarray:
-        return np.array([z[1], 0.0 if mode == 0 else (driven(time) - mode * most) / w])
-
-    return by_hand(
-        rates,
-        lambda z: float(z[1]),
-        lambda time, z: most - abs(driven(time)),
-        lambda time, z: driven(time),
-        np.zeros(2),
-        times,
-    )
-
-
 TIMES = np.linspace(0, 3, 31)
 SYSTEMS: dict[str, Any] = {
     "wedge": (wedge, wedge_by_hand, ("X", "x", "y", "der(X)", "der(x)", "der(y)"), "grip"),
     "clutch": (clutch, clutch_by_hand, ("phi", "psi", "der(phi)", "der(psi)"), "clutch"),
-    "sledge": (sledge, sledge_by_hand, ("x", "der(x)"), "rear_grip"),
 }
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 
-import fmpy
 import numpy as np
 import pytest
 from runs import simulate_fmu
@@ -166,26 +165,6 @@ def test_the_error_of_the_other_methods_falls_with_the_tolerance(native_fmu, nam
     assert errors[-1] < 100 * 10.0**-finest
 
 
-@pytest.mark.parametrize("method", ["dop853", "radau5"])
-def test_the_importers_tolerance_is_obeyed(native_fmu, method):
-    """fmi2SetupExperiment's tolerance is the dial; solver.tolerance goes before it; without either it
-    is 1e-8, which the FMU states as its default."""
-    path = native_fmu("PendulumCartesian")
-
-    def motion(tolerance=None, **solver):
-        result = run(path, 1.0, 0.5, tolerance, solver_method=method, **solver)
-        return result["x"].tolist(), result["lambda.rod"].tolist(), result["solver.steps"].tolist()
-
-    default, coarse, fine = motion(), motion(1e-4), motion(1e-9)
-    assert coarse[2][-1] < default[2][-1] < fine[2][-1]
-    assert motion(1e-8) == default
-    assert motion(1e-4, solver_tolerance=1e-9) == fine
-    assert motion(solver_tolerance=1e-4) == coarse
-    assert motion(1e-9, solver_tolerance=0.0) == fine
-    stated = fmpy.read_model_description(str(path)).defaultExperiment.tolerance
-    assert float(stated) == 1e-8
-
-
 def test_steps_are_no_longer_than_the_largest_step(native_fmu):
     """solver.maximum_step bounds the step: 1 s in steps of at most 0.01 s are at least 100."""
     path = native_fmu("PendulumAngle")
@@ -193,16 +172,6 @@ def test_steps_are_no_longer_than_the_largest_step(native_fmu):
     bound = run(path, 1.0, 1.0, 1e-3, solver_maximum_step=0.01)["solver.steps"][-1]
     assert free < 20
     assert 100 <= bound <= 110
-
-
-@pytest.mark.parametrize("method", ["dop853", "radau5"])
-def test_a_finer_communication_step_changes_nothing_beyond_the_tolerance(native_fmu, method):
-    """The bob does not know when it is looked at: one step of 2 s or 200 of 10 ms."""
-    path = native_fmu("PendulumCartesian")
-    coarse = run(path, 2.0, 2.0, 1e-10, solver_method=method)
-    fine = run(path, 2.0, 0.01, 1e-10, solver_method=method)
-    for name in ("x", "y", "der(x)", "der(y)", "lambda.rod"):
-        assert coarse[name][-1] == pytest.approx(fine[name][-1], abs=1e-8)
 
 
 def test_a_step_that_is_far_too_large_is_refused(native_fmu):
