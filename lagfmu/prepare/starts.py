@@ -45,10 +45,13 @@ def check_given(model: str, moved: Iterable[Moved], missed: Sequence[str]) -> No
     """
     wrong = [m for m in moved if m.priority == GIVEN and abs(m.used - m.given) > ALLOWED * m.size]
     if wrong:
+        what = f"the constraints ({', '.join(missed)})"
+        if not missed:
+            what = "what the other values say: a quaternion has the norm 1, an angle goes with it"
         raise ModelError(
             model,
             [
-                f"start gives {m.name} = {m.given!r}, which misses the constraints ({', '.join(missed)}); "
+                f"start gives {m.name} = {m.given!r}, which misses {what}; "
                 f"the nearest start that satisfies them has {m.used!r}: correct the start, or leave it out"
                 for m in wrong
             ],

@@ -118,7 +118,8 @@ class Places:
         stepped = _motion(system, ("S", "SDOT", "SDDOT"))
         read = _motion(full, ("Q", "V", "VDOT"))
         if full.kinematics is not None:
-            read |= {names.derivative(q): ("QDOT", j, NONE) for j, q in enumerate(full.coordinates)}
+            rates = {names.derivative(q): j for j, q in enumerate(full.coordinates)}
+            read = {q: ("QDOT", j, NONE) for q, j in rates.items()} | read
         # a coordinate of both is read from the full ones, unless these have no accelerations
         self.values = {name: ("PARAMETER", k, NONE) for k, name in enumerate(parameters)}
         self.values |= {name: ("INPUT", k, NONE) for k, name in enumerate(inputs)}

@@ -17,14 +17,16 @@
 
 static const double TURN = 6.283185307179586477;
 
-/* Where each speed's values stand in the list of B, which goes by rows. */
-static void find_columns(Mechanism *b) {
+/* The columns of B, whose list goes by rows; and which coordinates are unwrapped. */
+static void find_tables(Mechanism *b) {
     const System *s = b->system;
     int *end = b->column_start + 1; /* of the columns before, and then of each */
     memset(b->column_start, 0, (size_t)(s->nv + 2) * sizeof *end);
     for (int e = 0; e < s->rates; e++) end[s->rate_column[e] + 1] += 1;
     for (int i = 0; i < s->nv; i++) end[i + 1] += end[i];
     for (int e = 0; e < s->rates; e++) b->column_rate[end[s->rate_column[e]]++] = e;
+    memset(b->is_unwrapped, 0, (size_t)s->nq * sizeof *b->is_unwrapped);
+    for (int i = 0; i < s->unwrapped_count; i++) b->is_unwrapped[s->unwrapped[i]] = 1;
 }
 
 static void kinematics_layout(Mechanism *b, Arena *arena) {
@@ -34,7 +36,8 @@ static void kinematics_layout(Mechanism *b, Arena *arena) {
     b->angle = arena_doubles(arena, s->unwrapped_count);
     b->column_start = arena_ints(arena, s->nv + 2);
     b->column_rate = arena_ints(arena, s->rates);
-    if (arena->base != NULL) find_columns(b);
+    b->is_unwrapped = arena_ints(arena, s->nq);
+    if (arena->base != NULL) find_tables(b);
 }
 
 static void kinematics_evaluate(Mechanism *b, double t, const double *q, const double *u, const double *p) {
@@ -51,12 +54,6 @@ static void kinematics_rates(const Mechanism *b, const double *v, double *rate) 
     kinematics_move(b, 1, v, rate);
 }
 
-static int is_unwrapped(const System *s, int j) {
-    for (int i = 0; i < s->unwrapped_count; i++)
-        if (s->unwrapped[i] == j) return 1;
-    return 0;
-}
-
 /* The largest of the coordinates that have the speed's dimension; where there is none, by which each moves
  * no more than by its own. */
 static double kinematics_reach(const Mechanism *b, const double *x, int i, int turns) {
@@ -65,7 +62,7 @@ static double kinematics_reach(const Mechanism *b, const double *x, int i, int t
     int alike = 0;
     for (int c = b->column_start[i]; c < b->column_start[i + 1]; c++) {
         const int e = b->column_rate[c], j = s->rate_row[e];
-        if (!turns && is_unwrapped(s, j)) continue;
+        if (!turns && b->is_unwrapped[j]) continue;
         if (s->dimension[j] == s->speed_dimension[i]) {
             largest = fmax(largest, fabs(x[j]));
             alike = 1;

@@ -38,7 +38,8 @@ struct Mechanism {
     Linear linear;
     double *M, *F, *G, *nu, *gamma; /* values at the state that was evaluated last */
     double *B, *drift;              /* of q' = B v + b, the same; with them, for kinematics.c: */
-    int *column_start, *column_rate; /* (nv + 1), (rates) */
+    int *column_start, *column_rate; /* (nv + 1), (rates) where the values of each speed stand in the list of B */
+    int *is_unwrapped;              /* (nq) */
     double *angle;                  /* (unwrapped_count) scratch */
     double *vdot, *lambda;          /* of the latest motion(): (nv), (m) */
     double *f;                      /* (m) scratch for residuals */
