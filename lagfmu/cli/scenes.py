@@ -30,16 +30,6 @@ def for_models(path: Path, **options: Any) -> None:
         )
 
 
-def chosen(file: ModelFile, names: Names | str) -> list[Scene]:
-    """The scenes of a file that are called so; all of them without names.  Raises UsageError."""
-    names = [names] if isinstance(names, str) else names
-    known = [s.name for s in file.scenes]
-    unknown = ", ".join(repr(n) for n in names or [] if n not in known)
-    if unknown:
-        raise UsageError(f"{file.path}: no FMU is called {unknown}; known: {', '.join(known)}")
-    return [s for s in file.scenes if names is None or s.name in names]
-
-
 def narrowed(scenes: Sequence[Scene], needs: Needs) -> list[Scene]:
     """The scenes with what was said on the command line; what was not said stays.
 

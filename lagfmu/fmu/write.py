@@ -114,13 +114,7 @@ def as_fmu(
             return
         file = load(path)
         model, closed_forms = file.model, closed_forms or file.closed_forms
-        names = [s.name for s in file.scenes]
-        if isinstance(scene, Scene):
-            chosen = scene
-        elif scene is not None and scene not in names:
-            raise SettingError(f"{path}: no FMU is called {scene!r}; known: {', '.join(names)}")
-        else:
-            chosen = file.scenes[0 if scene is None else names.index(scene)]
+        chosen = scene if isinstance(scene, Scene) else file.called(scene)[0]
     kind = target_of()
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         prepared = prepare(model, chosen)

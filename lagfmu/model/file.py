@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import LagfmuError, ModelError
+from ..errors import LagfmuError, ModelError, SettingError
 from .closed_form import ClosedForm, Conserved
 from .family import made
 from .model import Model
@@ -27,6 +27,17 @@ class ModelFile:
     model: Model
     scenes: tuple[Scene, ...]
     closed_forms: tuple[ClosedForm | Conserved, ...]
+
+    def called(self, names: Sequence[str] | str | None) -> list[Scene]:
+        """The scenes that are called so; all of them without names.  Raises SettingError."""
+        names = [names] if isinstance(names, str) else names
+        known = [s.name for s in self.scenes]
+        unknown = ", ".join(repr(n) for n in names or [] if n not in known)
+        if unknown:
+            raise SettingError(
+                f"{self.path}: no FMU is called {unknown}; known: {', '.join(known)}"
+            )
+        return [s for s in self.scenes if names is None or s.name in names]
 
 
 def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFile:

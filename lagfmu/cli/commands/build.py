@@ -74,7 +74,7 @@ def build(
     from ...prepare.prepare import prepare
     from ..finish import print_verdicts
     from ..progress import progress
-    from ..scenes import chosen, loaded, narrowed
+    from ..scenes import loaded, narrowed
     from ..tradeoff import say_chosen
 
     failed = False
@@ -86,7 +86,7 @@ def build(
             )
         kind = target_of(NATIVE if platforms else target)
         file = loaded(model, add_output, arguments)
-        for s in narrowed(chosen(file, scene), {**needs, "accuracy": accuracy}):
+        for s in narrowed(file.called(scene), {**needs, "accuracy": accuracy}):
             what = (
                 f"building {'and verifying ' if check else ''}{s.name}{_first_time(kind, places)}"
             )

@@ -30,7 +30,7 @@ def page(
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
     from ...live.command import write_page
-    from ..scenes import chosen, for_models, loaded, narrowed
+    from ..scenes import for_models, loaded, narrowed
 
     with plainly():
         source: Model | Path = target
@@ -38,7 +38,7 @@ def page(
         if target.suffix == ".py":
             file = loaded(target, add_output, arguments)
             source = file.model
-            shown = narrowed(chosen(file, scene)[:1], needs)[0]
+            shown = narrowed(file.called(scene)[:1], needs)[0]
         else:
             for_models(target, scene=scene, p=arguments, **needs, add_output=add_output)
         with console.status("compiling to WebAssembly"):

@@ -29,11 +29,11 @@ def show(
     from ...page.text import show_what_is_known
     from ...prepare.prepare import prepare
     from ...prepare.starts import check_given
-    from ..scenes import chosen, loaded, narrowed
+    from ..scenes import loaded, narrowed
 
     with plainly():
         file = loaded(model, add_output, arguments)
-        for s in narrowed(chosen(file, scene), needs):
+        for s in narrowed(file.called(scene), needs):
             try:
                 prepared = prepare(file.model, s)
                 untried = try_start(prepared)

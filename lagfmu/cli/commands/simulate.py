@@ -66,13 +66,13 @@ def simulate(
     from ...verification.reference import read_table
     from ...verification.simulate import simulate as simulated
     from ..film import film
-    from ..scenes import chosen, for_models, loaded, narrowed
+    from ..scenes import for_models, loaded, narrowed
 
     with plainly():
         run: Any = source
         if source.suffix == ".py":
             file = loaded(source, add_output, arguments)
-            scenes = narrowed(chosen(file, scene), {"error_bars": error_bars})
+            scenes = narrowed(file.called(scene), {"error_bars": error_bars})
             run = prepare(file.model, scenes[0])
             name, variables = run.scene.name, run.table.variables
         else:

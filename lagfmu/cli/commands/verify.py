@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -20,9 +20,6 @@ from ..options import (
     assignments,
 )
 from ..terminal import plainly
-
-if TYPE_CHECKING:
-    from ...verification.junit import Report
 
 
 def verify(
@@ -52,23 +49,34 @@ def verify(
 
     The exit code is the largest of all FMUs'.
     """
+    from ...verification.junit import refused
+    from ...verification.reference import Reference, read_table
+    from ...verification.report import report
+    from ...verification.verify import verify as held
     from ..finish import finish, print_verdicts
 
     with plainly():
-        done = examine(
-            fmus,
-            assignments(set_, lambda: _units(fmus)),
-            stop_time,
-            step_size,
-            tolerance,
-            inputs,
-            reference,
-            rtol or (),
-            atol,
-        )
-        for one in done:
-            if one.found is not None:
-                print_verdicts(one.found)
+        if reference is None and (rtol or atol):
+            raise UsageError("--rtol and --atol are for --reference")
+        if reference is not None and len(fmus) > 1:
+            raise UsageError("--reference belongs to one FMU")
+        common, own = _tolerances(rtol or ())
+        try:
+            signals = None if inputs is None else read_table(inputs)
+            known = None if reference is None else read_table(reference)
+            table = None if known is None else Reference(known, common, atol, own)
+        except SimulationError as error:
+            raise UsageError(str(error)) from None
+        values = assignments(set_, lambda: _units(fmus))
+        done = []
+        for fmu in fmus:  # one that cannot be run does not keep the others from it
+            try:
+                found = held(fmu, values, stop_time, step_size, tolerance, signals, table)
+            except LagfmuError as error:
+                done.append(refused(str(fmu), error))
+            else:
+                done.append(report(str(fmu), found))
+                print_verdicts(found)
         finish("verify", done, json, junit)
 
 
@@ -81,7 +89,7 @@ def _units(fmus: Sequence[Path]) -> dict[str, str | None]:
     }
 
 
-def tolerances(texts: Sequence[str]) -> tuple[float, dict[str, float]]:
+def _tolerances(texts: Sequence[str]) -> tuple[float, dict[str, float]]:
     """RTOL or NAME=RTOL, repeatable: the one for all, and those of single variables."""
     common, own = 1e-6, {}
     for text in texts:
@@ -97,41 +105,3 @@ def tolerances(texts: Sequence[str]) -> tuple[float, dict[str, float]]:
         else:
             common = number
     return common, own
-
-
-def examine(
-    fmus: Sequence[Path],
-    values: Mapping[str, Any],
-    stop_time: float | None,
-    step_size: float | None,
-    tolerance: float | None,
-    inputs: Path | None,
-    reference: Path | None,
-    rtol: Sequence[str],
-    atol: float,
-) -> list[Report]:
-    """Each FMU; one that cannot be run does not keep the others from it.  Raises UsageError."""
-    from ...verification.junit import refused
-    from ...verification.reference import Reference, read_table
-    from ...verification.report import report
-    from ...verification.verify import verify as held
-
-    if reference is None and (rtol or atol):
-        raise UsageError("--rtol and --atol are for --reference")
-    if reference is not None and len(fmus) > 1:
-        raise UsageError("--reference belongs to one FMU")
-    common, own = tolerances(rtol)
-    try:
-        signals = None if inputs is None else read_table(inputs)
-        table = None if reference is None else Reference(read_table(reference), common, atol, own)
-    except SimulationError as error:
-        raise UsageError(str(error)) from None
-    done = []
-    for fmu in fmus:
-        try:
-            found = held(fmu, values, stop_time, step_size, tolerance, signals, table)
-        except LagfmuError as error:
-            done.append(refused(str(fmu), error))
-        else:
-            done.append(report(str(fmu), found))
-    return done
