@@ -136,7 +136,7 @@ static Status stabilize(Instance *x, double *derivatives) {
         c[k] = s->system->rows[k].kind == NONHOLONOMIC
                    ? -alpha * mechanism_slip(b, k, s->state.v)
                    : -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
-    if (linear_nearest(&b->linear, c, a) != OK) return OK; /* rows contradict each other */
+    if (linear_nearest(&b->linear, NULL, c, a, NULL) != OK) return OK; /* rows contradict each other */
     for (int i = 0; i < s->system->nv; i++) derivatives[place_of(s->system, s->system->nq + i)] += a[i];
     return OK;
 }

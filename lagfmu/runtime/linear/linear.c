@@ -197,9 +197,9 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
     return status;
 }
 
-Status linear_nearest(Linear *l, const double *c, double *x) {
+Status linear_nearest(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     l->nearest = 1;
-    const Status status = linear_solve(l, NULL, c, x, NULL);
+    const Status status = linear_solve(l, b, c, x, lambda);
     l->nearest = 0;
     return status;
 }

@@ -58,10 +58,10 @@ SHARED Status linear_factor(Linear *l, const double *M, const double *G, const i
  * lambda may be NULL.  FAILED: dependent rows contradict each other, or the result overflows. */
 SHARED Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
-/* x (nv) of least size in the metric of M with G x = c, for a projection.  Where dependent rows
- * contradict each other, as those of c do that is nothing but rounding, c is met as nearly as can be
- * (least squares in rows of comparable units). */
-SHARED Status linear_nearest(Linear *l, const double *c, double *x);
+/* The same for a projection (b = NULL: x of least size in the metric of M) or an impact: where dependent rows
+ * contradict each other, as those of c do that is nothing but rounding, c is met as nearly as can be (least
+ * squares in rows of comparable units). */
+SHARED Status linear_nearest(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
 /* Factors and does that at once; a coordinate that has neither mass nor a constraint stays. */
 SHARED Status linear_project(Linear *l, const double *M, const double *G, const int *active,

@@ -65,6 +65,12 @@ static inline double mechanism_row(const Mechanism *b, int k, const double *x) {
     return sum;
 }
 
+/* G_k^T part, added to the force (nv). */
+static inline void mechanism_push(const Mechanism *b, int k, double part, double *force) {
+    const System *s = b->system;
+    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) force[s->entry_column[e]] += part * b->G[e];
+}
+
 /* G v - nu of row k at the state that was evaluated last. */
 static inline double mechanism_slip(const Mechanism *b, int k, const double *v) {
     return mechanism_row(b, k, v) - b->nu[k];

@@ -91,7 +91,7 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
         if ((stale || count == 0) &&
             linear_factor(&b->linear, b->M, b->G, b->fixed) == FAILED)
             return FAILED;
-        if (linear_nearest(&b->linear, b->f, b->dq) == FAILED) return FAILED;
+        if (linear_nearest(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
         mechanism_move(b, 1, b->dq, q);
         if (mechanism_settle(b, at, q) == FAILED) return FAILED;
         before = miss.error;
@@ -109,7 +109,7 @@ static Status project_velocities(Mechanism *b, double *v, const int *active) {
     }
     if (rounding) return OK;
     if (linear_factor(&b->linear, b->M, b->G, active) == FAILED) return FAILED;
-    if (linear_nearest(&b->linear, b->f, b->dq) == FAILED) return FAILED;
+    if (linear_nearest(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
     for (int j = 0; j < s->nv; j++) v[j] += b->dq[j];
     return OK;
 }

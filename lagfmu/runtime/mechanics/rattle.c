@@ -48,7 +48,7 @@ static Status onto_constraints(Mechanism *b, Instant at, const int *active, cons
         if (distance(b, at, active, offset, q1, &largest) != OK) return FAILED;
         if (largest == 0 || (largest > before / 2 && largest < SMALL)) return OK;
         if (!(largest < before)) break;
-        if (linear_nearest(&b->linear, b->f, b->dq) != OK) return FAILED;
+        if (linear_nearest(&b->linear, NULL, b->f, b->dq, NULL) != OK) return FAILED;
         for (int j = 0; j < b->system->nv; j++) {
             q1[j] += b->dq[j];
             step[j] += b->dq[j];

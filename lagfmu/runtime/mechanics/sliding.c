@@ -89,11 +89,7 @@ static void find_push(Mechanism *b, int i) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
     for (int j = 0; j < s->nv; j++) f->d[j] = 0;
-    for (int r = 0; r < s->friction[i].rows; r++) {
-        const int k = s->friction[i].row[r];
-        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
-            f->d[s->entry_column[e]] += b->G[e] * f->towards[2 * i + r];
-    }
+    for (int r = 0; r < s->friction[i].rows; r++) mechanism_push(b, s->friction[i].row[r], f->towards[2 * i + r], f->d);
 }
 
 /* The normal forces of those that slip, and what they add to vdot and lambda. */

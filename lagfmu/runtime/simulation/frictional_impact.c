@@ -36,13 +36,6 @@ size_t frictional_impact_ints(const System *s) {
     return (size_t)(s->contacts + 2 * s->frictions + s->frictions + s->m);
 }
 
-/* G_k^T times a number, added to the force. */
-static void add_row(const FrictionalImpact *x, int k, double part) {
-    const System *s = x->s->system;
-    for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
-        x->force[s->entry_column[e]] += part * x->b->G[e];
-}
-
 /* Rows that are struck, frictions that have a normal force of them; 0 if there are none. */
 static int find_struck_rows(FrictionalImpact *x, const int *entering) {
     const System *s = x->s->system;
@@ -71,21 +64,10 @@ static Status reduce_frictional(FrictionalImpact *x, const int *entering, int *a
         x->right[k] = -x->slip[k];
         x->zero[k] = 0;
     }
-    if (linear_nearest(l, x->right, x->dv) != OK) return FAILED;
+    if (linear_nearest(l, NULL, x->right, x->dv, NULL) != OK) return FAILED;
     for (int i = 0; i < x->count; i++)
         x->free[i] = x->slip[x->rows[i]] + mechanism_row(x->b, x->rows[i], x->dv);
-    for (int i = 0; i < x->count; i++) {
-        memset(x->force, 0, (size_t)s->nv * sizeof *x->force);
-        add_row(x, x->rows[i], 1);
-        if (linear_solve(l, x->force, x->zero, x->dv, Lambda) != OK) return FAILED;
-        for (int j = 0; j < x->count; j++)
-            x->A[j * x->count + i] = mechanism_row(x->b, x->rows[j], x->dv);
-    }
-    for (int i = 0; i < x->count; i++)
-        for (int j = 0; j < i; j++)
-            x->A[i * x->count + j] = x->A[j * x->count + i] =
-                (x->A[i * x->count + j] + x->A[j * x->count + i]) / 2;
-    return OK;
+    return impact_compliance(x->b, x->count, x->rows, x->force, x->zero, (Impulse){x->dv, Lambda}, x->A);
 }
 
 /* A z + free + e s- of row i. */
@@ -144,11 +126,9 @@ static int sweep(FrictionalImpact *x, const double *e) {
 static Status finish_frictional(FrictionalImpact *x, double *dv, double *Lambda) {
     const System *s = x->s->system;
     memset(x->force, 0, (size_t)s->nv * sizeof *x->force);
-    for (int i = 0; i < x->count; i++) add_row(x, x->rows[i], x->z[i]);
+    for (int i = 0; i < x->count; i++) mechanism_push(x->b, x->rows[i], x->z[i], x->force);
     for (int k = 0; k < s->m; k++) x->right[k] = -x->slip[k];
-    x->b->linear.nearest = 1;
-    const Status status = linear_solve(&x->b->linear, x->force, x->right, dv, Lambda);
-    x->b->linear.nearest = 0;
+    const Status status = linear_nearest(&x->b->linear, x->force, x->right, dv, Lambda);
     for (int i = 0; i < x->count; i++) Lambda[x->rows[i]] = x->z[i];
     return status;
 }

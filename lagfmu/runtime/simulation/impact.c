@@ -27,12 +27,10 @@ typedef struct {
     double *slip, *e, *zero, *right; /* (m) s-, e; 0; right-hand sides */
     double *x;                       /* (nv) */
     double *A, *c, *z, *w, *work;    /* of complementarity.h */
-    int k, *contact, *holding;       /* (contacts) those that enter; 1: rows that act with it do */
+    int k, *contact, *row, *holding; /* (contacts) those that enter, their rows; 1: rows that act with it do */
     int *active;                     /* (m) */
     int *iwork;
 } Struck;
-
-static int row_of(const Struck *x, int i) { return x->s->system->contact[x->contact[i]]; }
 
 /* Rows that act with both signs: those that always do, and those of the contacts in `holding`. */
 static void set_base(Struck *x) {
@@ -48,13 +46,17 @@ static int acts_with(const System *system, int contact) {
     return 0;
 }
 
-/* Rows of one impact may miss each other by rounding: they are met as nearly as can be. */
-static Status solve_impact(Struck *x, const double *right, double *dv, double *Lambda) {
-    Linear *l = &x->b->linear;
-    l->nearest = 1;
-    const Status status = linear_solve(l, NULL, right, dv, Lambda);
-    l->nearest = 0;
-    return status;
+Status impact_compliance(Mechanism *b, int count, const int *rows, double *force, const double *zero,
+                         Impulse scratch, double *A) {
+    for (int i = 0; i < count; i++) {
+        memset(force, 0, (size_t)b->system->nv * sizeof *force);
+        mechanism_push(b, rows[i], 1, force);
+        if (linear_solve(&b->linear, force, zero, scratch.dv, scratch.Lambda) != OK) return FAILED;
+        for (int j = 0; j < count; j++) A[j * count + i] = mechanism_row(b, rows[j], scratch.dv);
+    }
+    for (int i = 0; i < count; i++)
+        for (int j = 0; j < i; j++) A[i * count + j] = A[j * count + i] = (A[i * count + j] + A[j * count + i]) / 2;
+    return OK;
 }
 
 /* A (k, k) and c (k): s+ + e s- = A Lambda + c on the contacts, the base rows taken care of. */
@@ -63,25 +65,12 @@ static Status reduce_impact(Struck *x, const Impulse *scratch) {
     Mechanism *b = x->b;
     if (linear_factor(&b->linear, b->M, b->G, x->active) != OK) return FAILED;
     for (int j = 0; j < system->m; j++) x->right[j] = -x->slip[j];
-    if (solve_impact(x, x->right, scratch->dv, scratch->Lambda) != OK) return FAILED;
+    if (linear_nearest(&b->linear, NULL, x->right, scratch->dv, scratch->Lambda) != OK) return FAILED;
     for (int i = 0; i < x->k; i++) {
-        const int row = row_of(x, i);
+        const int row = x->row[i];
         x->c[i] = (1 + x->e[row]) * x->slip[row] + mechanism_row(b, row, scratch->dv);
     }
-    for (int i = 0; i < x->k; i++) {
-        const int row = row_of(x, i);
-        memset(x->x, 0, (size_t)system->nv * sizeof *x->x);
-        for (int e = system->row_start[row]; e < system->row_start[row + 1]; e++)
-            x->x[system->entry_column[e]] = b->G[e];
-        if (linear_solve(&b->linear, x->x, x->zero, scratch->dv, scratch->Lambda) != OK)
-            return FAILED;
-        for (int j = 0; j < x->k; j++)
-            x->A[j * x->k + i] = mechanism_row(b, row_of(x, j), scratch->dv);
-    }
-    for (int i = 0; i < x->k; i++)
-        for (int j = 0; j < i; j++)
-            x->A[i * x->k + j] = x->A[j * x->k + i] = (x->A[i * x->k + j] + x->A[j * x->k + i]) / 2;
-    return OK;
+    return impact_compliance(b, x->k, x->row, x->x, x->zero, *scratch, x->A);
 }
 
 static int rebounds(const Struck *x) {
@@ -95,7 +84,7 @@ static Status no_velocities(Struck *x, double time) {
     Digits t = digits(time);
     fail(&x->s->why, "no velocities after the impact at t = %s s satisfy the contacts ", t.text);
     for (int i = 0; i < x->k; i++) {
-        why_append(&x->s->why, "%s'%s'", comma, x->s->system->rows[row_of(x, i)].name);
+        why_append(&x->s->why, "%s'%s'", comma, x->s->system->rows[x->row[i]].name);
         comma = ", ";
     }
     why_append(&x->s->why, " together: they are driven against each other");
@@ -112,14 +101,14 @@ static Status finish_impact(Struck *x, const Impulse *found) {
         double most = 0, least = 0;
         set_base(x);
         for (int i = 0; i < x->k; i++) {
-            const int row = row_of(x, i);
+            const int row = x->row[i];
             x->active[row] = pass == 0 ? x->w[i] == 0 : x->z[i] > 0;
             x->right[row] = -(1 + x->e[row]) * x->slip[row];
         }
         if (linear_factor(&b->linear, b->M, b->G, x->active) != OK) return FAILED;
-        if (solve_impact(x, x->right, found->dv, found->Lambda) != OK) return FAILED;
+        if (linear_nearest(&b->linear, NULL, x->right, found->dv, found->Lambda) != OK) return FAILED;
         for (int j = 0; j < system->m; j++) most = fmax(most, fabs(found->Lambda[j]));
-        for (int i = 0; i < x->k; i++) least = fmin(least, found->Lambda[row_of(x, i)]);
+        for (int i = 0; i < x->k; i++) least = fmin(least, found->Lambda[x->row[i]]);
         if (least >= -IMPACT_PULL * most) break;
     }
     return OK;
@@ -231,12 +220,16 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
     x.z = x.c + contacts;
     x.w = x.z + contacts;
     x.work = x.w + contacts;
-    x.holding = x.contact + contacts;
+    x.row = x.contact + contacts;
+    x.holding = x.row + contacts;
     x.active = x.holding + contacts;
     x.iwork = x.active + m;
     if (mechanism_evaluate(x.b, at, q, v) != OK) return FAILED;
     for (int c = 0; c < contacts; c++)
-        if (entering[c]) x.contact[x.k++] = c;
+        if (entering[c]) {
+            x.row[x.k] = system->contact[c];
+            x.contact[x.k++] = c;
+        }
     for (int j = 0; j < m; j++) {
         const double terms = mechanism_row_size(x.b, j, v) + fabs(x.b->nu[j]);
         x.slip[j] = mechanism_slip(x.b, j, v);

@@ -13,7 +13,7 @@ static inline int impact_doubles(int n, int m, int contacts) {
     return 3 * n + 6 * m + contacts * contacts + 3 * contacts + complementarity_doubles(contacts);
 }
 static inline int impact_ints(int m, int contacts) {
-    return m + 3 * contacts + complementarity_ints(contacts);
+    return m + 4 * contacts + complementarity_ints(contacts);
 }
 
 /* The velocities' change (nv) and the impulses (m). */
@@ -31,6 +31,11 @@ SHARED Status impacts(Solver *s, Instant at, const double *q, double *v, const i
  * Lambda (m): the impulses, 0 where a row did not act. */
 SHARED Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
                      double *Lambda);
+
+/* A (count, count), symmetric to the bit: how a unit impulse on each of the rows moves them all, those that are
+ * factored taken care of.  force (nv): scratch; zero (m): 0. */
+SHARED Status impact_compliance(Mechanism *b, int count, const int *rows, double *force, const double *zero,
+                                Impulse scratch, double *A);
 
 /* FAILED if a coefficient of restitution is not between 0 and 1. */
 SHARED Status impact_check(Solver *s);

@@ -50,7 +50,7 @@ Status landing_bring_back(Solver *s, const int *happened, const double *pull) {
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     set_changes(s, happened, pull, depth, change);
     if (linear_factor(&b->linear, b->M, b->G, acting) != OK) return FAILED;
-    if (linear_nearest(&b->linear, change, dv) != OK) return FAILED;
+    if (linear_nearest(&b->linear, NULL, change, dv, NULL) != OK) return FAILED;
     for (int j = 0; j < system->nv; j++) s->state.v[j] += dv[j];
     return OK;
 }
