@@ -1,4 +1,4 @@
-"""Twenty-six systems against integrations written by hand, in co-simulation and in model exchange.
+"""Twenty-seven systems against integrations written by hand, in co-simulation and in model exchange.
 
     python benchmarks/independent/compare.py [NAME ...]
 
@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 
+import andrews
 import events
 import fmpy
 import mechanisms
@@ -72,7 +73,7 @@ def main() -> int:
     """Print the table."""
     wrong = 0
     print(f"{'':22}", *(f"{h:>12}" for h in HEADINGS))
-    for make in (*smooth.SYSTEMS, *events.SYSTEMS, *mechanisms.SYSTEMS):
+    for make in (*smooth.SYSTEMS, *events.SYSTEMS, *mechanisms.SYSTEMS, *andrews.SYSTEMS):
         if sys.argv[1:] and make.__name__ not in sys.argv[1:]:
             continue
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
