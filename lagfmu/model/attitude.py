@@ -34,12 +34,11 @@ class Attitude(sp.Function):  # type: ignore[misc]
         return True
 
     def polynomial(self) -> Expr:
-        """The element written out, for a quaternion of norm 1 (Goldstein, Classical Mechanics, eq. 4.47)."""
+        """The element written out (Goldstein, Classical Mechanics, eq. 4.47): R' = R [w]x of whatever norm."""
         i, j = self.place
         e0, *e = self.quaternion
         if i == j:
-            others = [x for k, x in enumerate(e) if k != i]
-            return 1 - 2 * (others[0] ** 2 + others[1] ** 2)
+            return e0**2 + sum(x**2 if k == i else -(x**2) for k, x in enumerate(e))
         k = 3 - i - j
         sign = 1 if (i + 1) % 3 == j else -1
         return 2 * (e[i] * e[j] - sign * e0 * e[k])
