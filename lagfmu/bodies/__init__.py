@@ -5,6 +5,7 @@ from .contacts import Contact
 from .joints import Distance, Fixed, Gear, PointOnPlane, Prismatic, Revolute, Rolling
 from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
 from .mechanism import mechanism
+from .urdf import from_urdf
 
 __all__ = [
     "Body",
@@ -23,5 +24,6 @@ __all__ = [
     "SpringDamper",
     "Torque",
     "Torsion",
+    "from_urdf",
     "mechanism",
 ]

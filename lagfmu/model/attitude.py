@@ -34,7 +34,8 @@ class Attitude(sp.Function):  # type: ignore[misc]
         return True
 
     def polynomial(self) -> Expr:
-        """The element written out (Goldstein, Classical Mechanics, eq. 4.47): R' = R [w]x of whatever norm."""
+        """The element written out (Goldstein, Classical Mechanics, eq. 4.47): R' = R [w]x of whatever
+        norm."""
         i, j = self.place
         e0, *e = self.quaternion
         if i == j:

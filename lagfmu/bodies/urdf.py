@@ -1,0 +1,235 @@
+"""Bodies and joints from a URDF file, read by yourdfpy.
+
+A link is a body whose own frame is that of the link, so that the FMU's points and inertias are those of the
+file; a joint of the file keeps its name, and what it drives turns about the z axis of a marker that is laid
+along the file's axis.  The root link is the ground.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ModelError
+from .body import Body, Ground, Marker
+from .joints import Fixed, Joint, Prismatic, Revolute
+from .loads import Torsion
+
+KINDS = {"revolute": Revolute, "continuous": Revolute, "prismatic": Prismatic, "fixed": Fixed}
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx, yy, zz, xy, xz, yz
+Pose = NDArray[np.float64]  # (4, 4) homogeneous
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a URDF file holds: pass it on to `mechanism`, with loads and motors of your own beside it.
+
+    `loads` are the dampers of its joints; `frames` names the links without mass that are fixed to another:
+    each is a marker, not a body.
+    """
+
+    name: str
+    ground: Ground
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    loads: tuple[Torsion, ...]
+    frames: dict[str, Marker]
+
+
+def from_urdf(file: str | os.PathLike[str], limits: bool = True) -> Parts:
+    """The bodies and joints of a URDF file; without `limits` its joints do not stop where it says so.
+
+    Raises ModelError with every problem at once: links without inertia that move, mimic joints, joints of a
+    kind that there is not, links with two parents or none, friction in a joint.
+    """
+    robot = _read(Path(file))
+    problems = _problems_of_tree(robot) or _problems_of_parts(robot)
+    if problems:
+        raise ModelError(str(robot.name), problems)
+    return _Builder(robot, limits).parts()
+
+
+def _read(path: Path) -> Any:
+    try:
+        from yourdfpy import URDF
+    except ImportError:
+        raise ModelError(
+            path.name, ["reading URDF needs yourdfpy: pip install 'lagfmu[urdf]'"]
+        ) from None
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        problem = f"{str(path)!r} cannot be read ({error.strerror or error}): correct the path"
+        raise ModelError(path.name, [problem]) from None
+    from io import BytesIO
+
+    try:
+        return URDF.load(BytesIO(content), build_scene_graph=False, load_meshes=False).robot
+    except Exception as error:  # of lxml, of a number that is none, of an element that is missing
+        problem = f"{str(path)!r} is no URDF file that can be read: {str(error).splitlines()[0]}"
+        raise ModelError(path.name, [problem]) from None
+
+
+def _problems_of_tree(robot: Any) -> list[str]:
+    """What is no tree of known links with one root."""
+    links = [link.name for link in robot.links]
+    problems = [f"two links are called {n!r}: rename one" for n in _twice(links)]
+    problems += [f"two joints are called {n!r}: rename one" for n in _twice(_names(robot.joints))]
+    parents: dict[str, list[str]] = defaultdict(list)
+    for joint in robot.joints:
+        for end, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in links:
+                problems.append(f"joint {joint.name!r}: its {end} {link!r} is no link of the file")
+        parents[joint.child].append(joint.name)
+    problems += [
+        f"link {link!r} is the child of {' and '.join(map(repr, of))}, expected one joint: URDF has trees "
+        "only; close a loop by a joint of your own beside those of the file"
+        for link, of in parents.items()
+        if len(of) > 1
+    ]
+    roots = [link for link in links if link not in parents]
+    if len(roots) != 1 and not problems:
+        found = ", ".join(map(repr, roots)) or "none: the joints form a cycle"
+        problems.append(f"the file has the root links {found}, expected one")
+    if not problems and len(robot.joints) >= len(links):
+        problems.append("the joints form a cycle: URDF has trees only")
+    return problems
+
+
+def _problems_of_parts(robot: Any) -> list[str]:
+    problems = []
+    for joint in robot.joints:
+        if joint.type not in KINDS:
+            problems.append(
+                f"joint {joint.name!r} is of the type {joint.type!r}, expected one of "
+                f"{', '.join(KINDS)}: build it from bodies and joints of lagfmu"
+            )
+        if joint.mimic is not None:
+            problems.append(
+                f"joint {joint.name!r} mimics {joint.mimic.joint!r}: leave the mimic out, and add Gear(NAME, "
+                f"{joint.name!r}, {joint.mimic.joint!r}, {joint.mimic.multiplier or 1.0!r}) to the joints"
+            )
+        if friction := _dynamics(joint, "friction"):
+            problems.append(
+                f"joint {joint.name!r} has the friction {friction!r}, which no normal force "
+                "limits: leave it out, and give the joint of lagfmu a coefficient of friction"
+            )
+        if joint.type != "fixed" and joint.axis is not None and not np.linalg.norm(joint.axis) > 0:
+            problems.append(f"joint {joint.name!r} has the axis {joint.axis}, expected a direction")
+    root = _root(robot)
+    fixed = {joint.child for joint in robot.joints if joint.type == "fixed"}
+    for link in robot.links:
+        if link.name != root and link.name not in fixed and not _mass(link):
+            problems.append(
+                f"link {link.name!r} moves and has no inertia: give it an <inertial> with mass and inertia, "
+                "or a fixed joint to a link that has one"
+            )
+    return problems
+
+
+def _twice(names: Sequence[str]) -> list[str]:
+    return sorted({n for n in names if names.count(n) > 1})
+
+
+def _names(things: Sequence[Any]) -> list[str]:
+    return [thing.name for thing in things]
+
+
+def _root(robot: Any) -> str:
+    children = {joint.child for joint in robot.joints}
+    return next(str(link.name) for link in robot.links if link.name not in children)
+
+
+def _dynamics(joint: Any, name: str) -> float:
+    """A number of <dynamics>, which yourdfpy hands on as text."""
+    return float(getattr(joint.dynamics, name, None) or 0.0)
+
+
+def _mass(link: Any) -> float:
+    return float(link.inertial.mass or 0.0) if link.inertial is not None else 0.0
+
+
+class _Builder:
+    """Links in the order in which the tree reaches them."""
+
+    def __init__(self, robot: Any, limits: bool) -> None:
+        self.robot, self.limits = robot, limits
+        self.links = {link.name: link for link in robot.links}
+        self.ground = Ground()
+        self.carrier: dict[str, tuple[Body | Ground, Pose]] = {}  # of each link's frame
+        self.bodies: list[Body] = []
+        self.joints: list[Joint] = []
+        self.loads: list[Torsion] = []
+        self.frames: dict[str, Marker] = {}
+
+    def parts(self) -> Parts:
+        """The whole of it."""
+        self.carrier[_root(self.robot)] = self.ground, np.eye(4)
+        waiting = list(self.robot.joints)
+        while waiting:
+            joint = next(j for j in waiting if j.parent in self.carrier)
+            waiting.remove(joint)
+            self._add(joint)
+        return Parts(
+            str(self.robot.name),
+            self.ground,
+            tuple(self.bodies),
+            tuple(self.joints),
+            tuple(self.loads),
+            self.frames,
+        )
+
+    def _add(self, joint: Any) -> None:
+        carrier, pose = self.carrier[joint.parent]
+        pose = pose @ (np.eye(4) if joint.origin is None else joint.origin)
+        link = self.links[joint.child]
+        if joint.type == "fixed" and not _mass(link):
+            self.carrier[link.name] = carrier, pose
+            self.frames[link.name] = _marker(carrier, pose)
+            return
+        body = _body(link)
+        self.bodies.append(body)
+        self.carrier[link.name] = body, np.eye(4)
+        turned = np.eye(4)
+        if joint.type != "fixed":
+            axis = (1.0, 0.0, 0.0) if joint.axis is None else joint.axis
+            turned[:3, :3] = _onto(np.array(axis, dtype=float))
+        kind = KINDS[joint.type]
+        stops = joint.limit if self.limits and joint.type in ("revolute", "prismatic") else None
+        limits = None if stops is None else (stops.lower or 0.0, stops.upper or 0.0)
+        first, second = _marker(carrier, pose @ turned), _marker(body, turned)
+        axis_of_marker = "" if joint.type == "fixed" else "z"
+        self.joints.append(kind(joint.name, first, second, axis_of_marker, limits))
+        if damping := _dynamics(joint, "damping"):
+            self.loads.append(Torsion(f"{joint.name}.damper", joint.name, damping=damping))
+
+
+def _body(link: Any) -> Body:
+    """The link's mass, centre and inertia, which the file gives in axes of their own, in the link's frame."""
+    origin = np.eye(4) if link.inertial.origin is None else link.inertial.origin
+    R = origin[:3, :3]
+    J = R @ np.array(link.inertial.inertia, dtype=float) @ R.T
+    inertia = tuple(float(J[pair]) for pair in PAIRS)
+    return Body(link.name, _mass(link), inertia, center=tuple(map(float, origin[:3, 3])))
+
+
+def _marker(carrier: Body | Ground, pose: Pose) -> Marker:
+    rotation = None if np.array_equal(pose[:3, :3], np.eye(3)) else pose[:3, :3].tolist()
+    return carrier.at(tuple(map(float, pose[:3, 3])), rotation=rotation)
+
+
+def _onto(axis: Pose) -> Pose:
+    """The rotation that takes z onto that direction by the least turn (Rodrigues' formula)."""
+    x, y, z = axis / np.linalg.norm(axis)
+    if z <= -1.0:
+        return np.diag([1.0, -1.0, -1.0])
+    K = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
+    turned: Pose = np.eye(3) + K + K @ K / (1.0 + z)
+    return turned

@@ -1,0 +1,114 @@
+"""Bodies and joints from URDF files: what is taken, and what is refused by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lagfmu.bodies import Revolute, from_urdf
+from lagfmu.errors import ModelError
+
+ARM = Path(__file__).parent.parent / "models" / "arm.urdf"
+INERTIA = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+MASS = f'<inertial><mass value="1"/>{INERTIA}</inertial>'
+
+
+def link(name: str, inertial: str = MASS) -> str:
+    return f'<link name="{name}">{inertial}</link>'
+
+
+def joint(name: str, parent: str, child: str, kind: str = "continuous", more: str = "") -> str:
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}<axis xyz="0 0 1"/>{more}</joint>'
+
+
+def robot(tmp_path: Path, *parts: str) -> Path:
+    path = tmp_path / "r.urdf"
+    path.write_text(f'<robot name="R">{"".join(parts)}</robot>')
+    return path
+
+
+def test_links_are_bodies_and_joints_keep_their_names() -> None:
+    """The root is the ground; a link without mass that is fixed to another is a frame on it."""
+    arm = from_urdf(ARM)
+    assert [body.name for body in arm.bodies][:2] == ["shoulder", "upper_arm"]
+    assert [j.name for j in arm.joints] == [f"j{k}" for k in range(1, 7)]
+    assert all(isinstance(j, Revolute) for j in arm.joints)
+    assert arm.joints[0].limits == (-3.0, 3.0)
+    assert arm.joints[5].limits is None
+    assert arm.frames["tool"].body is arm.bodies[-1]
+    assert {j.limits for j in from_urdf(ARM, limits=False).joints} == {None}
+
+
+def test_an_inertia_in_turned_axes_is_turned_into_those_of_the_link() -> None:
+    """J = R J' R^T keeps its trace and its principal moments."""
+    body = {b.name: b for b in from_urdf(ARM).bodies}["wrist_1"]
+    xx, yy, zz, xy, xz, yz = body.inertia
+    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    np.testing.assert_allclose(np.linalg.eigvalsh(J), [0.0012, 0.0019, 0.0022], rtol=1e-12)
+    c, s = np.cos(0.3), np.sin(0.3)
+    assert yz == pytest.approx(c * s * (0.0019 - 0.0012))
+
+
+def test_a_marker_lays_z_along_the_axis_of_the_file() -> None:
+    """The axis (0, 0.6, 0.8) of the fifth joint is the third column of both markers' rotations."""
+    fifth = from_urdf(ARM).joints[4]
+    for marker in (fifth.first, fifth.second):
+        np.testing.assert_allclose(np.array(marker.rotation)[:, 2], [0, 0.6, 0.8], atol=1e-15)
+
+
+BASE = link("base", "")
+WRONG: dict[str, tuple[tuple[str, ...], str]] = {
+    "mimic": (
+        (BASE, link("a"), joint("j", "base", "a", more='<mimic joint="k" multiplier="2"/>')),
+        r"joint 'j' mimics 'k': leave the mimic out, and add Gear\(NAME, 'j', 'k', 2.0\)",
+    ),
+    "massless": (
+        (BASE, link("a", ""), joint("j", "base", "a")),
+        "link 'a' moves and has no inertia",
+    ),
+    "kind": ((BASE, link("a"), joint("j", "base", "a", "floating")), "of the type 'floating'"),
+    "two parents": (
+        (BASE, *map(link, "ab"), *(joint(*j.split()) for j in ("i base a", "j base b", "k a b"))),
+        "link 'b' is the child of 'j' and 'k', expected one joint",
+    ),
+    "cycle": ((link("a"), link("b"), joint("i", "a", "b"), joint("j", "b", "a")), "form a cycle"),
+    "two roots": ((BASE, link("a"), link("b"), joint("j", "base", "a")), "root links 'base', 'b'"),
+    "unknown": ((BASE, link("a"), joint("j", "base", "c")), "its child 'c' is no link of the file"),
+    "friction": (
+        (BASE, link("a"), joint("j", "base", "a", more='<dynamics friction="0.1"/>')),
+        "joint 'j' has the friction 0.1",
+    ),
+    "twice": ((BASE, link("a"), link("a"), joint("j", "base", "a")), "two links are called 'a'"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_a_file_holds_and_lagfmu_does_not_is_named(tmp_path: Path, case: str) -> None:
+    """With the remedy, before anything is built."""
+    parts, told = WRONG[case]
+    with pytest.raises(ModelError, match=told):
+        from_urdf(robot(tmp_path, *parts))
+
+
+def test_all_problems_are_told_at_once(tmp_path: Path) -> None:
+    """Of three links without inertia each is named."""
+    parts: list[Any] = [BASE]
+    for k in range(3):
+        parts += [link(f"l{k}", ""), joint(f"j{k}", "base", f"l{k}")]
+    with pytest.raises(ModelError, match="has 3 problems"):
+        from_urdf(robot(tmp_path, *parts))
+
+
+@pytest.mark.parametrize("text", ["", "<robot", "<sdf/>", '<robot name="R"><link/></robot>'])
+def test_a_file_that_is_no_urdf_is_refused(tmp_path: Path, text: str) -> None:
+    """One line with the path, never a traceback of the reader's."""
+    path = tmp_path / "x.urdf"
+    path.write_text(text)
+    with pytest.raises(ModelError):
+        from_urdf(path)
+    with pytest.raises(ModelError, match="No such file"):
+        from_urdf(tmp_path / "none.urdf")
