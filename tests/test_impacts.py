@@ -60,6 +60,25 @@ def test_a_table_dropped_flat_on_four_legs_stays_level(run, order):
     assert top(result)[after].max() == pytest.approx(0.25, rel=1e-9)
 
 
+def test_no_leg_of_a_table_pulls_in_an_impact(built):
+    """A table that turns lands level, all legs at once, and stays: m v, and J omega about both axes, are the
+    legs' impulses, of which the least would pull at one leg where J (omega_1 + omega_2) > m v l."""
+    speed, turns, way = 1.0, {"theta": 0.4, "phi": 0.3}, 0.1
+    start = {q: -rate * way for q, rate in turns.items()}
+    start |= {f"der({q})": rate for q, rate in turns.items()}
+    start |= {"z": speed * way + G * way**2 / 2, "der(z)": -speed, "e": 0.0}
+    with instance(built(table())) as one:
+        one.start(start, tolerance=1e-10)
+        one.step(2 * way)
+        legs = {(i, j): one.get(f"closing.leg{i}{j}.impulse") for i in (0, 1) for j in (0, 1)}
+        assert all(one.get(f"contact.leg{i}{j}") for i, j in legs)
+    assert min(legs.values()) >= 0
+    assert sum(legs.values()) == pytest.approx(speed + G * way, rel=1e-9)
+    for axis, rate in enumerate(turns.values()):
+        torque = sum((2 * leg[axis] - 1) * 0.5 * impulse for leg, impulse in legs.items())
+        assert torque == pytest.approx(-2.0 * rate, rel=1e-9)
+
+
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_a_particle_that_falls_into_a_v_climbs_neither_side(run, order):
     """e = 0: it stays at the bottom of a symmetric V, and each wall then carries m g/(2 sin(angle)); with
