@@ -23,6 +23,7 @@ from .reactions import reaction_units, reactions_in
 from .shapes import unusable_surfaces
 from .speeds import check_rates, check_speeds
 from .spline import Spline, splines_in
+from .symbols import known_symbols, symbols_in, undeclared
 from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
 
 RATES = (
@@ -132,7 +133,7 @@ def _check_start(
                 + (" (it moves by `kinematics`)" if state.is_Derivative else "")
             )
         if isinstance(value, sp.Basic) and value.free_symbols:
-            if others := _unknown(value, set(parameters)):
+            if others := sorted(map(plain, symbols_in(value) - set(parameters))):
                 problems.append(
                     f"{what} of {plain(state)} = {plain(value)} holds {', '.join(others)}, expected a number "
                     "or an expression of parameters"
@@ -195,10 +196,7 @@ def _expressions(model: ModelFields) -> list[tuple[str, Expr]]:
 
 
 def _check_symbols(model: ModelFields, problems: list[str]) -> None:
-    t = dynamicsymbols._t
-    known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t}
     moving = {*model.coordinates, *model.speeds}
-    names = {name_of(s) for s in known | moving}
     for q in model.forces:
         if q in model.kinematics:
             problems.append(
@@ -208,17 +206,7 @@ def _check_symbols(model: ModelFields, problems: list[str]) -> None:
             problems.append(f"a force is given on {plain(q)}, which is no coordinate of the model")
     for what, expression in _expressions(model):
         problems += _solved_for(what, expression)
-        unknown = _unknown(expression, known | moving | set(reactions_in(expression)))
-        problems += [
-            f"{what}: {name} is neither coordinate, parameter nor input: "
-            + (
-                "one of that name is declared, but as another symbol (other assumptions, or no "
-                "function of time): use the same"
-                if name in names
-                else "declare it, e.g. as a Parameter with value and unit"
-            )
-            for name in unknown
-        ]
+        problems += undeclared(model, what, expression, reactions_in(expression))
         if what.startswith("constraint") and not expression.has(*moving):
             problems.append(
                 f"{what}: {expression} holds no coordinate, expected a condition on the motion: "
@@ -236,11 +224,11 @@ def _check_symbols(model: ModelFields, problems: list[str]) -> None:
             )
     if model.embedding is not None:
         for q, phi in model.embedding.relations.items():
-            unknown = _unknown(sp.sympify(phi), known | set(model.embedding.coordinates))
+            known = known_symbols(model) - moving | set(model.embedding.coordinates)
             problems += [
                 f"embedding of {plain(q)}: {name} is neither an independent coordinate nor a "
                 "parameter"
-                for name in unknown
+                for name in sorted(map(plain, symbols_in(phi) - known))
             ]
 
 
@@ -258,11 +246,6 @@ def _pfaffian(model: ModelFields, what: str) -> bool:
     return any(
         isinstance(c, Nonholonomic) and what == f"constraint {c.name!r}" for c in model.constraints
     )
-
-
-def _unknown(expression: Expr, known: set[Expr]) -> list[str]:
-    symbols = expression.free_symbols | expression.atoms(AppliedUndef)
-    return sorted(str(plain(s)) for s in symbols - known)
 
 
 def declared_units(model: ModelFields, problems: list[str]) -> dict[Expr, Unit]:

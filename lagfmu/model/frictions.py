@@ -10,12 +10,12 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 import sympy as sp
-from sympy.core.function import AppliedUndef
 from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
-from .elements import NAME, Contact, Expr, Friction, ModelFields, Nonholonomic, name_of
-from .reactions import is_reaction, multiplier, reactions_in
+from .elements import NAME, Contact, Expr, Friction, ModelFields, Nonholonomic
+from .reactions import multiplier, reactions_in
+from .symbols import undeclared
 from .units import ONE, Unit, check_dimension, parse_unit, plain
 
 MOST_ROWS = 2  # tangential directions of a surface
@@ -250,18 +250,9 @@ def _dimension(
 def _check_symbols(
     model: ModelFields, what: str, expression: Expr, also: set[Expr], problems: list[str]
 ) -> None:
-    t = dynamicsymbols._t
-    known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t} | also
-    known |= {s for q in model.coordinates for s in (q, q.diff(t))} | {*model.speeds}
-    found = {s for s in expression.free_symbols if s != t}
-    found |= expression.atoms(AppliedUndef) | expression.atoms(sp.Derivative)
-    inner = {a for d in expression.atoms(sp.Derivative) for a in d.atoms(AppliedUndef)}
-    for s in sorted(found - known - inner, key=str):
-        name = name_of(s) if not isinstance(s, sp.Derivative) else plain(s)
-        if what.startswith("normal") and is_reaction(s):
-            continue  # told already
-        problems.append(
-            f"{what}: {name} is neither coordinate, parameter nor input"
-            + (", and no multiplier(NAME)" if what.startswith("normal") else "")
-            + ": declare it, e.g. as a Parameter with value and unit"
-        )
+    told = {s for s in reactions_in(expression) if what.startswith("normal")}
+    problems += undeclared(model, what, expression, also | told)
+    for d in sorted(expression.atoms(sp.Derivative), key=str):
+        highest = 0 if d.expr in model.speeds or d.expr not in model.coordinates else 1
+        if d.derivative_count > highest:
+            problems.append(f"{what}: holds {plain(d)}, expected coordinates and their velocities")

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import sympy as sp
-from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
 from ..names import MULTIPLIER, RESERVED, read
 from .elements import Contact, Expr, ModelFields, Nonholonomic, Peak, is_name, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
+from .symbols import undeclared
 from .units import Unit, check_dimension, parse_unit, plain
 
 HIGHEST = 2  # order of a derivative
@@ -91,23 +91,7 @@ def _check_names(model: ModelFields, problems: list[str]) -> None:
 
 
 def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
-    t = dynamicsymbols._t
-    known = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs} | {t}
-    known |= {*model.coordinates, *model.speeds}
-    embedded = set(model.embedding.coordinates) if model.embedding else set()
-    names = {name_of(s) for s in known}
-    found = expression.free_symbols | expression.atoms(AppliedUndef)
-    for symbol in sorted(found - known - set(reactions_in(expression)), key=str):
-        name = plain(symbol)
-        remedy = "declare it, e.g. as a Parameter with value and unit"
-        if symbol in embedded:
-            remedy = "it is one of the embedding: write it by the model's own coordinates"
-        elif name in names:
-            remedy = (
-                "one of that name is declared, but as another symbol (other assumptions, or no "
-                "function of time): use the same"
-            )
-        yield f"{what}: {name} is neither coordinate, parameter nor input: {remedy}"
+    yield from undeclared(model, what, expression, reactions_in(expression))
     constraints = [c.name for c in model.constraints]
     reactions = {multiplier(c) for c in constraints}
     reactions |= {force_of_constraint(q) for q in model.directions}

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import sympy as sp
-from sympy.core.function import AppliedUndef
-from sympy.physics.vector import dynamicsymbols
 
 from .elements import Expr, ModelFields, name_of
+from .symbols import known_symbols, symbols_in
 
 Point = tuple[Expr, ...]
 
@@ -182,12 +180,11 @@ def expressions_of(shape: Shape) -> Iterator[Expr]:
 def _unknown(model: ModelFields, shape: Shape) -> Iterator[str]:
     """Names that are none of the model's; those with a dot are outputs."""
     extra = model.embedding.coordinates if model.embedding else {}
-    known: set[Any] = {*model.coordinates, *model.speeds, *extra, dynamicsymbols._t}
-    known |= {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs}
+    known = known_symbols(model) | set(extra)
     own = {o.name for o in model.outputs}
     if isinstance(shape, Track):
         known.add(shape.over)
     for expression in expressions_of(shape):
-        for symbol in expression.free_symbols | expression.atoms(AppliedUndef):
+        for symbol in symbols_in(expression):
             if symbol not in known and "." not in str(symbol) and str(symbol) not in own:
                 yield name_of(symbol)

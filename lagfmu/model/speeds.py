@@ -12,9 +12,8 @@ from collections.abc import Iterator
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
-from sympy.physics.vector import dynamicsymbols
 
-from .elements import Expr, ModelFields, name_of
+from .elements import Expr, ModelFields
 from .units import Unit, check_dimension, plain
 
 
@@ -50,14 +49,11 @@ def check_speeds(model: ModelFields, problems: list[str]) -> None:
     """What is wrong with the speeds and the kinematics, apart from units."""
     if not model.speeds and not model.kinematics and not model.unwrapped:
         return
-    t = dynamicsymbols._t
-    known = {*model.coordinates, *model.speeds, t}
-    known |= {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs}
     for q, expression in model.kinematics.items():
         if q not in model.coordinates:
             problems.append(f"kinematics give {plain(q)}, which is no coordinate of the model")
             continue
-        problems += _of_rate(model, q, sp.sympify(expression), known)
+        problems += _of_rate(model, q, sp.sympify(expression))
     used = {s for e in model.kinematics.values() for s in sp.sympify(e).atoms(AppliedUndef)}
     problems += [
         f"speed {plain(w)} moves nothing: say in `kinematics` which coordinates move by it"
@@ -69,9 +65,11 @@ def check_speeds(model: ModelFields, problems: list[str]) -> None:
             problems.append(
                 f"unwrapped gives {plain(q)}, which has no entry in `kinematics`: say there how fast it grows"
             )
-        problems += _unknown(
-            f"unwrapped {plain(q)}", sp.sympify(expression), known - {*model.speeds}
-        )
+        problems += [
+            f"unwrapped {plain(q)} holds the speed {plain(w)}, expected coordinates and parameters"
+            for w in model.speeds
+            if sp.sympify(expression).has(w)
+        ]
     if len(model.directions) > len(model.coordinates):
         problems.append(
             f"there are {len(model.directions)} speeds and {len(model.coordinates)} coordinates, expected no "
@@ -84,9 +82,8 @@ def check_speeds(model: ModelFields, problems: list[str]) -> None:
         )
 
 
-def _of_rate(model: ModelFields, q: Expr, rate: Expr, known: set[Expr]) -> Iterator[str]:
+def _of_rate(model: ModelFields, q: Expr, rate: Expr) -> Iterator[str]:
     what = f"kinematics of {plain(q)}"
-    yield from _unknown(what, rate, known)
     if rate.has(sp.Derivative):
         yield f"{what}: {plain(rate)} holds a derivative, expected coordinates and speeds"
         return
@@ -97,15 +94,6 @@ def _of_rate(model: ModelFields, q: Expr, rate: Expr, known: set[Expr]) -> Itera
                 f"{what}: {plain(rate)} is not affine in the speeds, expected B(q, t) v + b(q, t)"
             )
             return
-
-
-def _unknown(what: str, expression: Expr, known: set[Expr]) -> Iterator[str]:
-    found = expression.free_symbols | expression.atoms(AppliedUndef)
-    for s in sorted(found - known, key=str):
-        yield (
-            f"{what}: {name_of(s)} is neither coordinate, speed, parameter nor input: declare it, e.g. in "
-            "`speeds` with its unit"
-        )
 
 
 def check_rates(model: ModelFields, units: dict[Expr, Unit], problems: list[str]) -> None:

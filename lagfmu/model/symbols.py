@@ -1,0 +1,47 @@
+"""The symbols of a model, and what to say of those in an expression that are none of them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+from sympy.physics.vector import dynamicsymbols
+
+from .elements import Expr, ModelFields, name_of
+from .units import plain
+
+
+def known_symbols(model: ModelFields) -> set[Expr]:
+    """Coordinates, speeds, parameters, inputs and time."""
+    declared = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs}
+    return {*model.coordinates, *model.speeds, *declared, dynamicsymbols._t}
+
+
+def undeclared(
+    model: ModelFields, what: str, expression: Expr, also: Collection[Expr] = ()
+) -> list[str]:
+    """The symbols of an expression that are none of the model's, nor `also`, each with the remedy."""
+    known = known_symbols(model)
+    names = {name_of(s) for s in known}
+    problems = []
+    for symbol in sorted(symbols_in(expression) - known - set(also), key=lambda s: str(plain(s))):
+        remedy = "declare it, e.g. as a Parameter with value and unit"
+        if model.embedding and symbol in model.embedding.coordinates:
+            remedy = "it is one of the embedding: write it by the model's own coordinates"
+        elif plain(symbol) in names:
+            remedy = (
+                "one of that name is declared, but as another symbol (other assumptions, or no "
+                "function of time): use the same"
+            )
+        problems.append(
+            f"{what}: {plain(symbol)} is neither coordinate, parameter nor input: {remedy}"
+        )
+    return problems
+
+
+def symbols_in(expression: Expr) -> set[Expr]:
+    """Symbols, and functions of time."""
+    e = sp.sympify(expression)
+    found: set[Expr] = e.free_symbols | e.atoms(AppliedUndef)
+    return found
