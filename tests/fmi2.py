@@ -332,3 +332,5 @@ class Single:
     def free(self) -> None:
         self.library.dll.fmi2FreeInstance(self.handle)
         self.handle = c_void_p()
+
+    __del__ = free

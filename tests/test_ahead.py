@@ -47,7 +47,6 @@ def test_the_communication_step_changes_nothing_to_the_last_bit(library, name, s
             run(one, step, until)
             seen.append((one.outputs(), one.integer("solver.steps")))
         ends.append(seen)
-        one.free()
     assert all(end == ends[0] for end in ends)
     assert ends[0][1][1] < most  # not one a communication step
 
@@ -66,8 +65,6 @@ def test_a_fine_communication_step_sees_the_same_motion_in_between(library):
         for a, b in zip(fine.reals(names), exact.reals(names), strict=True):
             assert abs(a - b) < 20 * tolerance
         assert abs(fine.get("residual.rod")) < 1e-15
-    fine.free()
-    exact.free()
 
 
 @pytest.mark.parametrize("name", ["PendulumCartesian", "Hemisphere"])
@@ -91,8 +88,6 @@ def test_looking_changes_nothing_to_the_last_bit(library, name):
         for one in (curious, blind, other):
             one.step(2.0**-6)
             one.step(2.0**-6)
-    for one in (curious, blind, other):
-        one.free()
 
 
 @pytest.mark.parametrize("step", STEPS[1:])
@@ -103,7 +98,6 @@ def test_an_event_ahead_is_invisible_until_its_time(library, step):
     first = library("Hemisphere")(logging=False).start({"theta": 0.3}, 1e-9)
     run(first, 1.0, 2.0)
     (expected,) = first.reals(["departure.surface.time"])
-    first.free()
     one = library("Hemisphere")(logging=False).start({"theta": 0.3}, 1e-9)
     for _ in range(int(1 / step)):
         one.step(step)
@@ -116,7 +110,6 @@ def test_an_event_ahead_is_invisible_until_its_time(library, step):
         else:
             assert (closed, count, time) == (0, 1, expected)
             assert push == 0
-    one.free()
 
 
 @pytest.mark.parametrize("step", STEPS[1:])
@@ -136,7 +129,6 @@ def test_a_landing_ahead_is_invisible_until_its_time(library, step):
         else:
             assert speed == pytest.approx(e * g * landing - g * (one.time - landing), rel=1e-9)
             assert height > 0
-    one.free()
 
 
 def lifted() -> Model:
@@ -173,7 +165,6 @@ def test_what_lies_behind_an_obstacle_need_not_be_defined(built, library, step):
     lying = one.reals(["y", "der(y)", "lambda.floor"])
     assert lying == pytest.approx([0, 0, 9.81 - 0.3], abs=1e-12)
     assert not [text for status, _, text in one.log if status >= DISCARD]
-    one.free()
 
 
 @pytest.mark.parametrize(
@@ -208,8 +199,6 @@ def test_rollback_within_a_step_ahead_is_exact(library, name):
     if name != "Loop":  # whose particle is about to leave
         assert ahead
     one.does("FreeFMUstate", byref(state))
-    one.free()
-    other.free()
 
 
 def candle() -> Model:
@@ -244,7 +233,6 @@ def test_a_failure_ahead_is_invisible_until_its_time(built, library, step, stop)
         text = one.refuses("DoStep", c_double(1.0), c_double(0.125), 1, status=DISCARD)
         assert "not finite" in text
         assert one.outputs() == before
-    one.free()
 
 
 def test_the_stop_time_is_never_passed(built, library):
@@ -256,4 +244,3 @@ def test_the_stop_time_is_never_passed(built, library):
     (speed,) = one.reals(["der(x)"])
     assert speed == pytest.approx(1.0, rel=1e-6)
     assert not [text for status, _, text in one.log if status >= DISCARD]
-    one.free()

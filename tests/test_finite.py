@@ -83,7 +83,6 @@ def test_extremes_are_finite_or_refused(
                 if one.call("DoStep", c_double(one.time), c_double(h), 1) == OK:
                     one.time += h
                 check(one)
-        one.free()
 
 
 def test_a_step_that_fails_leaves_the_saved_state_as_it_was(rough: Callable[..., Library]) -> None:
@@ -99,4 +98,3 @@ def test_a_step_that_fails_leaves_the_saved_state_as_it_was(rough: Callable[...,
     after = one.bytes_of(one.saved())
     words = range(HEAD, len(before), 4)
     assert sum(before[k : k + 4] != after[k : k + 4] for k in words) == 1
-    one.free()

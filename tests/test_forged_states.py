@@ -190,7 +190,6 @@ def test_a_run_may_last(library, steps):
     assert one.integer("solver.steps") == min(steps + more, 2**31 - 1)
     one.does("SetFMUstate", one.loaded(one.bytes_of(one.saved())))
     one.step(0.1)
-    one.free()
 
 
 def test_a_coordinate_is_a_number(library):
