@@ -14,34 +14,41 @@ import sympy as sp
 from ..model.attitude import Attitude
 from ..model.elements import Expr
 from ..model.model import Model
+from ..model.speeds import quaternions
 
 
 @dataclass(frozen=True)
 class Closed:
-    """Elements of rotation matrices -> symbols, and the rates of these."""
+    """Elements of rotation matrices -> symbols, and the rates of these; of each quaternion the components
+    of w."""
 
     symbols: Mapping[Expr, Expr]
     rates: Mapping[Expr, Expr]
+    turning: tuple[tuple[Expr, Expr, Expr], ...]
 
 
 def attitudes(model: Model, table: Mapping[Expr, Expr]) -> Closed:
-    """Of the quaternions whose rotation matrix stands in the energy or in a constraint, and whose kinematics
-    are e' = (0, w) e / 2 from the right; `table`: dynamicsymbols -> plain symbols."""
+    """Of the unit quaternions whose kinematics are e' = e (0, w) / 2; with symbols for those whose rotation
+    matrix stands in the energy or in a constraint.  `table`: dynamicsymbols -> plain symbols."""
     expressions = [model.energy_expression, *(sp.sympify(c.expression) for c in model.constraints)]
-    found = {a.quaternion: None for e in expressions for a in e.atoms(Attitude)}
+    found = {a.quaternion for e in expressions for a in e.atoms(Attitude)}
     symbols: dict[Expr, Expr] = {}
     rates: dict[Expr, Expr] = {}
-    for k, four in enumerate(sorted(found, key=str)):
+    turning = []
+    for k, four in enumerate(quaternions(model)):
         w = _angular_velocity(model, four)
         if w is None:
             continue
-        e, x, y, z = [s.xreplace(table) for s in four], *(s.xreplace(table) for s in w)
+        e, x, y, z = [table[s] for s in four], *(s.xreplace(table) for s in w)
+        turning.append((x, y, z))
+        if four not in found:
+            continue
         R = [[sp.Symbol(f"R{i}{j} of {k}", real=True) for j in range(3)] for i in range(3)]
         for i, row in enumerate(R):
             symbols |= {Attitude(i, j, *e): s for j, s in enumerate(row)}
             turned = row[1] * z - row[2] * y, row[2] * x - row[0] * z, row[0] * y - row[1] * x
             rates |= dict(zip(row, turned, strict=True))
-    return Closed(symbols, rates)
+    return Closed(symbols, rates, tuple(turning))
 
 
 def _angular_velocity(model: Model, four: tuple[Expr, ...]) -> tuple[Expr, ...] | None:

@@ -359,7 +359,8 @@ def derive(model: Model) -> EquationsOfMotion:
     angles = {table[s] for s in model.unwrapped}
     places = frozenset(j for j, s in enumerate(q) if s in angles)
     closed = attitudes(model, table)
-    moving = Kinematics(q, v, qdot, TIME, rates, places).beside(closed.rates)
+    moving = Kinematics(q, v, qdot, TIME, rates, places)
+    moving = moving.beside(closed.rates, closed.turning)
     clock = _Clock(moving.q, moving.rates, rates)
     problems: list[str] = []
 

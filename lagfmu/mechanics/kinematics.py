@@ -32,7 +32,8 @@ class Kinematics:
     """q' = B v + b of coordinates q (nq) and speeds v (nv), in plain symbols.
 
     `rates` (nq) are the expressions of q', `time` is the symbol of time, `drift` the rates of prescribed
-    inputs. `unwrapped` are the places of what follows from other coordinates.
+    inputs. `unwrapped` are the places of what follows from other coordinates, `turning` the angular
+    velocities (speeds) of which the coefficients c are known.
     """
 
     q: tuple[Expr, ...]
@@ -41,14 +42,15 @@ class Kinematics:
     time: Expr
     drift: Mapping[Expr, Expr]
     unwrapped: frozenset[int] = frozenset()
+    turning: tuple[tuple[Expr, Expr, Expr], ...] = ()
 
-    def beside(self, more: Mapping[Expr, Expr]) -> Kinematics:
+    def beside(
+        self, more: Mapping[Expr, Expr], turning: tuple[tuple[Expr, Expr, Expr], ...]
+    ) -> Kinematics:
         """The same with quantities that follow from the coordinates as further coordinates: their rates."""
-        if not more:
-            return self
         follow = frozenset(range(len(self.q), len(self.q) + len(more)))
         q, rates = (*self.q, *more), (*self.rates, *more.values())
-        return replace(self, q=q, rates=rates, unwrapped=self.unwrapped | follow)
+        return replace(self, q=q, rates=rates, unwrapped=self.unwrapped | follow, turning=turning)
 
     @cached_property
     def B(self) -> dict[tuple[int, int], Expr]:
@@ -113,7 +115,12 @@ class Kinematics:
         kinematics restrict the motion as a nonholonomic constraint does.
         """
         found: Turning = [[] for _ in self.v]
-        for group in self._groups():
+        place = {s: i for i, s in enumerate(self.v)}
+        known = [[place[s] for s in w] for w in self.turning if place.keys() >= {*w}]
+        for x, y, z in known:
+            for first, second, third in ((x, y, z), (y, z, x), (z, x, y)):
+                found[third] += [(second, self.v[first]), (first, -self.v[second])]
+        for group in self._groups({i for w in known for i in w}):
             inverse = self._inverse(group)
             for i in group:
                 for k in (None, *group):
@@ -132,13 +139,14 @@ class Kinematics:
                         found[r].append((i, x if k is None else x * self.v[k]))
         return found, []
 
-    def _groups(self) -> list[list[int]]:
-        """Speeds that share coordinates in B, or in what it depends on; without those that are rates."""
+    def _groups(self, known: set[int]) -> list[list[int]]:
+        """Speeds that share coordinates in B, or in what it depends on; without those that are rates, and
+        those whose coefficients are known."""
         plain = {i for i, column in enumerate(self.columns) if list(column.values()) == [sp.S.One]}
         of = {s: j for j, s in enumerate(self.q)}
         touched = []
         for i, column in enumerate(self.columns):
-            if i in plain:
+            if i in plain or i in known:
                 continue
             kept = {j: a for j, a in column.items() if j not in self.unwrapped}
             inside = {of[s] for a in kept.values() for s in a.free_symbols if s in of}
