@@ -15,6 +15,7 @@ from redundant import platform
 from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
 from test_extremes import isosceles
 from test_jumps import MODELS as JUMPS
+from test_speeds_native import ball, geared
 
 from lagfmu import Peak, Scene, build_fmu
 from lagfmu.testing import GENERATED, find_compiler, load
@@ -38,9 +39,12 @@ LIVES = {  # steps that reach the event or the singular point in between
     "Gate": 0.2,  # forces that jump at two places, no contact
     "Lifted": 0.2,  # a force that jumps and opens a contact
     "Peaks": 0.1,  # extremes, across impacts
+    "Thrown": 0.1,  # speeds of a model's own, with contact and friction
+    "Geared": 0.1,  # an angle that is unwrapped
     "Normal": 0.07,  # a scene: lambda of the hemisphere alone, numbers for m and g
     "Places": 0.1,  # a scene: coordinates that are only read, nothing is solved for lambda
 }
+OWN = {**JUMPS, "Thrown": ball, "Geared": geared}
 SCENES = {  # FMU, outputs, numbers
     "Normal": ("Hemisphere", ["lambda.surface"], ["m", "g"]),
     "Places": ("PendulumCartesian", ["x", "der(y)", "energy.total"], ["*"]),
@@ -62,8 +66,8 @@ def unpacked(native_fmu, prepared, tmp_path_factory):
             model = prepared("BouncingBall").model
             model = replace(model, name=name, peaks=(Peak("der(y)"), Peak("energy.*")))
             path = build_fmu(model, folder, target="native", check=False)
-        elif name in JUMPS:
-            path = build_fmu(JUMPS[name](), folder, target="native", check=False)
+        elif name in OWN:
+            path = build_fmu(OWN[name](), folder, target="native", check=False)
         elif name == "Isosceles":
             path = build_fmu(
                 isosceles(),
