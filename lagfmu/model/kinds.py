@@ -15,7 +15,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
-from ..names import RESERVED
+from ..names import RESERVED, read
 from .elements import (
     Contact,
     Embedding,
@@ -182,18 +182,20 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
         problems.append("there is no coordinate: a model needs at least one")
     named += [("parameter", name_of(p.symbol)) for p in model.parameters]
     named += [("input", name_of(i.symbol)) for i in model.inputs]
+    own = {o.name for o in model.outputs if is_name(o.name)}
+    named += [("output", o.name) for o in model.outputs if not _is_rate_of(o.name, own)]
     seen: dict[str, str] = {}
     for kind, name in named:
         check_name(kind, name, problems)
-        if kind == "model":
+        if kind == "model" or not is_name(name):
             continue
         if name in seen:
             problems.append(
-                f"the name {name!r} is used twice, by a {seen[name]} and a {kind}: rename one"
+                f"the name {name!r} is used twice, by {_a(seen[name])} and {_a(kind)}: rename one"
             )
         seen[name] = kind
     problems += [
-        f"{short!r} is a {seen[short]} and, with the {seen[name]} {name!r}, a group of variables: rename one"
+        f"{short!r} is {_a(seen[short])} and, with the {seen[name]} {name!r}, a group: rename one"
         for name in seen
         for short in accumulate(name.split("."), lambda a, b: f"{a}.{b}")
         if short != name and short in seen
@@ -223,6 +225,15 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
                 f"constraint {constraint.name!r} acts while_closed={closed!r}, which is no contact "
                 f"of this model (contacts: {known})"
             )
+
+
+def _a(kind: str) -> str:
+    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
+
+
+def _is_rate_of(name: object, outputs: set[str]) -> bool:
+    """der(angle.A), of which angle.A is another output."""
+    return isinstance(name, str) and read(name).coordinate in outputs - {name}
 
 
 def check_name(kind: str, name: Any, problems: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""What is wrong with the outputs of a model's own, in words: names, symbols, units, missing values."""
+"""What is wrong with the outputs of a model's own, in words: symbols, units, missing values."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import UnitError
-from ..names import MULTIPLIER, RESERVED, read
-from .elements import Contact, Expr, ModelFields, Nonholonomic, Peak, is_name, name_of
+from ..names import MULTIPLIER, read
+from .elements import Contact, Expr, ModelFields, Nonholonomic, Peak, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
 from .symbols import undeclared
 from .units import Unit, check_dimension, parse_unit, plain
@@ -18,8 +18,7 @@ HIGHEST = 2  # order of a derivative
 
 
 def check_outputs(model: ModelFields, problems: list[str]) -> None:
-    """Names that cannot be, symbols that are none of the model's, quotients without a value."""
-    _check_names(model, problems)
+    """Symbols that are none of the model's, quotients without a value."""
     problems += [
         f"{peak!r}, expected the name of an output of the FMU, as Peak('lambda.rod')"
         for peak in model.peaks
@@ -51,43 +50,6 @@ def check_output_units(model: ModelFields, units: Mapping[Expr, Unit], problems:
         problems += check_dimension(sp.sympify(o.expression), unit, known, what)
         if o.otherwise is not None and not sp.sympify(o.otherwise).is_number:
             problems += check_dimension(sp.sympify(o.otherwise), unit, known, f"{what}, otherwise")
-
-
-def _check_names(model: ModelFields, problems: list[str]) -> None:
-    extra = model.embedding.coordinates if model.embedding else {}
-    taken = {name_of(q): "a coordinate" for q in (*model.coordinates, *extra)}
-    taken |= {name_of(w): "a speed" for w in model.speeds}
-    taken |= {name_of(p.symbol): "a parameter" for p in model.parameters}
-    taken |= {name_of(i.symbol): "an input" for i in model.inputs}
-    own = {o.name for o in model.outputs if is_name(o.name)}
-    for o in model.outputs:
-        of = read(o.name).coordinate if isinstance(o.name, str) else ""
-        if of != o.name and of in own:
-            continue  # der(angle.A), of which angle.A is another
-        if not is_name(o.name):
-            problems.append(
-                f"output name {o.name!r} is not a name that FMI allows: use letters a-z, A-Z, digits "
-                "and _, not beginning with a digit, in parts with a dot between them, as 'bob.height'; "
-                "der(bob.height) beside bob.height"
-            )
-            continue
-        if (first := o.name.split(".")[0]) in RESERVED:
-            problems.append(
-                f"output name {o.name!r} begins with {first!r}, which is reserved for the FMU's own "
-                f"variables ({', '.join(RESERVED)}): choose another"
-            )
-            continue
-        for name, other in taken.items():
-            if name == o.name:
-                problems.append(
-                    f"the name {name!r} is used twice, by {other} and an output: rename one"
-                )
-            elif o.name.startswith(f"{name}.") or name.startswith(f"{o.name}."):
-                short, long = sorted((name, o.name), key=len)
-                problems.append(
-                    f"{short!r} would be a variable and, with {long!r}, a group of variables: rename one"
-                )
-        taken[o.name] = "an output"
 
 
 def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
