@@ -20,6 +20,7 @@ from .model.model import (
     Parameter,
     Peak,
 )
+from .model.norms import norm
 from .model.page import Page
 from .model.picture import Arrow, Disk, Ground, Line, Rod, Spring, Track
 from .model.reactions import force_of_constraint, multiplier
@@ -66,6 +67,7 @@ __all__ = [
     "from_lagranges_method",
     "initial",
     "multiplier",
+    "norm",
     "output",
     "play",
     "rotation_matrix",

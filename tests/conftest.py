@@ -69,6 +69,7 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     **FILES,
     "Belt": "belt",
     "Bowling": "bowling",
+    "CrankWithBearingFriction": "crank_with_bearing_friction",
     "FallingRod": "falling_rod",
     "FrictionOscillator": "friction_oscillator",
     "InclineFriction": "incline_friction",

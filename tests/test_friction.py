@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from instance import instance
-from sympy import sqrt, symbols
+from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -21,6 +21,7 @@ from lagfmu import (
     Parameter,
     Scene,
     multiplier,
+    norm,
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
@@ -179,14 +180,21 @@ WRONG = {
     ),
     "normal is not linear": (
         [Friction("grip", of=["rest"], normal=N**2 / (m * G), static=mu)],
-        "is not linear in the multipliers",
+        "is neither linear in the multipliers nor a sum of norms",
     ),
-    "normal is a norm": (
+    "normal is a norm of contacts": (
         [
             Contact("side", z),
-            Friction("grip", ["rest"], sqrt(N**2 + multiplier("side") ** 2), static=mu),
+            Friction("grip", ["rest"], norm(N, multiplier("side")), static=mu),
         ],
-        "journal in its bearing",
+        "is a norm with the contacts 'side', 'table', expected multipliers of joints",
+    ),
+    "normal is a difference of norms": (
+        [
+            Holonomic("side", z),
+            Friction("grip", ["rest"], norm(N, multiplier("side")) - N, static=mu),
+        ],
+        "is neither linear in the multipliers nor a sum of norms",
     ),
     "normal is no force": (
         [Friction("grip", of=["rest"], normal=N * m, static=mu)],

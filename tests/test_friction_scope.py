@@ -6,7 +6,6 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from xml.etree.ElementTree import Element, fromstring
 
 import fmpy
@@ -15,9 +14,6 @@ import pytest
 from conftest import model_file
 from instance import instance
 from runs import simulate_fmu
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
-from sympy import cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
@@ -27,7 +23,6 @@ from lagfmu import (
     Friction,
     Model,
     Nonholonomic,
-    Parameter,
     Scene,
     multiplier,
     simulate,
@@ -210,103 +205,3 @@ def test_an_output_is_added_on_the_command_line(tmp_path: Path) -> None:
     run = simulate(tmp_path / "native" / "Belt.fmu", stop_time=0.2, step_size=0.1)
     assert run["used"] == pytest.approx(100 * run["x"] / (0.5 * g), abs=1e-12)
     assert run["used"][-1] > 0.7
-
-
-def journal(theta0: float, clearance: float) -> Model:
-    """A compound pendulum, 1 kg, 0.5 m below a pin of radius r that lies in its bearing with some clearance,
-    on the side to which it is pressed at the start."""
-    t = dynamicsymbols._t
-    x, y, theta = dynamicsymbols("x y theta")
-    m, G, L, J, r, epsilon, mu = symbols("m g L J r epsilon mu", positive=True)
-    u, v = x - L * sin(theta), y + L * cos(theta)
-    rho = sqrt(u**2 + v**2)
-    force = np.array(pin_force(theta0, 0.0, pin_acceleration(theta0, 0.0, 0.0)))
-    seat = -clearance * force / np.hypot(*force)
-    return Model(
-        name="Journal",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * theta.diff() ** 2 / 2 - m * G * y,
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[
-            Contact("pin", epsilon - rho),
-            Nonholonomic("rub", (u * v.diff(t) - v * u.diff(t)) / rho + r * theta.diff()),
-            Friction("bearing", of=["rub"], normal=multiplier("pin"), static=mu),
-        ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(G, g, "m/s^2"),
-            Parameter(L, 0.5, "m"),
-            Parameter(J, 0.05, "kg.m^2"),
-            Parameter(r, RADIUS, "m"),
-            Parameter(epsilon, clearance, "m"),
-            Parameter(mu, MU, "1"),
-        ],
-        start={
-            theta: theta0,
-            x: seat[0] + 0.5 * np.sin(theta0),
-            y: seat[1] - 0.5 * np.cos(theta0),
-        },
-    )
-
-
-RADIUS, MU = 0.02, 0.3
-
-
-def pin_force(theta: float, omega: float, alpha: float) -> tuple[float, float]:
-    """[N] that the bearing exerts on 1 kg that circles 0.5 m below the pin."""
-    along = 0.5 * (alpha * np.cos(theta) - omega**2 * np.sin(theta))
-    up = 0.5 * (alpha * np.sin(theta) + omega**2 * np.cos(theta))
-    return along, up + g
-
-
-def pin_acceleration(theta: float, omega: float, torque: float) -> float:
-    """J theta'' about the pin [rad/s^2]."""
-    return (-g * 0.5 * np.sin(theta) - torque) / (0.05 + 0.25)
-
-
-def swing(theta0: float, way: float) -> float:
-    """The angle at which a swing from rest ends, tau = mu r N against it, F = sqrt(1 + mu^2) N of the same
-    instant: an integration of its own, of the pendulum's one equation."""
-
-    def acceleration(theta: float, omega: float) -> float:
-        def excess(N: float) -> float:
-            alpha = pin_acceleration(theta, omega, way * MU * RADIUS * N)
-            return float(np.hypot(*pin_force(theta, omega, alpha)) - np.sqrt(1 + MU**2) * N)
-
-        alpha = pin_acceleration(theta, omega, way * MU * RADIUS * brentq(excess, 0.0, 1e3))
-        return alpha
-
-    def stops(_: float, y: Any) -> float:
-        return float(y[1])
-
-    stops.terminal, stops.direction = True, -way  # type: ignore[attr-defined]
-    run = solve_ivp(
-        lambda _, y: [y[1], acceleration(*y)],
-        (0, 2),
-        [theta0, way * 1e-12],
-        "DOP853",
-        events=stops,
-        rtol=1e-9,
-    )
-    return float(run.y[0, -1])
-
-
-def test_a_journal_in_its_bearing_rubs_by_the_norm_of_its_force(built: Build) -> None:
-    """lambda of a contact at the clearance is the normal force of a joint, whatever its direction: a pendulum
-    loses its amplitude by tau = mu r N with F = sqrt(1 + mu^2) N, to the clearance's own swing."""
-    path = built(journal(1.0, 1e-5))
-    run = simulate(path, stop_time=3.6, step_size=0.002)
-    theta, way, amplitude = run["theta"], -1.0, 1.0
-    turns = [
-        k
-        for k in range(1, len(theta) - 1)
-        if (theta[k] - theta[k - 1]) * (theta[k + 1] - theta[k]) < 0
-    ]
-    assert len(turns) == 4
-    for k in turns:
-        amplitude = swing(amplitude, way)
-        way = -way
-        assert theta[k] == pytest.approx(amplitude, abs=2e-4)
-    assert 1 - abs(amplitude) == pytest.approx(0.14, abs=0.005)
-    N = run["lambda.pin"]
-    slides = ~run["sticks.bearing"].astype(bool) & (np.abs(run["slip.rub"]) > 1e-3)
-    assert np.abs(run["lambda.rub"][slides]) == pytest.approx(MU * N[slides], rel=1e-9)

@@ -37,6 +37,7 @@ CHANGED = {  # far from the defaults, consistent or not: the projection and the 
     "PendulumNullspace": {"m": 0.3, "g": 1.6, "L": 2, "x": 1.7, "y": 0.9, "der(x)": 0.4},
     "RotatingWire": {"m": 0.3, "omega": -1.5, "r": 0.4, "der(r)": -0.9, "der(phi)": -1.5},
     "Crane": {"M": 500, "m": 900, "g": 1.6, "c": 40, "x": -1.5, "y": -5.5, "l": 6.0, "der(l)": 0.1},
+    "CrankWithBearingFriction": {"m1": 3, "J2": 0.05, "a": 0.12, "b": 0.4, "r": 0.02, "mu": 0.15},
     "HalfCar": {"M": 900, "J": 1100, "m": 90, "k": 3e4, "c": 2e3, "der(s)": 15.0},
     "KnifeEdge": {
         "m": 3,

@@ -124,9 +124,13 @@ class Parts:
         found = []
         for law in self.eom.frictions:
             rows = tuple(position[name] for name in law.of)
-            normal = tuple(position[name] for name in law.normal)
-            gated = law.load == 0 and all(isinstance(self.constraints[k], Contact) for k in normal)
-            found.append(Friction(law.name, rows, normal, gated and bool(normal)))
+            norms = tuple(
+                tuple(tuple(position[k] for k in a.c) for a in norm) for norm in law.norms
+            )
+            normal = [self.constraints[position[name]] for name in law.normal_rows]
+            pushed = all(isinstance(c, Contact) for c in normal) and bool(normal)
+            gated = pushed and all(a.load == 0 for a in law.parts)
+            found.append(Friction(law.name, rows, norms, gated))
         return found
 
     @cached_property
@@ -299,16 +303,17 @@ class Parts:
             yield Function("restitution", text, {"p": eom.p}, results)
         if laws:
             mu = {f"{w} of {a.name}": getattr(a, w) for a in laws for w in ("static", "kinetic")}
-            normal = {f"{a.name}, {row}": c for a in laws for row, c in a.normal.items()}
-            listed = {
-                "coefficients": mu,
-                "load": {a.name: a.load for a in laws},
-                "normal": normal,
-            }
+            parts = [(a.name, part) for a in laws for part in a.parts]
+            normal = [(f"{name}, {row}", c) for name, part in parts for row, c in part.c.items()]
             text = (
-                "Coefficients, static and kinetic, and normal force load + sum of c * lambda [N]."
+                "Coefficients, static and kinetic, and load + sum of c * lambda of each component of "
+                "the normal forces."
             )
-            results = {a: values([*of.values()], [*of]) for a, of in listed.items()}
+            results = {
+                "coefficients": values([*mu.values()], [*mu]),
+                "load": values([part.load for _, part in parts], [name for name, _ in parts]),
+                "normal": values([c for _, c in normal], [place for place, _ in normal]),
+            }
             yield Function("coulomb", text, self.state, results)
 
     def _of_outputs(self) -> Iterator[Function]:

@@ -12,13 +12,11 @@ import sympy as sp
 
 from .. import names
 from ..mechanics.equations import symbols_of
-from ..model.elements import Expr
+from ..model.elements import Constraint, Expr
 from ..model.model import Contact, Nonholonomic, name_of
 from ..model.selection import select
 from ..model.units import (
     ENERGY,
-    FORCE,
-    METRE,
     ONE,
     POWER,
     SECOND,
@@ -32,7 +30,6 @@ from ..names import Subject
 from .dependencies import Dependencies
 from .variables import Variable
 
-SPEED = METRE / SECOND
 BARRED = (  # what has an error bar, besides coordinates, velocities and outputs of one word
     *(names.MULTIPLIER, names.FORCE, names.OWN, *names.COUNT_OF),
 )
@@ -181,14 +178,12 @@ class Outputs:
         entries = self.behind.symbols(*jacobian.values())
         for k, c in enumerate(self.eom.constraints):
             what = f"constraint {c.name}" + (f": {c.description}" if c.description else "")
-            unit = dimension_of(sp.sympify(c.expression), self.model.units, c.name) or ONE
-            lam = multiplier_unit(unit, isinstance(c, Nonholonomic))
+            unit, lam, rate = self._units_of(c)
             of = Subject(names.MULTIPLIER, c.name)
             row = self.behind.group(row=k)
             variables.append(self.output(of, f"multiplier of {what}", lam, row))
             if isinstance(c, Nonholonomic) or c.name in self.eom.limited:
-                text, behind = f"velocity residual of {what}", self.behind.rates(k)
-                unit = unit if isinstance(c, Nonholonomic) else unit.per_second()
+                text, behind, unit = f"velocity residual of {what}", self.behind.rates(k), rate
             else:
                 kind = "gap, zero while closed," if isinstance(c, Contact) else "position residual"
                 text, behind = f"{kind} of {what}", self.behind.symbols(self.eom.f[k])
@@ -259,11 +254,18 @@ class Outputs:
             variables += self._closing(c)
         return variables
 
+    def _units_of(self, c: Constraint) -> tuple[Unit, Unit, Unit]:
+        """Of its expression, of its multiplier, of the velocity that it holds."""
+        unit = dimension_of(sp.sympify(c.expression), self.model.units, c.name) or ONE
+        moves = isinstance(c, Nonholonomic)
+        return unit, multiplier_unit(unit, moves), unit if moves else unit.per_second()
+
     def frictions(self) -> list[Variable]:
         """Of each whether it sticks, slip velocities, margin, power, when it slipped and stuck."""
         variables = []
         row = {c.name: k for k, c in enumerate(self.eom.constraints)}
         for law in self.eom.frictions:
+            _, force, speed = self._units_of(self.eom.constraints[row[law.of[0]]])
             what = f"friction {law.name}" + (f": {law.description}" if law.description else "")
             behind = self.behind.group(row=row[law.of[0]]) | self.behind.symbols(*law.expressions)
             behind = self.behind.known | behind
@@ -272,9 +274,9 @@ class Outputs:
             variables.append(self.output(of, text, None, behind, "Boolean"))
             for name in law.of:
                 text, of = f"slip velocity G v - nu of {name}", Subject(names.SLIP, name)
-                variables.append(self.output(of, text, SPEED, self.behind.rates(row[name])))
+                variables.append(self.output(of, text, speed, self.behind.rates(row[name])))
             text = f"static coefficient times normal force less |lambda| of {what}"
-            variables.append(self.output(Subject(names.MARGIN, law.name), text, FORCE, behind))
+            variables.append(self.output(Subject(names.MARGIN, law.name), text, force, behind))
             text = f"power of {what}, lambda times slip velocity, never positive"
             variables.append(self.output(Subject(names.POWER, law.name), text, POWER, behind))
             for events in (names.SLIPPING, names.STICKING):

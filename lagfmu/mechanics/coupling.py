@@ -16,7 +16,7 @@ def coupled(eom: EquationsOfMotion) -> list[Group]:
     position = {c.name: eom.nv + k for k, c in enumerate(eom.constraints)}
     pairs = list(eom.M.todok())
     for law in eom.frictions:
-        first, *others = (position[name] for name in (*law.of, *law.normal))
+        first, *others = (position[name] for name in (*law.of, *law.normal_rows))
         pairs += [(first, i) for i in others]
     return _tied(eom, pairs)
 

@@ -24,6 +24,7 @@ from ..errors import ModelError
 from ..model.display import Displayed
 from ..model.elements import Expr
 from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
+from ..model.norms import norm, norms_of
 from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.speeds import quaternions
 from ..model.spline import Spline, SplineBase
@@ -37,31 +38,64 @@ TIME = dynamicsymbols._t
 
 
 @dataclass(frozen=True)
-class FrictionLaw:
-    """|lambda| of the rows `of` is at most static * |N|, and kinetic * |N| while they slip.
+class NormalPart:
+    """load + sum_k c[k] lambda_k, with names of constraints: a normal force, or one of its components."""
 
-    N = load + sum_k normal[k] lambda_k [N], with names of constraints and plain symbols.
+    load: Expr
+    c: Mapping[str, Expr]
+
+    @property
+    def force(self) -> Expr:
+        """In the multipliers' symbols."""
+        return sp.Add(self.load, *(c * multiplier(k) for k, c in self.c.items()))
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    """|lambda| of the rows `of` is at most static * N, and kinetic * N while they slip.
+
+    N is the sum of `norms`, each of one component or several; in plain symbols.
     """
 
     name: str
     of: tuple[str, ...]
-    normal: Mapping[str, Expr]
-    load: Expr
+    norms: tuple[tuple[NormalPart, ...], ...]
     static: Expr
     kinetic: Expr
     description: str = ""
 
     @property
+    def parts(self) -> tuple[NormalPart, ...]:
+        """The components of all norms."""
+        return tuple(part for parts in self.norms for part in parts)
+
+    @property
+    def normal(self) -> Expr:
+        """The normal force; where it is of one component, that with its sign."""
+        if len(self.parts) == 1:
+            return self.parts[0].force
+        return sp.Add(*(norm(*(part.force for part in parts)) for parts in self.norms))
+
+    @property
+    def normal_rows(self) -> tuple[str, ...]:
+        """The constraints whose multipliers make up the normal force, as often as they stand in it."""
+        return tuple(name for part in self.parts for name in part.c)
+
+    @property
     def expressions(self) -> tuple[Expr, ...]:
         """All of its expressions."""
-        return (self.load, self.static, self.kinetic, *self.normal.values())
+        of_parts = (e for part in self.parts for e in (part.load, *part.c.values()))
+        return (self.static, self.kinetic, *of_parts)
 
     def mapped(self, change: Callable[[Expr], Expr]) -> FrictionLaw:
         """The same with `change` done to every expression."""
+
+        def moved(part: NormalPart) -> NormalPart:
+            return NormalPart(change(part.load), {k: change(c) for k, c in part.c.items()})
+
         return replace(
             self,
-            normal={k: change(c) for k, c in self.normal.items()},
-            load=change(self.load),
+            norms=tuple(tuple(map(moved, parts)) for parts in self.norms),
             static=change(self.static),
             kinetic=change(self.kinetic),
         )
@@ -416,14 +450,22 @@ def derive(model: Model) -> EquationsOfMotion:
 
 
 def _friction(f: Friction, table: dict[Expr, Expr]) -> FrictionLaw:
-    """A friction in plain symbols, its normal force as a sum over multipliers."""
-    normal = sp.sympify(f.normal).xreplace(table)
-    symbols = reactions_in(normal)
+    """A friction in plain symbols, its normal force by components."""
+
+    def part(component: Expr) -> NormalPart:
+        component = sp.sympify(component).xreplace(table)
+        symbols = reactions_in(component)
+        return NormalPart(
+            component.xreplace(dict.fromkeys(symbols, sp.S.Zero)),
+            {read(str(s)).constraint: component.diff(s) for s in symbols},
+        )
+
+    norms = norms_of(f.normal)
+    assert norms is not None  # checked with the model
     return FrictionLaw(
         name=f.name,
         of=tuple(f.of),
-        normal={read(str(s)).constraint: normal.diff(s) for s in symbols},
-        load=normal.xreplace(dict.fromkeys(symbols, sp.S.Zero)),
+        norms=tuple(tuple(map(part, components)) for components in norms),
         static=sp.sympify(f.static).xreplace(table),
         kinetic=sp.sympify(f.sliding).xreplace(table),
         description=f.description,

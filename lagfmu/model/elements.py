@@ -93,8 +93,10 @@ class Friction:
     """Coulomb friction: the constraints `of`, one or two, hold while |lambda| <= static * |normal|.
 
     Beyond that they slip, and lambda = -kinetic * |normal| * s/|s| with the slip velocity s = G v - nu
-    (two constraints: orthogonal velocities).  `normal` [N] is linear in `multiplier(NAME)`s; `static` and
-    `kinetic` (the same as `static` if None) are numbers or expressions without dimension.
+    (two constraints: orthogonal velocities).  `normal` [N] is linear in `multiplier(NAME)`s, or a sum of
+    `norm`s of such; `static` and `kinetic` (the same as `static` if None) are numbers or expressions without
+    dimension.  Where `of` is one angle, lambda is a torque [N.m], and the radius stands in the normal force
+    or in the coefficients.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """What is wrong with the frictions of a model, in words.
 
-A friction limits the multipliers of one or two constraints, each a force in newtons, by a normal force that
-is linear in multipliers of other constraints.
+A friction limits the multipliers of one or two constraints, forces or one torque, by a normal force that is
+linear in multipliers of other constraints, or a sum of norms of such (norms.py).
 """
 
 from __future__ import annotations
@@ -14,12 +14,14 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
 from .elements import NAME, Contact, Expr, Friction, ModelFields, Nonholonomic
+from .norms import norms_of
 from .reactions import multiplier, reactions_in
 from .symbols import undeclared
-from .units import ONE, Unit, check_dimension, parse_unit, plain
+from .units import ONE, Unit, check_dimension, dimension_of, parse_unit, plain
 
 MOST_ROWS = 2  # tangential directions of a surface
 NEWTON = parse_unit("N", "a force")
+TORQUE = parse_unit("N.m", "a torque")
 METRE = parse_unit("m", "a length")
 
 
@@ -78,8 +80,9 @@ def check_frictions(
         if len(problems) == before:
             _check_directions(model, f, units, problems)
     for f in model.frictions:
-        _check_normal(model, f, owner, units, reactions, problems)
-        _check_coefficients(model, f, units, problems)
+        known = {**units, **reactions}
+        arm = _check_normal(model, f, owner, known, problems)
+        _check_coefficients(model, f, known, arm, problems)
     if model.frictions and model.embedding is not None:
         problems.append(
             "friction with an embedding: the normal force is needed in every mode, and the embedding "
@@ -122,11 +125,12 @@ def _check_rows(
             )
         owner[name] = f.name
         unit = reactions.get(multiplier(name))
-        if unit is not None and not unit.same_dimension(NEWTON):
+        alone = len(f.of) == 1
+        if unit is not None and not any(map(unit.same_dimension, (NEWTON, TORQUE)[: 1 + alone])):
             problems.append(
-                f"friction {f.name!r}: the multiplier of {name!r} is in {unit.name}, expected N: write "
-                "the constraint as a length or a velocity at the surface, e.g. x - R*theta in m or "
-                "x.diff() - R*theta.diff() in m/s"
+                f"friction {f.name!r}: the multiplier of {name!r} is in {unit.name}, expected N"
+                f"{' or N.m' if alone else ''}: write the constraint as a length or a velocity at the "
+                "surface, e.g. x - R*theta in m or x.diff() - R*theta.diff() in m/s"
             )
         gate = getattr(c, "while_closed", None)
         if gate is not None and multiplier(gate) not in sp.sympify(f.normal).free_symbols:
@@ -179,39 +183,58 @@ def _check_normal(
     f: Friction,
     owner: Mapping[str, str],
     units: Mapping[Expr, Unit],
-    reactions: Mapping[Expr, Unit],
     problems: list[str],
-) -> None:
+) -> Unit:
+    """Of the normal force; returns the unit that a coefficient then needs: of the multiplier over the normal
+    force's, of which the one or the other may be a torque."""
     normal = sp.sympify(f.normal)
     what = f"normal of friction {f.name!r}"
-    rows = {multiplier(c.name): c.name for c in model.constraints}
+    rows = {multiplier(c.name): c for c in model.constraints}
     before = len(problems)
     for symbol in reactions_in(normal):
         if symbol not in rows:
             problems.append(
                 f"{what}: {symbol} is no multiplier of this model's constraints "
-                f"({', '.join(rows.values())}): use multiplier(NAME)"
+                f"({', '.join(c.name for c in rows.values())}): use multiplier(NAME)"
             )
-        elif rows[symbol] in owner:
+        elif rows[symbol].name in owner:
             problems.append(
-                f"{what}: {symbol} is itself limited by the friction {owner[rows[symbol]]!r}, expected "
-                "multipliers of surfaces and joints"
+                f"{what}: {symbol} is itself limited by the friction {owner[rows[symbol].name]!r}, "
+                "expected multipliers of surfaces and joints"
             )
     present = [s for s in reactions_in(normal) if s in rows]
-    if any(sp.simplify(normal.diff(a, b)) != 0 for a in present for b in present):
+    pushing = [rows[s].name for s in present if isinstance(rows[s], Contact)]
+    norms = norms_of(normal)
+    if norms is None:
         problems.append(
-            f"{what}: {plain(normal)} is not linear in the multipliers, expected a sum of multipliers "
-            "times numbers: the friction of a joint whose force has two components is that of a journal in "
-            "its bearing, a Contact whose multiplier is the normal force (docs/friction.md); a friction for "
-            "each component would be up to 41 % too strong"
+            f"{what}: {plain(normal)} is neither linear in the multipliers nor a sum of norms of such, "
+            "expected a sum of multipliers times numbers, or, in a joint whose force has two components, "
+            "norm(multiplier('A.x'), multiplier('A.y')): a friction for each component would be up to 41 % "
+            "too strong"
+        )
+    elif len(sum(norms, ())) > 1 and pushing:
+        problems.append(
+            f"{what}: {plain(normal)} is a norm with the contact{'s' if len(pushing) > 1 else ''} "
+            f"{', '.join(map(repr, pushing))}, expected multipliers of joints: a contact pushes along its "
+            "normal alone: make a friction of each contact"
         )
     _check_symbols(model, what, normal, set(present), problems)
-    if len(problems) == before:
-        problems += _dimension(normal, NEWTON, {**units, **reactions}, what)
+    limited = next((units[s] for s in map(multiplier, f.of) if s in units), NEWTON)
+    if len(problems) > before:
+        return ONE
+    try:
+        found = dimension_of(normal, units, what) or NEWTON
+    except UnitError as error:
+        problems.append(str(error))
+        return ONE
+    if limited.same_dimension(TORQUE) and found.same_dimension(TORQUE):
+        return ONE
+    problems += _dimension(normal, NEWTON, units, what)
+    return limited / NEWTON
 
 
 def _check_coefficients(
-    model: ModelFields, f: Friction, units: Mapping[Expr, Unit], problems: list[str]
+    model: ModelFields, f: Friction, units: Mapping[Expr, Unit], arm: Unit, problems: list[str]
 ) -> None:
     values = {p.symbol: float(p.value) for p in model.parameters}
     numbers = {}
@@ -222,7 +245,13 @@ def _check_coefficients(
         before = len(problems)
         _check_symbols(model, what, mu, set(), problems)
         if len(problems) == before:
-            problems += _dimension(mu, ONE, units, what)
+            found = _dimension(mu, arm, units, what)
+            if found and arm.same_dimension(METRE):
+                found[-1] += (
+                    f"; it limits the torque {', '.join(f.of)} by a force, and takes the radius with it: "
+                    "mu*r"
+                )
+            problems += found
         if len(problems) > before:
             continue
         value = sp.sympify(mu.xreplace(values))

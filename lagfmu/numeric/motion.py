@@ -7,8 +7,10 @@ the laws of frictions and contacts have one solution together is asked of the na
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -47,12 +49,19 @@ class Motion:
 
 @dataclass(frozen=True)
 class FrictionLaw:
-    """The coefficients of all frictions at a state; C (frictions, m) takes lambda to N - load."""
+    """The coefficients of all frictions at a state; C (parts, m) takes lambda to the components of their
+    normal forces less `load` (parts), `places` of each friction and each of its norms."""
 
     static: Vector
     kinetic: Vector
     load: Vector
     C: Matrix
+    places: Sequence[Sequence[range]]
+
+    def normal(self, lam: Vector) -> Vector:
+        """The normal forces (frictions)."""
+        parts = self.load + self.C @ lam
+        return np.array([sum(math.hypot(*parts[norm]) for norm in of) for of in self.places])
 
 
 def friction_law(at: Instant, q: Vector, v: Vector) -> FrictionLaw:
@@ -61,17 +70,24 @@ def friction_law(at: Instant, q: Vector, v: Vector) -> FrictionLaw:
     assert system.coulomb is not None
     coefficients, load, normal = system.coulomb(at.t, q.tolist(), v.tolist(), at.u, at.p)
     static, kinetic = coefficients[::2], coefficients[1::2]
-    C = np.zeros((len(system.frictions), system.m))
-    values = iter(normal)
+    C = np.zeros((len(load), system.m))
+    values, part = iter(normal), 0
+    places: list[list[range]] = []
     for i, friction in enumerate(system.frictions):
-        for k in friction.normal:
-            C[i, k] = next(values)
+        places.append([])
+        for norm in friction.norms:
+            places[i].append(range(part, part + len(norm)))
+            for rows in norm:
+                C[part, list(rows)] = list(islice(values, len(rows)))
+                part += 1
         if not 0 <= kinetic[i] <= static[i] < np.inf:
             raise StepFailureError(
                 f"friction {friction.name!r} has the coefficients static = {static[i]!r} and kinetic = "
                 f"{kinetic[i]!r} at t = {float(at.t)!r} s, expected 0 <= kinetic <= static"
             )
-    return FrictionLaw(np.array(static, float), np.array(kinetic, float), np.array(load, float), C)
+    return FrictionLaw(
+        np.array(static, float), np.array(kinetic, float), np.array(load, float), C, places
+    )
 
 
 def motion(at: Instant, q: Vector, v: Vector, rows: Sequence[int], slips: Slips = NONE) -> Motion:
@@ -91,9 +107,9 @@ def motion(at: Instant, q: Vector, v: Vector, rows: Sequence[int], slips: Slips 
         if law is None:
             break
         before, pushed = pushed, np.zeros(system.m)
+        N = law.normal(lam)
         for i, e in slips.items():
-            N = abs(law.load[i] + law.C[i] @ lam)
-            pushed[list(system.frictions[i].rows)] = -law.kinetic[i] * N * e
+            pushed[list(system.frictions[i].rows)] = -law.kinetic[i] * N[i] * e
         if np.abs(pushed - before).max() <= ARRIVED * np.abs(lam).max():
             break
     return Motion(M, F, G, nu, gamma, x, lam)
@@ -124,10 +140,11 @@ def stick_slip(
             lam = motion(at, q, v, acting, slips).lam
         except StepFailureError:  # they are driven apart, and the simulation will say which slip
             return list(rows), NONE
+        most = law.static * law.normal(lam)
         excess = {
-            i: float(np.linalg.norm(lam[k]) / held - 1)
+            i: float(np.linalg.norm(lam[k]) / most[i] - 1)
             for i, k in sticking.items()
-            if (held := law.static[i] * abs(law.load[i] + law.C[i] @ lam)) > 0 or lam[k].any()
+            if most[i] > 0 or lam[k].any()
         }
         worst = max(excess, key=lambda i: excess[i], default=None)
         if worst is None or excess[worst] <= FRICTION_SLACK:

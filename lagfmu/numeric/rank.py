@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .motion import FrictionLaw
 from .system import Matrix, System, Vector
 from .thresholds import RANK
 
@@ -28,11 +29,14 @@ class Rank:
     undecided: tuple[str, ...]
 
 
-def rank_of(system: System, G: Matrix, f: Vector, size: Vector, C: Matrix) -> Rank:
+def rank_of(
+    system: System, G: Matrix, f: Vector, size: Vector, law: FrictionLaw | None = None
+) -> Rank:
     """Rows are scaled to unit norm; what is left of each beside the span of those before it by Gram and
     Schmidt, twice.  Contacts come last: one that cannot be closed while those on which it depends are (a wall
-    on either side) is no redundancy.  f (m) are the residuals, `size` (m) the magnitudes of their terms; C
-    (frictions, m) takes multipliers to normal forces."""
+    on either side) is no redundancy.  f (m) are the residuals, `size` (m) the magnitudes of their terms;
+    `law` gives the normal forces of the frictions, if there are any."""
+    C = np.zeros((0, system.m)) if law is None else law.C
     norm = np.linalg.norm(G, axis=1)
     norm = np.where(norm > 0, norm, 1.0)
     G, f, size, C = G / norm[:, None], f / norm, size / norm, C / norm
@@ -58,7 +62,9 @@ def rank_of(system: System, G: Matrix, f: Vector, size: Vector, C: Matrix) -> Ra
     shared = np.linalg.norm(left, axis=1) > ALONE
     grows = np.linalg.norm(C[:, rows] @ left, axis=1) > ALONE * np.linalg.norm(C[:, rows], axis=1)
     names = tuple(system.rows[k].name for k, part in zip(rows, shared, strict=True) if part)
-    frictions = tuple(x.name for x, part in zip(system.frictions, grows, strict=True) if part)
+    places = [] if law is None else law.places
+    undecided = [any(grows[list(norm)].any() for norm in of) for of in places]
+    frictions = tuple(x.name for x, part in zip(system.frictions, undecided, strict=True) if part)
     return Rank(len(span), tuple(redundant), names, frictions)
 
 

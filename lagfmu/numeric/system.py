@@ -39,12 +39,18 @@ class Row:
 @dataclass(frozen=True)
 class Friction:
     """Coulomb friction: its name, the rows that it limits (one or two), those whose multipliers make up
-    the normal force, and whether these are contacts alone: without them there is none."""
+    each component of each norm of which the normal force is the sum, and whether these are contacts alone:
+    without them there is none."""
 
     name: str
     rows: tuple[int, ...]
-    normal: tuple[int, ...]
+    norms: tuple[tuple[tuple[int, ...], ...], ...]
     gated: bool
+
+    @property
+    def normal(self) -> tuple[int, ...]:
+        """The rows of all components."""
+        return tuple(k for norm in self.norms for part in norm for k in part)
 
 
 @dataclass(frozen=True)
@@ -85,7 +91,7 @@ class System:
     unwrapped_angles(t, q, u, p) -> what the coordinates at `unwrapped` equal modulo 2 pi.
 
     coulomb(t, q, v, u, p) -> (coefficients, load, normal) of the `frictions`: the static and the kinetic one
-    of each in turn, and N = load + sum_k normal_k lambda_k [N] over each friction's rows `normal`.
+    of each in turn, and load + sum_k normal_k lambda_k over the rows of each component of its norms.
 
     surfaces(t, q, u, p) -> h of each surface at which forces jump (instant.py); `switches`: which of them
     jump wherever h is a whole number; `driven`: length of u, the inputs and the switch states behind them.

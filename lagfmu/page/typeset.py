@@ -345,8 +345,8 @@ class _Typesetter:
 
         equations: list[tuple[str, Sequence[Printed]]] = []
         for law in self.eom.frictions:
-            normal = sp.Add(law.load, *(c * multiplier(k) for k, c in law.normal.items()))
-            force, size = vector([multiplier(k) for k in law.of]), _magnitude(show(normal))
+            size = _magnitude(show(law.normal)) if len(law.parts) == 1 else factor(law.normal)
+            force = vector([multiplier(k) for k in law.of])
             slip = [
                 sp.Add(*(self.eom.G[k, j] * v for j, v in enumerate(self.eom.v))) - self.eom.nu[k]
                 for k in map(rows.__getitem__, law.of)

@@ -11,6 +11,7 @@ import random
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -111,10 +112,10 @@ def structure_of(posed: Posed) -> Structure:
         M, _, G, _, _ = at.equations(q, v)
         f = at.residual(q) if full.contacts else np.zeros(full.m)
         try:
-            C = friction_law(at, q, v).C if full.frictions else np.zeros((0, full.m))
+            law = friction_law(at, q, v) if full.frictions else None
         except StepFailureError:
             continue
-        ranks.append(rank_of(full, G, f, np.abs(G) @ full.across(np.abs(q), begun.span), C))
+        ranks.append(rank_of(full, G, f, np.abs(G) @ full.across(np.abs(q), begun.span), law))
         masses.append(M)
     size = np.abs([M.diagonal() for M in masses]).max(axis=0)
     negative = negative_energy(full, masses[0], size)
@@ -131,6 +132,9 @@ def structure_of(posed: Posed) -> Structure:
             RedundantConstraintWarning,
             stacklevel=5,
         )
+    several = {f.name for f in full.frictions if len([*chain(*f.norms)]) > 1}
+    if refused := [name for name in undecided if name in several]:
+        raise ModelError(eom.model.name, [of_norms(refused, redundant)])
     if undecided:
         warnings.warn(
             f"model {eom.model.name!r}: {of_undecided(undecided, redundant)}",
@@ -149,6 +153,17 @@ def of_undecided(frictions: Sequence[str], redundant: Sequence[str]) -> str:
         f"{', '.join(map(repr, frictions))} {'are' if several else 'is'} not unique, and the motion may "
         "depend on it: taken is that of the multipliers of least norm; take as `normal` a sum of "
         f"multipliers that is unique, or leave out what is redundant ({', '.join(redundant)})"
+    )
+
+
+def of_norms(frictions: Sequence[str], redundant: Sequence[str]) -> str:
+    """That norms of multipliers are not unique, so that no friction follows from them, and the remedy."""
+    several = len(frictions) > 1
+    return (
+        f"friction{'s' if several else ''} {', '.join(map(repr, frictions))}: the normal "
+        f"force{'s are norms' if several else ' is a norm'} of multipliers that are not unique, and the "
+        "motion would depend on how redundant constraints share a force: leave out what is redundant "
+        f"({', '.join(redundant)}), or take as `normal` what is unique"
     )
 
 

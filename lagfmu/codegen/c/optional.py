@@ -21,8 +21,8 @@ PEAKS, PASSAGE = "peaks.c", "passage.c"  # behind PEAKS and PASSAGE
 BEHIND_BOTH = "extreme.c"
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
 FRICTION = (  # behind FRICTION_EVENTS
-    *("friction_events.c", "frictional_impact.c", "nonunique.c", "painleve.c"),
-    *("sliding.c", "slip.c", "stick_slip.c"),
+    *("friction_events.c", "frictional_impact.c", "nonunique.c", "norms.c"),
+    *("painleve.c", "sliding.c", "slip.c", "stick_slip.c"),
 )
 NO_RUNGS = """
 #include "dependent.h"

@@ -51,9 +51,10 @@ class Tables:
             *([self._integers("estimated", estimated)] if estimated else []),
             sizes,
         ]
-        frictions, normal_rows = self._frictions()
+        frictions, normal_parts, normal_rows = self._frictions()
         if frictions:
             tables.append(self._array("const Friction", "frictions", frictions))
+            tables.append(self._array("const NormalPart", "normal_part", normal_parts))
             tables.append(self._integers("normal_row", normal_rows))
         if parts.at_integers:
             tables.append(self._integers("at_integers", [int(x) for x in parts.at_integers]))
@@ -127,8 +128,10 @@ class Tables:
         if frictions:
             fields |= {
                 "frictions": len(frictions),
+                "normal_parts": len(normal_parts),
                 "normal_rows": len(normal_rows),
                 "friction": f"{p}frictions",
+                "normal_part": f"{p}normal_part",
                 "normal_row": f"{p}normal_row",
                 "coulomb": f"{p}coulomb",
             }
@@ -229,18 +232,23 @@ class Tables:
             items.append(f'{{"{row.name}", {row.kind.upper()}, {gate}, {owner}}}')
         return items or ['{"", HOLONOMIC, -1, 0}']
 
-    def _frictions(self) -> tuple[list[str], list[int]]:
-        """The frictions as Friction in system.h, and the rows whose multipliers make up N."""
+    def _frictions(self) -> tuple[list[str], list[str], list[int]]:
+        """Friction and NormalPart of system.h, and the rows whose multipliers make up the normal forces."""
         items: list[str] = []
+        parts: list[str] = []
         normal_rows: list[int] = []
         for law in self.parts.frictions:
             rows = ", ".join(map(str, law.rows))
+            count = sum(map(len, law.norms))
             items.append(
-                f'{{"{law.name}", {len(law.rows)}, {{{rows}}}, {len(normal_rows)}, '
-                f"{len(law.normal)}, {int(law.gated)}}}"
+                f'{{"{law.name}", {len(law.rows)}, {{{rows}}}, {len(parts)}, {count}, '
+                f"{len(normal_rows)}, {len(law.normal)}, {int(law.gated)}}}"
             )
-            normal_rows += law.normal
-        return items, normal_rows
+            for norm in law.norms:
+                for i, of in enumerate(norm):
+                    parts.append(f"{{{len(normal_rows)}, {len(of)}, {int(i == 0)}}}")
+                    normal_rows += of
+        return items, parts, normal_rows
 
 
 def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:

@@ -189,7 +189,7 @@ def _rows(parts: Parts) -> str:
 
 
 def _frictions(parts: Parts) -> str:
-    items = [f"Friction({f.name!r}, {f.rows}, {f.normal}, {f.gated})," for f in parts.frictions]
+    items = [f"Friction({f.name!r}, {f.rows}, {f.norms}, {f.gated})," for f in parts.frictions]
     return f"({' '.join(items)})"
 
 

@@ -27,12 +27,19 @@ typedef struct {
     int friction;     /* the number, from 1, of the friction by which alone it holds; 0: it holds */
 } Row;
 
-/* Coulomb friction: |lambda| of one or two rows is at most a part of N = load + sum_k c_k lambda_k, over
- * the rows normal_row[first .. first + normals - 1].  gated: these are contacts alone, and there is no load, so
- * that while they are open there is no normal force. */
+/* load + sum_k c_k lambda_k over the rows normal_row[first .. first + normals - 1]: a component of a norm.
+ * begins: 1 where it is the first of one. */
+typedef struct {
+    int first, normals, begins;
+} NormalPart;
+
+/* Coulomb friction: |lambda| of one or two rows is at most a part of the normal force, the sum of the norms of the
+ * components normal_part[part .. part + parts - 1], over the rows normal_row[first .. first + normals - 1].
+ * gated: these are contacts alone, and there is no load, so that while they are open there is no normal force. */
 typedef struct {
     const char *name;
     int rows, row[2];
+    int part, parts;
     int first, normals, gated;
 } Friction;
 
@@ -147,10 +154,11 @@ struct System {
     const System *full;
 
     /* Frictions; 0 and NULL without. */
-    int frictions, normal_rows;
-    const Friction *friction;  /* (frictions) */
-    const int *normal_row;     /* (normal_rows) rows whose multipliers make up the normal forces */
-    /* static and kinetic coefficient (2 frictions), load (frictions) [N], c (normal_rows) of the normal forces */
+    int frictions, normal_parts, normal_rows;
+    const Friction *friction;      /* (frictions) */
+    const NormalPart *normal_part; /* (normal_parts) components of the normal forces */
+    const int *normal_row;         /* (normal_rows) rows whose multipliers make them up */
+    /* static and kinetic coefficient (2 frictions), load (normal_parts) and c (normal_rows) of the normal forces */
     void (*coulomb)(double t, const double *q, const double *v, const double *u, const double *p,
                     double *coefficients, double *load, double *normal);
 };

@@ -3,6 +3,9 @@
  *   sticks   G_t v = nu_t ,  |lambda_t| <= mu_s N
  *   slips    lambda_t = -mu_k N s/|s| ,  s = G_t v - nu_t      (Pfeiffer & Glocker 1996, ch. 5)
  *
+ * N is |load + c lambda|, or a sum of norms of such components, as in a joint (norms.c).  In the equations it is
+ * linear, N = load + c lambda: with a sign, or along the unit vectors of the norms' components.
+ *
  * Which of them stick is decided in stick_slip.c. */
 #ifndef LAGFMU_FRICTION_H
 #define LAGFMU_FRICTION_H
@@ -26,24 +29,36 @@ struct FrictionForces {
     int *acting;         /* (m) rows that act, those that stick by friction among them */
     int *loaded;         /* (frictions) 1: a normal force acts */
     double *mu;          /* (2 frictions) static, kinetic */
-    double *load;        /* (frictions) [N] */
+    double *part_load;   /* (normal_parts) components of the normal forces, ... */
+    double *part_c;      /* (normal_rows) ... and what multipliers add to them */
+    double *load;        /* (frictions) N = load + c lambda */
     double *c;           /* (normal_rows) */
-    double *normal;      /* (frictions) [N]: with its sign while it slips, its magnitude while it sticks */
-    double *slip;        /* (2 frictions) [m/s] */
+    double *normal;      /* (frictions): with its sign while it slips, its magnitude while it sticks */
+    double *slip;        /* (2 frictions) */
     double *tangential;  /* (2 frictions) multipliers */
     double *towards;     /* (2 frictions) direction of slip */
     double *reserve;     /* (frictions) mu_s N - |lambda_t| over their sum, of the best lambda */
     /* scratch: */
-    int *sliding;        /* (frictions) those that slip */
+    int *sliding;        /* (frictions) those that slip, whose normal forces are norms last */
     double *d, *zero, *first, *right; /* (nv), (m), (m), (frictions) */
     double *answer;      /* (frictions nv) accelerations, to each d alone */
     double *pushed;      /* (frictions m) multipliers, to each d alone */
     double *A, *minor;   /* (frictions^2), and 1 + A of those that slip */
+    double *norms;       /* of norms.c */
     double *nonunique;   /* of nonunique.c */
 };
 
 /* sliding.c -- what a Mechanism with frictions does besides (optional.h); NULL in an FMU without. */
 SHARED const Sliding SLIDING;
+
+/* mu, and the normal forces by their components; load and c of those that have one. */
+SHARED void friction_coefficients(Mechanism *b, Instant at, const double *q, const double *v);
+
+/* norms.c -- what the frictions f->sliding[linear ... count - 1], whose normal forces are norms, add to vdot and
+ * lambda, f->normal of all that slip, and 1 + A of them in f->minor; `determinant`: times theirs.  FAILED where
+ * they have no solution, or it cannot be shown to be the only one. */
+SHARED Status norms_slide(Mechanism *b, double t, int linear, int count, double *determinant);
+SHARED size_t norms_doubles(const System *s);
 
 /* G_t v - nu_t of friction i at the state that was evaluated last. */
 static inline void friction_slip(const Mechanism *b, int i, const double *v, double s[2]) {
@@ -58,6 +73,35 @@ static inline double friction_normal(const Mechanism *b, int i, const double *la
     double sum = b->friction->load[i];
     for (int k = law->first; k < law->first + law->normals; k++)
         sum += b->friction->c[k] * lambda[b->system->normal_row[k]];
+    return sum;
+}
+
+/* Component p of a normal force; `share` of the load: 1 under the multipliers of a motion, 0 for a change of
+ * them. */
+static inline double friction_part(const Mechanism *b, int p, double share, const double *lambda) {
+    const NormalPart *part = &b->system->normal_part[p];
+    double sum = share * b->friction->part_load[p];
+    for (int k = part->first; k < part->first + part->normals; k++)
+        sum += b->friction->part_c[k] * lambda[b->system->normal_row[k]];
+    return sum;
+}
+
+/* The length of the norm that begins with component p of friction i; `end`: where the next one does. */
+static inline double friction_norm(const Mechanism *b, int i, int p, double share, const double *lambda,
+                                   int *end) {
+    const int last = b->system->friction[i].part + b->system->friction[i].parts;
+    double length = fabs(friction_part(b, p, share, lambda));
+    for (*end = p + 1; *end < last && !b->system->normal_part[*end].begins; *end += 1)
+        length = hypot(length, friction_part(b, *end, share, lambda));
+    return length;
+}
+
+/* The normal force of friction i, the sum of its norms: never negative. */
+static inline double friction_norms(const Mechanism *b, int i, double share, const double *lambda) {
+    const Friction *law = &b->system->friction[i];
+    double sum = 0;
+    for (int p = law->part, end; p < law->part + law->parts; p = end)
+        sum += friction_norm(b, i, p, share, lambda, &end);
     return sum;
 }
 

@@ -84,23 +84,23 @@ static void find_null_space(Nonunique *x, double *basis, double *made, double *r
     orthonormalize(x);
 }
 
-/* By how much the normal force of friction i grows along z, relative to its coefficients. */
-static double normal_along(const Mechanism *b, int i, const double *z) {
-    const Friction *law = &b->system->friction[i];
+/* By how much component p of a normal force grows along z, relative to its coefficients. */
+static double normal_along(const Mechanism *b, int p, const double *z) {
+    const NormalPart *part = &b->system->normal_part[p];
     double sum = 0, most = 0;
-    for (int k = law->first; k < law->first + law->normals; k++) {
-        sum += b->friction->c[k] * z[b->system->normal_row[k]];
-        most = fmax(most, fabs(b->friction->c[k]));
+    for (int k = part->first; k < part->first + part->normals; k++) {
+        sum += b->friction->part_c[k] * z[b->system->normal_row[k]];
+        most = fmax(most, fabs(b->friction->part_c[k]));
     }
     return most > 0 ? sum / most : 0;
 }
 
-/* Of Z what leaves the normal force of friction i as it is. */
-static void keep_normal(Nonunique *x, int i) {
+/* Of Z what leaves component p of a normal force as it is. */
+static void keep_normal(Nonunique *x, int p) {
     const int m = x->b->system->m;
     int pivot = 0;
     for (int j = 0; j < x->count; j++) {
-        x->slope[j] = normal_along(x->b, i, x->Z + j * m);
+        x->slope[j] = normal_along(x->b, p, x->Z + j * m);
         if (fabs(x->slope[j]) > fabs(x->slope[pivot])) pivot = j;
     }
     if (x->count == 0 || !(fabs(x->slope[pivot]) > NONUNIQUE_DEPENDENT)) return;
@@ -125,7 +125,7 @@ static double worst_cone(Nonunique *x, double part, const double *y) {
         if (!f->loaded[i] || !f->stick_slip[i].sticks) continue;
         double force = 0;
         for (int r = 0; r < law->rows; r++) force = hypot(force, x->there[law->row[r]]);
-        const double value = f->mu[2 * i] * fabs(friction_normal(b, i, b->lambda)) - force;
+        const double value = f->mu[2 * i] * friction_norms(b, i, 1, b->lambda) - force;
         if (!(value < least)) continue;
         least = value;
         for (int j = 0; j < x->count; j++) {
@@ -200,8 +200,10 @@ static Nonunique nonunique_of(Mechanism *b) {
 
 int normal_is_unique(Mechanism *b, int i) {
     const Nonunique x = nonunique_of(b);
-    for (int j = 0; j < x.count; j++)
-        if (fabs(normal_along(b, i, x.Z + j * b->system->m)) > NONUNIQUE_DEPENDENT) return 0;
+    const Friction *law = &b->system->friction[i];
+    for (int p = law->part; p < law->part + law->parts; p++)
+        for (int j = 0; j < x.count; j++)
+            if (fabs(normal_along(b, p, x.Z + j * b->system->m)) > NONUNIQUE_DEPENDENT) return 0;
     return 1;
 }
 
@@ -210,8 +212,10 @@ void nonunique_best(Mechanism *b, double *best) {
     const int m = s->m;
     Nonunique x = nonunique_of(b);
     memcpy(best, b->lambda, (size_t)m * sizeof *best);
-    for (int i = 0; i < s->frictions; i++)
-        if (b->friction->loaded[i]) keep_normal(&x, i);
+    for (int i = 0; i < s->frictions; i++) {
+        const Friction *law = &s->friction[i];
+        for (int p = law->part; p < law->part + law->parts && b->friction->loaded[i]; p++) keep_normal(&x, p);
+    }
     if (x.count == 0) return;
     double wide = 0, low = 0, high = 1;
     for (int k = 0; k < m; k++) wide = fmax(wide, fabs(b->lambda[k]));

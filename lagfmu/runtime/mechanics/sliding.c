@@ -24,6 +24,8 @@ static void layout_sliding(Mechanism *b, Arena *arena) {
     f->acting = arena_ints(arena, m);
     f->loaded = arena_ints(arena, count);
     f->mu = arena_doubles(arena, 2 * count);
+    f->part_load = arena_doubles(arena, s->normal_parts);
+    f->part_c = arena_doubles(arena, s->normal_rows);
     f->load = arena_doubles(arena, count);
     f->c = arena_doubles(arena, s->normal_rows);
     f->normal = arena_doubles(arena, count);
@@ -40,6 +42,7 @@ static void layout_sliding(Mechanism *b, Arena *arena) {
     f->pushed = arena_doubles(arena, count * m);
     f->A = arena_doubles(arena, count * count);
     f->minor = arena_doubles(arena, count * count);
+    f->norms = arena_take(arena, norms_doubles(s), sizeof(double));
     f->nonunique = arena_take(arena, nonunique_doubles(s), sizeof(double));
     for (int k = 0; k < m && f->zero != NULL; k++) f->zero[k] = 0;
     b->friction = f == &counted ? NULL : f;
@@ -67,11 +70,19 @@ static const int *acting(Mechanism *b, const int *active) {
     return f->acting;
 }
 
+void friction_coefficients(Mechanism *b, Instant at, const double *q, const double *v) {
+    const System *s = b->system;
+    struct FrictionForces *f = b->friction;
+    s->coulomb(at.t, q, v, at.u, at.p, f->mu, f->part_load, f->part_c);
+    for (int i = 0; i < s->frictions; i++) f->load[i] = f->part_load[s->friction[i].part];
+    memcpy(f->c, f->part_c, (size_t)s->normal_rows * sizeof *f->c);
+}
+
 /* Coefficients at the state. */
 static Status find_coefficients(Mechanism *b, Instant at, const double *q, const double *v) {
     const System *s = b->system;
-    struct FrictionForces *f = b->friction;
-    s->coulomb(at.t, q, v, at.u, at.p, f->mu, f->load, f->c);
+    const struct FrictionForces *f = b->friction;
+    friction_coefficients(b, at, q, v);
     for (int i = 0; i < s->frictions; i++) {
         if (0 <= f->mu[2 * i + 1] && f->mu[2 * i + 1] <= f->mu[2 * i] && f->mu[2 * i] < HUGE_VAL)
             continue;
@@ -92,16 +103,11 @@ static void find_push(Mechanism *b, int i) {
     for (int r = 0; r < s->friction[i].rows; r++) mechanism_push(b, s->friction[i].row[r], f->towards[2 * i + r], f->d);
 }
 
-/* The normal forces of those that slip, and what they add to vdot and lambda. */
-static Status solve_sliding(Mechanism *b, double t, int count) {
+/* The normal forces of the first `count` that slip, which are linear, and what they add to vdot and lambda. */
+static Status solve_linear(Mechanism *b, double t, int count, double *determinant) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
     const int n = s->nv, m = s->m;
-    for (int g = 0; g < count; g++) {
-        find_push(b, f->sliding[g]);
-        if (linear_solve(&b->linear, f->d, f->zero, f->answer + g * n, f->pushed + g * m) != OK)
-            return FAILED;
-    }
     for (int h = 0; h < count; h++) {
         const int i = f->sliding[h];
         f->right[h] = f->stick_slip[i].sign * friction_normal(b, i, b->lambda);
@@ -115,8 +121,8 @@ static Status solve_sliding(Mechanism *b, double t, int count) {
         f->A[h * count + h] += 1;
     }
     memcpy(f->minor, f->A, (size_t)(count * count) * sizeof *f->A);
-    const double determinant = painleve_eliminate(count, f->A, f->right);
-    if (!(determinant > PAINLEVE_SAFE)) return painleve_paradox(b, t, f->sliding, count, determinant);
+    *determinant = painleve_eliminate(count, f->A, f->right);
+    if (!(*determinant > PAINLEVE_SAFE)) return painleve_paradox(b, t, f->sliding, count, *determinant);
     for (int g = 0; g < count; g++) {
         const int i = f->sliding[g];
         const double strength = f->mu[2 * i + 1] * f->right[g];
@@ -124,6 +130,21 @@ static Status solve_sliding(Mechanism *b, double t, int count) {
         for (int j = 0; j < n; j++) b->vdot[j] -= strength * f->answer[g * n + j];
         for (int k = 0; k < m; k++) b->lambda[k] -= strength * f->pushed[g * m + k];
     }
+    return OK;
+}
+
+/* The normal forces of those that slip, the first `linear` of `count` without norms, and what they add. */
+static Status solve_sliding(Mechanism *b, double t, int linear, int count) {
+    const System *s = b->system;
+    struct FrictionForces *f = b->friction;
+    double determinant;
+    for (int g = 0; g < count; g++) {
+        find_push(b, f->sliding[g]);
+        if (linear_solve(&b->linear, f->d, f->zero, f->answer + g * s->nv, f->pushed + g * s->m) != OK)
+            return FAILED;
+    }
+    if (solve_linear(b, t, linear, &determinant) != OK) return FAILED;
+    if (count > linear && norms_slide(b, t, linear, count, &determinant) != OK) return FAILED;
     for (int g = 0; g < count; g++) {
         const int i = f->sliding[g];
         for (int r = 0; r < s->friction[i].rows; r++)
@@ -131,6 +152,24 @@ static Status solve_sliding(Mechanism *b, double t, int count) {
                 -f->mu[2 * i + 1] * f->normal[i] * f->towards[2 * i + r];
     }
     return painleve_departures(b, t, count, determinant);
+}
+
+/* FAILED where a norm of multipliers that are not the only ones would decide on the motion. */
+static Status check_norms(Mechanism *b, double t) {
+    const System *s = b->system;
+    for (int i = 0; i < s->frictions; i++) {
+        const Friction *law = &s->friction[i];
+        int shared = 0;
+        for (int k = law->first; k < law->first + law->normals; k++)
+            shared |= !b->linear.unique[s->normal_row[k]];
+        if (law->parts == 1 || !shared || normal_is_unique(b, i)) continue;
+        return fail(b->why,
+                    "friction '%s': its normal force, a norm of multipliers, is not unique at t = %s s, as its "
+                    "rows depend on others, and the motion would depend on it: leave out what is redundant, "
+                    "or take as normal force what is unique",
+                    law->name, digits(t).text);
+    }
+    return OK;
 }
 
 /* Are the multipliers of a friction that sticks the only ones? */
@@ -157,18 +196,28 @@ static void find_reserves(Mechanism *b) {
         double force[2];
         f->reserve[i] = 0;
         if (!f->loaded[i] || !f->stick_slip[i].sticks) continue;
-        f->normal[i] = fabs(friction_normal(b, i, b->lambda));
-        const double held = f->mu[2 * i] * fabs(friction_normal(b, i, best));
+        f->normal[i] = friction_norms(b, i, 1, b->lambda);
+        const double held = f->mu[2 * i] * friction_norms(b, i, 1, best);
         const double asked = friction_tangential(b, i, best, force);
         if (held + asked > 0) f->reserve[i] = (held - asked) / (held + asked);
     }
+}
+
+/* Appends to the first `count` that slip those with normal forces of one component, or of several (`norms`);
+ * how many there are then. */
+static int list_sliding(Mechanism *b, int norms, int count) {
+    struct FrictionForces *f = b->friction;
+    for (int i = 0; i < b->system->frictions; i++)
+        if (f->loaded[i] && !f->stick_slip[i].sticks && (b->system->friction[i].parts > 1) == norms)
+            f->sliding[count++] = i;
+    return count;
 }
 
 static Status motion_with_friction(Mechanism *b, Instant at, const double *q, const double *v,
                                    const int *active) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
-    int sliding = 0, sticking = 0;
+    int sticking = 0;
     if (find_coefficients(b, at, q, v) != OK) return FAILED;
     if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
     if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) != OK) return FAILED;
@@ -179,9 +228,10 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
         sticking |= f->stick_slip[i].sticks;
         if (f->stick_slip[i].sticks) continue;
         friction_heading(&f->stick_slip[i], f->slip + 2 * i, f->towards + 2 * i);
-        f->sliding[sliding++] = i;
     }
-    if (sliding > 0 && solve_sliding(b, at.t, sliding) != OK) return FAILED;
+    const int linear = list_sliding(b, 0, 0), sliding = list_sliding(b, 1, linear);
+    if (check_norms(b, at.t) != OK) return FAILED;
+    if (sliding > 0 && solve_sliding(b, at.t, linear, sliding) != OK) return FAILED;
     if (b->stage) return OK;
     if (sticking) find_reserves(b);
     for (int i = 0; i < s->frictions; i++) friction_tangential(b, i, b->lambda, f->tangential + 2 * i);

@@ -152,7 +152,7 @@ Status frictional_impact(Solver *s, Instant at, const double *q, const double *v
     memcpy(x.slip, slip, (size_t)m * sizeof *slip);
     *done = 0;
     if (!find_struck_rows(&x, entering)) return OK;
-    system->coulomb(at.t, q, v, at.u, at.p, x.b->friction->mu, x.b->friction->load, x.b->friction->c);
+    friction_coefficients(x.b, at, q, v);
     if (reduce_frictional(&x, entering, active, plastic.Lambda) != OK) return FAILED;
     if (!sweep(&x, e)) return OK;
     if (finish_frictional(&x, found.dv, found.Lambda) != OK) return FAILED;

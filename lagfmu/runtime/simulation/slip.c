@@ -18,7 +18,8 @@ void slip_indicators(const Solver *s, double *values) {
         value[0] = mode->sticks ? f->reserve[i]
                                  : f->slip[2 * i] * mode->direction[0] +
                                        f->slip[2 * i + 1] * mode->direction[1];
-        if (!mode->sticks && !s->system->friction[i].gated) value[1] = f->normal[i];
+        const Friction *law = &s->system->friction[i];
+        if (!mode->sticks && !law->gated && law->parts == 1) value[1] = f->normal[i];
     }
 }
 

@@ -1,0 +1,388 @@
+"""The friction of joints, whose normal force is a norm of multipliers of the same instant: a pin, a guide, a
+sleeve, and a slider-crank with all joints rubbing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from sympy import cos, sin, symbols
+from sympy.physics.mechanics import dynamicsymbols
+
+from lagfmu import (
+    Contact,
+    Friction,
+    Holonomic,
+    Model,
+    Nonholonomic,
+    Parameter,
+    Result,
+    multiplier,
+    norm,
+    simulate,
+)
+from lagfmu.errors import LagfmuError, ModelError, SimulationError
+from lagfmu.testing import find_compiler, load
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
+MODELS = Path(__file__).parent.parent / "models"
+Build = Callable[..., Path]
+g = 9.81  # m/s^2
+x, y, z, theta, phi = dynamicsymbols("x y z theta phi")
+m, M, G, L, J, r, b, h, P = symbols("m M g L J r b h P", positive=True)
+mu, mu_s, mu_k = symbols("mu mu_s mu_k", positive=True)
+
+
+def pendulum(normal: Any, static: Any, kinetic: Any = None, *more: Any) -> Model:
+    """A compound pendulum, its pin as two rows: 1 kg, 0.5 m below the pin, 0.05 kg m^2 about its centre."""
+    return Model(
+        name="Pin",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * theta.diff() ** 2 / 2 - m * G * y,
+        coordinates={x: "m", y: "m", theta: "rad"},
+        constraints=[
+            Holonomic("A.x", x - L * sin(theta)),
+            Holonomic("A.y", y + L * cos(theta)),
+            Nonholonomic("turn", theta.diff()),
+            *more,
+            Friction("bearing", of=["turn"], normal=normal, static=static, kinetic=kinetic),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(G, g, "m/s^2"),
+            Parameter(L, 0.5, "m"),
+            Parameter(J, 0.05, "kg.m^2"),
+            Parameter(r, 0.02, "m"),
+            Parameter(mu_s, 0.3, "1"),
+            Parameter(mu_k, 0.3, "1"),
+        ],
+        start={theta: 1.0},
+    )
+
+
+PIN = norm(multiplier("A.x"), multiplier("A.y"))
+
+
+@pytest.fixture(scope="module")
+def pin(built: Build) -> Path:
+    return built(pendulum(PIN, mu_s * r, mu_k * r))
+
+
+def swings(angle: float, limit: float, arm: float) -> list[float]:
+    """The angles at which each swing from rest ends [rad], the last of which it keeps.
+
+    With J0 = J + m L^2 the pin's force is (m L (alpha cos theta - omega^2 sin theta),
+    m g + m L (alpha sin theta + omega^2 cos theta)), alpha = (-m g L sin theta + tau)/J0, so that
+    N = |n0 + n1 tau| with n1 = m L (cos theta, sin theta)/J0, and |tau| = arm N is a quadratic: with
+    w = sgn(tau),  (1 - arm^2 n1^2) N^2 - 2 w arm n0.n1 N - n0^2 = 0,  of which one root is positive.
+    At rest N = m g, and it stays where L |sin theta| <= limit.
+    """
+    m, L, J0 = 1.0, 0.5, 0.05 + 0.25
+    found = [angle]
+    while L * abs(np.sin(angle)) > limit:
+        way = -np.sign(angle)  # of omega
+
+        def rates(_: float, state: Any, way: float = way) -> list[float]:
+            theta, omega = state
+            along = m * L / J0 * np.array([np.cos(theta), np.sin(theta)])
+            free = np.array([-m * L * omega**2 * np.sin(theta), m * L * omega**2 * np.cos(theta)])
+            free += [0.0, m * g] - along * m * g * L * np.sin(theta)
+            a, half = 1 - (arm * along) @ (arm * along), way * arm * free @ along
+            N = (np.sqrt(half**2 + a * (free @ free)) - half) / a
+            return [omega, (-m * g * L * np.sin(theta) - way * arm * N) / J0]
+
+        def stops(_: float, state: Any, way: float = way) -> float:
+            return float(way * state[1])
+
+        stops.terminal, stops.direction = True, -1.0  # type: ignore[attr-defined]
+        run = solve_ivp(
+            rates, (0, 3), [angle, way * 1e-300], "DOP853", events=stops, rtol=1e-13, atol=1e-15
+        )
+        angle = float(run.y_events[0][-1][0])
+        found.append(angle)
+    return found
+
+
+def test_a_pendulum_in_a_rubbing_pin_stops_where_an_integration_of_its_own_does(pin: Path) -> None:
+    """tau = -mu r N sgn(omega), N = |n0 + n1 tau| of the same instant, from 1 rad until
+    L |sin theta| <= mu r: the ends of all swings and the angle at which it stays."""
+    ends = swings(1.0, 0.3 * 0.02, 0.3 * 0.02)
+    assert len(ends) > 25
+    run = simulate(pin, stop_time=50.0, step_size=0.01, tolerance=1e-13)
+    assert run["sticks.bearing"][-1]
+    assert run["theta"][-1] == pytest.approx(ends[-1], abs=1e-9)
+    highest = [max(abs(a), abs(b)) for a, b in pairwise(ends)][1:]
+    omega, theta = run["der(theta)"], np.abs(run["theta"])
+    turned = [k for k in range(1, len(omega)) if omega[k - 1] * omega[k] < 0]
+    found = [float(max(theta[k - 1 : k + 1])) for k in turned]
+    assert found[: len(highest) - 1] == pytest.approx(highest[:-1], abs=2e-4)  # sampled
+    assert run["energy.total"] + run["energy.dissipated"] == pytest.approx(
+        run["energy.total"][0], abs=1e-11
+    )
+
+
+@pytest.mark.parametrize(("part", "sticks"), [(0.999, True), (1.001, False)])
+def test_a_pin_holds_up_to_its_static_coefficient(pin: Path, part: float, sticks: bool) -> None:
+    """At rest tau = m g L sin(theta) and N = m g: it sticks while sin(theta) <= mu_s r/L; the margin is
+    mu_s r N - |tau| [N.m]."""
+    start = float(np.arcsin(part * 0.5 * 0.02 / 0.5))
+    run = simulate(pin, start_values={"theta": start, "mu_s": 0.5}, stop_time=0.2, step_size=0.1)
+    assert run["sticks.bearing"].all() == sticks
+    assert (run["theta"][-1] == start) == sticks
+    if sticks:
+        assert run["margin.bearing"][0] == pytest.approx(0.01 * g * (1 - part), rel=1e-9)
+        assert run["lambda.turn"][0] == pytest.approx(g * 0.5 * np.sin(start), rel=1e-12)
+
+
+@pytest.mark.parametrize("friction", [0.3, 20.0, 29.0])
+def test_the_torque_is_that_of_the_normal_force_of_its_own_instant(
+    pin: Path, friction: float
+) -> None:
+    """|tau| = mu r |lambda| to rounding, also where mu r |lambda1| = mu r m L/(J + m L^2) is 0.97; slip is an
+    angular velocity, and the power tau omega."""
+    start = {"der(theta)": 4.0, "theta": 0.0, "mu_s": friction, "mu_k": friction}
+    run = simulate(pin, start_values=start, stop_time=0.02, step_size=0.001)
+    N = np.hypot(run["lambda.A.x"], run["lambda.A.y"])
+    slides = ~run["sticks.bearing"].astype(bool)
+    assert slides[0]
+    assert run["lambda.turn"][slides] == pytest.approx(-friction * 0.02 * N[slides], rel=1e-12)
+    assert run["slip.turn"] == pytest.approx(run["der(theta)"], abs=1e-15)
+    assert run["power.bearing"] == pytest.approx(
+        (run["lambda.turn"] * run["der(theta)"]) * slides, rel=1e-13
+    )
+
+
+def test_a_pin_that_would_load_itself_is_refused_by_name(pin: Path) -> None:
+    """mu r |lambda1| = 31 * 0.02 * 0.5/0.3 = 1.033 > 1: |tau| = mu r |lambda0 + lambda1 tau| has no root of
+    the right sign, or two."""
+    start = {"der(theta)": 4.0, "mu_s": 31.0, "mu_k": 31.0}
+    with pytest.raises(
+        SimulationError, match=r"'bearing': sliding has no acceleration, or several.*1\.03"
+    ):
+        simulate(pin, start_values=start, stop_time=0.02, step_size=0.001)
+
+
+def test_the_radius_stands_in_the_coefficient_or_in_the_normal_force(
+    pin: Path, built: Build
+) -> None:
+    """mu r times N, or mu times r N: the same torque."""
+    other = simulate(built(pendulum(r * PIN, mu_s, mu_k)), stop_time=0.5, step_size=0.1)
+    run = simulate(pin, stop_time=0.5, step_size=0.1)
+    assert other["lambda.turn"] == pytest.approx(run["lambda.turn"], rel=1e-12)
+
+
+REFUSED = {
+    "no radius": (
+        PIN,
+        mu_s,
+        (),
+        r"static of friction 'bearing'.*expected m.*takes the radius with it",
+    ),
+    "a torque as normal force and a radius": (r * PIN, mu_s * r, (), "static.*expected 1"),
+    "an area": (r**2 * PIN, mu_s, (), "normal of friction 'bearing'.*expected N"),
+    "a product": (
+        multiplier("A.x") * multiplier("A.y") / (m * G),
+        mu_s * r,
+        (),
+        r"neither linear in the multipliers nor a sum of norms.*norm\(multiplier",
+    ),
+    "a contact": (
+        norm(multiplier("A.x"), multiplier("wall")),
+        mu_s * r,
+        (Contact("wall", x + 1),),
+        "is a norm with the contact 'wall'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", sorted(REFUSED))
+def test_what_is_no_friction_of_a_joint_is_refused_with_the_remedy(case: str) -> None:
+    """A torque is limited by a force times a length; a normal force is linear, or a sum of norms."""
+    normal, static, more, words = REFUSED[case]
+    with pytest.raises(ModelError, match=words):
+        pendulum(normal, static, None, *more)
+
+
+def test_a_norm_of_shared_multipliers_is_refused_by_name(tmp_path: Path) -> None:
+    """Two pins on one axis share the force as one likes: the motion would follow the least norm."""
+    twice = (Holonomic("B.x", x - L * sin(theta)), Holonomic("B.y", y + L * cos(theta)))
+    with (
+        pytest.warns(UserWarning, match="follow from the others"),
+        pytest.raises(
+            LagfmuError, match=r"'bearing'.*not unique.*leave out what is redundant \(B.x, B.y\)"
+        ),
+    ):
+        simulate(pendulum(PIN, mu_s * r, None, *twice), stop_time=0.1, step_size=0.1)
+
+
+def test_a_guide_rubs_by_the_norm_of_its_two_radial_forces(built: Build) -> None:
+    """A block thrown up a guide at alpha = 0.5, pressed sideways by P: N = sqrt((m g cos alpha)^2 + P^2); it
+    stops after v0/(g sin alpha + mu N/m), slides back by a = g sin alpha - mu N/m, or stays."""
+    alpha, m_, P_ = 0.5, 2.0, 7.0
+    model = Model(
+        name="Guide",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2
+        - m * G * (x * np.sin(alpha) + y * np.cos(alpha)),
+        coordinates={x: "m", y: "m", z: "m"},
+        forces={z: P},
+        constraints=[
+            Holonomic("D.y", y),
+            Holonomic("D.z", z),
+            Nonholonomic("slide", x.diff()),
+            Friction("guide", ["slide"], norm(multiplier("D.y"), multiplier("D.z")), mu),
+        ],
+        parameters=[
+            Parameter(m, m_, "kg"),
+            Parameter(G, g, "m/s^2"),
+            Parameter(P, P_, "N"),
+            Parameter(mu, 0.3, "1"),
+        ],
+        start={x.diff(): 3.0},
+    )
+    N = np.hypot(m_ * g * np.cos(alpha), P_)
+    for friction in (0.3, 0.6):
+        up, down = (g * np.sin(alpha) + s * friction * N / m_ for s in (1, -1))
+        run = simulate(built(model), start_values={"mu": friction}, stop_time=2.0, step_size=0.1)
+        t = run["time"]
+        back = np.where(t > 3 / up, max(down, 0.0) * (t - 3 / up) ** 2 / 2, 0)
+        rising = np.minimum(t, 3 / up)
+        assert run["x"] == pytest.approx(3 * rising - up * rising**2 / 2 - back, abs=1e-10)
+        assert run["sticks.guide"][-1] == (down < 0)
+        assert run["sticking.guide.count"][-1] == (down < 0)
+
+
+def test_a_drawer_jams_by_the_norms_at_both_edges(built: Build) -> None:
+    """A drawer of length b in its guide, pulled by P at h from the centre line: the edges bear P h/b each,
+    the friction is 2 mu P h/b, and it comes with a = P (1 - 2 mu h/b)/m, or jams where 2 mu h >= b."""
+    edges = [multiplier("D.y") / 2 + s * multiplier("D.phi") / b for s in (1, -1)]
+    model = Model(
+        name="Drawer",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * phi.diff() ** 2 / 2,
+        coordinates={x: "m", y: "m", phi: "rad"},
+        forces={x: P, phi: -P * h},
+        constraints=[
+            Holonomic("D.y", y),
+            Holonomic("D.phi", phi),
+            Nonholonomic("slide", x.diff()),
+            Friction("guide", ["slide"], norm(edges[0]) + norm(edges[1]), mu),
+        ],
+        parameters=[
+            Parameter(m, 2.0, "kg"),
+            Parameter(J, 0.1, "kg.m^2"),
+            Parameter(P, 10.0, "N"),
+            Parameter(h, 0.3, "m"),
+            Parameter(b, 0.4, "m"),
+            Parameter(mu, 0.5, "1"),
+        ],
+    )
+    run = simulate(built(model), stop_time=1.0, step_size=0.5)
+    assert run["x"][-1] == pytest.approx(10.0 * (1 - 2 * 0.5 * 0.3 / 0.4) / 2.0 / 2, rel=1e-12)
+    run = simulate(built(model), start_values={"mu": 0.67}, stop_time=1.0, step_size=0.5)
+    assert run["sticks.guide"].all()
+    assert run["x"][-1] == 0
+
+
+def test_a_sleeve_rubs_against_its_slip_vector(built: Build) -> None:
+    """A tube of radius r slides and turns on a rod: lambda = -mu N (v, r omega)/|(v, r omega)|.  With
+    J = m r^2 both decay alike, (v, r omega) by mu N/m along itself, and stop at |s|/(mu N/m)."""
+    model = Model(
+        name="Sleeve",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2
+        + m * r**2 * phi.diff() ** 2 / 2
+        - m * G * z,
+        coordinates={x: "m", y: "m", z: "m", phi: "rad"},
+        forces={y: P},
+        constraints=[
+            Holonomic("C.y", y),
+            Holonomic("C.z", z),
+            Nonholonomic("slide", x.diff()),
+            Nonholonomic("turn", r * phi.diff()),
+            Friction("sleeve", ["slide", "turn"], norm(multiplier("C.y"), multiplier("C.z")), mu),
+        ],
+        parameters=[
+            Parameter(m, 1.5, "kg"),
+            Parameter(r, 0.05, "m"),
+            Parameter(G, g, "m/s^2"),
+            Parameter(P, 5.0, "N"),
+            Parameter(mu, 0.2, "1"),
+        ],
+        start={x.diff(): 0.3, phi.diff(): 8.0},
+    )
+    run = simulate(built(model), stop_time=0.4, step_size=0.01)
+    a = 0.2 * np.hypot(1.5 * g, 5.0) / 1.5
+    left = np.maximum(0.5 - a * run["time"], 0)
+    assert run["slip.slide"] == pytest.approx(0.6 * left, abs=1e-9)
+    assert run["slip.turn"] == pytest.approx(0.8 * left, abs=1e-9)
+    assert run["sticking.sleeve.time"][-1] == pytest.approx(0.5 / a, rel=1e-9)
+
+
+# ------------------------------------------------------------------ several joints
+
+
+@pytest.fixture(scope="module")
+def crank(native_fmu: Callable[[str], Path]) -> Path:
+    return native_fmu("CrankWithBearingFriction")
+
+
+JOINTS = {"A": "A.turn", "B": "B.turn", "C": "C.turn"}
+
+
+def norms(run: Result) -> dict[str, Any]:
+    return {j: np.hypot(run[f"lambda.{j}.x"], run[f"lambda.{j}.y"]) for j in JOINTS}
+
+
+def test_each_joint_of_a_slider_crank_rubs_by_its_own_force(crank: Path) -> None:
+    """tau_i = -mu r N_i sgn(omega_i) and F = -mu |N_D| sgn(v) with all N of the same instant, to rounding."""
+    run = simulate(crank, stop_time=0.5, step_size=0.01, tolerance=1e-9)
+    for joint, N in norms(run).items():
+        assert run[f"lambda.{JOINTS[joint]}"] == pytest.approx(
+            -0.1 * 0.01 * N * np.sign(run[f"slip.{JOINTS[joint]}"]), rel=1e-11
+        )
+    assert run["lambda.D.slide"] == pytest.approx(
+        -0.1 * np.abs(run["lambda.D.y"]) * np.sign(run["slip.D.slide"]), rel=1e-11
+    )
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
+def test_the_powers_of_all_joints_balance(crank: Path, tolerance: float) -> None:
+    """energy.total + energy.dissipated is constant, to the tolerance of the energy."""
+    run = simulate(crank, stop_time=1.0, step_size=0.01, tolerance=tolerance)
+    balance = run["energy.total"] + run["energy.dissipated"]
+    assert run["energy.dissipated"][-1] > 3
+    assert np.ptp(balance) < 100 * tolerance * np.abs(run["energy.total"]).max()
+
+
+@pytest.mark.parametrize("order", [(3, 2, 1, 0), (1, 3, 0, 2)])
+def test_the_order_of_the_joints_changes_nothing(
+    crank: Path, built: Build, order: Sequence[int]
+) -> None:
+    """Frictions and constraints declared in another order: the same motion and the same forces."""
+    model = load(MODELS / "crank_with_bearing_friction.py").model
+    frictions = [model.frictions[k] for k in order]
+    other = Model(
+        **{
+            name: getattr(model, name)
+            for name in ("name", "coordinates", "lagrangian", "parameters", "start")
+        },
+        constraints=[*reversed(model.constraints), *frictions],
+    )
+    runs = [
+        simulate(fmu, stop_time=0.5, step_size=0.05, tolerance=1e-10)
+        for fmu in (crank, built(other))
+    ]
+    for name in ("phi1", "lambda.A.x", "lambda.C.y", "lambda.D.slide", "energy.dissipated"):
+        size = np.abs(runs[0][name]).max()
+        assert runs[1][name] == pytest.approx(runs[0][name], abs=1e-8 * size)
+
+
+def test_joints_that_would_load_each_other_are_refused_by_name(crank: Path) -> None:
+    """With bearings as large as the crank no bound shows that the friction of one, by way of the others, does
+    not load itself: nothing is resolved by luck."""
+    with pytest.raises(
+        SimulationError, match=r"'A', 'B', 'C'.*cannot be shown unique.*spectral radius"
+    ):
+        simulate(crank, start_values={"r": 0.1, "mu": 1.0}, stop_time=0.1, step_size=0.01)
