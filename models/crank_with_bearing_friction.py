@@ -59,7 +59,7 @@ def force(pin):
     return norm(multiplier(f"{pin}.x"), multiplier(f"{pin}.y"))
 
 
-begin = pi / 4  # of the crank
+begin = pi / 2  # of the crank
 slant = -asin(a / b * sin(begin))  # of the rod
 
 model = Model(
