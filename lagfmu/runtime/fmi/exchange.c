@@ -110,8 +110,7 @@ Status exchange_multipliers(Instance *x) {
     if (instance_start(x) != OK) return FAILED;
     segment_begin(s);
     x->evaluated = 0;
-    return mechanism_motion_near(&s->stepped, segment_instant(s, s->state.now.t), s->state.q, s->state.v,
-                                 s->active, s->state.offset, s->state.span);
+    return segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v);
 }
 
 /* What frictions dissipate [W], of the latest motion. */

@@ -27,9 +27,7 @@ static Status choose_rows(Instance *x) {
     if (s->system->m < 2) return OK;
     segment_begin(s);
     x->evaluated = 0;
-    if (mechanism_motion_near(&s->stepped, segment_instant(s, s->state.now.t), s->state.q, s->state.v,
-                              s->active, s->state.offset, s->state.span) != OK)
-        return FAILED;
+    if (segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
     segment_choose_rows(s);
     return OK;
 }

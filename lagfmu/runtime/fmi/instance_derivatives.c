@@ -16,9 +16,7 @@ Status instance_differentiate(Instance *x, Direction d) {
     if (instance_observe(x) != OK) return FAILED;
     const Instant at = segment_instant(s, s->state.now.t);
     segment_begin(s);
-    if (mechanism_motion_near(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                              s->state.span) != OK)
-        return FAILED;
+    if (segment_motion_near(s, at, s->state.q, s->state.v) != OK) return FAILED;
     if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK)
         return FAILED;
     if (full == NULL) {
@@ -41,12 +39,6 @@ Status instance_differentiate(Instance *x, Direction d) {
     return OK;
 }
 
-/* Q = G^T lambda: the change of the share that G's value e has in it. */
-static double share_change(const Sensitivity *w, const Mechanism *b, int e) {
-    const int k = b->system->entry_row[e];
-    return w->dG[e] * b->lambda[k] + b->G[e] * w->dlambda[k];
-}
-
 Status instance_change(const Instance *x, const Variable *v, Direction d, double *change) {
     const Solver *s = &x->solver;
     const int embedded = s->system->full != NULL;
@@ -66,11 +58,8 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_RESIDUAL:
             *change = sensitivity_residual(w, b, v->index, x->seen.v, dv);
             break;
-        case AT_FORCE:
-            for (int e = 0; e < b->system->entries; e++)
-                if (b->system->entry_column[e] == v->index) *change += share_change(w, b, e);
-            break;
-        case AT_SHARE: *change = share_change(w, b, v->index); break;
+        case AT_FORCE: *change = w->dforce[v->index]; break;
+        case AT_SHARE: *change = sensitivity_share(w, b, v->index); break;
         case AT_KINETIC: *change = w->denergy[0]; break;
         case AT_POTENTIAL: *change = w->denergy[1]; break;
         case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;

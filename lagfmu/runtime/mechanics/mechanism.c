@@ -106,6 +106,16 @@ void mechanism_at_work(const Mechanism *b, double *forces, double *reach) {
     }
 }
 
+double mechanism_square(const Mechanism *b, const double *x) {
+    double sum = 0;
+    for (int e = 0; e < b->system->masses; e++) {
+        const int i = b->system->mass_row[e], j = b->system->mass_column[e];
+        const double part = b->M[e] * x[i] * x[j];
+        sum += part != 0 ? (i == j ? part : 2 * part) : 0;
+    }
+    return sum;
+}
+
 /* The largest |f - offset| of the rows, relative to the terms of G size. */
 static Status find_off(Mechanism *b, Instant at, const double *q, const int *active,
                        const double *offset, const double *span, double *off) {

@@ -124,6 +124,9 @@ static inline Status mechanism_settle(const Mechanism *b, Instant at, double *q)
 /* M, F, G, nu, gamma, B, b at a state.  FAILED if one is not finite. */
 SHARED Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v);
 
+/* x^T M x, by the M that was evaluated last. */
+SHARED double mechanism_square(const Mechanism *b, const double *x);
+
 /* f (m).  FAILED if one is not finite. */
 SHARED Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
 

@@ -30,7 +30,7 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dq = arena_doubles(arena, s->nq);
     w->dv = arena_doubles(arena, s->nv);
     w->du = arena_doubles(arena, s->inputs);
-    w->dforce = arena_doubles(arena, s->output_count > 0 ? s->nv : 0);
+    w->dforce = arena_doubles(arena, s->nv);
     w->down = arena_doubles(arena, s->output_count);
     w->dother = arena_doubles(arena, s->output_count);
 }

@@ -19,7 +19,7 @@ typedef struct {
     double *dB, *drate;      /* (rates), (nq) of q' = B v + b */
     double *b, *c;           /* (nv), (m) right sides */
     double *dq, *dv, *du;    /* (nq), (nv), (inputs): a direction, for whoever asks */
-    double *dforce;          /* (nv) change of Q, where there are outputs of the model's own */
+    double *dforce;          /* (nv) change of Q */
     double *down, *dother;   /* (output_count) changes of these */
 } Sensitivity;
 
@@ -33,6 +33,12 @@ SHARED Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const 
 /* Changes of the energies along a direction, of a system of which coordinates are only read. */
 SHARED void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
                                     const double *v, Direction d);
+
+/* The change of the share that G's value e has in Q = G^T lambda. */
+static inline double sensitivity_share(const Sensitivity *w, const Mechanism *b, int e) {
+    const int k = b->system->entry_row[e];
+    return w->dG[e] * b->lambda[k] + b->G[e] * w->dlambda[k];
+}
 
 /* The change of row k's residual: df, or of G v - nu for a nonholonomic row. */
 SHARED double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,

@@ -25,9 +25,7 @@ static Status top_of_rebound(Solver *s, double t, const double *y, const double 
     for (int c = 0; c < system->contacts; c++)
         departed |= !s->state.closed[c] && values[c] <= s->state.gap[c];
     if (!departed) return OK;
-    if (mechanism_motion_near(b, segment_instant(s, t), y, y + system->nq, s->active, s->state.offset,
-                              s->state.span) != OK)
-        return FAILED;
+    if (segment_motion_near(s, segment_instant(s, t), y, y + system->nq) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++) {
         const int k = system->contact[c];
         if (s->state.closed[c] || !(values[c] <= s->state.gap[c])) continue;

@@ -65,17 +65,6 @@ static Status change(Solver *s, Instant at, const int *left, int *closed, const 
     return stick_slip_finish(&x, OK);
 }
 
-/* x^T M x. */
-static double squared(const Mechanism *b, const double *x) {
-    double sum = 0;
-    for (int e = 0; e < b->system->masses; e++) {
-        const int i = b->system->mass_row[e], j = b->system->mass_column[e];
-        const double part = b->M[e] * x[i] * x[j];
-        sum += part != 0 ? (i == j ? part : 2 * part) : 0;
-    }
-    return sum;
-}
-
 /* How long ago the slip of a friction was 0 [s], by its speed and acceleration; 0 where there is none. */
 static double overshot(const Solver *s, const Friction *law) {
     const Mechanism *b = &s->stepped;
@@ -97,7 +86,7 @@ static Status stop(Solver *s, Instant at, const int *left) {
     Mechanism *b = &s->stepped;
     StickSlip *held = s->trial_modes;
     double *y = s->work_friction + 2 * system->frictions, *v = y + system->nq, *change = v + nv;
-    const double lost = s->state.now.lost, pull = squared(b, b->vdot);
+    const double lost = s->state.now.lost, pull = mechanism_square(b, b->vdot);
     double since = 0;
     int any = 0;
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
@@ -115,7 +104,7 @@ static Status stop(Solver *s, Instant at, const int *left) {
     const Status stopped = losses_project(s, at, 1);
     b->friction->stick_slip = s->state.stick_slip;
     for (int j = 0; j < nv; j++) change[j] = s->state.v[j] - v[j];
-    if (stopped == OK && squared(b, change) <= UNDONE * UNDONE * since * since * pull) return OK;
+    if (stopped == OK && mechanism_square(b, change) <= UNDONE * UNDONE * since * since * pull) return OK;
     state_scatter(system, y, s->state.q, s->state.v);
     s->state.now.lost = lost;
     return OK;

@@ -24,8 +24,7 @@ static Status of_contacts(Solver *s, double t, const double *y, double *values) 
     if (mechanism_residual(b, at, y, b->f) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++) values[c] = b->f[system->contact[c]];
     if (!any) return OK;
-    if (mechanism_motion_near(b, at, y, y + system->nq, s->active, s->state.offset, s->state.span) != OK)
-        return FAILED;
+    if (segment_motion_near(s, at, y, y + system->nq) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++)
         if (s->state.closed[c]) values[c] = b->lambda[system->contact[c]];
     if (system->frictions > 0)

@@ -28,11 +28,7 @@ Status losses_project(Solver *s, Instant at, int drifted) {
     memcpy(s->state.v, before, bytes);
     if (drifted) lost -= losses_energy(s, at);
     memcpy(s->state.v, after, bytes);
-    for (int e = 0; e < system->masses; e++) {
-        const int i = system->mass_row[e], j = system->mass_column[e];
-        const double part = b->M[e] * (after[i] - before[i]) * (after[j] - before[j]);
-        lost += part != 0 ? (i == j ? part / 2 : part) : 0;
-    }
-    s->state.now.lost += lost;
+    for (int j = 0; j < system->nv; j++) after[j] -= before[j];
+    s->state.now.lost += lost + mechanism_square(b, after) / 2;
     return OK;
 }

@@ -22,23 +22,12 @@ Status outputs_observe(const System *s, Instant at, Observed *o, Why *why) {
     return OK;
 }
 
-/* dQ = d(G^T lambda), entry by entry of G. */
-static void change_of_forces(Sensitivity *w, const Mechanism *b) {
-    const System *s = b->system;
-    for (int j = 0; j < s->nv; j++) w->dforce[j] = 0;
-    for (int e = 0; e < s->entries; e++) {
-        const int k = s->entry_row[e];
-        w->dforce[s->entry_column[e]] += w->dG[e] * b->lambda[k] + b->G[e] * w->dlambda[k];
-    }
-}
-
 void outputs_change(Sensitivity *w, const Mechanism *b, const System *s, Instant at,
                     const Observed *o, Direction d) {
+    for (int j = 0; j < s->nv; j++) w->dforce[j] = 0;
+    for (int e = 0; b != NULL && e < s->entries; e++) w->dforce[s->entry_column[e]] += sensitivity_share(w, b, e);
     if (s->outputs_tangent == NULL) return;
-    if (b != NULL) {
-        change_of_forces(w, b);
-        for (int k = 0; k < s->m; k++) w->c[k] = o->unique[k] ? w->dlambda[k] : NAN;
-    }
+    for (int k = 0; b != NULL && k < s->m; k++) w->c[k] = o->unique[k] ? w->dlambda[k] : NAN;
     /* the values tell which of a guarded output's two expressions holds: */
     s->outputs(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, o->own, o->other);
     s->outputs_tangent(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, d.dt, d.dq, d.dv,

@@ -38,9 +38,12 @@ Instant segment_instant(Solver *s, double t) {
     return (Instant){t, s->u, s->p};
 }
 
+Status segment_motion_near(Solver *s, Instant at, const double *q, const double *v) {
+    return mechanism_motion_near(&s->stepped, at, q, v, s->active, s->state.offset, s->state.span);
+}
+
 Status segment_motion(Solver *s, Instant at, const double *q, const double *v) {
-    return s->system->frictions > 0 ? mechanism_motion_near(&s->stepped, at, q, v, s->active,
-                                                            s->state.offset, s->state.span)
+    return s->system->frictions > 0 ? segment_motion_near(s, at, q, v)
                                     : mechanism_motion(&s->stepped, at, q, v, solver_rows(s));
 }
 

@@ -24,8 +24,11 @@ SHARED void segment_choose_rows(Solver *s);
 /* Time t with the inputs then, and the switch states behind them (kept in s->u). */
 SHARED Instant segment_instant(Solver *s, double t);
 
-/* The motion at a state that may lie off the constraints: by those rows, but by all that act where there are
- * frictions, for the normal force is that of the multipliers of least norm. */
+/* The motion at a state that may lie off the constraints, by all rows that act. */
+SHARED Status segment_motion_near(Solver *s, Instant at, const double *q, const double *v);
+
+/* The same by the rows of solver_rows(), but by all that act where there are frictions, for the normal force is
+ * that of the multipliers of least norm. */
 SHARED Status segment_motion(Solver *s, Instant at, const double *q, const double *v);
 
 /* The relative tolerance of the step that begins here. */

@@ -56,12 +56,6 @@ static const double NODES[] = {-0.9061798459386640, -0.5384693101056831, 0, 0.53
 static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
                                  0.4786286704993665, 0.2369268850561891};
 
-/* The motion at a state that may lie off the constraints. */
-static Status move_near(Solver *s, double t, const double *y) {
-    return mechanism_motion_near(&s->stepped, segment_instant(s, t), y, y + s->system->nq, s->active,
-                                 s->state.offset, s->state.span);
-}
-
 Status slip_work(Solver *s, double t0, double t1, double *lost) {
     const struct FrictionForces *f = s->stepped.friction;
     const Integrator *integrator = &s->integrator;
@@ -73,7 +67,7 @@ Status slip_work(Solver *s, double t0, double t1, double *lost) {
     for (int k = 0; k < 5; k++) {
         const double t = t0 + (t1 - t0) * (1 + NODES[k]) / 2;
         integrator->method->dense(integrator, t, y);
-        if (move_near(s, t, y) != OK) return FAILED;
+        if (segment_motion_near(s, segment_instant(s, t), y, y + s->system->nq) != OK) return FAILED;
         for (int i = 0; i < 2 * s->system->frictions; i++)
             if (!f->stick_slip[i / 2].sticks)
                 *lost -= WEIGHTS[k] * (t1 - t0) / 2 * f->tangential[i] * f->slip[i];
@@ -83,7 +77,7 @@ Status slip_work(Solver *s, double t0, double t1, double *lost) {
 
 static Status rate(Solver *s, double t, const double *y, double *dydt) {
     const int nq = s->system->nq;
-    if (move_near(s, t, y) != OK) return FAILED;
+    if (segment_motion_near(s, segment_instant(s, t), y, y + s->system->nq) != OK) return FAILED;
     mechanism_rates(&s->stepped, y + nq, dydt);
     memcpy(dydt + nq, s->stepped.vdot, (size_t)s->system->nv * sizeof *dydt);
     return OK;
