@@ -66,7 +66,6 @@ print(execution.simulate_until(2_000_000_000), get_last_error_message())
 print("alive")
 """
 CAUSE = "needs NumPy and SciPy, but the Python"
-PACKAGES = pytest.mark.parametrize("missing", ["numpy", "scipy"])
 
 
 def run(script: str, fmu: Path, missing: str = "scipy") -> subprocess.CompletedProcess[str]:
@@ -89,24 +88,22 @@ def test_no_number_comes_and_each_step_names_what_is_missing(python_fmu):
     assert ended.stderr.count(CAUSE) == 1  # whoever asks for no log is told, too
 
 
-@PACKAGES
-def test_ecos_goes_on_without_a_number(python_fmu, missing):
+def test_ecos_goes_on_without_a_number(python_fmu):
     """ecos looks at no status and asks for no log: it is told on the error stream, lambda is NaN."""
     if importlib.util.find_spec("ecospy") is None:
         pytest.skip("the engine ecospy is not installed")
-    ended = run(IN_ECOS, python_fmu("Hemisphere"), missing)
+    ended = run(IN_ECOS, python_fmu("Hemisphere"), "scipy")
     assert ended.returncode == 0, ended.stderr[-2000:]
     assert CAUSE in ended.stderr
     assert "value nan" in ended.stdout
     assert ended.stdout.strip().endswith("alive")
 
 
-@PACKAGES
-def test_libcosim_ends_the_simulation_not_the_process(python_fmu, missing):
+def test_libcosim_ends_the_simulation_not_the_process(python_fmu):
     """Any error before the first step would end the process (signal 6): the step says False, and why."""
     if importlib.util.find_spec("libcosimpy") is None:
         pytest.skip("the engine libcosimpy is not installed")
-    ended = run(IN_LIBCOSIM, python_fmu("Hemisphere"), missing)
+    ended = run(IN_LIBCOSIM, python_fmu("Hemisphere"), "numpy")
     assert ended.returncode == 0, ended.stderr[-2000:]
     (told,) = [line for line in ended.stdout.splitlines() if line.startswith("False ")]
     assert told.startswith("False Simulation error: one: ")

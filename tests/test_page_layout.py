@@ -161,8 +161,7 @@ def test_one_dot_is_told_from_two(opened: Opened) -> None:
     assert min(found) > 0.75
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize(("width", "theme"), [(390, "light"), (1280, "dark")])
 def test_nothing_of_a_page_keeps_a_reader_out(width: int, theme: str, opened: Opened) -> None:
     """axe-core finds nothing in the live page, everything unfolded and drawn: headings in order, contrast,
     names, sizes."""
