@@ -53,22 +53,6 @@ def platform(redundant: bool) -> Model:
     return _model("Platform", kinetic - m * g * y, {x: "m", y: "m", turn: "rad"}, hung, start)
 
 
-def truss(redundant: bool) -> Model:
-    """Four joints, one of them a pivot, tied by all six distances between them, or by the five that do."""
-    p = _points(3)
-    place = [(0.6, -0.8), (0.6 - 0.8, -0.8 - 0.6), (-0.8, -0.6)]
-    ties = [_distance(f"tie{k}", p[k], (0, 0), (1, sqrt(2), 1)[k]) for k in range(3)]
-    ties += [_distance("side1", p[0], p[1], 1), _distance("side2", p[1], p[2], 1)]
-    if redundant:
-        ties.append(_distance("brace", p[0], p[2], sqrt(2)))
-    start = {
-        q: at
-        for point, where in zip(p, place, strict=True)
-        for q, at in zip(point, where, strict=True)
-    }
-    return _model("Truss", _masses(p), {q: "m" for a in p for q in a}, ties, start)
-
-
 def four_bar(redundant: bool) -> Model:
     """Two joints between two pins; each rod said twice, as a length and as its square."""
     p = _points(2)
@@ -189,7 +173,6 @@ def trammel(redundant: bool) -> Model:
 
 SYSTEMS: dict[str, Callable[[bool], Model]] = {
     "platform": platform,
-    "truss": truss,
     "four_bar": four_bar,
     "spatial_loop": spatial_loop,
     "ball": ball,

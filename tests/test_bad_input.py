@@ -761,19 +761,6 @@ def test_a_corrupt_file_is_not_verified(fmu, tmp_path):
     says(refusal(lambda: verify(tmp_path), VerificationError), str(tmp_path))
 
 
-def test_an_fmu_whose_script_raises_is_not_verified(python_fmu, tmp_path):
-    """The script inside the archive is damaged: one message, no crash."""
-    with zipfile.ZipFile(python_fmu("Atwood")) as archive:
-        script = archive.read("resources/slavemodule.txt").decode().strip()
-    path = rewritten(
-        python_fmu("Atwood"),
-        tmp_path / "X.fmu",
-        f"resources/{script}.py",
-        b"raise RuntimeError('x')",
-    )
-    says(refusal(lambda: verify(path)), "X.fmu")
-
-
 def test_a_step_without_headway_ends(fmu):
     """100 steps of 1e-9 of the natural time are refused where 50 are allowed, with the setting that allows
     more; where as many as needed are allowed they are taken, and as a hundred calls they always were."""

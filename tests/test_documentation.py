@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import html
-import io
 import random
 import re
 from dataclasses import replace
 
 import pytest
 import sympy as sp
-from rich.console import Console
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -26,7 +24,6 @@ from lagfmu.testing import (
     with_figures,
 )
 from lagfmu.testing import documentation_page as page
-from lagfmu.testing import show_in as show
 
 t = dynamicsymbols._t
 x, y, s, theta, F = dynamicsymbols("x y s theta F")
@@ -171,30 +168,3 @@ def test_page_is_the_same_each_time(text):
     """Same model, same bytes."""
     again = prepare(model, Scene("CartScene", formulation="nullspace"))
     assert with_figures(page(again), FIGURES) == text
-
-
-def test_show_tells_classes_freedoms_units_and_projected_starts():
-    """A knife edge is nonholonomic, a circle is not; a start that misses the circle is projected."""
-    mixed = Model(
-        name="Mixed",
-        lagrangian=m
-        * (x.diff() ** 2 + y.diff() ** 2 + s.diff() ** 2 + (L * theta.diff()) ** 2)
-        / 2,
-        coordinates={x: "m", y: "m", s: "m", theta: "rad"},
-        constraints=[
-            Holonomic("circle", x**2 + y**2 - L**2),
-            Nonholonomic("edge", s.diff() * sin(theta) - L * theta.diff()),
-            Nonholonomic("scaled", y * s.diff() - L * y.diff()),
-        ],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(L, 1.0, "m")],
-        start={x: 0.5, y: 0.5},
-    )
-    stream = io.StringIO()
-    show(prepare(mixed), Console(file=stream, width=120))
-    printed = stream.getvalue()
-    assert "circle   holonomic" in printed
-    assert "edge and scaled" in printed
-    assert "N = n - rank G = 4 - 3 = 1\n" in printed
-    assert re.search(r"lambda.circle +N/m", printed)
-    assert re.search(r"Q.theta +N·m", printed)
-    assert "x = 0.5 is projected to 0.707106" in printed

@@ -25,7 +25,7 @@ pytestmark = [
 SPAN = 1.0  # s
 Pair = tuple[Path, Path]
 EACH = pytest.mark.parametrize(
-    "name", of_each_kind(SYSTEMS, kinds=("platform", "truss", "ball", "trammel"))
+    "name", of_each_kind(SYSTEMS, kinds=("platform", "four_bar", "ball", "trammel"))
 )
 
 

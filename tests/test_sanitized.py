@@ -7,23 +7,21 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-import fmpy
 import pytest
-from conftest import of_each_kind
+import runs
+from conftest import of_each_kind, scene_of
 from redundant import platform
 from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
 from test_extremes import isosceles
 from test_jumps import MODELS as JUMPS
 from test_speeds_native import ball, geared
 
-from lagfmu import Peak, Scene, build_fmu
-from lagfmu.testing import GENERATED, find_compiler, load
+from lagfmu import Model, Peak, Scene
+from lagfmu.testing import GENERATED
 
-pytestmark = [
-    pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine"),
-    pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning"),
-]
+pytestmark = pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
 SCENARIO = Path(__file__).parent / "scenario.c"
 LIVES = {  # steps that reach the event or the singular point in between
     "Hemisphere": 0.07,  # a contact that opens
@@ -44,47 +42,44 @@ LIVES = {  # steps that reach the event or the singular point in between
     "Normal": 0.07,  # a scene: lambda of the hemisphere alone, numbers for m and g
     "Places": 0.1,  # a scene: coordinates that are only read, nothing is solved for lambda
 }
-OWN = {**JUMPS, "Thrown": ball, "Geared": geared}
 SCENES = {  # FMU, outputs, numbers
     "Normal": ("Hemisphere", ["lambda.surface"], ["m", "g"]),
     "Places": ("PendulumCartesian", ["x", "der(y)", "energy.total"], ["*"]),
 }
 
 
-@pytest.fixture(scope="module")
-def unpacked(native_fmu, prepared, tmp_path_factory):
-    """unpacked(NAME): folder of the FMU and its description."""
-    folder = tmp_path_factory.mktemp("sources")
+def peaks() -> Model:
+    """A ball whose extremes are told, across impacts."""
+    model = scene_of("BouncingBall")[0].model
+    return replace(model, name="Peaks", peaks=(Peak("der(y)"), Peak("energy.*")))
 
-    def get(name: str):
-        if name == "Platform":
-            path = build_fmu(platform(True), folder, target="native", check=False)
-        elif name == "FallingRod":
-            file = load(Path(__file__).parent.parent / "models" / "falling_rod.py")
-            path = build_fmu(file.model, folder, target="native", check=False)
-        elif name == "Peaks":
-            model = prepared("BouncingBall").model
-            model = replace(model, name=name, peaks=(Peak("der(y)"), Peak("energy.*")))
-            path = build_fmu(model, folder, target="native", check=False)
-        elif name in OWN:
-            path = build_fmu(OWN[name](), folder, target="native", check=False)
-        elif name == "Isosceles":
-            path = build_fmu(
-                isosceles(),
-                folder,
-                Scene("Isosceles", tolerance=1e-9),
-                target="native",
-                check=False,
-            )
+
+OWN = {
+    "Platform": lambda: platform(True),
+    "Isosceles": isosceles,
+    "Peaks": peaks,
+    "Thrown": ball,
+    "Geared": geared,
+    **JUMPS,
+}
+
+
+@pytest.fixture
+def unpacked(native_fmu, built):
+    """unpacked(NAME): folder of the FMU and its description."""
+
+    def get(name: str) -> tuple[Path, Any]:
+        if name in OWN:
+            model = OWN[name]()
+            path = built(model, Scene(model.name, tolerance=1e-9))
         elif name in SCENES:
-            model, outputs, numbers = SCENES[name]
-            scene = replace(prepared(model).asked, name=name, outputs=outputs, fixed=numbers)
-            path = build_fmu(prepared(model).model, folder, scene, target="native", check=False)
+            fmu, outputs, numbers = SCENES[name]
+            file, scene = scene_of(fmu)
+            path = built(file.model, replace(scene, name=name, outputs=outputs, fixed=numbers))
         else:
             path = native_fmu(name)
-        return Path(fmpy.extract(str(path), str(folder / name))), fmpy.read_model_description(
-            str(path)
-        )
+        folder, description = runs.unpacked(path)
+        return Path(folder), description
 
     return get
 
