@@ -11,7 +11,6 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
-from ..errors import UnitError
 from ..names import read
 from .elements import Contact, Expr, ModelFields, Nonholonomic, is_number, name_of
 from .frictions import check_frictions
@@ -24,7 +23,7 @@ from .shapes import unusable_surfaces
 from .speeds import check_rates, check_speeds
 from .spline import Spline, splines_in
 from .symbols import known_symbols, symbols_in, undeclared
-from .units import ENERGY, POWER, Unit, check_dimension, parse_unit, plain
+from .units import ENERGY, POWER, Unit, check_dimension, declared_unit, parse_unit, plain
 
 RATES = (
     "given",
@@ -258,18 +257,13 @@ def declared_units(model: ModelFields, problems: list[str]) -> dict[Expr, Unit]:
     declared += [("parameter", p.symbol, p.unit) for p in model.parameters]
     declared += [("input", i.symbol, i.unit) for i in model.inputs]
     for kind, symbol, text in declared:
-        what = f"{kind} {name_of(symbol)!r}"
-        if not isinstance(text, str) or not text.strip():
-            problems.append(f"{what} has no unit: give one, e.g. 'm', 'rad', or '1' for a number")
+        unit = declared_unit(text, f"{kind} {name_of(symbol)!r}", problems)
+        if unit is None:
             continue
-        try:
-            units[symbol] = parse_unit(text, what)
-        except UnitError as error:
-            problems.append(str(error))
-            continue
+        units[symbol] = unit
         if isinstance(symbol, AppliedUndef):
-            units[symbol.diff(t)] = units[symbol].per_second()
-            units[symbol.diff(t, 2)] = units[symbol].per_second().per_second()
+            units[symbol.diff(t)] = unit.per_second()
+            units[symbol.diff(t, 2)] = unit.per_second().per_second()
     return units
 
 

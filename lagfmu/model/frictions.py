@@ -229,7 +229,7 @@ def _check_normal(
         return ONE
     if limited.same_dimension(TORQUE) and found.same_dimension(TORQUE):
         return ONE
-    problems += _dimension(normal, NEWTON, units, what)
+    problems += check_dimension(normal, NEWTON, units, what)
     return limited / NEWTON
 
 
@@ -245,7 +245,7 @@ def _check_coefficients(
         before = len(problems)
         _check_symbols(model, what, mu, set(), problems)
         if len(problems) == before:
-            found = _dimension(mu, arm, units, what)
+            found = check_dimension(mu, arm, units, what)
             if found and arm.same_dimension(METRE):
                 found[-1] += (
                     f"; it limits the torque {', '.join(f.of)} by a force, and takes the radius with it: "
@@ -265,15 +265,6 @@ def _check_coefficients(
             f"friction {f.name!r}: kinetic = {numbers['kinetic']!r} is above static = "
             f"{numbers['static']!r}, so that it could neither stick nor slip: exchange them"
         )
-
-
-def _dimension(
-    expression: Expr, expected: Unit, units: Mapping[Expr, Unit], what: str
-) -> list[str]:
-    try:
-        return list(check_dimension(expression, expected, units, what))
-    except UnitError as error:
-        return [str(error)]
 
 
 def _check_symbols(

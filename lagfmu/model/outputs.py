@@ -7,12 +7,11 @@ from collections.abc import Iterator, Mapping
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
-from ..errors import UnitError
 from ..names import MULTIPLIER, read
 from .elements import Contact, Expr, ModelFields, Nonholonomic, Peak, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
 from .symbols import undeclared
-from .units import Unit, check_dimension, parse_unit, plain
+from .units import Unit, check_dimension, declared_unit, plain
 
 HIGHEST = 2  # order of a derivative
 
@@ -37,16 +36,9 @@ def check_output_units(model: ModelFields, units: Mapping[Expr, Unit], problems:
     known = {**units, **(reaction_units(model, units) if model.outputs else {})}
     for o in model.outputs:
         what = f"output {o.name!r}"
-        if not isinstance(o.unit, str) or not o.unit.strip():
-            problems.append(f"{what} has no unit: give one, e.g. 'N', 'rad', or '1' for a number")
-            continue
-        try:
-            unit = parse_unit(o.unit, what)
-        except UnitError as error:
-            problems.append(str(error))
-            continue
-        if any(r not in known for r in reactions_in(o.expression)):
-            continue  # of a constraint without a unit of its own, which is told there
+        unit = declared_unit(o.unit, what, problems)
+        if unit is None or any(r not in known for r in reactions_in(o.expression)):
+            continue  # or of a constraint without a unit of its own, which is told there
         problems += check_dimension(sp.sympify(o.expression), unit, known, what)
         if o.otherwise is not None and not sp.sympify(o.otherwise).is_number:
             problems += check_dimension(sp.sympify(o.otherwise), unit, known, f"{what}, otherwise")

@@ -194,6 +194,18 @@ def parse_unit(text: str, what: str) -> Unit:
     return read.unit
 
 
+def declared_unit(text: object, what: str, problems: list[str]) -> Unit | None:
+    """The unit that something was given; what is wrong with it joins `problems`."""
+    if not isinstance(text, str) or not text.strip():
+        problems.append(f"{what} has no unit: give one, e.g. 'm', 'rad', or '1' for a number")
+        return None
+    try:
+        return parse_unit(text, what)
+    except UnitError as error:
+        problems.append(str(error))
+        return None
+
+
 def parse_scaled(text: str, what: str) -> DisplayUnit:
     """Read any unit that is a multiple of a coherent one: 'g', 'mm', 'deg', 'rpm', 'kN/mm'.
 
