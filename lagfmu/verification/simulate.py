@@ -162,13 +162,12 @@ def _of_fmu(path: Path, called: str, description: Any, asked: _Asked) -> Traject
 
 def _run(session: Session, called: str, asked: _Asked) -> Run:
     """A run of a session; what it tells of its start and of error bars becomes warnings."""
-    values, inputs, known = asked.values, asked.inputs, session.experiment
-    _check(called, session.rules, values, inputs, session.inputs)
+    inputs, known = asked.inputs, session.experiment
+    given = _checked(called, session.rules, asked, session.inputs)
     times = communication_points(
         asked.stop_time or known.stop_time, asked.step_size or known.step_size
     )
     every = np.union1d(times, jumps(inputs, times))
-    given = {n: session.rules[n].asked(x) for n, x in values.items()}
     read, fed = [*session.outputs, *asked.besides], columns_at(inputs, every, session.rules)
     tolerance = asked.tolerance or known.tolerance
     run = session.run(every.tolist(), given, tolerance, read, fed, late=True)
@@ -183,26 +182,22 @@ def _by_fmpy(path: Path, called: str, description: Any, asked: _Asked) -> Run:
     """A run of an FMU that no session steps."""
     rules, variables = described_rules(description), description.modelVariables
     inputs = [v.name for v in variables if v.causality == "input"]
-    _check(called, rules, asked.values, asked.inputs, inputs)
+    given = _checked(called, rules, asked, inputs)
     experiment = experiment_of(description, asked.stop_time, asked.step_size)
     points = communication_points(experiment.stop_time, experiment.step_size)
-    given = {n: rules[n].asked(x) for n, x in asked.values.items()}
     read = [*(v.name for v in variables if v.causality == "output"), *asked.besides]
     stop, step = float(points[-1]), experiment.step_size
     return by_fmpy(path, description, stop, step, asked.tolerance, given, asked.inputs, read)
 
 
-def _check(
-    what: str,
-    rules: Mapping[str, Rule],
-    values: Mapping[str, Any],
-    inputs: Trajectory | None,
-    known: Sequence[str],
-) -> None:
-    """Refuse what the FMU would refuse: all problems at once."""
-    check_inputs(inputs, rules, known)
-    if problems := problems_of(rules, values):
+def _checked(
+    what: str, rules: Mapping[str, Rule], asked: _Asked, inputs: Sequence[str]
+) -> dict[str, Any]:
+    """The values as the FMU gets them; refused is what it would refuse, all problems at once."""
+    check_inputs(asked.inputs, rules, inputs)
+    if problems := problems_of(rules, asked.values):
         raise SettingError(f"{what}: " + "; ".join(problems))
+    return {n: rules[n].asked(x) for n, x in asked.values.items()}
 
 
 def steps_of(table: Trajectory) -> int:
