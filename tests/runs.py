@@ -18,6 +18,15 @@ def simulate_fmu(path: str | Path, **options: Any) -> Any:
     return fmpy.simulate_fmu(folder, model_description=description, **options)
 
 
+def evenly(
+    path: str | Path, stop: float, points: int, tolerance: float | None, start: Any, **options: Any
+) -> Any:
+    """A run of fmpy to `stop` [s] in equal communication steps, from the values `start`."""
+    step = stop / points
+    sizes = {"stop_time": stop, "step_size": step, "output_interval": step}
+    return simulate_fmu(path, relative_tolerance=tolerance, start_values=start, **sizes, **options)
+
+
 def unpacked(path: str | Path) -> tuple[str, Any]:
     """The folder and the description of an FMU as it is now."""
     state = Path(path).stat()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from instance import instance
-from runs import simulate_fmu
+from runs import evenly
 
 G = 9.81
 CASES = {  # m [kg], e, h [m], v0 [m/s]
@@ -50,12 +50,7 @@ def test_it_rests_when_the_bounces_have_accumulated(native_fmu, case):
 @pytest.mark.parametrize("points", [1, 30, 1000])
 def test_infinitely_many_bounces_fit_into_one_communication_step(native_fmu, points):
     """Rest is reached whether the whole run is one communication step or a thousand."""
-    result = simulate_fmu(
-        str(native_fmu("BouncingBall")),
-        stop_time=5.0,
-        output_interval=5 / points,
-        step_size=5 / points,
-    )
+    result = evenly(native_fmu("BouncingBall"), 5.0, points, None, {})
     assert result["contact.floor"][-1]
     assert result["y"][-1] == 0
     assert result["lambda.floor"][-1] == pytest.approx(9.81, rel=1e-14)
@@ -64,13 +59,7 @@ def test_infinitely_many_bounces_fit_into_one_communication_step(native_fmu, poi
 def test_each_bounce_keeps_e_squared_of_the_energy(native_fmu):
     """Between the bounces the energy is m g h e^2k, falling in steps that all have the ratio e^2."""
     e = 0.8
-    result = simulate_fmu(
-        str(native_fmu("BouncingBall")),
-        stop_time=3.0,
-        output_interval=1e-2,
-        relative_tolerance=1e-12,
-        start_values={"e": e},
-    )
+    result = evenly(native_fmu("BouncingBall"), 3.0, 300, 1e-12, {"e": e})
     levels = np.round(np.log(result["energy.total"] / G) / np.log(e**2), 8)
     found = np.unique(levels)
     np.testing.assert_array_equal(found, np.arange(len(found)))

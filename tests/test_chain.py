@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from conftest import MODELS
-from runs import simulate_fmu
+from runs import evenly
 from scipy.integrate import solve_ivp
 from scipy.special import roots_laguerre
 
@@ -29,14 +29,7 @@ def places(angles):
 
 
 def hang(path, angles, stop, points=1, tolerance=1e-12):
-    return simulate_fmu(
-        str(path),
-        stop_time=stop,
-        output_interval=stop / points,
-        step_size=stop / points,
-        relative_tolerance=tolerance,
-        start_values=places(angles),
-    )
+    return evenly(path, stop, points, tolerance, places(angles))
 
 
 @pytest.mark.parametrize("n", [1, 3, 20])

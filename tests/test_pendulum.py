@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from instance import instance
-from runs import simulate_fmu
+from runs import evenly
 from scipy.special import ellipj, ellipk
 
 NAMES = ("PendulumCartesian", "PendulumAngle", "PendulumNullspace")
@@ -24,14 +24,7 @@ def swing(path, theta0, rate=0.0, stop=5.0, tolerance=1e-12, points=100):
             "der(x)": rate * np.cos(theta0),
             "der(y)": rate * np.sin(theta0),
         }
-    return simulate_fmu(
-        str(path),
-        stop_time=stop,
-        output_interval=stop / points,
-        step_size=stop / points,
-        relative_tolerance=tolerance,
-        start_values=start,
-    )
+    return evenly(path, stop, points, tolerance, start)
 
 
 def libration(t, theta0, g, L):

@@ -7,21 +7,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from instance import instance
-from runs import simulate_fmu
+from runs import evenly
 from scipy.integrate import simpson, solve_ivp
 
 DEFAULT = {"J": 0.1, "m": 1.0, "M": 1.0, "r": 0.1, "l": 0.3, "s": 0.2, "k": 1e6, "c": 1e4}
 
 
 def turn(path, stop=1.0, points=100, tolerance=1e-8, **values):
-    return simulate_fmu(
-        str(path),
-        stop_time=stop,
-        output_interval=stop / points,
-        step_size=stop / points,
-        relative_tolerance=tolerance,
-        start_values=values,
-    )
+    return evenly(path, stop, points, tolerance, values)
 
 
 def alone(times, tau=0.0):
