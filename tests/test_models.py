@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import EVERY
+from conftest import EVERY, scene_of
 
 from lagfmu import simulate, verify
 from lagfmu.errors import SimulationError
-from lagfmu.testing import ModelFile, carried, check_closed_form, load, prepare, read_description
+from lagfmu.testing import carried, check_closed_form, read_description
 
 MODELS = Path(__file__).parent.parent / "models"
 g = 9.81  # m/s^2
@@ -231,27 +231,12 @@ WORLDS: dict[
 }
 
 
-def files() -> dict[str, tuple[ModelFile, int]]:
-    """Scene's name -> its model file and its number there."""
-    loaded = [load(path) for path in sorted(MODELS.glob("*.py"))]
-    return {s.name: (f, k) for f in loaded for k, s in enumerate(f.scenes) if s.name in CHANGED}
-
-
-FILES = files()
-
-
-def run(name: str, values: dict[str, float] | None = None, **options):
-    file, k = FILES[name]
-    return simulate(prepare(file.model, file.scenes[k]), start_values=values, **options)
-
-
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-12])
 @pytest.mark.parametrize("name", sorted(CHANGED))
 def test_outputs_equal_the_closed_forms(name: str, tolerance: float, native_fmu: Any) -> None:
     """As it is built, changed, and in each of its worlds; over long steps, so that it is the integrator's
     tolerance that counts."""
-    file, k = FILES[name]
-    scene = file.scenes[k]
+    file, scene = scene_of(name)
     closed_forms = carried(scene, file.closed_forms)
     assert any(v.startswith("lambda.") for c in closed_forms for v in c.variables)
     moving = [f"{i.symbol.func}" for i in file.model.prescribed]  # inputs that go on by themselves
@@ -276,7 +261,7 @@ def test_outputs_equal_the_closed_forms(name: str, tolerance: float, native_fmu:
 
 def test_the_table_above_names_every_scene() -> None:
     """But the falling rod, which has a file of its own."""
-    assert set(CHANGED) == set(FILES) == set(EVERY) - {"FallingRod"}
+    assert set(CHANGED) == set(EVERY) - {"FallingRod"}
 
 
 @pytest.mark.thorough

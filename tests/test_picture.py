@@ -56,36 +56,34 @@ def pendulum(**fields: Any) -> Model:
     return replace(model_of("pendulum"), **fields)
 
 
-def test_the_normal_force_is_radial() -> None:
-    """On the hemisphere lambda (sin theta, cos theta) does the work of r - a = 0."""
-    model = model_of("hemisphere")
-    r = next(iter(model.coordinates))
-    at = (r * sp.sin(theta), r * sp.cos(theta))
-    found = direction(model, Arrow("surface", at))
-    assert sp.simplify(sp.Matrix(found) - sp.Matrix([sp.sin(theta), sp.cos(theta)])).is_zero_matrix
+PHI, LENGTH = dynamicsymbols("phi"), sp.symbols("l", positive=True)
+WHERE = {  # model: constraint, where its force acts in the model's coordinates, the direction
+    "hemisphere": (
+        "surface",
+        lambda r, angle: (r * sp.sin(angle), r * sp.cos(angle)),
+        (sp.sin(theta), sp.cos(theta)),
+    ),
+    "rotating_wire": (  # lambda is a torque: lambda/r across the wire
+        "drive",
+        lambda r, angle: (r * sp.cos(angle), r * sp.sin(angle)),
+        (-sp.sin(PHI) / dynamicsymbols("r"), sp.cos(PHI) / dynamicsymbols("r")),
+    ),
+    "ladder": (  # three coordinates, two components
+        "wall",
+        lambda cx, cy, lean: (cx - LENGTH / 2 * sp.cos(lean), cy + LENGTH / 2 * sp.sin(lean)),
+        (1, 0),
+    ),
+    "knife_edge": ("edge", lambda cx, cy, _: (cx, cy), (sp.sin(PHI), -sp.cos(PHI))),
+}
 
 
-def test_a_torque_is_a_force_over_its_arm() -> None:
-    """The wire's torque lambda pushes the bead across the wire with lambda/r."""
-    model = model_of("rotating_wire")
-    r, phi = model.coordinates
-    found = direction(model, Arrow("drive", (r * sp.cos(phi), r * sp.sin(phi))))
-    across = sp.Matrix([-sp.sin(phi), sp.cos(phi)]) / r
-    assert sp.simplify(sp.Matrix(found) - across).is_zero_matrix
-
-
-def test_a_wall_pushes_the_ladders_end_level() -> None:
-    """Three coordinates, two components: the force (1, 0) at the upper end does all the wall's work."""
-    model = model_of("ladder")
-    arrow = next(s for s in model.picture if isinstance(s, Arrow) and s.constraint == "wall")
-    assert direction(model, arrow) == (1, 0)
-
-
-def test_a_blade_is_held_sideways() -> None:
-    """lambda of x' sin phi - y' cos phi = 0 acts along (sin phi, -cos phi)."""
-    model = model_of("knife_edge")
-    cx, cy, phi = model.coordinates
-    assert direction(model, Arrow("edge", (cx, cy))) == (sp.sin(phi), -sp.cos(phi))
+@pytest.mark.parametrize("name", WHERE)
+def test_a_force_does_the_work_of_its_constraint(name: str) -> None:
+    """Radial on the hemisphere, the wire's torque over its arm, level at the ladder's end, across a blade."""
+    constraint, place, expected = WHERE[name]
+    model = model_of(name)
+    found = direction(model, Arrow(constraint, place(*model.coordinates)))
+    assert sp.simplify(sp.Matrix(found) - sp.Matrix(expected)).is_zero_matrix
 
 
 def test_a_force_elsewhere_does_not_do_the_work() -> None:
