@@ -2,7 +2,19 @@
 
 from .body import Body, Ground
 from .contacts import Contact
-from .joints import Distance, Fixed, Gear, PointOnPlane, Prismatic, Revolute, Rolling
+from .joints import (
+    Cylindrical,
+    Distance,
+    Fixed,
+    Gear,
+    Planar,
+    PointOnPlane,
+    Prismatic,
+    Revolute,
+    Rolling,
+    Spherical,
+    Universal,
+)
 from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
 from .mechanism import mechanism
 from .urdf import from_urdf
@@ -10,6 +22,7 @@ from .urdf import from_urdf
 __all__ = [
     "Body",
     "Contact",
+    "Cylindrical",
     "Distance",
     "Fixed",
     "Force",
@@ -17,13 +30,16 @@ __all__ = [
     "Gravity",
     "Ground",
     "Motor",
+    "Planar",
     "PointOnPlane",
     "Prismatic",
     "Revolute",
     "Rolling",
+    "Spherical",
     "SpringDamper",
     "Torque",
     "Torsion",
+    "Universal",
     "from_urdf",
     "mechanism",
 ]

@@ -14,9 +14,10 @@ import difflib
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import sympy as sp
 
 from ..errors import LagfmuWarning, ModelError
 from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, is_number, name_of
@@ -24,7 +25,7 @@ from ..model.model import Model
 from ..names import derivative
 from .draft import Draft
 from .guess import guessed
-from .rows import TIME, Array, Rows, numbers_of
+from .rows import TIME, Array, Rows, condition, numbers_of
 
 STEPS, HALVINGS = 100, 12
 TRIES = 12  # beginnings with other omitted values, where the first leads nowhere
@@ -46,20 +47,17 @@ def assemble(
     """
     known = _known(draft, model)
     given = _given(model, known, start)
-    places = {n: x for n, x in given.items() if not known[n][1]}
-    rates = {n: x for n, x in given.items() if known[n][1]}
+    places = {n: x for n, x in given.items() if not known[n].of_velocities}
+    rates = {n: x for n, x in given.items() if known[n].of_velocities}
     acting = [c for c in model.constraints if not isinstance(c, Contact) and not c.while_closed]
     closing = [c for c in acting if isinstance(c, Holonomic)]
     rolling = [c for c in acting if isinstance(c, Nonholonomic)]
-    f = Rows(model, [c.expression for c in closing])
-    weight = np.sqrt(numbers_of(model, [m for body in draft.motions.values() for m in body.masses]))
-    rough = guessed(draft, model, parts, places)
-    lengths = np.array([unit == "m" for unit in model.coordinates.values()])
-    size = float(np.abs(np.where(lengths, rough, 0.0)).max(initial=0.0)) or 1.0
-    moving = _Moving(weight, np.where(lengths, size, 1.0))
-
-    held = Rows(model, [known[n][0] for n in places])
+    f = Rows(model, [condition(model, c) for c in closing])
+    held = Rows(model, [known[n][:2] for n in places])
     wanted = np.concatenate([np.zeros(len(closing)), np.array([*places.values()])])
+    moving = _Moving(draft, model)
+    rough = moving.tied(guessed(draft, model, parts, places), places)
+    size = moving.sized(rough)
     q, missed = moving.closed([f, held], wanted, rough)
     if missed.max(initial=0.0) > CLOSED:
         q, missed = moving.closed([f], np.zeros(len(closing)), q)
@@ -67,30 +65,63 @@ def assemble(
         raise ModelError(model.name, list(_open([c.name for c in closing], f.values(q), missed)))
     _tell(model, places, held.values(q), size)
 
-    still = [f, Rows(model, [c.expression for c in rolling], True)]
-    driven = Rows(model, [known[n][0] for n in rates], True)
+    still = [f, Rows(model, [condition(model, c) for c in rolling])]
+    driven = Rows(model, [known[n][:2] for n in rates])
     asked = np.concatenate([np.zeros(len(acting)), np.array([*rates.values()])])
-    v = moving.velocities([*still, driven], asked, q, np.zeros(len(q)))
+    v = moving.velocities([*still, driven], asked, q, np.zeros(len(model.directions)))
     v = moving.velocities(still, np.zeros(len(acting)), q, v)
-    found = driven.values(q, v)
+    found = driven.rates(q, v)
     _tell(model, rates, found, float(np.abs(found).max(initial=0.0)))
-    states = [*model.coordinates, *(c.diff(TIME) for c in model.coordinates)]
+    fast = float(np.abs(v / moving.scale).max(initial=0.0))
+    rounding = 4 * EPS * np.concatenate([np.full(len(q), size), moving.scale * fast])
     return {
-        s: float(x) if abs(x) > 4 * EPS * scale else 0.0
-        for s, x, scale in zip(
-            states,
-            (*q, *v),
-            (*moving.scale, *(moving.scale * np.abs(v / moving.scale).max())),
-            strict=True,
-        )
+        s: float(x) if abs(x) > least else 0.0
+        for s, x, least in zip(model.states, (*q, *v), rounding, strict=True)
     }
 
 
 class _Moving:
-    """Movements d (n) that are least in d^T W^2 d; `scale`: what is much of each coordinate."""
+    """Movements d (n_v) of a mechanism that are least in d^T W^2 d, and what they do to its coordinates."""
 
-    def __init__(self, weight: Array, scale: Array) -> None:
-        self.weight, self.scale = weight, scale
+    def __init__(self, draft: Draft, model: Model) -> None:
+        masses = {
+            d: m
+            for b in draft.motions.values()
+            for d, m in zip(b.directions, b.masses, strict=True)
+        }
+        self.weight = np.sqrt(numbers_of(model, [masses[d] for d in model.directions]))
+        self.lengths = np.array([model.coordinates.get(d) == "m" for d in model.directions])
+        self.scale = np.ones(len(self.lengths))  # what is much of each speed, in a second
+        rates = [model.kinematics.get(q, q.diff(TIME)) for q in model.coordinates]
+        self._moved = Rows(model, [(sp.S.Zero, rate) for rate in rates])
+        names = list(model.coordinates)
+        heads = [j for j, q in enumerate(names) if name_of(q).endswith(".orientation.w")]
+        self._quaternions = [slice(j, j + 4) for j in heads]
+        self._angles = {names.index(q): name_of(q) for q in model.unwrapped}
+        self._turned = Rows(model, [(angle, sp.S.Zero) for angle in model.unwrapped.values()])
+
+    def sized(self, q: Array) -> float:
+        """The size of the mechanism at q [m], by which its lengths are judged from now on."""
+        at = self._moved.slopes(q) @ np.diag(self.lengths.astype(float))
+        straight = np.abs(at).max(axis=1, initial=0.0) > 0
+        size = float(np.abs(q[straight]).max(initial=0.0)) or 1.0
+        self.scale = np.where(self.lengths, size, 1.0)
+        return size
+
+    def tied(self, q: Array, near: Mapping[str, float] | None = None) -> Array:
+        """q with unit quaternions, and with each angle that goes on over turns at its attitude, nearest to
+        where it was, or to a value that is given."""
+        q = q.copy()
+        for place in self._quaternions:
+            q[place] /= np.linalg.norm(q[place])
+        for (j, name), angle in zip(self._angles.items(), self._turned.values(q), strict=True):
+            before = q[j] if near is None else near.get(name, q[j])
+            q[j] = angle + 2 * np.pi * np.round((before - angle) / (2 * np.pi))
+        return q
+
+    def moved(self, q: Array, d: Array) -> Array:
+        """The coordinates after a movement."""
+        return self.tied(q + self._moved.slopes(q) @ d)
 
     def closed(self, rows: Sequence[Rows], wanted: Array, rough: Array) -> tuple[Array, Array]:
         """Coordinates at which the rows have the wanted values, and what each misses, relative to its size.
@@ -101,8 +132,8 @@ class _Moving:
         draws = np.random.default_rng(0)
         best, least = rough, np.full(len(wanted), np.inf)
         for k in range(TRIES):
-            away = draws.uniform(-0.5, 0.5, len(rough)) * self.scale if k else 0.0
-            q, missed = self._newton(rows, wanted, rough + away)
+            away = draws.uniform(-0.5, 0.5, len(self.scale)) * self.scale
+            q, missed = self._newton(rows, wanted, self.moved(rough, away) if k else rough)
             if missed.max(initial=0.0) < least.max(initial=0.0):
                 best, least = q, missed
             if least.max(initial=0.0) <= CLOSED:
@@ -114,7 +145,7 @@ class _Moving:
         for _ in range(STEPS):
             step = self._least(A / size[:, None], r / size)
             for halved in range(HALVINGS):
-                new = q + step * 0.5**halved
+                new = self.moved(q, step * 0.5**halved)
                 after = self._missed(rows, wanted, new)
                 if np.linalg.norm(after[0] / after[2]) < np.linalg.norm(r / size):
                     break
@@ -124,11 +155,14 @@ class _Moving:
         return q, np.abs(r / size)
 
     def _missed(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array, Array]:
-        """What is missing (m), the slopes (m, n), and how large a change each row sees (m)."""
+        """What is missing (m), the slopes (m, n_v), and how large a change each row sees (m)."""
         A = np.vstack([r.slopes(q) for r in rows])
-        size = np.abs(A * self.scale).max(axis=1, initial=0.0)
         r = wanted - np.concatenate([row.values(q) for row in rows])
-        return r, A, np.where(size > 0, size, 1.0)
+        return r, A, self._sizes(A)
+
+    def _sizes(self, A: Array) -> Array:
+        size = np.abs(A * self.scale).max(axis=1, initial=0.0)
+        return np.where(size > 0, size, 1.0)
 
     def _least(self, A: Array, r: Array) -> Array:
         """d with A d = r as nearly as can be, and least among those."""
@@ -138,24 +172,34 @@ class _Moving:
     def velocities(self, rows: Sequence[Rows], wanted: Array, q: Array, v: Array) -> Array:
         """The velocities nearest to v at which the rows have the wanted rates."""
         A = np.vstack([r.slopes(q) for r in rows])
-        missing = wanted - np.concatenate([r.drift(q) for r in rows]) - A @ v
-        size = np.abs(A * self.scale).max(axis=1, initial=0.0)
-        size = np.where(size > 0, size, 1.0)
+        missing = wanted - np.concatenate([r.drifts(q) for r in rows]) - A @ v
+        size = self._sizes(A)
         return v + self._least(A / size[:, None], missing / size)
 
 
-def _known(draft: Draft, model: Model) -> dict[str, tuple[Expr, bool]]:
-    """The names of the FMU that may begin somewhere: expression, and whether it is a rate."""
-    found: dict[str, tuple[Expr, bool]] = {}
+class Beginning(NamedTuple):
+    """What may begin somewhere: its value and its rate; `of_velocities`: the rate is what begins."""
+
+    value: Expr
+    rate: Expr
+    of_velocities: bool
+
+
+def _known(draft: Draft, model: Model) -> dict[str, Beginning]:
+    """By their names in the FMU."""
+    found: dict[str, Beginning] = {}
     for q in model.coordinates:
-        found[name_of(q)] = q, False
-        found[derivative(name_of(q))] = q.diff(TIME), True
+        rate = model.kinematics.get(q, q.diff(TIME))
+        found[name_of(q)] = Beginning(q, rate, False)
+        found[derivative(name_of(q))] = Beginning(sp.S.Zero, rate, True)
+    found |= {name_of(w): Beginning(sp.S.Zero, w, True) for w in model.speeds}
     for of in draft.relative.values():
-        found[of.name] = of.values[0], False
-        found[derivative(of.name)] = of.values[1], True
+        value, rate, _ = of.values
+        found[of.name] = Beginning(value, rate, False)
+        found[derivative(of.name)] = Beginning(sp.S.Zero, rate, True)
     moving = re.compile(r"\w+\.(velocity|omega)\.\w")
-    found |= {o.name: (o.expression, True) for o in draft.outputs if moving.fullmatch(o.name)}
-    return found
+    outputs = (o for o in draft.outputs if moving.fullmatch(o.name))
+    return found | {o.name: Beginning(sp.S.Zero, o.expression, True) for o in outputs}
 
 
 def _given(model: Model, known: Mapping[str, Any], start: Mapping[str, Any]) -> dict[str, float]:
@@ -177,7 +221,8 @@ def _given(model: Model, known: Mapping[str, Any], start: Mapping[str, Any]) -> 
             problems.append(f"start of {name!r} is {value!r}, expected finite numbers")
         else:
             names = [name] if name in known else parts
-            found |= dict(zip(names, map(float, values), strict=True))
+            norm = float(np.linalg.norm(values)) if len(parts) == 4 else 1.0
+            found |= {n: float(x) / (norm or 1.0) for n, x in zip(names, values, strict=True)}
     if problems:
         raise ModelError(model.name, problems)
     return found

@@ -5,23 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..model.elements import NAME, Parameter, is_number
 from ..names import RESERVED
 from .body import Body, Ground, Marker
 from .contacts import Contact
-from .joints import Distance, Gear, Joint, Rolling, name_of_joint
+from .joints import Distance, Gear, Joint, Rolling, Universal, name_of_joint
 from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
+from .rotation import problem_of
+from .space import PAIRS
+from .vectors import AXES
 
 PARTS = (Joint, Distance, Rolling, Gear, Contact)
 PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor)  # type: ignore[assignment]
-PLANES = ("xy",)
+PLANES = (None, "xy")
 
 
 def problems_of(plane: object, bodies: Sequence[Any], parts: Sequence[Any]) -> list[str]:
     """All of them."""
     problems = []
     if plane not in PLANES:
-        problems.append(f"plane = {plane!r}, expected 'xy'")
+        problems.append(f"plane = {plane!r}, expected 'xy', or nothing for a mechanism in space")
     problems += [
         f"bodies hold {b!r}, expected Body(...)" for b in bodies if not isinstance(b, Body)
     ]
@@ -34,9 +39,14 @@ def problems_of(plane: object, bodies: Sequence[Any], parts: Sequence[Any]) -> l
         return problems
     return [
         *_names([*bodies, *parts]),
-        *(problem for body in bodies for problem in _of_body(body)),
-        *(problem for part in parts for problem in _of_markers(part, bodies)),
-        *(problem for part in parts if isinstance(part, Joint) for problem in _of_joint(part)),
+        *(problem for body in bodies for problem in _of_body(body, plane is not None)),
+        *(problem for part in parts for problem in _of_markers(part, bodies, plane is not None)),
+        *(
+            p
+            for part in parts
+            if isinstance(part, Joint)
+            for p in _of_joint(part, plane is not None)
+        ),
         *(problem for part in parts for problem in _of_references(part, parts)),
     ]
 
@@ -61,15 +71,48 @@ def _names(named: Sequence[Any]) -> Iterator[str]:
         seen[str(name)] = kind
 
 
-def _of_body(body: Body) -> Iterator[str]:
-    for what, value, unit in (("mass", body.mass, "kg"), ("inertia", body.inertia, "kg.m^2")):
-        number = value.value if isinstance(value, Parameter) else value
+def _of_body(body: Body, planar: bool) -> Iterator[str]:
+    what = f"body {body.name!r}"
+    masses = [("mass", body.mass, "kg")]
+    if planar:
+        masses.append(("inertia", body.inertia, "kg.m^2"))
+    elif not isinstance(body.inertia, Sequence) or len(body.inertia) not in (3, 6):
+        yield (
+            f"{what} has the inertia {body.inertia!r}, expected three numbers (xx, yy, zz) in kg.m^2, or six "
+            "with xy, xz, yz; a mechanism of the plane says so: plane='xy'"
+        )
+    else:
+        masses += [
+            (f"inertia {x}", J, "kg.m^2") for x, J in zip(PAIRS, body.inertia[:3], strict=False)
+        ]
+        yield from _of_tensor(what, body.inertia)
+    for of, value, unit in masses:
+        number = _value(value)
         if is_number(number) and not float(number) > 0:
             yield (
-                f"body {body.name!r} has the {what} {number!r}, expected a positive number in {unit}: what "
-                "has none cannot move by itself: put its markers on the body that it belongs to, or use "
-                "Distance for a rod without mass"
+                f"{what} has the {of} {number!r}, expected a positive number in {unit}: what has none cannot "
+                "move by itself: put its markers on the body that it belongs to, or use Distance for a rod "
+                "without mass"
             )
+
+
+def _value(value: Any) -> Any:
+    return value.value if isinstance(value, Parameter) else value
+
+
+def _of_tensor(what: str, inertia: Sequence[Any]) -> Iterator[str]:
+    """The principal moments of a rigid body satisfy the triangle inequality."""
+    values = [_value(x) for x in inertia]
+    if not all(map(is_number, values)) or min(map(float, values[:3])) <= 0:
+        return
+    xx, yy, zz, xy, xz, yz = [*map(float, values), 0.0, 0.0, 0.0][:6]
+    least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
+    if least <= 0 or most > (least + middle) * (1 + 1e-9):
+        yield (
+            f"{what} has the principal moments of inertia {least:.6g}, {middle:.6g}, {most:.6g} kg.m^2, "
+            "expected positive ones of which none is above the sum of the others: no distribution of "
+            "mass has these; products of inertia are elements of the tensor, -sum m x y"
+        )
 
 
 def _markers(part: Any) -> Iterator[tuple[str, Any]]:
@@ -78,7 +121,7 @@ def _markers(part: Any) -> Iterator[tuple[str, Any]]:
             yield field, getattr(part, field)
 
 
-def _of_markers(part: Any, bodies: Sequence[Body]) -> Iterator[str]:
+def _of_markers(part: Any, bodies: Sequence[Body], planar: bool) -> Iterator[str]:
     what = f"{_kind(part)} {part.name!r}"
     found = dict(_markers(part))
     for field, marker in found.items():
@@ -89,6 +132,11 @@ def _of_markers(part: Any, bodies: Sequence[Body]) -> Iterator[str]:
                 f"{what}: its {field} marker is on {getattr(marker.body, 'name', marker.body)!r}, which is "
                 f"not among the bodies ({', '.join(b.name for b in bodies)}): add it"
             )
+        elif planar and (marker.axis is not None or not _is_angle(marker.rotation)):
+            turned = marker.rotation if marker.axis is None else marker.axis
+            yield f"{what}: its {field} marker is turned by {turned!r}, expected an angle in the plane [rad]"
+        elif not planar and (wrong := problem_of(marker)):
+            yield f"{what}: its {field} marker: {wrong}"
     first, second = found.get("first"), found.get("second")
     if isinstance(first, Marker) and isinstance(second, Marker) and first.body == second.body:
         yield (
@@ -99,12 +147,22 @@ def _of_markers(part: Any, bodies: Sequence[Body]) -> Iterator[str]:
         yield f"{what} acts on {part.on!r}, which is not among the bodies: name one of them"
 
 
-def _of_joint(joint: Joint) -> Iterator[str]:
+def _is_angle(rotation: Any) -> bool:
+    return rotation is None or is_number(rotation)
+
+
+def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
     what = f"{_kind(joint)} {joint.name!r}"
-    possible = joint.possible[0]
+    possible = joint.possible[0 if planar else 1]
+    where = "in the plane xy" if planar else "in space"
+    if not possible and planar:
+        yield f"{what} is a joint in space: in the plane use Revolute, Prismatic or PointOnPlane"
+        return
+    if isinstance(joint, Universal) and joint.second_axis not in tuple(AXES):
+        yield f"{what}: second_axis is {joint.second_axis!r}, expected 'x', 'y' or 'z'"
     if joint.axis and (len(joint.axis) > 1 or joint.axis not in possible):
         yield (
-            f"{what}: axis is {joint.axis!r}, expected {' or '.join(map(repr, possible))} in the plane xy"
+            f"{what}: axis is {joint.axis!r}, expected {' or '.join(map(repr, possible)) or 'none'} {where}"
         )
     limits = joint.limits
     if limits is None:
@@ -126,17 +184,21 @@ def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
     else:
         return
     known = {j.name: j for j in parts if isinstance(j, Joint)}
-    fit = [n for n, j in known.items() if j.measure]
+    fit = [n for n, j in known.items() if len(j.measures) == 1]
+    fit += [m for j in known.values() if len(j.measures) > 1 for m in j.measures]
+    alone = {m for j in known.values() for m in j.measures}
     for joint in map(name_of_joint, named):
+        if joint in fit or joint in alone:
+            continue
         if joint not in known:
             yield (
                 f"{_kind(part)} {part.name!r}: no joint is called {joint!r}, expected one of "
                 f"{', '.join(fit) or 'none: no joint turns or slides'}"
             )
-        elif joint not in fit:
+        else:
             yield (
-                f"{_kind(part)} {part.name!r}: {_kind(known[joint])} {joint!r} has no angle or position, "
-                f"expected one of {', '.join(fit) or 'none: no joint turns or slides'}"
+                f"{_kind(part)} {part.name!r}: {_kind(known[joint])} {joint!r} has no angle or position "
+                f"or both, expected one of {', '.join(fit) or 'none: no joint turns or slides'}"
             )
     if len(named) == 2 and len({*map(name_of_joint, named)}) == 1:
         yield f"Gear {part.name!r} ties {name_of_joint(named[0])!r} to itself, expected two joints"

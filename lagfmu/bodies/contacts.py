@@ -1,24 +1,24 @@
-"""Contacts of bodies: a point or a wheel on a line, with friction or without."""
+"""Contacts of bodies: a point or a wheel on a line; in space a point or a ball on a plane."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import sympy as sp
-
 from ..model import elements
 from ..model.reactions import multiplier
 from .body import Marker, Number
 from .draft import Draft
-from .joints import places, rolling
+from .joints import Touch, places
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """The second marker (with `radius` [m]: a wheel about it) stays above the x axis of the first.
+    """The second marker (with `radius` [m]: a wheel, in space a ball about it) stays on the y side of the
+    first marker's x axis, in space on the z side of its plane xy.
 
-    NAME.y [N] pushes and never pulls; `restitution` is Newton's.  With `friction` (static, or static and
-    kinetic coefficient) NAME.x [N] is the force along the line: it sticks or slips by Coulomb's law.
+    The multiplier of NAME.y (NAME.z) [N] pushes and never pulls; `restitution` is Newton's.  With `friction`
+    (static, or static and kinetic coefficient) NAME.x (and NAME.y) [N] is the force along the line (in the
+    plane): it sticks or slips by Coulomb's law.
     """
 
     name: str
@@ -34,12 +34,11 @@ class Contact:
         a, b = places(draft, self)
         r = draft.number(self.radius, f"{name}.radius", "m", f"radius of {name}")
         e = draft.number(self.restitution, f"{name}.restitution", "1", f"restitution of {name}")
-        gap, slip = rolling(a, b, r)
-        closed, row = f"{name}.y", f"{name}.x"
-        draft.constraints.append(elements.Contact(closed, gap, f"{name} touches the line", e))
-        wrench = draft.wrench(name)
-        wrench.force[1] += multiplier(closed)
+        touch = Touch(draft, name, a, b, r)
+        text = f"{name} touches"
+        draft.constraints.append(elements.Contact(touch.normal, touch.gap.value, text, e))
         if self.friction is None:
+            touch.transmit(draft.wrench(name), [])
             return
         given = self.friction if isinstance(self.friction, tuple) else (self.friction,)
         words = ("friction",) if len(given) == 1 else ("static", "kinetic")
@@ -47,10 +46,12 @@ class Contact:
             draft.number(mu, f"{name}.{word}", "1", f"coefficient of friction of {name}, {word}")
             for mu, word in zip(given, words, strict=True)
         ]
-        text = f"{name} does not slip"
+        rows = list(touch.slips)
         draft.constraints += [
-            elements.Nonholonomic(row, slip, text, while_closed=closed),
-            elements.Friction(name, [row], multiplier(closed), *coefficients),
+            *(
+                elements.Nonholonomic(row, slip, f"{name} does not slip", while_closed=touch.normal)
+                for row, slip in touch.slips.items()
+            ),
+            elements.Friction(name, rows, multiplier(touch.normal), *coefficients),
         ]
-        wrench.force[0] += multiplier(row)
-        wrench.torque[2] += r * multiplier(row) if r != 0 else sp.S.Zero
+        touch.transmit(draft.wrench(name), rows)

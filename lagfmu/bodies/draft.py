@@ -11,11 +11,25 @@ from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
+from sympy.physics.vector import dynamicsymbols
 
-from ..model.elements import Constraint, Expr, Friction, Input, Output, Parameter, is_number
+from ..model.elements import (
+    Constraint,
+    Expr,
+    Friction,
+    Input,
+    Output,
+    Parameter,
+    Tie,
+    is_number,
+    name_of,
+)
+from ..names import derivative
 from .body import Body, Ground, Marker
-from .motion import Motion, Placed
-from .vectors import AXES, ZERO, Vector, cross, minus, times
+from .motion import Motion, Placed, Timed, about
+from .vectors import AXES, ZERO, Vector, cross, dot, minus, times
+
+TIME = dynamicsymbols._t
 
 
 class Wrench:
@@ -40,7 +54,7 @@ class Relative:
 
     def drive(self, draft: Draft, effort: Expr) -> None:
         """A torque [N.m] or force [N] along it on the second body, and its reaction on the first."""
-        e = times(effort, self.first.axes[self.axis])
+        e = times(effort, self.first.axes[self.axis].value)
         if self.unit == "m":
             draft.pull_together(self.first, self.second, self.second.point, e)
         else:
@@ -63,7 +77,9 @@ class Draft:
         self.forces: dict[Expr, Expr] = defaultdict(lambda: sp.S.Zero)
         self.motions: dict[Any, Motion] = {}
         self.wrenches: dict[str, Wrench] = {}
-        self.relative: dict[str, Relative] = {}  # of the joints that have one
+        self.relative: dict[str, Relative] = {}  # by its name, angle.A
+        self.wound: set[str] = set()  # angles that something needs over many turns
+        self.unwrapped: dict[Expr, tuple[Expr, Expr]] = {}  # in space: rate, and value modulo 2 pi
         self.placed: dict[Marker, Placed] = {}
 
     # ------------------------------------------------------------------ numbers
@@ -114,14 +130,54 @@ class Draft:
             self.placed[marker] = self.motions[marker.body].placed(marker, point)
         return self.placed[marker]
 
+    def angle(self, name: str, a: Placed, b: Placed, axis: int) -> Timed:
+        """The angle of b about an axis of a.  In space it is a coordinate of its own, tied to the attitude
+        modulo 2 pi, where something needs it over many turns."""
+        rates = about(a, b, axis)
+        if len(self.components) == 2:
+            return Timed(b.angle - a.angle, *rates)
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        x, y, turned = a.axes[j].value, a.axes[k].value, b.axes[j].value
+        within_turn = sp.atan2(dot(turned, y), dot(turned, x))
+        if name not in self.wound:
+            return Timed(within_turn, *rates)
+        angle = dynamicsymbols(name)
+        self.unwrapped[angle] = rates[0], within_turn
+        return Timed(angle, *rates)
+
+    def hold(self, name: str, f: Timed, text: str) -> None:
+        """A row f = 0."""
+        self.constraints.append(Tie(name, f.value, text, rates=(f.rate, f.bend)))
+
+    def second(self, f: Timed) -> Expr:
+        """The second derivative: the bend, and the rate, which is linear in the speeds, of accelerations."""
+        changes: dict[Expr, Expr] = {}
+        for motion in self.motions.values():
+            speeds = [q.diff(TIME) for q in motion.coordinates if q not in motion.kinematics]
+            changes |= {v: v.diff(TIME) for v in (*speeds, *motion.speeds) if f.rate.has(v)}
+        return f.bend + f.rate.xreplace(changes)
+
+    @property
+    def known(self) -> set[str]:
+        """What the FMU tells of unwrapped angles by itself."""
+        return {derivative(name_of(q), k) for q in self.unwrapped for k in (0, 1)}
+
+    def motion_of(self, joint: Any) -> Relative:
+        """The one motion of a joint, which may be given by its name; or the motion of that name."""
+        name = joint if isinstance(joint, str) else joint.name
+        found = (name, f"angle.{name}", f"position.{name}")
+        return next(self.relative[n] for n in found if n in self.relative)
+
     # ------------------------------------------------------------------ forces
 
     def push(self, body: Body | Ground, point: Vector, force: Vector) -> None:
         """A force [N] on a body at a point, both in the ground's axes."""
         motion = self.motions[body]
         self.turn(body, cross(minus(point, motion.position), force))
-        for speed, component in zip(motion.velocity_speeds, force, strict=False):
-            self.forces[speed] += component
+        if isinstance(body, Body):
+            for x, component in zip(motion.position, force, strict=True):
+                if x in motion.coordinates:
+                    self.forces[x] += component
 
     def turn(self, body: Body | Ground, torque: Vector) -> None:
         """A torque [N.m] on a body, in the ground's axes."""

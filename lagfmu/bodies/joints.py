@@ -2,16 +2,20 @@
 
 A row that holds back a translation is f = e . (p2 - p1) [m] with an axis e of the first marker: its
 multiplier is the component along e of the force [N] that the second body receives at p2; the first receives
-the opposite force there.  In the plane a row that holds back the rotation is f = angle2 - angle1 [rad]: its
-multiplier is the torque [N.m] on the second body.  The rows of the joint A are A.x, A.y, A.rz: named by axis.
+the opposite force there.  A row that holds back a rotation is f = angle2 - angle1 [rad] in the plane; in
+space, with a, b, c right-handed from the axis a of the joint, a2 . b1 and -a2 . c1, whose rates are
+(w2 - w1) . (a2 x b1) and -(w2 - w1) . (a2 x c1): where f is 0 its multiplier is the torque [N.m] on the
+second body about c, about b.  The rows of the joint A are A.x, A.y, A.z, A.rx, A.ry, A.rz: named by the axes
+of the first marker.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
 import sympy as sp
 
 from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, Parameter
@@ -20,8 +24,9 @@ from ..model.reactions import multiplier
 from ..names import derivative
 from .body import Marker, Number
 from .draft import Draft, Relative, Wrench
-from .motion import Placed, about, along, distance
-from .vectors import AXES, dot, minus
+from .guess import Guess, Reach
+from .motion import Placed, Timed, about, between, distance, product
+from .vectors import AXES, cross, dot, minus, plus, times
 
 
 def places(draft: Draft, tie: Any) -> tuple[Placed, Placed]:
@@ -57,56 +62,69 @@ class Joint:
         self.rows(draft, a, b, axis, wrench)
         self.coordinate(draft, a, b, axis, wrench)
 
-    def relative_pose(
-        self, draft: Draft, model: Model, given: Mapping[str, float]
-    ) -> tuple[float | None, complex]:
-        """A rough place of the second marker in the first, in the plane: its angle [rad], None where that is
-        free and not given, and its origin x + iy [m]."""
-        axis = AXES.index(self.axis or self.usual[0])
-        turn = given.get(f"angle.{self.name}") if self.turns else 0.0
-        return turn, given.get(f"position.{self.name}", 0.0) * (1, 1j, 0)[axis]
+    def relative_pose(self, guess: Guess) -> Reach:
+        """A rough place of the second marker in the first."""
+        axis = AXES.index(self.axis or self.usual[0 if guess.planar else 1])
+        angle = guess.given.get(f"angle.{self.name}")
+        reach = np.eye(3)[axis] * guess.given.get(f"position.{self.name}", 0.0)
+        fixed = not self.turns or (self.turns == "about" and angle is not None)
+        hinge = axis if self.turns == "about" and not guess.planar else None
+        return Reach(reach, angle, hinge, fixed)
 
     def rows(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
         """A row for each motion that it holds back."""
         for k, x in enumerate(draft.components):
             if ("along" if k == axis else "across") not in self.slides:
-                f = dot(a.axes[k], minus(b.point, a.point))
                 text = f"{self.name} does not move along {x} of its first marker"
-                draft.constraints.append(Holonomic(f"{self.name}.{x}", f, text))
+                draft.hold(f"{self.name}.{x}", product(a.axes[k], between(a, b)), text)
                 wrench.force[k] += multiplier(f"{self.name}.{x}")
-        if ("about" if axis == 2 else "across") not in self.turns:
-            f = b.angle - a.angle
-            draft.constraints.append(Holonomic(f"{self.name}.rz", f, f"{self.name} does not turn"))
-            wrench.torque[2] += multiplier(f"{self.name}.rz")
+        if len(draft.components) == 2:
+            if ("about" if axis == 2 else "across") not in self.turns:
+                self.hold(draft, wrench, 2, Timed(b.angle - a.angle, *about(a, b, 2)))
+            return
+        i, j, k = axis, (axis + 1) % 3, (axis + 2) % 3  # a, b, c: right-handed
+        if "across" not in self.turns:
+            self.hold(draft, wrench, k, product(b.axes[i], a.axes[j]))
+            opposite = product(b.axes[i], a.axes[k])
+            self.hold(draft, wrench, j, Timed(*(-x for x in opposite)))
+        if "about" not in self.turns:
+            self.hold(draft, wrench, i, product(b.axes[j], a.axes[k]))
+
+    def hold(self, draft: Draft, wrench: Wrench, axis: int, f: Timed) -> None:
+        """A row that holds back the rotation about an axis of the first marker."""
+        row, text = f"{self.name}.r{AXES[axis]}", f"{self.name} does not turn about {AXES[axis]}"
+        draft.hold(row, f, text)
+        wrench.torque[axis] += multiplier(row)
 
     @property
-    def measure(self) -> str:
-        """What the FMU calls the one motion that it leaves free: angle.A or position.A; empty if none."""
-        kind = {("", "about"): "angle", ("along", ""): "position"}.get((self.slides, self.turns))
-        return f"{kind}.{self.name}" if kind else ""
+    def measures(self) -> list[str]:
+        """What the FMU calls the motions that it leaves free: angle.A, position.A."""
+        turns, slides = self.turns == "about", self.slides == "along"
+        return [f"angle.{self.name}"] * turns + [f"position.{self.name}"] * slides
 
     def coordinate(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
-        """The motion that it leaves free, with two derivatives and its limits."""
-        name = self.measure
-        if not name:
-            return
-        turns = bool(self.turns)
-        values = (b.angle - a.angle, *about(a, b, axis)) if turns else along(a, b, axis)
-        of = draft.relative[self.name] = Relative(name, "rad" if turns else "m", values, a, b, axis)
-        text = f"{name.split('.')[0]} of {self.name}, of its second marker from the first"
-        for order, expression in enumerate(values):
-            what = ("", "rate of the ", "second derivative of the ")[order] + text
-            draft.report(
-                derivative(name, order), expression, of.unit + ("", "/s", "/s^2")[order], what
-            )
+        """The motions that it leaves free, with two derivatives, and the limits of the first."""
+        for name in self.measures:
+            turns = name.startswith("angle")
+            f = draft.angle(name, a, b, axis) if turns else product(a.axes[axis], between(a, b))
+            values = (f.value, f.rate, draft.second(f))
+            unit = "rad" if turns else "m"
+            of = draft.relative[name] = Relative(name, unit, values, a, b, axis)
+            text = f"{name.split('.')[0]} of {self.name}, of its second marker from the first"
+            for order, expression in enumerate(values):
+                called = derivative(name, order)
+                if called not in draft.known:
+                    what = ("", "rate of the ", "second derivative of the ")[order] + text
+                    draft.report(called, expression, of.unit + ("", "/s", "/s^2")[order], what)
         if self.limits is None:
             return
-        acts = wrench.torque if turns else wrench.force
+        of = draft.relative[self.measures[0]]
+        acts = wrench.torque if of.unit == "rad" else wrench.force
         for which, sign, value in zip(("lower", "upper"), (1, -1), self.limits, strict=True):
             row = f"{self.name}.{which}"
-            stop = draft.number(value, row, of.unit, f"{which} limit of {name}")
-            text = f"{name} stops at its {which} limit"
-            draft.constraints.append(Contact(row, sign * (values[0] - stop), text))
+            stop = draft.number(value, row, of.unit, f"{which} limit of {of.name}")
+            text = f"{of.name} stops at its {which} limit"
+            draft.constraints.append(Contact(row, sign * (of.values[0] - stop), text))
             acts[axis] += sign * multiplier(row)
 
 
@@ -133,13 +151,64 @@ class Fixed(Joint):
 
 @dataclass(frozen=True, eq=False)
 class PointOnPlane(Joint):
-    """The second marker's origin stays in the plane through the first whose normal is the axis (z; in the
-    plane a line with the normal y)."""
+    """The second marker's origin stays in the plane through the first whose normal is the axis (z; of the
+    plane xy a line with the normal y)."""
 
     usual = ("y", "z")
     possible = ("xy", "xyz")
     slides = "across"
     turns = "about across"
+
+
+@dataclass(frozen=True, eq=False)
+class Spherical(Joint):
+    """A ball: the markers' origins coincide (in space)."""
+
+    possible = ("", "")
+    turns = "about across"
+
+
+@dataclass(frozen=True, eq=False)
+class Cylindrical(Joint):
+    """The second marker turns about an axis of the first and slides along it (in space)."""
+
+    possible = ("", "xyz")
+    slides = "along"
+    turns = "about"
+
+
+@dataclass(frozen=True, eq=False)
+class Planar(Joint):
+    """The second marker slides in the plane of the first whose normal is the axis, and turns about it (in
+    space)."""
+
+    possible = ("", "xyz")
+    slides = "across"
+    turns = "about"
+
+
+@dataclass(frozen=True, eq=False)
+class Universal(Joint):
+    """A Hooke's joint: the origins coincide, and an `axis` (x) of the first marker stays square to the
+    `second_axis` (y) of the second (in space).
+
+    The multiplier of NAME.cross is the torque along b2 x a1 [N.m], which turns with the bodies.
+    """
+
+    second_axis: str = "y"
+
+    usual = ("x", "x")
+    possible = ("", "xyz")
+    turns = "about across"
+
+    def rows(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
+        """Three rows of the origins, and a1 . b2 = 0."""
+        super().rows(draft, a, b, axis, wrench)
+        second, row = b.axes[AXES.index(self.second_axis)], f"{self.name}.cross"
+        draft.hold(row, product(a.axes[axis], second), f"the axes of {self.name} stay square")
+        j, k = (axis + 1) % 3, (axis + 2) % 3  # b2 x a1 has no component along a1
+        wrench.torque[j] += multiplier(row) * dot(second.value, a.axes[k].value)
+        wrench.torque[k] -= multiplier(row) * dot(second.value, a.axes[j].value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,32 +223,31 @@ class Distance:
     second: Marker
     length: Number
 
-    def relative_pose(
-        self, draft: Draft, model: Model, given: Mapping[str, float]
-    ) -> tuple[float | None, complex]:
+    def relative_pose(self, guess: Guess) -> Reach:
         """The second marker to the right of the first."""
-        return None, model_number(model, self.length)
+        return Reach((model_number(guess.model, self.length), 0, 0))
 
     def add(self, draft: Draft) -> None:
         """|p2 - p1| - length = 0."""
         a, b = places(draft, self)
-        size, direction, _ = distance(a, b)
+        size, direction = distance(a, b)
         length = draft.number(
             self.length, f"{self.name}.length", "m", f"length of {self.name}", True
         )
-        draft.constraints.append(
-            Holonomic(self.name, size - length, f"{self.name} keeps its length")
-        )
+        f = Timed(size.value - length, size.rate, size.bend)
+        draft.hold(self.name, f, f"{self.name} keeps its length")
         force = draft.wrench(self.name).force
         for k in range(len(draft.components)):
-            force[k] += multiplier(self.name) * dot(a.axes[k], direction)
+            force[k] += multiplier(self.name) * dot(a.axes[k].value, direction)
 
 
 @dataclass(frozen=True, eq=False)
 class Rolling:
-    """A wheel of `radius` [m] about the second marker rolls along the x axis of the first, on its y side.
+    """A wheel of `radius` [m] about the second marker rolls along the x axis of the first, on its y side; in
+    space a ball on the plane xy of the first, on its z side.
 
-    NAME.y [N] is the normal force on the wheel, NAME.x [N] the force along the line at the point of contact.
+    The multiplier of NAME.y [N] is the normal force on the wheel, that of NAME.x [N] the force along the line
+    at the point of contact; in space NAME.z, and NAME.x, NAME.y.
     """
 
     name: str
@@ -187,33 +255,57 @@ class Rolling:
     second: Marker
     radius: Number
 
-    def relative_pose(
-        self, draft: Draft, model: Model, given: Mapping[str, float]
-    ) -> tuple[float | None, complex]:
+    def relative_pose(self, guess: Guess) -> Reach:
         """The wheel above the first marker."""
-        return None, 1j * model_number(model, self.radius)
+        radius = model_number(guess.model, self.radius)
+        return Reach((0, radius, 0) if guess.planar else (0, 0, radius))
 
     def add(self, draft: Draft) -> None:
-        """e_y . d - r = 0, and the wheel's point on the line has the velocity of the line."""
+        """n . d - r = 0, and the wheel's point on the line has the velocity of the line."""
         a, b = places(draft, self)
         r = draft.number(self.radius, f"{self.name}.radius", "m", f"radius of {self.name}", True)
-        gap, slip = rolling(a, b, r)
-        draft.constraints += [
-            Holonomic(f"{self.name}.y", gap, f"{self.name} touches the line"),
-            Nonholonomic(f"{self.name}.x", slip, f"{self.name} rolls without slipping"),
-        ]
-        wrench = draft.wrench(self.name)
-        wrench.force[1] += multiplier(f"{self.name}.y")
-        wrench.force[0] += multiplier(f"{self.name}.x")
-        wrench.torque[2] += r * multiplier(f"{self.name}.x")
+        touch = Touch(draft, self.name, a, b, r)
+        draft.hold(touch.normal, touch.gap, f"{self.name} touches")
+        for row, slip in touch.slips.items():
+            draft.constraints.append(Nonholonomic(row, slip, f"{self.name} rolls without slipping"))
+        touch.transmit(draft.wrench(self.name), list(touch.slips))
 
 
-def rolling(a: Placed, b: Placed, radius: Expr) -> tuple[Expr, Expr]:
-    """The gap between the x axis of a and a wheel about b, and the velocity of the wheel's lowest point
-    against the line, which a turns with (both as they are where the gap is 0)."""
-    x, y = a.axes[0], a.axes[1]
-    rate = minus(b.velocity, a.velocity)
-    return dot(y, minus(b.point, a.point)) - radius, dot(x, rate) + radius * b.motion.omega[2]
+class Touch:
+    """A wheel of a radius about b (in space a ball; a point where it is 0) on the side of a to which the
+    normal points: the x axis and its y side in the plane, in space the plane xy and its z side.
+
+    `normal` names the row of the `gap` [m], `slips` the rows of the velocities [m/s] of the lowest point
+    against what it lies on, along the other axes, both as they are where the gap is 0.
+    """
+
+    def __init__(self, draft: Draft, name: str, a: Placed, b: Placed, radius: Expr) -> None:
+        self.radius, self.tangents = radius, AXES[: len(draft.components) - 1]
+        self.normal = f"{name}.{draft.components[-1]}"
+        self._n = len(self.tangents)
+        x, y, n = a.axes[0].value, a.axes[1].value, a.axes[self._n]
+        d = between(a, b)
+        height = product(n, d)
+        self.gap = Timed(height.value - radius, height.rate, height.bend)
+        rate = minus(d.rate, times(radius, cross(b.motion.omega, n.value)))
+        if self._n == 2:  # a line turns across itself, a plane also within itself
+            on_plane = plus(times(dot(x, d.value), x), times(dot(y, d.value), y))
+            rate = minus(rate, cross(a.motion.omega, on_plane))
+        self.slips = {
+            f"{name}.{x}": dot(a.axes[k].value, rate) for k, x in enumerate(self.tangents)
+        }
+
+    def transmit(self, wrench: Wrench, rows: Sequence[str]) -> None:
+        """The forces of the rows, which act at the lowest point, about the centre of the wheel."""
+        wrench.force[self._n] += multiplier(self.normal)
+        for k, row in enumerate(rows):
+            wrench.force[k] += multiplier(row)
+        fx, fy = (*map(multiplier, rows), sp.S.Zero, sp.S.Zero)[:2]
+        if self._n == 1:
+            wrench.torque[2] += self.radius * fx
+        else:  # (0, 0, -r) x (fx, fy, 0)
+            wrench.torque[0] += self.radius * fy
+            wrench.torque[1] -= self.radius * fx
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +324,7 @@ class Gear:
 
     def add(self, draft: Draft) -> None:
         """The one row."""
-        a, b = (draft.relative[name_of_joint(j)] for j in (self.first, self.second))
+        a, b = (draft.motion_of(j) for j in (self.first, self.second))
         per = {("rad", "m"): "1/m", ("m", "rad"): "m"}.get((a.unit, b.unit), "1")
         ratio = draft.number(self.ratio, f"{self.name}.ratio", per, f"ratio of {self.name}")
         offset = draft.number(self.offset, f"{self.name}.offset", a.unit, f"offset of {self.name}")

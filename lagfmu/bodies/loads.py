@@ -14,7 +14,7 @@ from ..model.elements import Expr, Holonomic, Input
 from ..model.reactions import multiplier
 from .body import Body, Marker, Number
 from .draft import Draft
-from .joints import name_of_joint, places
+from .joints import places
 from .motion import distance
 from .vectors import AXES, Vector, times
 
@@ -56,7 +56,7 @@ class SpringDamper:
         """The potential of the spring and of its preload, the force of the damper."""
         name = self.name
         a, b = places(draft, self)
-        size, direction, rate = distance(a, b)
+        (size, rate, _), direction = distance(a, b)
         k = draft.number(self.stiffness, f"{name}.stiffness", "N/m", f"stiffness of {name}")
         c = draft.number(self.damping, f"{name}.damping", "N.s/m", f"damping of {name}")
         free = draft.number(self.length, f"{name}.length", "m", f"length of {name} without force")
@@ -85,7 +85,7 @@ class Torsion:
 
     def add(self, draft: Draft) -> None:
         """The potential of the spring and of its preload, the torque of the damper."""
-        name, of = self.name, draft.relative[name_of_joint(self.joint)]
+        name, of = self.name, draft.motion_of(self.joint)
         effort = "N.m" if of.unit == "rad" else "N"
         per = "/rad" if of.unit == "rad" else "/m"
         k = draft.number(
@@ -125,7 +125,9 @@ class Force:
         else:
             force = draft.vector(self.force, self.name, "N", text)
         if self.follows:
-            parts = [times(f, e) for f, e in zip(force, placed.axes, strict=True)]
+            parts = [
+                times(f, e) for f, e in zip(force, (x.value for x in placed.axes), strict=True)
+            ]
             force = tuple(map(sum, zip(*parts, strict=True)))  # type: ignore[assignment]
         draft.push(placed.body, placed.point, force)
 
@@ -180,8 +182,8 @@ class Motor:
 
     def add(self, draft: Draft) -> None:
         """A generalized force on the joint's coordinate, or a row for it."""
-        name, joint = self.name, name_of_joint(self.joint)
-        of, wrench = draft.relative[joint], draft.wrench(joint)
+        name, of = self.name, draft.motion_of(self.joint)
+        wrench = draft.wrench(of.name.split(".")[1])
         turns = of.unit == "rad"
         kind, unit = ("torque", "N.m") if turns else ("force", "N")
         if self.motion is None:

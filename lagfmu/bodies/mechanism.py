@@ -11,14 +11,18 @@ import sympy as sp
 from ..errors import ModelError
 from ..model.elements import Input, Output, Parameter
 from ..model.model import Model
+from ..names import read
 from .assembly import assemble
 from .body import Body, Ground
 from .check import problems_of
 from .draft import Draft
-from .joints import Gear
+from .joints import Gear, Joint
+from .loads import Motor, Torsion
 from .picture import picture_of
 from .plane import PlaneMotion
+from .space import SpaceMotion
 from .told import lines_of
+from .vectors import AXES
 
 
 def mechanism(
@@ -35,7 +39,7 @@ def mechanism(
     outputs: Sequence[Output] = (),
     **more: Any,
 ) -> Model:
-    """The Model of a mechanism; with `plane` = 'xy' all points, forces and axes are of that plane.
+    """The Model of a mechanism in space; with `plane` = 'xy' all points, forces and axes are of that plane.
 
     `start` maps names of the FMU to where they begin: 'angle.A', 'der(angle.A)', 'rod.position.x', or
     'rod.position' to all of its components.  The rest is assembled: what is omitted moves first.
@@ -49,22 +53,30 @@ def mechanism(
     problems = problems_of(plane, bodies, parts)
     if problems:
         raise ModelError(str(name), problems)
-    draft = Draft("xy")
-    draft.motions[Ground()] = PlaneMotion(draft, Ground())
+    draft = Draft(plane or AXES)
+    motion = PlaneMotion if plane else SpaceMotion
+    draft.motions[Ground()] = motion(draft, Ground())
     for body in bodies:
-        draft.motions[body] = PlaneMotion(draft, body)
+        draft.motions[body] = motion(draft, body)
+    draft.wound = _wound(parts, start or {})
     for part in sorted(parts, key=lambda part: isinstance(part, Gear)):
         part.add(draft)
     draft.report_wrenches()
     if draft.problems:
         raise ModelError(str(name), draft.problems)
-    coordinates = {q: u for m in draft.motions.values() for q, u in m.coordinates.items()}
-    descriptions = {q: t for m in draft.motions.values() for q, t in m.descriptions.items()}
+    coordinates, descriptions, speeds, kinematics = (
+        {s: x for m in draft.motions.values() for s, x in getattr(m, field).items()}
+        for field in ("coordinates", "descriptions", "speeds", "kinematics")
+    )
+    angles = draft.unwrapped
     model = Model(
         name=name,
         lagrangian=sp.Add(*draft.kinetic, *(-V for V in draft.potential)),
         forces={q: Q for q, Q in draft.forces.items() if Q != 0},
-        coordinates=coordinates,
+        coordinates={**coordinates, **dict.fromkeys(angles, "rad")},
+        speeds=speeds,
+        kinematics={**kinematics, **{q: rate for q, (rate, _) in angles.items()}},
+        unwrapped={q: within for q, (_, within) in angles.items()},
         constraints=draft.constraints,  # type: ignore[arg-type]
         parameters=[*draft.parameters.values(), *parameters],
         inputs=[*draft.inputs, *inputs],
@@ -74,3 +86,14 @@ def mechanism(
         **{"picture": picture_of(draft), **more},
     )
     return replace(model, start=assemble(draft, model, parts, start or {}))
+
+
+def _wound(parts: Sequence[Any], start: Mapping[str, Any]) -> set[str]:
+    """The angles of joints that a gear, a motor, a torsion spring, a limit or the start needs over turns."""
+    joints = {p.name: p for p in parts if isinstance(p, Joint)}
+    named: list[Any] = [j for j in joints.values() if j.limits is not None]
+    named += [j for p in parts if isinstance(p, Gear) for j in (p.first, p.second)]
+    named += [p.joint for p in parts if isinstance(p, Motor | Torsion)]
+    names = {j if isinstance(j, str) else j.name for j in named}
+    found = {n if n.startswith("angle.") else f"angle.{n}" for n in names}
+    return found | {read(name).coordinate for name in start if "angle." in name}

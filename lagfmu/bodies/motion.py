@@ -1,8 +1,13 @@
-"""How a body moves, as joints and loads ask for it: one interface for the plane and for space.
+"""How bodies move, as joints and loads ask for it: one interface for the plane and for space.
 
-For a point p = r + s that is fixed on a body with angular velocity w, in the ground's axes,
+A vector s that is fixed on a body with the angular velocity w, both by components in the body's frame, is
+along the ground's axes
 
-    p' = r' + w x s ,    p'' = r'' + w' x s + w x (w x s)
+    u = R s ,   u' = R (w x s) ,   u'' = R (w x (w x s)) + R (w' x s)
+
+What is differentiated in time is kept as three expressions: itself, its rate, and its bend, the part of the
+second derivative that is there while the speeds do not change.  These are short, where the chain rule over
+the elements of R is long.
 """
 
 from __future__ import annotations
@@ -11,21 +16,93 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..model.elements import Expr
 from .body import Marker
 from .vectors import Vector, cross, dot, length, minus, plus, times
 
 
+class Timed(NamedTuple):
+    """A number with its rate and its bend."""
+
+    value: Expr
+    rate: Expr
+    bend: Expr
+
+
+class TimedVector(NamedTuple):
+    """A vector along the ground's axes, with its rate and its bend."""
+
+    value: Vector
+    rate: Vector
+    bend: Vector
+
+
+def product(u: TimedVector, v: TimedVector) -> Timed:
+    """u . v."""
+    return Timed(
+        dot(u.value, v.value),
+        dot(u.rate, v.value) + dot(u.value, v.rate),
+        dot(u.bend, v.value) + 2 * dot(u.rate, v.rate) + dot(u.value, v.bend),
+    )
+
+
+class Motion(ABC):
+    """The motion of a body: `position` and `velocity` of its centre of mass along the ground's axes, and its
+    angular velocity `spin` by components in its own frame.
+
+    `coordinates` and `speeds` map what the body has of these to units, `kinematics` says how coordinates
+    move whose rates are no speeds; `masses` are what resists each of the `directions`.
+    """
+
+    body: Any
+    position: Vector
+    velocity: Vector
+    spin: Vector
+    mass: Expr
+    masses: tuple[Expr, ...]
+    coordinates: dict[Expr, str]
+    speeds: dict[Expr, str]
+    kinematics: dict[Expr, Expr]
+    descriptions: dict[Expr, str]
+
+    @property
+    def directions(self) -> list[Expr]:
+        """What forces are on: the coordinates whose rates are speeds, then the speeds of its own."""
+        return [*(q for q in self.coordinates if q not in self.kinematics), *self.speeds]
+
+    @abstractmethod
+    def turned(self, vector: Vector) -> Vector:
+        """R s: components in the body's frame -> along the ground's axes."""
+
+    @abstractmethod
+    def placed(self, marker: Marker, point: Vector) -> Placed:
+        """The marker, whose point [m] is given in the body's own frame."""
+
+    @abstractmethod
+    def torque_on(self, torque: Vector) -> Iterator[tuple[Expr, Expr]]:
+        """(direction, generalized force) of a torque [N.m] along the ground's axes."""
+
+    def fixed(self, vector: Vector) -> TimedVector:
+        """A vector that is fixed on the body."""
+        rate = cross(self.spin, vector)
+        return TimedVector(*map(self.turned, (vector, rate, cross(self.spin, rate))))
+
+    @cached_property
+    def omega(self) -> Vector:
+        """The angular velocity along the ground's axes."""
+        return self.turned(self.spin)
+
+
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A marker in the ground's axes: its `point` and the unit vectors of its `axes`.  In the plane `angle`
-    [rad] is that of its x axis, and grows over many turns."""
+    """A marker on a body in motion: `arm` from the centre of mass [m] and unit vectors, all in the body's
+    frame.  In the plane `angle` [rad] is that of its x axis, and grows over many turns."""
 
     motion: Motion
-    point: Vector
-    axes: tuple[Vector, Vector, Vector]
+    arm: Vector
+    own_axes: tuple[Vector, Vector, Vector]
     angle: Expr
 
     @property
@@ -34,69 +111,40 @@ class Placed:
         return self.motion.body
 
     @cached_property
-    def _arm(self) -> Vector:
-        return minus(self.point, self.motion.position)
+    def origin(self) -> TimedVector:
+        """Where it is [m]."""
+        value, rate, bend = self.motion.fixed(self.arm)
+        return TimedVector(
+            plus(self.motion.position, value), plus(self.motion.velocity, rate), bend
+        )
+
+    @property
+    def point(self) -> Vector:
+        """Where it is [m], along the ground's axes."""
+        return self.origin.value
 
     @cached_property
-    def velocity(self) -> Vector:
-        """p' [m/s]."""
-        return plus(self.motion.velocity, cross(self.motion.omega, self._arm))
-
-    @cached_property
-    def acceleration(self) -> Vector:
-        """p'' [m/s^2]."""
-        w = self.motion.omega
-        turning = plus(cross(self.motion.alpha, self._arm), cross(w, cross(w, self._arm)))
-        return plus(self.motion.acceleration, turning)
+    def axes(self) -> tuple[TimedVector, TimedVector, TimedVector]:
+        """The directions of its axes."""
+        x, y, z = map(self.motion.fixed, self.own_axes)
+        return x, y, z
 
 
-class Motion(ABC):
-    """Position, velocity and acceleration of a body's centre of mass, its angular velocity `omega` and
-    `alpha`, all in the ground's axes.  `velocity_speeds`: the speeds that forces act on."""
-
-    body: Any
-    position: Vector
-    velocity: Vector
-    acceleration: Vector
-    omega: Vector
-    alpha: Vector
-    velocity_speeds: tuple[Expr, ...]
-    mass: Expr
-    masses: tuple[Expr, ...]  # of each coordinate, as the assembly weighs its movement
-    coordinates: dict[Expr, str]
-    descriptions: dict[Expr, str]
-
-    @abstractmethod
-    def placed(self, marker: Marker, point: Vector) -> Placed:
-        """The marker, whose point [m] is given in the body's own frame."""
-
-    @abstractmethod
-    def torque_on(self, torque: Vector) -> Iterator[tuple[Expr, Expr]]:
-        """(speed, generalized force) of a torque [N.m] in the ground's axes."""
-
-
-def along(a: Placed, b: Placed, axis: int) -> tuple[Expr, Expr, Expr]:
-    """How far b is from a along an axis of a [m], with the first and the second derivative."""
-    e, w = a.axes[axis], a.motion.omega
-    turned = cross(w, e)
-    d, rate = minus(b.point, a.point), minus(b.velocity, a.velocity)
-    bent = plus(cross(a.motion.alpha, e), cross(w, turned))
-    second = dot(e, minus(b.acceleration, a.acceleration)) + 2 * dot(turned, rate) + dot(bent, d)
-    return dot(e, d), dot(e, rate) + dot(turned, d), second
+def between(a: Placed, b: Placed) -> TimedVector:
+    """From a to b [m]."""
+    return TimedVector(*(minus(v, u) for u, v in zip(a.origin, b.origin, strict=True)))
 
 
 def about(a: Placed, b: Placed, axis: int) -> tuple[Expr, Expr]:
-    """The rate [rad/s] at which b turns about an axis of a, and its derivative."""
-    e = a.axes[axis]
-    w = minus(b.motion.omega, a.motion.omega)
-    return dot(e, w), dot(e, minus(b.motion.alpha, a.motion.alpha)) + dot(
-        cross(a.motion.omega, e), w
-    )
+    """The rate at which b turns about an axis of a [rad/s], and its bend."""
+    e, w = a.axes[axis], b.motion.omega
+    return dot(e.value, w) - dot(a.own_axes[axis], a.motion.spin), dot(e.rate, w)
 
 
-def distance(a: Placed, b: Placed) -> tuple[Expr, Vector, Expr]:
-    """|d| [m], the unit vector from a to b in the ground's axes, and the rate of |d| [m/s]."""
-    d = minus(b.point, a.point)
+def distance(a: Placed, b: Placed) -> tuple[Timed, Vector]:
+    """|d| [m], and the unit vector from a to b."""
+    d, rate, bend = between(a, b)
     size = length(d)
-    direction = times(1 / size, d)
-    return size, direction, dot(direction, minus(b.velocity, a.velocity))
+    n = times(1 / size, d)
+    along = dot(n, rate)
+    return Timed(size, along, (dot(rate, rate) - along**2) / size + dot(n, bend)), n

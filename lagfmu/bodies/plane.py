@@ -16,7 +16,7 @@ from ..model.elements import Expr, is_number
 from .body import Body, Ground, Marker
 from .draft import Draft
 from .motion import Motion, Placed
-from .vectors import ZERO, Vector, minus, plus, times
+from .vectors import ZERO, Vector, minus
 
 TIME = dynamicsymbols._t
 EXACT = 12  # parts of pi that an angle may be of, and have a sine without rounding
@@ -28,11 +28,11 @@ class PlaneMotion(Motion):
     def __init__(self, draft: Draft, body: Body | Ground) -> None:
         self.body, self._draft = body, draft
         self.coordinates, self.descriptions = {}, {}
+        self.speeds, self.kinematics = {}, {}
         self.mass, self.masses = sp.S.Zero, ()
         self.angle: Expr = sp.S.Zero
         self._center = ZERO
-        self.position = self.velocity = self.acceleration = self.omega = self.alpha = ZERO
-        self.velocity_speeds = ()
+        self.position = self.velocity = self.spin = ZERO
         if isinstance(body, Body):
             self._moving(body)
 
@@ -42,11 +42,8 @@ class PlaneMotion(Motion):
         self.angle = dynamicsymbols(f"{name}.orientation.z")
         self.coordinates = {x: "m", y: "m", self.angle: "rad"}
         self.position = (x, y, sp.S.Zero)
-        self.velocity, self.acceleration = (
-            (x.diff(TIME, k), y.diff(TIME, k), sp.S.Zero) for k in (1, 2)
-        )
-        self.omega, self.alpha = ((0, 0, self.angle.diff(TIME, k)) for k in (1, 2))
-        self.velocity_speeds = (x, y)
+        self.velocity = (x.diff(TIME), y.diff(TIME), sp.S.Zero)
+        self.spin = (sp.S.Zero, sp.S.Zero, self.angle.diff(TIME))
         self._center = draft.vector(body.center, f"{name}.center", "m", "centre of mass")
         m = draft.number(body.mass, f"{name}.mass", "kg", f"mass of {name}", positive=True)
         text = f"moment of inertia of {name} about its centre of mass"
@@ -61,25 +58,24 @@ class PlaneMotion(Motion):
         for axis, v in zip("xy", self.velocity, strict=False):
             text = f"velocity of the centre of mass of {name}"
             draft.report(f"{name}.velocity.{axis}", v, "m/s", text)
-        draft.report(f"{name}.omega.z", self.omega[2], "rad/s", f"angular velocity of {name}")
+        draft.report(f"{name}.omega.z", self.spin[2], "rad/s", f"angular velocity of {name}")
+
+    def turned(self, vector: Vector) -> Vector:
+        """Components in the body's frame -> along the ground's axes."""
+        (x, y, z), c, s = vector, sp.cos(self.angle), sp.sin(self.angle)
+        return c * x - s * y, s * x + c * y, z
 
     def placed(self, marker: Marker, point: Vector) -> Placed:
         """The marker, whose point [m] is given in the body's own frame."""
-        angle = self.angle + _exact(marker.rotation)
-        arm = minus(point, self._center)
-        x, y = _axes(self.angle)
-        at = plus(self.position, plus(times(arm[0], x), times(arm[1], y)))
-        return Placed(self, at, (*_axes(angle), (sp.S.Zero, sp.S.Zero, sp.S.One)), angle)
+        angle = _exact(marker.rotation)
+        c, s = sp.cos(angle), sp.sin(angle)
+        axes = ((c, s, sp.S.Zero), (-s, c, sp.S.Zero), (sp.S.Zero, sp.S.Zero, sp.S.One))
+        return Placed(self, minus(point, self._center), axes, self.angle + angle)
 
     def torque_on(self, torque: Vector) -> Iterator[tuple[Expr, Expr]]:
         """(coordinate, generalized force) of a torque [N.m]."""
         if self.coordinates:
             yield self.angle, torque[2]
-
-
-def _axes(angle: Expr) -> tuple[Vector, Vector]:
-    c, s = sp.cos(angle), sp.sin(angle)
-    return (c, s, sp.S.Zero), (-s, c, sp.S.Zero)
 
 
 def _exact(rotation: Any) -> Expr:

@@ -286,7 +286,9 @@ class Parts:
             text = "Their change along the direction (dt, dq, du)."
             yield self._tangent("kinematics_tangent", text, still, results)
         if eom.unwrapped:
-            angles = values([*eom.unwrapped.values()], [eom.q[j] for j in eom.unwrapped])
+            angles = values(
+                [*map(written_out, eom.unwrapped.values())], [eom.q[j] for j in eom.unwrapped]
+            )
             text = "What angles equal modulo 2 pi."
             yield Function("unwrapped_angles", text, still, {"angle": angles})
 

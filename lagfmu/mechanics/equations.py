@@ -22,7 +22,7 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
 from ..model.display import Displayed
-from ..model.elements import Expr
+from ..model.elements import Expr, Tie
 from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
 from ..model.norms import norm, norms_of
 from ..model.reactions import force_of_constraint, multiplier, reactions_in
@@ -412,6 +412,10 @@ def derive(model: Model) -> EquationsOfMotion:
         if isinstance(constraint, Nonholonomic):
             row, drift = _pfaffian(constraint, expression, v, problems)
             f.append(None)
+        elif isinstance(constraint, Tie):
+            rate, bend = (e.xreplace(table).xreplace(closed.symbols) for e in constraint.rates)
+            row, drift = _pfaffian(constraint, rate, v, problems)
+            f.append(expression)
         else:
             row = _along(expression, moving)
             drift = moving.along_time(expression)
@@ -419,7 +423,9 @@ def derive(model: Model) -> EquationsOfMotion:
         G.update({(k, j): a for j, a in row.items()})
         nu.append(-drift)
         # d/dt (sum_j a_j v_j + drift) = sum_j a_j vdot_j - gamma
-        gamma.append(-sp.Add(*(clock.total(a) * v[j] for j, a in row.items()), clock.total(drift)))
+        if not isinstance(constraint, Tie):
+            bend = sp.Add(*(clock.total(a) * v[j] for j, a in row.items()), clock.total(drift))
+        gamma.append(-bend)
 
     if problems:
         raise ModelError(model.name, problems)
@@ -574,7 +580,7 @@ def _left_hand_side(
 
 
 def _pfaffian(
-    constraint: Nonholonomic, expression: Expr, v: tuple[Expr, ...], problems: list[str]
+    constraint: Constraint, expression: Expr, v: tuple[Expr, ...], problems: list[str]
 ) -> tuple[dict[int, Expr], Expr]:
     """Coefficients a_j and a_0 of sum_j a_j v_j + a_0."""
     row = dict(_gradient(expression, v))

@@ -63,6 +63,14 @@ class Holonomic:
 
 
 @dataclass(frozen=True)
+class Tie(Holonomic):
+    """A row of a joint, f(q) = 0, that brings its derivatives, shorter than the chain rule finds them:
+    `rates`, f' and the part of f'' that is there while the speeds do not change."""
+
+    rates: tuple[Expr, Expr] = (0, 0)
+
+
+@dataclass(frozen=True)
 class Nonholonomic:
     """sum_j a_j(q, t) v_j + a_0(q, t) = 0, affine in the velocities.  [lambda] = W/[expression]."""
 

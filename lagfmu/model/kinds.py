@@ -182,7 +182,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
         problems.append("there is no coordinate: a model needs at least one")
     named += [("parameter", name_of(p.symbol)) for p in model.parameters]
     named += [("input", name_of(i.symbol)) for i in model.inputs]
-    own = {o.name for o in model.outputs if is_name(o.name)}
+    own = {o.name for o in model.outputs if is_name(o.name)} | {*map(name_of, model.unwrapped)}
     named += [("output", o.name) for o in model.outputs if not _is_rate_of(o.name, own)]
     seen: dict[str, str] = {}
     for kind, name in named:

@@ -105,7 +105,7 @@ def page(
         constraints=[
             (
                 c.name,
-                KINDS[type(c)],
+                next(words for kind, words in KINDS.items() if isinstance(c, kind)),
                 c.description,
                 c.while_closed if not isinstance(c, Contact) else None,
                 shown(whole[names.name(names.MULTIPLIER, c.name)].unit),

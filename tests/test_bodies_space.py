@@ -1,0 +1,175 @@
+"""Bodies and joints in space: Newton and Euler hold for each body with the wrenches that the FMU reports."""
+
+from __future__ import annotations
+
+import warnings
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lagfmu import simulate
+from lagfmu.bodies import (
+    Body,
+    Cylindrical,
+    Distance,
+    Fixed,
+    Gravity,
+    Ground,
+    Planar,
+    PointOnPlane,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+    mechanism,
+)
+from lagfmu.testing import load
+
+g = 9.81  # m/s^2
+FALL = (0.3, -0.5, -g)
+ground = Ground()
+MODELS = Path(__file__).parent.parent / "models"
+TILT = ("rpy", 0.3, -0.4, 0.2)
+KINDS = [
+    Revolute,
+    Prismatic,
+    Universal,
+    *(
+        pytest.param(kind, marks=pytest.mark.thorough)
+        for kind in (Cylindrical, Planar, Spherical, Fixed, PointOnPlane)
+    ),
+    pytest.param(
+        lambda name, a, b: Distance(name, a, b, 0.6), id="Distance", marks=pytest.mark.thorough
+    ),
+]
+
+
+def pair(kind):
+    """A first body on a ball joint, a second on it by the joint of that kind, both with products of inertia,
+    centres of mass aside and oblique markers."""
+    one = Body("one", 1.5, (0.04, 0.05, 0.06, 0.004, -0.003, 0.002), center=(0.02, 0.01, -0.03))
+    two = Body("two", 0.7, (0.02, 0.03, 0.025, -0.001, 0.002, 0.003), center=(-0.01, 0.05, 0.02))
+    pivot = Spherical("P", ground.at((0.1, 0.2, 0.3)), one.at((-0.2, 0.05, 0.1)))
+    at, end = one.at((0.3, 0.1, -0.1), rotation=TILT), two.at((0.05, -0.2, 0.1), rotation=TILT)
+    start = {"one.omega": (0.5, -1.0, 2.0), "two.omega": (0.3, 0.7, -1.1)}
+    if kind is not Fixed:
+        start["two.velocity"] = (0.2, 0.1, -0.3)
+    with warnings.catch_warnings():  # a joint leaves not all of these
+        warnings.simplefilter("ignore")
+        return mechanism(
+            "Pair",
+            bodies=[one, two],
+            joints=[pivot, kind("K", at, end)],
+            loads=[Gravity(FALL)],
+            start=start,
+        )
+
+
+def turning(row, body):
+    """R of a body, from its quaternion."""
+    w, x, y, z = (row[f"{body}.orientation.{q}"] for q in "wxyz")
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def vector(row, name):
+    return np.array([row[f"{name}.{x}"] for x in "xyz"])
+
+
+def rpy(roll, pitch, yaw):
+    """URDF's: about x, then y, then z, of the fixed axes."""
+    (a, b), (c, d), (e, f) = ((np.cos(x), np.sin(x)) for x in (roll, pitch, yaw))
+    return (
+        np.array([[e, -f, 0], [f, e, 0], [0, 0, 1]])
+        @ np.array([[c, 0, d], [0, 1, 0], [-d, 0, c]])
+        @ np.array([[1, 0, 0], [0, a, -b], [0, b, a]])
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_newton_and_euler_hold_with_the_reported_wrenches(kind):
+    """m r'' = sum F and J w' + w x J w = sum (T + s x F): the second body receives the wrench of a joint at
+    its own marker, the first receives the opposite there, whatever the joint leaves free."""
+    run = simulate(pair(kind), 0.2, 0.1, tolerance=1e-10, target="python")
+    inertia = {
+        "one": [[0.04, 0.004, -0.003], [0.004, 0.05, 0.002], [-0.003, 0.002, 0.06]],
+        "two": [[0.02, -0.001, 0.002], [-0.001, 0.03, 0.003], [0.002, 0.003, 0.025]],
+    }
+    mass = {"one": 1.5, "two": 0.7}
+    for row in run:
+        R = {b: turning(row, b) for b in mass}
+        r = {b: vector(row, f"{b}.position") for b in mass}
+        pivot = np.array([0.1, 0.2, 0.3])
+        end = r["two"] + R["two"] @ np.array([0.06, -0.25, 0.08])
+        axes = {"P": np.eye(3), "K": R["one"] @ rpy(0.3, -0.4, 0.2)}
+        F = {j: axes[j] @ vector(row, f"force.{j}") for j in axes}
+        T = {j: axes[j] @ vector(row, f"torque.{j}") for j in axes}
+        wrenches = {
+            "one": [(F["P"], T["P"], pivot), (-F["K"], -T["K"], end)],
+            "two": [(F["K"], T["K"], end)],
+        }
+        for b, m in mass.items():
+            acceleration = np.array([row[f"der({b}.position.{x},2)"] for x in "xyz"])
+            force = sum(f for f, _, _ in wrenches[b]) + m * np.array(FALL)
+            np.testing.assert_allclose(force, m * acceleration, atol=1e-11)
+            w = vector(row, f"{b}.omega")
+            rate = np.array([row[f"der({b}.omega.{x})"] for x in "xyz"])
+            J = np.array(inertia[b])
+            moment = sum(t + np.cross(p - r[b], f) for f, t, p in wrenches[b])
+            np.testing.assert_allclose(R[b].T @ moment, J @ rate + np.cross(w, J @ w), atol=1e-12)
+
+
+def slider_crank(hinge=Revolute):
+    """The planar slider-crank, built in space: hinges about z, a slide along x."""
+    crank = Body("crank", 2.0, (0.005, 0.01, 0.01))
+    rod = Body("rod", 1.0, (0.002, 0.02, 0.02))
+    piston = Body("piston", 0.5, (0.001, 0.001, 0.001))
+    joints = [
+        Revolute("A", ground.at((0, 0, 0)), crank.at((-0.1, 0, 0))),
+        Revolute("B", crank.at((0.1, 0, 0)), rod.at((-0.25, 0, 0))),
+        hinge("C", rod.at((0.25, 0, 0)), piston.at((0, 0, 0))),
+        Prismatic("D", ground.at((0, 0, 0)), piston.at((0, 0, 0)), axis="x"),
+    ]
+    return mechanism(
+        "SliderCrank",
+        bodies=[crank, rod, piston],
+        joints=joints,
+        loads=[Gravity((0, -g, 0))],
+        start={"angle.A": pi / 4, "der(angle.A)": 10.0},
+    )
+
+
+def test_of_a_redundant_slider_crank_these_forces_are_unique_and_right():
+    """20 rows on 18 speeds have rank 17.  Unique are Fx, Fy of A, B, C, and Fy, Tz of D; these are the forces
+    of the same mechanism in the plane, where all are.  With a ball at C one row is left over."""
+    with pytest.warns(UserWarning, match="follow from the others"):
+        run = simulate(slider_crank(), 0.5, 0.05, tolerance=1e-11, target="python")
+    unique = {
+        n.removeprefix("unique.") for n in run.dtype.names if n[:7] == "unique." and run[n].all()
+    }
+    never = {
+        n.removeprefix("unique.")
+        for n in run.dtype.names
+        if n[:7] == "unique." and not run[n].any()
+    }
+    assert unique == {f"{j}.{x}" for j in "ABC" for x in "xy"} | {"D.y", "D.rz"}
+    assert len(unique | never) == 20
+    file = load(MODELS / "slider_crank_bodies.py")
+    flat = simulate(file.model, 0.5, 0.05, tolerance=1e-11, target="python")
+    for n in [
+        "angle.A",
+        *(f"force.{j}.{x}" for j in "ABC" for x in "xy"),
+        "force.D.y",
+        "torque.D.z",
+    ]:
+        scale = abs(flat["force.A.norm"]).max()
+        np.testing.assert_allclose(run[n], flat[n], atol=1e-9 * scale, err_msg=n)
+    with pytest.warns(UserWarning, match=r"constraint 'D\.z' follows from the others"):
+        simulate(slider_crank(Spherical), 0.1, 0.05, target="python")
