@@ -118,5 +118,5 @@ def run(
     values = {}
     for name in read:
         values[name] = one.get(name) if variables[name].type == "Real" else one.integer(name)
-    one.call("FreeInstance")
+    one.free()
     return Ended(values, events)
