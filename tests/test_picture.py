@@ -39,6 +39,7 @@ from lagfmu.testing import (
     prepare,
     read_picture,
     render,
+    rotation_matrix,
 )
 from lagfmu.testing import pack_picture as pack
 from lagfmu.testing import picture_values as values
@@ -128,6 +129,13 @@ def test_what_cannot_be_drawn_is_named() -> None:
     model = pendulum(picture=[Disk((sp.besselj(0, x), y))])
     with pytest.raises(ModelError, match="besselj"):
         picture_of(prepare(model, Scene("P")))
+
+
+def test_a_point_of_a_turned_body_is_drawn() -> None:
+    """A third of a turn about (1, 1, 1) takes the axes of a body round: x to y, y to z, z to x."""
+    R = rotation_matrix(sp.symbols("w x y z"))
+    turned = [[values(pack(e), lambda _: 0.5) for e in row] for row in R.tolist()]
+    np.testing.assert_allclose(turned, [[0, 0, 1], [1, 0, 0], [0, 1, 0]], rtol=0, atol=1e-16)
 
 
 def test_an_expression_keeps_its_value() -> None:

@@ -17,6 +17,7 @@ import sympy as sp
 
 from ..errors import BuildError, ModelError
 from ..mechanics.equations import TIME
+from ..model.attitude import Attitude
 from ..model.closed_form import in_variables
 from ..model.elements import Expr
 from ..model.model import Model, Nonholonomic
@@ -171,6 +172,8 @@ def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
             float(x) for k, c in zip(table.knots, table.coefficients, strict=True) for x in (k, *c)
         ]
         return ["spline", pack(expression.args[0], numbers), float(table.periodic), *rows]
+    if isinstance(expression, Attitude):
+        return pack(expression.polynomial(), numbers)
     operation = FUNCTIONS.get(expression.func)
     if operation is None:
         known = ", ".join(sorted(f for f in FUNCTIONS.values() if f.isalpha()))
