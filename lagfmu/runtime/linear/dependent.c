@@ -4,9 +4,7 @@
 #include <math.h>
 
 #include "cod.h"
-#include "leastnorm.h"
 #include "numbers.h"
-#include "orthogonal.h"
 #include "weighted.h"
 
 static const double SAFE = 1e-6; /* rows of unit norm must stand out by this much to be eliminated */

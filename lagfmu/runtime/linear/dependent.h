@@ -1,5 +1,5 @@
-/* dependent.h -- the rungs of linear.c that only constraints need: rows of G that depend on each
- * other, and the null space of G. */
+/* dependent.h -- the rungs of linear.c that only constraints need: rows of G that depend on each other
+ * (orthogonal.c; leastnorm.c where a coordinate has no mass), and the null space of G. */
 #ifndef LAGFMU_DEPENDENT_H
 #define LAGFMU_DEPENDENT_H
 
@@ -19,6 +19,19 @@ typedef struct {
     /* See linear_basis(); of the rung that was factored, whose factors are lost. */
     int (*basis)(Linear *l, int *basis);
 } Dependent;
+
+/* orthogonal.c: 1 if M is safely positive definite; clears l->unique where lambda is not.  `doubtful`: rows that
+ * seem to depend on each other may do so only because a coordinate is so heavy that it hides in the metric of
+ * M.  FAILED: the constraints contradict each other. */
+SHARED int orthogonal_factor(Linear *l, int *doubtful);
+SHARED Status orthogonal_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
+
+/* leastnorm.c: its doubles and ints for n speeds and m rows; clears l->unique likewise.  FAILED: the mass matrix is
+ * singular on the constraint surface; the constraints contradict each other. */
+SHARED size_t least_norm_doubles(int n, int m);
+SHARED int least_norm_ints(int n, int m);
+SHARED Status least_norm_factor(Linear *l);
+SHARED Status least_norm_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 
 /* NULL in an FMU without constraints: its optional.c says so, and dependent.c is not there. */
 SHARED const Dependent *const DEPENDENT;

@@ -7,7 +7,7 @@
  *
  * Z2 spans the null space of K.  x must not take part in it, and lambda_k is unique if it does
  * not. */
-#include "leastnorm.h"
+#include "dependent.h"
 
 #include <math.h>
 

@@ -3,7 +3,7 @@
  * W = Q [T^T 0; 0 0] Z^T: Z2 spans the null space of G^T, in rows with g_k M^-1 g_k^T = 1.  The
  * equations contradict each other unless Z2^T c = 0; lambda_k is unique if row k of Z2 vanishes
  * (Wojtyra, Multibody System Dynamics 13 (2005) 265). */
-#include "orthogonal.h"
+#include "dependent.h"
 
 #include <math.h>
 

@@ -6,7 +6,7 @@
  * is taken off, s^2 <- s^2 - 2 a d with the acceleration a towards the contact: without it bounces with e
  * near 1 would not die out, e^2 (h + d) = h.  A contact that is inside and already departs, though it is
  * pulled back, has been in a flight too short for the solver's steps: it is at rest, s = 0. */
-#include "landing.h"
+#include "modes.h"
 
 #include <math.h>
 #include <string.h>

@@ -9,7 +9,6 @@
 #include "events.h"
 #include "impact.h"
 #include "switches.h"
-#include "landing.h"
 #include "linkage.h"
 #include "passage.h"
 #include "peaks.h"
