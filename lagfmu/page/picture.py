@@ -101,21 +101,14 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
     if isinstance(shape, Line):
         slack = {} if shape.length is None else {"length": expression(sp.sympify(shape.length))}
         return {"kind": "line", "points": [point(p) for p in shape.points], **slack}
-    if isinstance(shape, Rod):
-        return {"kind": "rod", "points": [point(shape.start), point(shape.end)]}
-    if isinstance(shape, Ground):
-        return {"kind": "ground", "points": [point(shape.start), point(shape.end)]}
-    if isinstance(shape, Spring):
+    if isinstance(shape, (Rod, Ground, Spring)):
         ends = [point(shape.start), point(shape.end)]
-        return {"kind": "spring", "points": ends, "coils": int(shape.coils)}
+        more = {"coils": int(shape.coils)} if isinstance(shape, Spring) else {}
+        return {"kind": type(shape).__name__.lower(), "points": ends, **more}
     if isinstance(shape, Track):
         reach = [expression(shape.first), expression(shape.last)]
-        return {
-            "kind": "path",
-            "point": point(shape.point),
-            "over": str(shape.over),
-            "range": reach,
-        }
+        over = {"over": str(shape.over), "range": reach}
+        return {"kind": "path", "point": point(shape.point), **over}
     if isinstance(shape, Disk):
         found: dict[str, Any] = {"kind": "disk", "center": point(shape.center)}
         for key, value in (("radius", shape.radius), ("angle", shape.angle)):

@@ -68,6 +68,15 @@ class Compiled:
         return np.broadcast_to(found, len(rows)).copy()
 
 
+def alone(differ: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Points at which two runs differ, and beside which they do not: where an event lies between them and the
+    next, the modes may differ by the error of its time."""
+    found = differ.copy()
+    found[1:] &= ~differ[:-1]
+    found[:-1] &= ~differ[1:]
+    return found
+
+
 _compiled = lru_cache(maxsize=1024)(Compiled)  # SymPy takes longer for one than the run takes
 
 

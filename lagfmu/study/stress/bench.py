@@ -25,6 +25,7 @@ from ... import names
 from ...fmu.archive import unpack
 from ...fmu.session import RefusalError, Session
 from ...fmu.target import PYTHON
+from ...verification.evaluate import alone
 from ...verification.verify import applies
 from .closed_forms import EQUATION, judged, laws
 from .facts import Facts, facts_of
@@ -220,10 +221,7 @@ class Bench:
             struck = names.name(names.CLOSINGS, c)
             if struck in (a.dtype.names or ()):
                 differ |= np.asarray(a[struck] != b[struck])
-            alone = differ.copy()
-            alone[1:] &= ~differ[:-1]
-            alone[:-1] &= ~differ[1:]
-            alike &= ~alone
+            alike &= ~alone(differ)
         for form in self.forms:
             if form.closed_form.name.startswith(EQUATION):
                 alike &= applies(form.closed_form, a, run.values)

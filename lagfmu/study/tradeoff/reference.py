@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ... import names
 from ...fmu.read import Trajectory
 from ...fmu.session import Session
+from ...verification.evaluate import alone
 from .observe import observe
 from .quantities import Quantity, magnitudes, quantities
 from .setting import Setting
@@ -79,19 +80,12 @@ def refer(
 
 
 def _shared(fine: Trajectory, run: Trajectory) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Rows of `fine` at the times of `run`, and where the contact modes of both are alike.
-
-    At a communication point beside an event the modes may differ by the error of the event's time:
-    such single points are left to that error.  Longer differences are errors like any other.
-    """
+    """Rows of `fine` at the times of `run`, and where the contact modes of both are alike, or differ at
+    longer than a single point: that is an error like any other."""
     times = fine["time"]
     rows = np.clip(np.searchsorted(times, run["time"]), 1, len(times) - 1)
     rows -= np.abs(times[rows - 1] - run["time"]) < np.abs(times[rows] - run["time"])
     alike = np.ones(len(run), dtype=bool)
     for name in names.those(run.dtype.names or (), names.CONTACT):
-        differ = run[name] != fine[name][rows]
-        alone = differ.copy()
-        alone[1:] &= ~differ[:-1]
-        alone[:-1] &= ~differ[1:]
-        alike &= ~alone
+        alike &= ~alone(run[name] != fine[name][rows])
     return rows, alike
