@@ -95,6 +95,23 @@ class Bench:
             raise AssertionError(self.why())
         return np.array(x), np.array(w)
 
+    def modes(self, guess: Sequence[int], departing: Sequence[int] | None = None) -> list[int]:
+        """Of contacts that are all touched at rest at 0, and then `lambda` and `vdot`."""
+        still, closed, touching = doubles([0.0] * self.system.nv), integers(guess), [1] * len(guess)
+        flags = None if departing is None else integers(departing)
+        at = self.handle, still, still, closed
+        if self.c.bench_modes(*at, integers(touching), flags) or self.c.bench_motion(*at):
+            raise AssertionError(self.why())
+        return list(closed)
+
+    def impact(self, before: Sequence[float], entering: Sequence[int]) -> tuple[Any, Any]:
+        """Velocities after an impact at 0, and the impulses of all rows."""
+        v, Lambda = doubles(before), doubles([0.0] * self.system.m)
+        at = self.handle, doubles([0.0] * self.system.nv), v, integers(entering), 0, Lambda
+        if self.c.bench_impact(*at):
+            raise AssertionError(self.why())
+        return np.array(v), np.array(Lambda)
+
 
 def doubles(values: Sequence[float]) -> Any:
     return (c_double * len(values))(*[float(x) for x in values])
@@ -361,12 +378,7 @@ def test_contact_modes_satisfy_signorinis_condition(count, sets, bench):
     for _ in range(60):
         force = rng.standard_normal(2) * 10
         one.drive(force)
-        closed = integers(rng.integers(0, 2, count))
-        still = doubles([0, 0])
-        assert not one.c.bench_modes(
-            one.handle, still, still, closed, integers([1] * count), None
-        ), one.why()
-        assert not one.c.bench_motion(one.handle, still, still, closed)
+        closed = one.modes(rng.integers(0, 2, count))
         lam, vdot = one.array("lambda", count), one.array("vdot", 2)
         for k in range(count):
             assert lam[k] > (-1e-12 if count == 3 else 0) if closed[k] else lam[k] == 0
@@ -394,11 +406,7 @@ def test_a_balance_is_no_motion(guess, bench):
     )
     one = bench(model)
     one.drive([-6.0, 0.0])
-    closed, still = integers(guess), doubles([0, 0])
-    assert not one.c.bench_modes(one.handle, still, still, closed, integers([1, 1]), None), (
-        one.why()
-    )
-    assert not one.c.bench_motion(one.handle, still, still, closed)
+    one.modes(guess)
     np.testing.assert_allclose(one.array("lambda", 2), [6, 0], atol=1e-14)
     np.testing.assert_allclose(one.array("vdot", 2), [0, 0], atol=1e-15)
 
@@ -425,11 +433,7 @@ def test_modes_are_found_where_the_active_set_goes_in_a_circle(bench):
     one = bench(model)
     one.p[1:] = normals.T.ravel()
     one.drive([-3.0, 0.0])
-    closed, still = integers([0] * 5), doubles([0, 0])
-    assert not one.c.bench_modes(one.handle, still, still, closed, integers([1] * 5), None), (
-        one.why()
-    )
-    assert list(closed) == [0, 1, 0, 0, 0]
+    assert one.modes([0] * 5) == [0, 1, 0, 0, 0]
 
 
 @pytest.mark.parametrize("unit", [1e-9, -1e-9, 1.0, -1.0, 1e9, -1e9])
@@ -448,15 +452,9 @@ def test_what_a_wall_does_depends_on_no_unit_and_no_side(unit, bench):
     )
     one = bench(model)
     one.p[1] = unit
-    still = doubles([0])
     for away, guess in itertools.product((False, True), (0, 1)):
         one.drive([1.0 if away == (unit > 0) else -1.0])
-        closed = integers([guess])
-        assert not one.c.bench_modes(one.handle, still, still, closed, integers([1]), None), (
-            one.why()
-        )
-        assert closed[0] != away
-        assert not one.c.bench_motion(one.handle, still, still, closed)
+        assert one.modes([guess]) == [not away]
         assert one.array("lambda", 1)[0] == pytest.approx(0 if away else 1 / abs(unit))
 
 
@@ -493,14 +491,12 @@ def test_what_the_legs_of_a_table_carry_depends_on_no_order(case, bench):
         start={z: 1.0},
     )
     one = bench(model)
-    still, found = doubles([0, 0, 0]), []
+    found = []
     one.drive([1.0, *torques])
     for order in itertools.islice(itertools.permutations(range(5)), 0, None, 7):
         stand = np.array(places, float)[list(order)]
         one.p[2:] = stand.T.ravel()
-        closed = integers([1] * 5)
-        assert not one.c.bench_modes(one.handle, still, still, closed, integers([1] * 5), None)
-        assert not one.c.bench_motion(one.handle, still, still, closed)
+        one.modes([1] * 5)
         carried, rising = np.zeros(5), one.array("vdot", 3)
         carried[list(order)] = one.array("lambda", 5)
         found.append(carried)
@@ -516,11 +512,8 @@ def test_a_contact_that_departs_is_not_closed_again(bench):
     one = bench(walls(1)[0])
     force = -walls(1)[1][0]
     one.drive(force)
-    still = doubles([0, 0])
-    for departing, expected in ((integers([0]), 1), (integers([1]), 0), (None, 1)):
-        closed = integers([0])
-        assert not one.c.bench_modes(one.handle, still, still, closed, integers([1]), departing)
-        assert closed[0] == expected
+    for departing, expected in (([0], 1), ([1], 0), (None, 1)):
+        assert one.modes([0], departing) == [expected]
 
 
 def struck(one: Bench, q: Sequence[float], before: Sequence[float]) -> Any:
@@ -608,10 +601,7 @@ def test_contacts_of_unlike_restitution_keep_newtons_law(bench):
         A[0] -= (A[0] @ before) / (before @ before) * before
         one.p[:] = [*M[np.tril_indices(4)], *A.ravel(), *values]
         entering = [(1, 1, 1), (0, 1, 1), (0, 0, 1), (1, 0, 1)][draw % 4]
-        v, Lambda = doubles(before), doubles([0.0] * 5)
-        at = one.handle, doubles([0.0] * 4), v, integers(entering), 0, Lambda
-        assert not one.c.bench_impact(*at), one.why()
-        pushes, after = np.array(Lambda), np.array(v)
+        after, pushes = one.impact(before, entering)
         size = np.abs(pushes).max()
         np.testing.assert_allclose(M @ (after - before), A.T @ pushes, atol=1e-9 * size)
         assert A[0] @ after == pytest.approx(0, abs=1e-9)
@@ -654,16 +644,8 @@ def test_rounding_of_a_fast_motion_does_not_jam_an_impact(bench):
     one, jammed = bench(model), 0
     for k in range(50):
         before = np.array([*((1e3 + k) * np.array([np.cos(a), np.sin(a)])), -1e-6])
-        v, Lambda = doubles(before), doubles([0.0] * 3)
         left = np.cos(a) * before[1] - np.sin(a) * before[0]
         jammed += left != 0
-        at = one.handle, doubles([0.0] * 3), v, integers([1] * 3), 0, Lambda
-        assert not one.c.bench_impact(*at), one.why()
-        np.testing.assert_allclose(v, [*before[:2], 0.5e-6], rtol=1e-14, atol=1e-12)
+        after, _ = one.impact(before, [1] * 3)
+        np.testing.assert_allclose(after, [*before[:2], 0.5e-6], rtol=1e-14, atol=1e-12)
     assert jammed > 5
-
-
-# --------------------------------------------------------------------------- inputs, embedding
-
-
-# --------------------------------------------------------------------------- memory
