@@ -1,6 +1,6 @@
 """Mechanisms in space as data, all bodies parallel to the ground at the start; the same for both sides.
 
-`reference` makes of them Newton's and Euler's equations (rigid.py), `model` a Model of lagfmu (space.py).
+`reference` makes of them Newton's and Euler's equations (rigid.py), `model` bodies and joints of lagfmu.
 """
 
 from __future__ import annotations
@@ -12,14 +12,24 @@ from typing import Any
 
 import joints
 import numpy as np
-import sympy as sp
-from rigid import GROUND, Joint, Look, Mass, Mechanism, Vector, rotation, state
-from space import Free, Parts
+from rigid import GROUND, Joint, Look, Mass, Mechanism, Vector, cross, rotation, state
 from system import System
 
-from lagfmu import Holonomic, Model
+from lagfmu import Model
+from lagfmu.bodies import (
+    Body,
+    Distance,
+    Gravity,
+    Ground,
+    Prismatic,
+    Revolute,
+    Spherical,
+    SpringDamper,
+    mechanism,
+)
 
 Point = Sequence[float]
+JOINTS = {"ball": Spherical, "hinge": Revolute, "slide": Prismatic}
 
 
 @dataclass(frozen=True)
@@ -100,75 +110,94 @@ class Linkage:
         return mechanism, mechanism.speeds(y, {numbers[k]: w for k, w in self.spin.items()})
 
     def model(self) -> Model:
-        """The same for lagfmu, by hand in speeds."""
+        """The same for lagfmu, of bodies and joints; it begins where the reference does."""
         _, y = self.reference()
-        parts = Parts()
-        states = y.reshape(-1, 13)
-        free = {
-            name: parts.body(name, mass, part)
-            for (name, (mass, _)), part in zip(self.bodies.items(), states, strict=True)
-        }
+        made: dict[str, Any] = {"ground": Ground()}
+        start: dict[str, Sequence[float]] = {}
+        for (name, (mass, _)), part in zip(self.bodies.items(), y.reshape(-1, 13), strict=True):
+            J = mass.J
+            made[name] = Body(name, mass.m, (*J.diagonal(), J[0, 1], J[0, 2], J[1, 2]))
+            for what, vector in zip(("position", "velocity", "omega"), _motion(part), strict=True):
+                start[f"{name}.{what}"] = tuple(map(float, vector))
+
+        def marker(body: str, point: Point, axis: Point = ()) -> Any:
+            at = tuple(map(float, self.arm(body, point)))
+            return made[body].at(at, axis=tuple(map(float, axis)) if len(axis) else None)
+
+        joints: list[Any] = []
         for name, tie in self.ties.items():
-            self._rows(parts, free, name, tie)
+            a = marker(tie.first, tie.point, tie.axis)
+            b = marker(tie.second, tie.other or tie.point, tie.axis)
+            if tie.kind == "rod":
+                length = float(np.linalg.norm(np.subtract(tie.other, tie.point)))
+                joints.append(Distance(name, a, b, length))
+            else:
+                joints.append(JOINTS[tie.kind](name, a, b))
+        loads: list[Any] = [Gravity((0, 0, -self.gravity))]
         for k, spring in enumerate(self.springs):
-            a = self._at(parts, free, spring.first, f"s{k}", spring.point)
-            b = self._at(parts, free, spring.second, f"t{k}", spring.other)
-            stiffness = parts.number(f"k{k}", spring.k, "N/m")
-            size = sp.sqrt((b - a).dot(b - a))
-            parts.kinetic -= stiffness * (size - parts.number(f"l{k}", spring.length, "m")) ** 2 / 2
-        return parts.model(self.name, self.gravity, {body.m: body.r[2] for body in free.values()})
-
-    def _at(self, parts: Parts, free: Mapping[str, Free], body: str, label: str, at: Point) -> Any:
-        if body != "ground":
-            return free[body].at(label, self.arm(body, at))
-        numbers = zip("xyz", at, strict=True)
-        return sp.Matrix([parts.number(f"ground.{label}.{x}", v, "m") for x, v in numbers])
-
-    def _rows(self, parts: Parts, free: Mapping[str, Free], name: str, tie: Tie) -> None:
-        def turned(body: str, axis: Point) -> Any:
-            return sp.Matrix(axis) if body == "ground" else free[body].axis(axis)
-
-        a = self._at(parts, free, tie.first, name, tie.point)
-        b = self._at(parts, free, tie.second, name, tie.other or tie.point)
-        if tie.kind == "rod":
-            span = float(np.linalg.norm(np.subtract(tie.other, tie.point)))
-            length = parts.number(f"{name}.length", span, "m")
-            d = b - a
-            parts.rows.append(Holonomic(name, sp.sqrt(d.dot(d)) - length))
-            return
-        if tie.kind != "slide":
-            parts.same(name, a, b)
-        if tie.kind == "hinge":
-            held = [turned(tie.first, e) for e in joints.across(tie.axis)]
-            axis = np.asarray(tie.axis) / np.linalg.norm(tie.axis)
-            parts.square(name, turned(tie.second, axis), held)
-        if tie.kind == "slide":
-            axes = joints.across(tie.axis)
-            for k, e in enumerate(axes, 1):
-                parts.rows.append(Holonomic(f"{name}.t{k}", turned(tie.first, e).dot(b - a)))
-            axis = np.cross(*axes)
-            held = [turned(tie.first, e) for e in axes]
-            parts.square(name, turned(tie.second, axis), held)
-            across = turned(tie.second, axes[0]).dot(turned(tie.first, axes[1]))
-            parts.rows.append(Holonomic(f"{name}.r3", across))
+            a, b = marker(spring.first, spring.point), marker(spring.second, spring.other)
+            loads.append(SpringDamper(f"spring{k}", a, b, spring.k, spring.length))
+        return mechanism(
+            self.name,
+            bodies=[body for body in made.values() if isinstance(body, Body)],
+            joints=joints,
+            loads=loads,
+            start=start,
+        )
 
     def system(self, stop: float) -> System:
-        """Where each body is at `stop`, and what all joints together do to it."""
+        """At `stop` where each body is, what all joints together do to it, and of each joint's wrench what is
+        determined; of the rows of hinges whether they are."""
 
         def expected(stop: float) -> Mapping[str, float]:
-            mechanism, begin = self.reference()
-            y = mechanism.moved(begin, (0.0, stop))[-1]
-            _, forces, _ = mechanism.solve(stop, y)
+            by_hand, begin = self.reference()
+            y = by_hand.moved(begin, (0.0, stop))[-1]
             found: dict[str, float] = {}
-            for name, part, (f, tau) in zip(
-                self.bodies, y.reshape(-1, 13), forces.reshape(-1, 2, 3), strict=True
-            ):
-                own = rotation(part[3:7]).T @ tau
-                values = ("position", part[:3]), ("Q.position", f), ("Q.omega", own)
-                for what, vector in values:
-                    start = f"Q.{name}.{what[2:]}" if what[0] == "Q" else f"{name}.{what}"
-                    found |= {f"{start}.{x}": v for x, v in zip("xyz", vector, strict=True)}
-            least = 1e-3 * np.abs(forces).max()
-            return {k: float(v) for k, v in found.items() if k[0] != "Q" or abs(v) > least}
+            _, forces, received = by_hand.solve(stop, y)
+            parts = zip(self.bodies, y.reshape(-1, 13), forces.reshape(-1, 2, 3), strict=True)
+            for name, part, (f, tau) in parts:
+                found |= named(f"{name}.position", part[:3])
+                found |= named(f"Q.{name}.position", f)
+                found |= named(f"Q.{name}.omega", rotation(part[3:7]).T @ tau)
+            look, doubts = Look(stop, y, len(self.bodies)), by_hand.doubts(stop, y)
+            for name, tie in self.ties.items():
+                seen = self._marked(tie, look)
+                wrench, doubt = seen @ received[name], np.abs(seen @ doubts[name]).max(1, initial=0)
+                every = named(f"force.{name}", wrench[:3]) | named(f"torque.{name}", wrench[3:])
+                found |= dict(p for p, d in zip(every.items(), doubt, strict=True) if d < 1e-7)
+                if tie.kind == "hinge":
+                    rows = zip(("x", "y", "z", "rx", "ry"), doubt, strict=False)
+                    found |= {f"unique.{name}.{row}": float(d < 1e-7) for row, d in rows}
+            return found
 
         return System(self.model(), stop, expected)
+
+    def _marked(self, tie: Tie, look: Look) -> Vector:
+        """(6, 6): a wrench about the second body's centre of mass, in space -> about its marker, in the axes
+        of the first body's, whose z is the tie's axis by the least rotation."""
+        numbers = {"ground": GROUND} | {name: k for k, name in enumerate(self.bodies)}
+        turn = look.R[numbers[tie.first]] @ least(tie.axis)
+        arm = look.arm(numbers[tie.second], self.arm(tie.second, tie.other or tie.point))
+        found = np.zeros((6, 6))
+        found[:3, :3] = found[3:, 3:] = turn.T
+        found[3:, :3] = -turn.T @ cross(arm)
+        return found
+
+
+def named(name: str, vector: Vector) -> dict[str, float]:
+    """NAME.x, NAME.y, NAME.z."""
+    return {f"{name}.{x}": float(v) for x, v in zip("xyz", vector, strict=True)}
+
+
+def least(axis: Point) -> Vector:
+    """The rotation about a line across both that turns z onto an axis."""
+    if not len(axis):
+        return np.eye(3)
+    e = np.asarray(axis) / np.linalg.norm(axis)
+    K = cross(np.cross((0, 0, 1), e))
+    return np.eye(3) + K + K @ K / (1 + e[2])
+
+
+def _motion(part: Vector) -> tuple[Vector, Vector, Vector]:
+    """Place, velocity, and angular velocity in its own axes of a body that is parallel to the ground."""
+    return part[:3], part[7:10], part[10:]

@@ -63,6 +63,21 @@ def governor() -> Linkage:
     )
 
 
+def four_bar() -> Linkage:
+    """A four-bar linkage that is plane, on four hinges in space: of 20 rows 17 count."""
+    places = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.3), (0.8, 0.0, 0.6), (0.7, 0.0, 0.0))
+    names = ("ground", "crank", "coupler", "rocker", "ground")
+    return Linkage(
+        "FourBar",
+        {names[k]: bar(m, places[k - 1], places[k]) for k, m in ((1, 1.0), (2, 3.0), (3, 2.0))},
+        {
+            joint: Tie("hinge", names[k], names[k + 1], places[k], (0, 1, 0))
+            for k, joint in enumerate("ABCD")
+        },
+        {"crank": (0.0, 5.0, 0.0)},
+    )
+
+
 def bricard() -> Linkage:
     """Bricard's linkage of six right angles along the edges of a cube: one motion, of 30 rows 29 count."""
     ends = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1], [0, 1, 1], [0, 0, 1]], dtype=float)
@@ -145,8 +160,8 @@ def stewart() -> Linkage:
 def wishbone() -> Linkage:
     """A double wishbone suspension: two triangular arms, an upright with its wheel, a tie rod, a spring."""
     low, high = (0.0, 0.45, 0.20), (0.05, 0.40, 0.55)
-    lower = Mass.of(4.0, 0.05, 0.03, 0.08, 0.002, 0.0, -0.004)
-    upper = Mass.of(2.0, 0.02, 0.012, 0.03, -0.001, 0.002, 0.0)
+    lower = Mass.of(4.0, 0.05, 0.03, 0.07, 0.002, 0.0, -0.004)
+    upper = Mass.of(2.0, 0.02, 0.012, 0.027, -0.001, 0.002, 0.0)
     upright = Mass.of(25.0, 0.6, 0.9, 0.6, 0.01, 0.02, -0.03)
     return Linkage(
         "Wishbone",
@@ -167,7 +182,7 @@ def wishbone() -> Linkage:
     )
 
 
-LINKAGES = (door, governor, bricard, bennett, stewart, wishbone)
+LINKAGES = (door, four_bar, governor, bricard, bennett, stewart, wishbone)
 
 
 def _system(make: Callable[[], Linkage]) -> Callable[[], System]:

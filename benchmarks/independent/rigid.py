@@ -182,6 +182,19 @@ class Mechanism:
         parts[:, 7:] = (free.T @ amounts).reshape(n, 6)
         return parts.ravel()
 
+    def doubts(self, t: float, y: Vector) -> dict[str, Vector]:
+        """Of each joint the wrenches (6, k) that the others could take instead: G^T lam = 0."""
+        n = len(self.masses)
+        named = self.rows(Look(t, y, n))
+        U, sizes, _ = np.linalg.svd(matrix([row for each in named.values() for row in each], n))
+        null = U[:, np.count_nonzero(sizes > 1e-9 * sizes.max(initial=1.0)) :]
+        found, k = {}, 0
+        for name, each in named.items():
+            J2 = np.array([row.J2 for row in each]).reshape(-1, 6)
+            found[name] = J2.T @ null[k : k + len(each)]
+            k += len(each)
+        return found
+
     def rank(self, y: Vector) -> tuple[int, int]:
         """How many rows there are, and how many are independent."""
         n = len(self.masses)
