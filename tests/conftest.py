@@ -74,6 +74,8 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     "FrictionOscillator": "friction_oscillator",
     "InclineFriction": "incline_friction",
     "RoughHemisphere": "rough_hemisphere",
+    "Door": "door",
+    "Gyroscope": "gyroscope",
     "SliderCrankBodies": "slider_crank_bodies",
 }
 # one of each kind: forces alone, multipliers eliminated, a contact and velocities, an input, a table and an

@@ -81,6 +81,8 @@ CHANGED = {  # far from the defaults, consistent or not: the projection and the 
         "der(phi)": -20,
         "tau": 0.5,
     },
+    "Gyroscope": {"wheel.mass": 0.5, "wheel.inertia.zz": 0.003, "wheel.omega.x": 1.0},
+    "Door": {"door.mass": 5.0, "gravity.z": -3.7, "door.inertia.zz": 2.0},
     "SliderCrankBodies": {"rod.mass": 2.5, "crank.inertia": 0.02, "gravity.y": -3.7},
     "DoublePendulum": {"m1": 0.3, "m2": 2, "L1": 2, "L2": 0.5, "y1": 0.3, "der(y2)": 1.5},
     "BouncingBall": {"m": 0.3, "g": 3.7, "e": 0.4, "y": 0.5, "der(y)": 1},
