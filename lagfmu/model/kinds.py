@@ -42,45 +42,33 @@ _NO_NUMBERS = (sp.I, sp.nan, sp.oo, -sp.oo, sp.zoo)
 
 def check_containers(model: ModelFields) -> list[str]:
     """Fields that are no dict or list, before they are copied."""
-    maps: list[tuple[str, object, str]] = [
-        ("coordinates", model.coordinates, "{x: 'm'}"),
-        ("forces", model.forces, "{x: F}"),
-        ("start", model.start, "{x: 1.0}"),
-        ("descriptions", model.descriptions, "{x: 'height'}"),
-        ("speeds", model.speeds, "{w: 'rad/s'}"),
-        ("kinematics", model.kinematics, "{phi: w}"),
-        ("unwrapped", model.unwrapped, "{phi: atan2(y, x)}"),
-    ]
     problems = []
     if isinstance(model.embedding, Embedding):
-        problems += [
-            f"embedding {name} = {value!r}, expected a dict, e.g. {example}"
-            for name, value, example in (
-                ("coordinates", model.embedding.coordinates, "{s: 'm'}"),
-                ("relations", model.embedding.relations, "{x: 2*s}"),
-                ("start", model.embedding.start, "{s: 1.0}"),
-            )
-            if not isinstance(value, Mapping)
-        ]
+        examples = {"coordinates": "{s: 'm'}", "relations": "{x: 2*s}", "start": "{s: 1.0}"}
+        problems += _no_dicts(model.embedding, "embedding ", examples)
     elif model.embedding is not None:
         problems.append(
             f"embedding = {model.embedding!r}, expected Embedding(coordinates, relations)"
         )
-    problems += [
-        f"{name} = {value!r}, expected a dict, e.g. {name}={example}"
-        for name, value, example in maps
-        if not isinstance(value, Mapping)
-    ]
+    examples = {"coordinates": "{x: 'm'}", "forces": "{x: F}", "start": "{x: 1.0}"}
+    examples |= {"descriptions": "{x: 'height'}", "speeds": "{w: 'rad/s'}"}
+    examples |= {"kinematics": "{phi: w}", "unwrapped": "{phi: atan2(y, x)}"}
+    problems += _no_dicts(model, "", examples)
+    lists = {"constraints": "Holonomic", "parameters": "Parameter", "inputs": "Input"}
+    lists |= {"outputs": "Output", "picture": "Line"}
     return problems + [
         f"{name} = {value!r}, expected a list, e.g. {name}=[{example}(...)]"
-        for name, value, example in (
-            ("constraints", model.constraints, "Holonomic"),
-            ("parameters", model.parameters, "Parameter"),
-            ("inputs", model.inputs, "Input"),
-            ("outputs", model.outputs, "Output"),
-            ("picture", model.picture, "Line"),
-        )
-        if isinstance(value, str) or not isinstance(value, Iterable)
+        for name, example in lists.items()
+        if isinstance(value := getattr(model, name), str) or not isinstance(value, Iterable)
+    ]
+
+
+def _no_dicts(thing: object, owner: str, examples: Mapping[str, str]) -> list[str]:
+    """Those of these fields that are no dict."""
+    return [
+        f"{owner}{name} = {value!r}, expected a dict, e.g. {name}={example}"
+        for name, example in examples.items()
+        if not isinstance(value := getattr(thing, name), Mapping)
     ]
 
 
