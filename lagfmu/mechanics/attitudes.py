@@ -29,8 +29,9 @@ class Closed:
 
 def attitudes(model: Model, table: Mapping[Expr, Expr]) -> Closed:
     """Of the unit quaternions whose kinematics are e' = e (0, w) / 2; with symbols for those whose rotation
-    matrix stands in the energy or in a constraint.  `table`: dynamicsymbols -> plain symbols."""
-    expressions = [model.energy_expression, *(sp.sympify(c.expression) for c in model.constraints)]
+    matrix stands in the energy, a constraint or a rate.  `table`: dynamicsymbols -> plain symbols."""
+    expressions = [model.energy_expression, *map(sp.sympify, model.kinematics.values())]
+    expressions += [sp.sympify(c.expression) for c in model.constraints]
     found = {a.quaternion for e in expressions for a in e.atoms(Attitude)}
     symbols: dict[Expr, Expr] = {}
     rates: dict[Expr, Expr] = {}

@@ -31,6 +31,7 @@ from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
 from ..names import derivative, rate_of, read
 from .attitudes import attitudes
+from .differential import Differential
 from .formulations.multipliers import multipliers
 from .kinematics import Kinematics
 
@@ -393,7 +394,7 @@ def derive(model: Model) -> EquationsOfMotion:
     angles = {table[s] for s in model.unwrapped}
     places = frozenset(j for j, s in enumerate(q) if s in angles)
     closed = attitudes(model, table)
-    moving = Kinematics(q, v, qdot, TIME, rates, places)
+    moving = Kinematics(q, v, tuple(r.xreplace(closed.symbols) for r in qdot), TIME, rates, places)
     moving = moving.beside(closed.rates, closed.turning)
     clock = _Clock(moving.q, moving.rates, rates)
     problems: list[str] = []
@@ -407,23 +408,27 @@ def derive(model: Model) -> EquationsOfMotion:
     nu: list[Expr] = []
     gamma: list[Expr] = []
     f: list[Expr | None] = []
+    along = Differential({**clock.rates, TIME: sp.S.One}) if closed.symbols else None
     for k, constraint in enumerate(model.constraints):
         expression = sp.sympify(constraint.expression).xreplace(table).xreplace(closed.symbols)
-        if isinstance(constraint, Nonholonomic):
-            row, drift = _pfaffian(constraint, expression, v, problems)
-            f.append(None)
-        elif isinstance(constraint, Tie):
+        holonomic = not isinstance(constraint, Nonholonomic)
+        f.append(expression if holonomic else None)
+        bend = None
+        if isinstance(constraint, Tie):
             rate, bend = (e.xreplace(table).xreplace(closed.symbols) for e in constraint.rates)
             row, drift = _pfaffian(constraint, rate, v, problems)
-            f.append(expression)
+        elif along:  # by factors as they stand: products of sums stay short
+            rate = along(expression) if holonomic else expression
+            row, drift = _pfaffian(constraint, rate, v, problems)
+            bend = along(rate)
+        elif holonomic:
+            row, drift = _along(expression, moving), moving.along_time(expression)
         else:
-            row = _along(expression, moving)
-            drift = moving.along_time(expression)
-            f.append(expression)
+            row, drift = _pfaffian(constraint, expression, v, problems)
         G.update({(k, j): a for j, a in row.items()})
         nu.append(-drift)
         # d/dt (sum_j a_j v_j + drift) = sum_j a_j vdot_j - gamma
-        if not isinstance(constraint, Tie):
+        if bend is None:
             bend = sp.Add(*(clock.total(a) * v[j] for j, a in row.items()), clock.total(drift))
         gamma.append(-bend)
 
