@@ -494,6 +494,10 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
             "limits are (1, -1), expected the smaller value first",
         ),
         (
+            {"joints": [Revolute("A", ground.at((0, 0)), arm.at((0, 0)), friction=0.3)]},
+            "Revolute 'A': friction is given without the radius of the pin",
+        ),
+        (
             {"joints": [Fixed("A", ground.at((0, 0)), arm.at((0, 0)), limits=(0, 1))]},
             "no angle or position to be limited",
         ),
@@ -532,3 +536,42 @@ def test_all_that_is_wrong_is_told_at_once():
             loads=[Motor("motor", "Z")],
         )
     assert len(caught.value.problems) == 3
+
+
+def test_a_rough_pin_slows_a_wheel_by_the_force_that_it_carries():
+    """A balanced wheel on a pin of 2 cm, mu = 0.3: the pin carries m g, so that |torque| = mu r m g until it
+    stops, at t = J w/(mu r m g); there it sticks."""
+    wheel = Body("wheel", 2.0, 0.05)
+    pin = Revolute("A", ground.at((0, 0)), wheel.at((0, 0)), friction=0.3, radius=0.02)
+    model = plane(
+        bodies=[wheel], joints=[pin], loads=[Gravity((0, -g))], start={"der(angle.A)": 2.0}
+    )
+    torque = 0.3 * 0.02 * 2.0 * g
+    stops = 0.05 * 2.0 / torque
+    run = moved(model, stop=2 * stops, target="native")
+    turning = run["time"] < stops
+    np.testing.assert_allclose(run["torque.A.z"][turning], -torque, rtol=1e-10)
+    np.testing.assert_allclose(
+        run["der(angle.A)"][turning], 2 - torque / 0.05 * run["time"][turning]
+    )
+    assert run["sticking.A.time"][-1] == pytest.approx(stops, rel=1e-9)
+    assert run["angle.A"][-1] == pytest.approx(2.0 * stops / 2, rel=1e-9)
+
+
+def test_a_rough_slide_holds_a_block_up_to_the_angle_of_friction():
+    """tan(alpha) = 0.5: it stays with mu = 0.6, and slides with g (sin - mu cos) with mu = 0.4."""
+    alpha = 0.4636476090008061
+
+    def run(mu):
+        block = Body("block", 2.0, 0.02)
+        slide = Prismatic("D", ground.at((0, 0), rotation=-alpha), block.at((0, 0)), friction=mu)
+        return moved(
+            plane(bodies=[block], joints=[slide], loads=[Gravity((0, -g))]), 0.5, target="native"
+        )
+
+    held, slides = run(0.6), run(0.4)
+    assert held["sticks.D"].all()
+    assert held["force.D.x"] == pytest.approx(-2 * g * sin(alpha), rel=1e-12)
+    expected = g * (sin(alpha) - 0.4 * cos(alpha))
+    assert slides["der(position.D,2)"][1:] == pytest.approx(expected, rel=1e-11)
+    assert slides["force.D.x"][1:] == pytest.approx(-0.4 * 2 * g * cos(alpha), rel=1e-11)

@@ -173,3 +173,26 @@ def test_of_a_redundant_slider_crank_these_forces_are_unique_and_right():
         np.testing.assert_allclose(run[n], flat[n], atol=1e-9 * scale, err_msg=n)
     with pytest.warns(UserWarning, match=r"constraint 'D\.z' follows from the others"):
         simulate(slider_crank(Spherical), 0.1, 0.05, target="python")
+
+
+def test_a_rough_sleeve_is_braked_against_the_way_of_its_surface():
+    """Spinning and falling at 45 degrees: -mu N (v, r w)/|(v, r w)| with N = m g cos 45 of the two
+    components across, not a friction for each."""
+    sleeve, axis = Body("sleeve", 2.0, (0.01, 0.01, 0.02)), (1, 0, -1)
+    mu, r, N = 0.3, 0.02, 2.0 * g * np.cos(pi / 4)
+    joint = Cylindrical(
+        "A", ground.at((0, 0, 0), axis=axis), sleeve.at((0, 0, 0), axis=axis), friction=mu, radius=r
+    )
+    model = mechanism(
+        "Sleeve",
+        bodies=[sleeve],
+        joints=[joint],
+        loads=[Gravity((0, 0, -g))],
+        start={"der(angle.A)": 20.0},
+    )
+    run = simulate(model, 0.5, 0.1, tolerance=1e-10)
+    v, surface = run["der(position.A)"], r * run["der(angle.A)"]
+    speed = np.hypot(v, surface)
+    np.testing.assert_allclose(run["force.A.z"], -mu * N * v / speed, atol=1e-12)
+    np.testing.assert_allclose(run["torque.A.z"], -r * mu * N * surface / speed, atol=1e-12)
+    assert run["angle.A"][-1] > pi  # it goes on over turns, as the start names it

@@ -49,7 +49,11 @@ def assemble(
     given = _given(model, known, start)
     places = {n: x for n, x in given.items() if not known[n].of_velocities}
     rates = {n: x for n, x in given.items() if known[n].of_velocities}
-    acting = [c for c in model.constraints if not isinstance(c, Contact) and not c.while_closed]
+    acting = [
+        c
+        for c in model.constraints
+        if not (isinstance(c, Contact) or c.while_closed or c.name in model.limited)
+    ]
     closing = [c for c in acting if isinstance(c, Holonomic)]
     rolling = [c for c in acting if isinstance(c, Nonholonomic)]
     f = Rows(model, [condition(model, c) for c in closing])

@@ -164,6 +164,10 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
         yield (
             f"{what}: axis is {joint.axis!r}, expected {' or '.join(map(repr, possible)) or 'none'} {where}"
         )
+    if joint.friction is not None and not joint.measures:
+        yield f"{what}: friction is given, but it leaves no motion that could rub: leave it out"
+    elif joint.friction is not None and joint.turns and not _value(joint.radius):
+        yield f"{what}: friction is given without the radius of the pin, expected radius=... in m"
     limits = joint.limits
     if limits is None:
         return

@@ -40,12 +40,7 @@ class Contact:
         if self.friction is None:
             touch.transmit(draft.wrench(name), [])
             return
-        given = self.friction if isinstance(self.friction, tuple) else (self.friction,)
-        words = ("friction",) if len(given) == 1 else ("static", "kinetic")
-        coefficients = [
-            draft.number(mu, f"{name}.{word}", "1", f"coefficient of friction of {name}, {word}")
-            for mu, word in zip(given, words, strict=True)
-        ]
+        coefficients = draft.coefficients(self.friction, name)
         rows = list(touch.slips)
         draft.constraints += [
             *(

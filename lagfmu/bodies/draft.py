@@ -121,6 +121,15 @@ class Draft:
         ]
         return tuple([*found, sp.S.Zero][:3])  # type: ignore[return-value]
 
+    def coefficients(self, friction: Any, name: str) -> list[Expr]:
+        """One coefficient of friction, or the static and the kinetic one."""
+        given = friction if isinstance(friction, tuple) else (friction,)
+        words = ("friction",) if len(given) == 1 else ("static", "kinetic")
+        return [
+            self.number(mu, f"{name}.{word}", "1", f"coefficient of friction of {name}, {word}")
+            for mu, word in zip(given, words, strict=True)
+        ]
+
     # ------------------------------------------------------------------ places
 
     def place(self, marker: Marker, name: str) -> Placed:

@@ -18,8 +18,9 @@ from typing import Any, ClassVar
 import numpy as np
 import sympy as sp
 
-from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, Parameter
+from ..model.elements import Contact, Expr, Friction, Holonomic, Nonholonomic, Parameter
 from ..model.model import Model
+from ..model.norms import norm
 from ..model.reactions import multiplier
 from ..names import derivative
 from .body import Marker, Number
@@ -40,7 +41,9 @@ class Joint:
     """A joint of that name between the markers `first` and `second`.
 
     `axis` is that of the first marker about which it turns or along which it slides; `limits` are the
-    smallest and the largest angle [rad] or position [m], where it strikes without rebounding.
+    smallest and the largest angle [rad] or position [m], where it strikes without rebounding.  `friction`
+    (a coefficient, or the static and the kinetic one) rubs with the norm of the two radial components of its
+    force; a joint that turns needs the `radius` [m] of its pin for it.
     """
 
     name: str
@@ -48,6 +51,8 @@ class Joint:
     second: Marker
     axis: str = ""
     limits: Sequence[Number] | None = None
+    friction: Number | tuple[Number, Number] | None = None
+    radius: Number = 0.0
 
     usual: ClassVar[tuple[str, str]] = ("z", "z")  # axis in the plane, and in space
     possible: ClassVar[tuple[str, str]] = ("z", "xyz")
@@ -61,6 +66,8 @@ class Joint:
         wrench = draft.wrench(self.name)
         self.rows(draft, a, b, axis, wrench)
         self.coordinate(draft, a, b, axis, wrench)
+        if self.friction is not None:
+            self.rub(draft, axis, wrench)
 
     def relative_pose(self, guess: Guess) -> Reach:
         """A rough place of the second marker in the first."""
@@ -126,6 +133,28 @@ class Joint:
             text = f"{of.name} stops at its {which} limit"
             draft.constraints.append(Contact(row, sign * (of.values[0] - stop), text))
             acts[axis] += sign * multiplier(row)
+
+    def rub(self, draft: Draft, axis: int, wrench: Wrench) -> None:
+        """Coulomb's law for the motion that it leaves free: |torque| <= mu r N, |force| <= mu N, of a
+        cylindrical joint for the vector (v, r w); N is the norm of the force across the axis."""
+        across = [x for x in draft.components if x != AXES[axis]]
+        normal = norm(*(multiplier(f"{self.name}.{x}") for x in across))
+        coefficients = draft.coefficients(self.friction, self.name)
+        r = draft.number(
+            self.radius, f"{self.name}.radius", "m", f"radius of the pin of {self.name}"
+        )
+        rows = []
+        for measure in self.measures:
+            turns, of = measure.startswith("angle"), draft.relative[measure]
+            row = f"{self.name}.{'r' if turns else ''}{AXES[axis]}"
+            lever = r if turns and len(self.measures) > 1 else 1  # both rows are velocities
+            text = f"{self.name} does not {'turn' if turns else 'slide'}"
+            draft.constraints.append(Nonholonomic(row, lever * of.values[1], text))
+            (wrench.torque if turns else wrench.force)[axis] += lever * multiplier(row)
+            rows.append(row)
+        if len(rows) == 1 and self.turns:
+            normal *= r
+        draft.constraints.append(Friction(self.name, rows, normal, *coefficients))
 
 
 @dataclass(frozen=True, eq=False)
