@@ -9,7 +9,7 @@ import arm
 import numpy as np
 import pytest
 from joints import pin
-from mechanisms import LINKAGES, door, four_bar, stewart
+from mechanisms import LINKAGES, cardan, door, four_bar, stewart
 from rigid import GROUND, Mass, Mechanism, rotation, state
 from scipy.special import ellipj, ellipkm1
 
@@ -76,7 +76,7 @@ def test_a_body_near_its_middle_axis_flips_when_jacobis_functions_say(built):
     np.testing.assert_allclose(w**2 @ J, energy, rtol=100 * tolerance)
 
 
-QUICK = (door, four_bar, stewart)
+QUICK = (door, four_bar, cardan, stewart)
 
 
 @pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
@@ -85,8 +85,8 @@ QUICK = (door, four_bar, stewart)
     [m if m in QUICK else pytest.param(m, marks=pytest.mark.thorough) for m in LINKAGES],
 )
 def test_joints_hold_as_by_newton_and_euler(make):
-    """Hinges, balls, slides and rods: what all do to each body, and the components that are determined where
-    rows are redundant; which these are is told of each."""
+    """Hinges, balls, slides, universal joints and rods: what all do to each body, and the components that are
+    determined where rows are redundant; which these are is told of each."""
     system = make().system(0.2)
     run = simulate(system.model, stop_time=0.2, tolerance=1e-12, target="python")
     wanted = system.expected(0.2)

@@ -1,4 +1,4 @@
-"""Twenty-eight systems against integrations written by hand, in co-simulation and in model exchange.
+"""Twenty-nine systems against integrations written by hand, in co-simulation and in model exchange.
 
     python benchmarks/independent/compare.py [NAME ...]
 

@@ -40,6 +40,17 @@ def turned(
     return [Row(first, row.J1, second, row.J2, row.gamma + rate(look.t))]
 
 
+def square(
+    first: int, a: Sequence[float], second: int, b: Sequence[float], look: Look
+) -> list[Row]:
+    """An axis of the first body stays square to one of the second; lam is the torque [N m] along b x a."""
+    u, v = look.arm(first, a), look.arm(second, b)
+    n = np.cross(v, u)
+    turn = np.cross(np.cross(look.w[second], v), u) + np.cross(v, np.cross(look.w[first], u))
+    gamma = -(look.w[second] - look.w[first]) @ turn
+    return [Row(first, np.array([*ZERO, *-n]), second, np.array([*ZERO, *n]), gamma)]
+
+
 def along(
     first: int,
     s1: Sequence[float],

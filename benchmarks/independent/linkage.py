@@ -25,6 +25,7 @@ from lagfmu.bodies import (
     Revolute,
     Spherical,
     SpringDamper,
+    Universal,
     mechanism,
 )
 
@@ -42,6 +43,7 @@ class Tie:
     point: Point
     axis: Point = ()
     other: Point = ()
+    second_axis: Point = ()  # of a "universal" joint, square to `axis`
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,9 @@ class Linkage:
             a, b = self.arm(tie.first, tie.point), self.arm(tie.second, tie.other or tie.point)
             if tie.kind == "ball":
                 return [partial(joints.pin, first, a, second, b)]
+            if tie.kind == "universal":
+                across = partial(joints.square, first, tie.axis, second, tie.second_axis)
+                return [partial(joints.pin, first, a, second, b), across]
             if tie.kind == "hinge":
                 return joints.hinge(first, a, tie.axis, second, b)
             if tie.kind == "rod":
@@ -124,15 +129,17 @@ class Linkage:
             at = tuple(map(float, self.arm(body, point)))
             return made[body].at(at, axis=tuple(map(float, axis)) if len(axis) else None)
 
-        joints: list[Any] = []
+        tied: list[Any] = []
         for name, tie in self.ties.items():
             a = marker(tie.first, tie.point, tie.axis)
-            b = marker(tie.second, tie.other or tie.point, tie.axis)
+            b = marker(tie.second, tie.other or tie.point, tie.second_axis or tie.axis)
             if tie.kind == "rod":
                 length = float(np.linalg.norm(np.subtract(tie.other, tie.point)))
-                joints.append(Distance(name, a, b, length))
+                tied.append(Distance(name, a, b, length))
+            elif tie.kind == "universal":
+                tied.append(Universal(name, a, b, axis="z", second_axis="z"))
             else:
-                joints.append(JOINTS[tie.kind](name, a, b))
+                tied.append(JOINTS[tie.kind](name, a, b))
         loads: list[Any] = [Gravity((0, 0, -self.gravity))]
         for k, spring in enumerate(self.springs):
             a, b = marker(spring.first, spring.point), marker(spring.second, spring.other)
@@ -140,7 +147,7 @@ class Linkage:
         return mechanism(
             self.name,
             bodies=[body for body in made.values() if isinstance(body, Body)],
-            joints=joints,
+            joints=tied,
             loads=loads,
             start=start,
         )

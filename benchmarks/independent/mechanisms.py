@@ -36,6 +36,26 @@ def door() -> Linkage:
     )
 
 
+def cardan() -> Linkage:
+    """Two shafts at 0.6 rad by a universal joint; a hinge and a ball bear them: of 12 rows 11 count."""
+    way = (np.cos(0.6), 0.0, np.sin(0.6))
+    cross, end = (0.5, 0.0, 0.0), np.add((0.5, 0.0, 0.0), np.multiply(0.8, way))
+    driven, center = bar(3.0, cross, end.tolist())
+    return Linkage(
+        "Cardan",
+        {
+            "driving": (Mass.of(4.0, 0.02, 0.12, 0.11, 0.003, 0.0, -0.002), (0.25, 0.02, 0.01)),
+            "driven": (driven, np.add(center, (0.0, 0.03, 0.0)).tolist()),
+        },
+        {
+            "A": Tie("hinge", "ground", "driving", (0.0, 0.0, 0.0), (1, 0, 0)),
+            "U": Tie("universal", "driving", "driven", cross, (0, 1, 0), (), (-way[2], 0, way[0])),
+            "B": Tie("ball", "driven", "ground", end.tolist()),
+        },
+        {"driving": (8.0, 0.0, 0.0)},
+    )
+
+
 def governor() -> Linkage:
     """A flyball governor: a shaft, two arms that hang on it unlike, a sleeve that two rods lift, a spring."""
     top, sleeve = (0.0, 0.0, 1.0), (0.0, 0.0, 0.5)
@@ -182,7 +202,7 @@ def wishbone() -> Linkage:
     )
 
 
-LINKAGES = (door, four_bar, governor, bricard, bennett, stewart, wishbone)
+LINKAGES = (door, four_bar, cardan, governor, bricard, bennett, stewart, wishbone)
 
 
 def _system(make: Callable[[], Linkage]) -> Callable[[], System]:
