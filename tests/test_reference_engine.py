@@ -142,6 +142,19 @@ def test_a_fall_from_nothing_has_a_size():
     np.testing.assert_allclose(run["z"], -9.81 * run["time"] ** 2 / 2, rtol=1e-12, atol=1e-15)
 
 
+def test_what_hardly_moves_is_stepped():
+    """A bead that drifts along its wire at 1e-154 m/s goes on so, though squares of its errors underflow."""
+    model = Model(
+        name="Adrift",
+        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2,
+        coordinates={x: "m", z: "m"},
+        constraints=[Holonomic("wire", z - L)],
+        parameters=PARAMETERS,
+        start={x: 1.0, z: 1.0, x.diff(): 1e-154},
+    )
+    assert (simulate(model, 0.3, 0.1, target="python")["der(x)"] == 1e-154).all()
+
+
 def test_a_dip_of_lambda_within_a_step_is_found():
     """A pull of F exp(-((t - 0.055)/w)^2) lifts a body off its floor, at t = 0.055 - w sqrt(ln(F/(m g))),
     though lambda is m g again at the end of the communication step."""
