@@ -161,7 +161,7 @@ def test_masses_of_24_decades_on_a_straight_chain(built, masses):
         assert abs(outputs["energy.total"] - start) < 1e-7 * max(masses) * g0
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_masses_at_random_on_a_bent_chain(built, seed):
     """Six bobs between 1e-12 and 1e12 kg, links in any direction, turning at any speed."""
     rng = np.random.default_rng(seed)
