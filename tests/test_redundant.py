@@ -11,11 +11,16 @@ import fmpy
 import numpy as np
 import pytest
 from conftest import of_each_kind
+from fmpy.fmi1 import FMICallException
+from instance import instance
 from linkages import rods
 from redundant import SYSTEMS
 from runs import simulate_fmu
+from sympy import sqrt
+from tops import door
 
-from lagfmu import Scene, simulate
+from lagfmu import Model, Output, Scene, multiplier, simulate
+from lagfmu.errors import ModelError
 from lagfmu.testing import Stage, prepare
 
 pytestmark = [
@@ -23,6 +28,14 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::lagfmu.testing.StartMovedWarning"),
 ]
 SPAN = 1.0  # s
+UPPER = [multiplier(f"upper.{a}") for a in "xyz"]
+COMPONENTS = {
+    "across": UPPER[0],
+    "shear": sqrt(UPPER[0] ** 2 + UPPER[1] ** 2),
+    "along": UPPER[2],
+    "whole": sqrt(sum(f**2 for f in UPPER)),
+    "sum": UPPER[2] + multiplier("lower.z"),
+}
 Pair = tuple[Path, Path]
 EACH = pytest.mark.parametrize(
     "name", of_each_kind(SYSTEMS, kinds=("platform", "four_bar", "ball", "trammel"))
@@ -144,3 +157,40 @@ def test_configurations_beside_the_start_are_near_it(monkeypatch, count):
     found = prepare(rods(f"Zigzag{count}", zigzag)).structure
     assert found.degrees_of_freedom == count - 2
     assert 4 <= len(taken) <= 4 * 7
+
+
+def hinged() -> Model:
+    """The door, which is asked of each component."""
+    return door(outputs=[Output(n, f, "N", unique=True) for n, f in COMPONENTS.items()])
+
+
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_a_door_tells_which_components_of_its_forces_are_unique(target):
+    """On two hinges that each hold a point: across the hinge line each force is unique, and its norm; along
+    it only the sum is, the weight, whose derivative is 0."""
+    run = simulate(hinged(), target=target, stop_time=0.5)
+    assert all(run[f"unique.{n}"].all() for n in ("across", "shear", "sum"))
+    assert not any(run[f"unique.{n}"].any() for n in ("along", "whole"))
+    np.testing.assert_allclose(run["sum"], 2.0 * 9.81, rtol=1e-12)
+
+
+def test_a_unique_output_has_a_derivative_where_its_multipliers_have_none(built):
+    """The weight on both hinges does not change along the motion; that on one is not known."""
+    with instance(built(hinged())) as one:
+        one.start()
+        one.step(0.1)
+        known = [one.variables["wz"].valueReference]
+        total, one_alone = (one.variables[n].valueReference for n in ("sum", "along"))
+        assert one.fmu.getDirectionalDerivative([total], known, [1.0]) == pytest.approx(
+            [0], abs=1e-9
+        )
+        with pytest.raises(FMICallException):
+            one.fmu.getDirectionalDerivative([one_alone], known, [1.0])
+
+
+def test_what_is_unique_may_be_read_alone(built):
+    """A scene that reads nothing else holds the output all the same; a constraint's name is refused."""
+    run = simulate_fmu(built(hinged(), Scene("Asked", outputs=["unique.sum"])), stop_time=0.1)
+    assert run["unique.sum"].all()
+    with pytest.raises(ModelError, match=r"'unique\.upper\.x' would be two things"):
+        door(outputs=[Output("upper.x", multiplier("upper.x"), "N", unique=True)])

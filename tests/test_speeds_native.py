@@ -32,7 +32,8 @@ from lagfmu import (
     multiplier,
     rotation_matrix,
 )
-from lagfmu.testing import find_compiler, playable
+from lagfmu.errors import DerivationError
+from lagfmu.testing import find_compiler, playable, prepare
 
 Built = Callable[..., Path]
 MASS, G, ARM = 2.0, 9.81, 0.3  # kg, m/s2, m
@@ -206,6 +207,16 @@ def test_a_rate_of_a_coordinate_has_a_bar_and_a_peak(built: Built) -> None:
         one.step(2.0)
         found = [one.get(f"peak.velocity.e0.{part}") for part in ("max", "min", "min_time")]
     assert found == pytest.approx([2.5, -2.5, np.pi / 5], abs=1e-6)  # e0' = -5/2 sin(5 t/2)
+
+
+def test_a_scene_may_ask_for_one_coordinate(built: Built) -> None:
+    """Nothing is eliminated where rates are no speeds, also if no multiplier is read."""
+    alone = Scene("HeldAlone", outputs=["e0"])
+    run = simulate_fmu(built(held(), alone), stop_time=0.2, output=["e0"])
+    whole = simulate_fmu(built(held()), stop_time=0.2, output=["e0"])
+    np.testing.assert_allclose(run["e0"], whole["e0"], rtol=0, atol=1e-9)
+    with pytest.raises(DerivationError, match="which are no speeds where `kinematics` stand"):
+        prepare(held(), Scene("HeldLess", formulation="minimal"))
 
 
 @pytest.mark.parametrize("method", ["dop853", "radau5", "rk4"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,25 @@ def body(name: str, inertia: tuple[float, float, float] = INERTIA, **more: Any) 
         kinematics=turning(),
         parameters=parameters,
         **{**options, **more},
+    )
+
+
+def door(**more: Any) -> Model:
+    """A body in weight that swings about the vertical on two hinges, each of which holds a point: one of the
+    six rows follows from the others."""
+    a, m, g = sp.symbols("a m g", positive=True)
+    plain = body("Door", start={E[0]: 1.0, W[2]: 2.0, R[0]: 0.3, R[1].diff(): 0.6})
+    rows = []
+    for hinge, up in (("upper", a), ("lower", -a)):
+        arm = sp.Matrix([-a, 0, up])
+        gap = sp.Matrix(R) + rotation_matrix(E) * arm - sp.Matrix([0, 0, up])
+        rows += [Holonomic(f"{hinge}.{x}", f) for x, f in zip("xyz", gap, strict=True)]
+    return replace(
+        plain,
+        lagrangian=plain.lagrangian - m * g * R[2],
+        constraints=rows,
+        parameters=[*plain.parameters, Parameter(g, 9.81, "m/s2"), Parameter(a, 0.3, "m")],
+        **more,
     )
 
 

@@ -232,6 +232,10 @@ class Outputs:
             text = o.description or f"output {o.name}"
             unit = parse_unit(o.unit, o.name)
             variables.append(self.output(Subject(names.OWN, "", o.name), text, unit, symbols))
+            if o.unique:
+                text = f"true where the multipliers leave {o.name} one value"
+                of = Subject(names.UNIQUE, o.name)
+                variables.append(self.output(of, text, None, symbols, "Boolean"))
         return variables
 
     # ------------------------------------------------------------------ contacts, frictions, events

@@ -99,12 +99,12 @@ def subjects(form: Form) -> Callable[[str], tuple[Indices, Indices]]:
     )
     energies = {names.KINETIC: [eom.kinetic], names.POTENTIAL: [eom.potential]}
     energies[names.TOTAL] = [eom.kinetic, eom.potential]
-    own = {o.name: o for o in eom.outputs}
+    outputs = {o.name: o for o in eom.outputs}
 
     def subject(name: str) -> tuple[Indices, Indices]:
         of = names.read(name)
-        if name in own:
-            return _of_output(eom, own[name])
+        if (asked := of.constraint if of.quantity == names.UNIQUE else name) in outputs:
+            return _of_output(eom, outputs[asked])
         if of.quantity in energies:
             parts = (e.free_symbols for e in energies[of.quantity] if e is not None)
             return _positions(eom, set().union(*parts)), NONE
@@ -214,8 +214,14 @@ def silent(eom: EquationsOfMotion, outputs: Collection[str]) -> EquationsOfMotio
         eom,
         kinetic=eom.kinetic if kinetic else None,
         potential=eom.potential if potential else None,
-        outputs=tuple(o for o in eom.outputs if o.name in outputs),
+        outputs=own(eom, outputs),
     )
+
+
+def own(eom: EquationsOfMotion, outputs: Collection[str]) -> tuple[Output, ...]:
+    """The model's own outputs that are read, or of which it is read whether they are unique."""
+    asked = {*outputs, *names.constraints(outputs, names.UNIQUE)}
+    return tuple(o for o in eom.outputs if o.name in asked)
 
 
 def read_only(form: Form, outputs: Collection[str]) -> Form:

@@ -127,7 +127,8 @@ class Output:
     `expression` may hold coordinates, their first and second derivatives, inputs, parameters, time,
     `multiplier(constraint)` and `force_of_constraint(coordinate)`; each of its terms has the dimension
     of `unit`.  The name may be structured, as bob.height.  `otherwise` (a number, or an expression) is
-    its value where the expression has none, as a quotient by the lambda of an open contact.
+    its value where the expression has none, as a quotient by the lambda of an open contact.  `unique`: the
+    FMU says in `unique.NAME` whether redundant constraints leave it one value, as each lambda's own does.
     """
 
     name: str
@@ -135,6 +136,7 @@ class Output:
     unit: str = "1"
     description: str = ""
     otherwise: Expr | None = None
+    unique: bool = False
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,14 @@ def check_outputs(model: ModelFields, problems: list[str]) -> None:
         for peak in model.peaks
         if not isinstance(peak, Peak) or not isinstance(peak.of, str) or not peak.of
     ]
+    constraints = {c.name for c in model.constraints}
     for o in model.outputs:
         what = f"output {o.name!r}"
+        if o.unique and o.name in constraints:
+            problems.append(
+                f"{what} has the name of a constraint, so that 'unique.{o.name}' would be two things: "
+                "rename one"
+            )
         for expression in (o.expression, 0 if o.otherwise is None else o.otherwise):
             problems += _unknown(model, what, sp.sympify(expression))
         if o.otherwise is None:

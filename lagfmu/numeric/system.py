@@ -57,12 +57,14 @@ class Friction:
 class Own:
     """An output of the model's own: value(t, q, v, vdot, u, p, lam, Q) -> [value].
 
-    `otherwise`, of the same arguments, gives the value where that is not finite.
+    `otherwise`, of the same arguments, gives the value where that is not finite; `unique`: it is asked
+    whether the multipliers leave it one value.
     """
 
     name: str
     value: Callable[..., Any]
     otherwise: Callable[..., Any] | None = None
+    unique: bool = False
 
 
 @dataclass(frozen=True)

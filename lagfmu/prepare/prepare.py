@@ -66,7 +66,7 @@ def reduce(narrowed: Narrowed) -> Reduced:
         reduction = form.reduction
         if reduction is not None and equations is not form.equations:
             reduction = minimal.reduce(equations)
-        own = tuple(o for o in equations.outputs if o.name in read)
+        own = prune.own(equations, read)
         if own != equations.outputs:
             equations = replace(equations, outputs=own)
         form = replace(form, equations=equations, reduction=reduction)

@@ -47,6 +47,12 @@ class Rows:
         found: list[bool] = (np.linalg.norm(null, axis=1) <= ALONE).tolist()
         return found
 
+    def leave_one(self, slope: Vector) -> bool:
+        """Is slope . lambda, slope (m), the same for all lambda + z with G^T z = 0?"""
+        scaled = slope / self.length
+        part = np.linalg.norm(scaled @ self.U[:, self.rank :])
+        return bool(part <= ALONE * np.linalg.norm(scaled))
+
 
 def rows_of(M: Matrix, G: Matrix, rank: int | None = None) -> Rows:
     """Scale and decompose; `rank` where it is known: off the constraints redundant rows seem independent."""

@@ -16,16 +16,18 @@ import numpy as np
 from .. import names
 from ..names import derivative, name
 from ..numeric.failure import StepFailureError, evaluated
-from ..numeric.system import NONHOLONOMIC, System, Vector
+from ..numeric.system import NONHOLONOMIC, Own, System, Vector
 from .contacts import as_flags, closed_rows
 from .equations import Motion
+from .linear import Rows
 from .state import Event, State
 
 
 @dataclass(frozen=True)
 class _Forces:
     """Of a model at a state: accelerations (nv), lambda (m; 0 of rows that do not act), Q (nv), each row's
-    share of it (m, nv), what is missed by each row (m), and whether its multiplier is unique (m)."""
+    share of it (m, nv), what is missed by each row (m), whether its multiplier is unique (m); the
+    rows that act, decomposed."""
 
     vdot: Vector
     lam: Vector
@@ -33,6 +35,8 @@ class _Forces:
     shares: Vector
     residual: Vector
     unique: list[bool]
+    acting: list[int]
+    decomposed: Rows
 
 
 def observe(system: System, state: State, u: Sequence[float], p: Sequence[float]) -> dict[str, Any]:
@@ -81,7 +85,7 @@ def _forces(motion: Motion, state: State, stepped: System, q: Vector, v: Vector)
     rolling = [k for k, row in enumerate(model.rows) if row.kind == NONHOLONOMIC]
     residual[rolling] = missed[rolling]
     shares = terms.G * lam[:, None]
-    return _Forces(vdot, lam, shares.sum(axis=0), shares, residual, unique)
+    return _Forces(vdot, lam, shares.sum(axis=0), shares, residual, unique, rows, decomposed)
 
 
 def _accelerations(system: System, vdot: Vector) -> dict[str, float]:
@@ -144,7 +148,28 @@ def _own(
                 )
             (value,) = evaluated(own.name, t, own.otherwise, *arguments)
         seen[own.name] = float(value)
+        if own.unique:
+            seen[name(names.UNIQUE, own.name)] = _is_unique(own, arguments, forces)
     return seen
+
+
+def _is_unique(own: Own, arguments: tuple[Any, ...], forces: _Forces | None) -> bool:
+    """Has the output one value for all multipliers of the motion?  Its slope by lambda is taken at
+    multipliers that nothing has chosen: that of a norm is blind at some to what changes them."""
+    if forces is None:
+        return True
+    *before, lam, Q = arguments
+    size = max(map(abs, lam), default=0.0) or 1.0
+    free = np.array(lam) + size * np.random.default_rng(5).uniform(0.5, 1.5, len(lam))
+    step = size * 2.0**-17
+    slope = np.zeros(len(forces.acting))
+    for sign in (1, -1):
+        for i, k in enumerate(forces.acting):
+            moved = free.copy()
+            moved[k] += sign * step
+            (value,) = own.value(*before, moved.tolist(), Q)
+            slope[i] += sign * value / (2 * step)
+    return forces.decomposed.leave_one(slope)
 
 
 def _of_contacts(system: System, model: System, state: State) -> dict[str, Any]:

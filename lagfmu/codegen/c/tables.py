@@ -145,8 +145,13 @@ class Tables:
         outputs = self.eom.outputs
         text = self._array("const char *const", "output_names", [f'"{o.name}"' for o in outputs])
         text += self._integers("guarded", [int(o.otherwise is not None) for o in outputs])
-        names = {"output_names": "output_names", "guarded": "guarded"}
-        return text, {"output_count": len(outputs), **names}
+        fields: dict[str, Any] = {"output_count": len(outputs)}
+        fields |= {name: name for name in ("output_names", "guarded")}
+        unique = [k for k, o in enumerate(outputs) if o.unique]
+        if unique:
+            text += self._integers("unique_output", unique)
+            fields |= {"unique_count": len(unique), "unique_output": "unique_output"}
+        return text, fields
 
     def _lookups(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
         """The names and ends of the tables that are looked up, and the System's fields for them."""

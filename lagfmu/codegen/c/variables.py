@@ -125,6 +125,7 @@ class Places:
         self.values |= {name: ("INPUT", k, NONE) for k, name in enumerate(inputs)}
         self.values |= stepped | read if full.dynamics is not None else read | stepped
         self.own = {own.name: ("OUTPUT", k, NONE) for k, own in enumerate(full.outputs)}
+        self.unique = _numbered(own.name for own in full.outputs if own.unique)
 
     def of(self, v: Variable, peaks: Mapping[str, int] = MappingProxyType({})) -> Place:
         """Of one variable; `peaks` numbers the quantities whose extremes are kept."""
@@ -134,6 +135,8 @@ class Places:
         what, c, q, rate = of.quantity, of.constraint, of.coordinate, of.order
         if what in ALONE:
             return ALONE[what], 0, NONE
+        if what == names.UNIQUE and c in self.unique:
+            return "OUTPUT_UNIQUE", self.unique[c], NONE
         if what in OF_ROW:
             return OF_ROW[what], self.rows[c], NONE
         if what in OF_CONTACT:

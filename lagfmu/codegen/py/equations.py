@@ -171,7 +171,8 @@ def _outputs(parts: Parts) -> dict[str, str]:
             made = {f"output_{k}": (f"{w.place}.", w)}
             if o.otherwise is not None:
                 made[f"otherwise_{k}"] = (f"{o.name} where it has no value.", other)
-            found[f"Own({o.name!r}, {', '.join(made)})"] = "\n\n".join(
+            said = [repr(o.name), *made, *(["unique=True"] if o.unique else [])]
+            found[f"Own({', '.join(said)})"] = "\n\n".join(
                 _define(Function(name, doc, arguments, {"w": [x]}), names)
                 for name, (doc, x) in made.items()
             )

@@ -49,6 +49,11 @@ class Reduction:
 
 def reduce(eom: EquationsOfMotion) -> Reduction:
     """Eliminate dependent coordinates.  Raises DerivationError if none can be, or the embedding fails."""
+    if not eom.moves_plainly:
+        raise DerivationError(
+            "coordinates are eliminated together with their rates, which are no speeds where `kinematics` "
+            "stand: choose the formulation 'multipliers' or 'nullspace'"
+        )
     relations, independent = _relations(eom)
     table = eom.symbols
     if independent is None:  # keep the coordinates that no relation gives

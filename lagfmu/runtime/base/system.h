@@ -127,6 +127,8 @@ struct System {
     int output_count;
     const char *const *output_names; /* (output_count) */
     const int *guarded;              /* (output_count) */
+    int unique_count;                /* of which it is said whether multipliers leave them one value, ... */
+    const int *unique_output;        /* (unique_count) ... and which these are */
     void (*outputs)(double t, const double *q, const double *v, const double *u, const double *p,
                     const double *vdot, const double *lambda, const double *Q, double *w,
                     double *other);

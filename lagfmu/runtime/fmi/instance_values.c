@@ -96,6 +96,7 @@ Status instance_value(Solver *s, const Observed *o, const Variable *v, double *v
         case AT_SDDOT: *value = o->sddot[v->index]; break;
         case AT_LAMBDA: *value = o->lambda[v->index]; break;
         case AT_UNIQUE: *value = o->unique[v->index]; break;
+        case AT_OUTPUT_UNIQUE: *value = o->own_unique[v->index]; break;
         case AT_RESIDUAL: *value = o->residual[v->index]; break;
         case AT_FORCE: *value = o->force[v->index]; break;
         case AT_SHARE: *value = o->share[v->index]; break;

@@ -24,6 +24,7 @@ typedef enum {
     AT_SHARE,          /* entry index of G */
     AT_KINETIC, AT_POTENTIAL, AT_TOTAL,
     AT_OUTPUT,         /* own output index */
+    AT_OUTPUT_UNIQUE,  /* its number among those of which that is asked */
     AT_CONTACT, AT_IMPULSE,                  /* contact index */
     AT_STEPS,
     AT_STICKS, AT_MARGIN, AT_POWER,          /* friction index */

@@ -6,6 +6,7 @@
 #include "indicators.h"
 #include "minimum_gap.h"
 #include "optional.h"
+#include "outputs.h"
 
 static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
     const int nq = s->nq, nv = s->nv, contacts = s->contacts, indicators = indicators_count(s);
@@ -104,6 +105,8 @@ void observed_layout(Observed *o, Arena *arena, const System *system) {
     o->applied = arena_doubles(arena, nv);
     o->own = arena_doubles(arena, full->output_count);
     o->other = arena_doubles(arena, full->output_count);
+    o->own_unique = arena_ints(arena, full->unique_count);
+    o->work_unique = arena_doubles(arena, outputs_unique_doubles(full));
     o->s = arena_doubles(arena, stepped);
     o->sdot = arena_doubles(arena, stepped);
     o->sddot = arena_doubles(arena, stepped);

@@ -219,6 +219,7 @@ Status solver_observe(Solver *s, Observed *o) {
     if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;
     if (full->energies != NULL) full->energies(at.t, o->q, o->v, at.u, at.p, o->energy);
     for (int k = 0; k < EVENT_KINDS && s->system->embed != NULL; k++) observe_events(s, (EventKind)k, o);
-    if (check_observed_finite(s, full, o) != OK) return FAILED;
-    return outputs_observe(full, at, o, &s->why);
+    if (check_observed_finite(s, full, o) != OK || outputs_observe(full, at, o, &s->why) != OK) return FAILED;
+    if (full->unique_count > 0) outputs_unique(b, at, o);
+    return OK;
 }

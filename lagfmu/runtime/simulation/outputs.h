@@ -9,6 +9,14 @@
  * its place. */
 SHARED Status outputs_observe(const System *s, Instant at, Observed *o, Why *why);
 
+/* Are those of which it is asked the same with all multipliers of this motion?  `b` as it was factored for it. */
+SHARED void outputs_unique(Mechanism *b, Instant at, Observed *o);
+
+/* What that needs: slopes, multipliers, lengths of rows, x, values and those where they have none. */
+static inline int outputs_unique_doubles(const System *s) {
+    return s->unique_count == 0 ? 0 : s->m * (s->unique_count + 2) + s->nv + 3 * s->output_count;
+}
+
 /* Their changes w->down along a direction (full coordinates), from those that `sensitivity_along` found
  * with `b`; b = NULL where nothing was solved for.  A change that hangs on a multiplier which is not
  * unique is no number. */

@@ -18,6 +18,8 @@ typedef struct {
     double *applied;               /* F (nv), of the unconstrained motion */
     double energy[2];              /* kinetic, potential */
     double *own, *other;           /* (output_count) the model's own; where these are not finite */
+    int *own_unique;               /* (unique_count), with */
+    double *work_unique;           /* (outputs_unique_doubles()) */
     double *s, *sdot, *sddot;      /* (nq of the stepped system) of an embedding */
     double *latest_q[EVENT_KINDS], *latest_v[EVENT_KINDS]; /* of an embedding: state.latest in full coordinates */
     double *slip, *margin, *power; /* (2 frictions), (frictions), (frictions) */
