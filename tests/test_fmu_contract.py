@@ -167,24 +167,16 @@ def test_no_name_is_the_beginning_of_another(xml):
 UNITS = {
     ("Hemisphere", "lambda.surface"): {"kg": 1, "m": 1, "s": -2},
     ("Hemisphere", "Q.theta"): {"kg": 1, "m": 2, "s": -2},
-    ("Hemisphere", "Q.r"): {"kg": 1, "m": 1, "s": -2},
     ("Hemisphere", "departure.surface.velocity.theta"): {"s": -1, "rad": 1},
     ("Hemisphere", "departure.surface.time"): {"s": 1},
     ("PendulumCartesian", "lambda.rod"): {"kg": 1, "s": -2},
-    ("PendulumAngle", "lambda.rod"): {"kg": 1, "s": -2},
     ("PendulumAngle", "der(theta,2)"): {"s": -2, "rad": 1},
     ("PendulumCartesian", "residual.rod"): {"m": 2},
     ("RotatingWire", "lambda.drive"): {"kg": 1, "m": 2, "s": -2},
     ("RotatingWire", "omega"): {"s": -1, "rad": 1},
-    ("InclineDisk", "lambda.rolling"): {"kg": 1, "m": 1, "s": -2},
-    ("InclineDisk", "Q.theta"): {"kg": 1, "m": 2, "s": -2},
     ("KnifeEdge", "lambda.edge"): {"kg": 1, "m": 1, "s": -2},
     ("KnifeEdge", "residual.edge"): {"m": 1, "s": -1},
-    ("KnifeEdge", "J"): {"kg": 1, "m": 2},
-    ("CartPendulum", "c"): {"kg": 1, "s": -1},
-    ("CartPendulum", "F"): {"kg": 1, "m": 1, "s": -2},
     ("CartPendulum", "energy.total"): {"kg": 1, "m": 2, "s": -2},
-    ("Atwood", "lambda.string"): {"kg": 1, "m": 1, "s": -2},
 }
 
 
