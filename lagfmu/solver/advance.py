@@ -31,7 +31,7 @@ INTEGRATORS = {"auto": DOP853, "dop853": DOP853, "radau5": Radau}
 HEADWAY = 1e-6  # of the natural time: shorter steps are counted
 PATIENCE = 200  # steps after which a communication step is judged by its average step, ...
 STEP_LIMIT = 1e6  # ... and the steps that it may need in all
-NOTHING = 1e-100  # of an error's unit, in a natural time: where squares underflow SciPy's norm is no number
+NOTHING = 1e-100  # [1/s] in units of the error: the squares in SciPy's norm underflow, and it divides by 0
 CROWD = (
     200  # events within 1e-9 of the natural time, and attempts at one step: there is no going on
 )
@@ -260,5 +260,5 @@ class _Stepper:
         terms = self.motion.terms(t, q, v).of(self.rows)
         vdot, _, _ = self.motion.accelerations(terms, self.rank)
         rates = np.concatenate([self.motion.rate(t, q, v), vdot])
-        rates[np.abs(rates) < NOTHING * self.settings.rate * self.weights] = 0.0
+        rates[np.abs(rates) < NOTHING * self.weights] = 0.0
         return rates
