@@ -374,9 +374,12 @@ def _own_speeds(model: Model, table: Mapping[Expr, Expr]) -> dict[Expr, Expr]:
         found[w.diff(TIME)] = sp.Symbol(derivative(name_of(w)), real=True)
     rates = {s.diff(TIME): sp.sympify(rate) for s, rate in model.kinematics.items()}
     whole = {**table, **found}
+    found |= {s: rate.xreplace(whole) for s, rate in rates.items()}
+    expressions = [sp.sympify(o.expression) for o in model.outputs]
+    read = set().union(*(e.atoms(sp.Derivative) for e in expressions)) if expressions else set()
     for s, rate in rates.items():
-        second = rate.diff(TIME).xreplace(rates)
-        found[s], found[s.diff(TIME)] = rate.xreplace(whole), second.xreplace(whole)
+        if s.diff(TIME) in read:
+            found[s.diff(TIME)] = rate.diff(TIME).xreplace(rates).xreplace(whole)
     return found
 
 
@@ -408,6 +411,7 @@ def derive(model: Model) -> EquationsOfMotion:
     nu: list[Expr] = []
     gamma: list[Expr] = []
     f: list[Expr | None] = []
+    slopes = {s: Differential({s: sp.S.One}) for s in v}
     along = Differential({**clock.rates, TIME: sp.S.One}) if closed.symbols else None
     for k, constraint in enumerate(model.constraints):
         expression = sp.sympify(constraint.expression).xreplace(table).xreplace(closed.symbols)
@@ -416,15 +420,15 @@ def derive(model: Model) -> EquationsOfMotion:
         bend = None
         if isinstance(constraint, Tie):
             rate, bend = (e.xreplace(table).xreplace(closed.symbols) for e in constraint.rates)
-            row, drift = _pfaffian(constraint, rate, v, problems)
+            row, drift = _pfaffian(constraint, rate, v, problems, slopes)
         elif along:  # by factors as they stand: products of sums stay short
             rate = along(expression) if holonomic else expression
-            row, drift = _pfaffian(constraint, rate, v, problems)
+            row, drift = _pfaffian(constraint, rate, v, problems, slopes)
             bend = along(rate)
         elif holonomic:
             row, drift = _along(expression, moving), moving.along_time(expression)
         else:
-            row, drift = _pfaffian(constraint, expression, v, problems)
+            row, drift = _pfaffian(constraint, expression, v, problems, slopes)
         G.update({(k, j): a for j, a in row.items()})
         nu.append(-drift)
         # d/dt (sum_j a_j v_j + drift) = sum_j a_j vdot_j - gamma
@@ -585,10 +589,16 @@ def _left_hand_side(
 
 
 def _pfaffian(
-    constraint: Constraint, expression: Expr, v: tuple[Expr, ...], problems: list[str]
+    constraint: Constraint,
+    expression: Expr,
+    v: tuple[Expr, ...],
+    problems: list[str],
+    slopes: Mapping[Expr, Differential],
 ) -> tuple[dict[int, Expr], Expr]:
-    """Coefficients a_j and a_0 of sum_j a_j v_j + a_0."""
-    row = dict(_gradient(expression, v))
+    """Coefficients a_j and a_0 of sum_j a_j v_j + a_0; `slopes`: the derivative by each speed."""
+    present = expression.free_symbols
+    found = {j: slopes[s](expression) for j, s in enumerate(v) if s in present}
+    row = {j: a for j, a in found.items() if a != 0}
     nonlinear = [a for a in row.values() if a.free_symbols & set(v)]
     if nonlinear:
         problems.append(
