@@ -4,6 +4,7 @@ sleeve, and a slider-crank with all joints rubbing."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -27,7 +29,7 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import LagfmuError, ModelError, SimulationError
-from lagfmu.testing import find_compiler, load
+from lagfmu.testing import StartMovedWarning, find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"
@@ -377,6 +379,87 @@ def test_the_order_of_the_joints_changes_nothing(
     for name in ("phi1", "lambda.A.x", "lambda.C.y", "lambda.D.slide", "energy.dissipated"):
         size = np.abs(runs[0][name]).max()
         assert runs[1][name] == pytest.approx(runs[0][name], abs=1e-8 * size)
+
+
+def pushed(order: Sequence[int] = (0, 1, 2, 3)) -> Model:
+    """The slider-crank at rest, under the torque `torque` + 0.5 N.m/s t, its static coefficients 0.6."""
+    model = load(MODELS / "crank_with_bearing_friction.py").model
+    torque = symbols("torque")
+    phi1 = next(q for q in model.coordinates if str(q.func) == "phi1")
+    frictions = [model.frictions[k] for k in order]
+    return replace(
+        model,
+        forces={phi1: torque + symbols("rate") * dynamicsymbols._t},
+        parameters=[
+            *model.parameters,
+            Parameter(torque, 0.5, "N.m"),
+            Parameter(symbols("rate"), 0.5, "N.m/s"),
+        ],
+        start={s: e for s, e in model.start.items() if s != phi1.diff()},
+        frictions=[replace(f, static=6 * f.static, kinetic=3 * f.static) for f in frictions],
+    )
+
+
+def breakaway(phi1: float, way: float) -> float:
+    """The torque [N.m] at which the crank at rest begins to turn (`way` = 1: forward): the nine equations of
+    equilibrium for eight forces and the torque, all four joints at their static limits."""
+    a, b, r, mu, (m1, m2, m3) = 0.1, 0.3, 0.01, 0.6, (2.0, 1.0, 0.5)
+    phi2 = -np.arcsin(a / b * np.sin(phi1))
+    s1, c1, s2, c2 = np.sin(phi1), np.cos(phi1), np.sin(phi2), np.cos(phi2)
+    omega1 = way
+    omega2 = -a / b * c1 / c2 * omega1
+    speed = -a * s1 * omega1 - b * s2 * omega2
+
+    def unbalanced(forces: Any) -> list[float]:
+        ax, ay, bx, by, cx, cy, d, moment, torque = forces
+        tau_a = -mu * r * np.hypot(ax, ay) * np.sign(omega1)
+        tau_b = -mu * r * np.hypot(bx, by) * np.sign(omega2 - omega1)
+        tau_c = -mu * r * np.hypot(cx, cy) * np.sign(-omega2)
+        return [
+            ax + bx,
+            ay + by - m1 * g,
+            a / 2 * (s1 * (ax - bx) - c1 * (ay - by)) + torque + tau_a - tau_b,
+            cx - bx,
+            cy - by - m2 * g,
+            b / 2 * (c2 * (by + cy) - s2 * (bx + cx)) + tau_b - tau_c,
+            -cx - mu * abs(d) * np.sign(speed),
+            d - cy - m3 * g,
+            moment + tau_c,
+        ]
+
+    found, _, status, words = fsolve(
+        unbalanced, [0, 30, 0, -10, 0, 5, 10, 0, 0.5], xtol=1e-14, full_output=True
+    )
+    assert status == 1, words
+    return float(found[-1])
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_mechanism_at_rest_sets_out_when_no_joint_holds_it(built: Build, way: float) -> None:
+    """All joints stick until all stand at their static limits at once, in the direction of the motion:
+    statics gives the torque, whatever of it each joint bears before."""
+    values = {"phi1": 1.0, "torque": 0.5, "rate": way}
+    with pytest.warns(StartMovedWarning):
+        run = simulate(built(pushed()), start_values=values, stop_time=2.0, step_size=0.05)
+    sets_out = run["slipping.A.time"][-1]
+    assert 0.5 + way * sets_out == pytest.approx(breakaway(1.0, way), rel=1e-8)
+    stands = run["time"] < sets_out
+    assert 2 < np.count_nonzero(stands) < len(stands)
+    for joint in "ABCD":
+        assert run[f"sticks.{joint}"][stands].all()
+        assert run[f"slipping.{joint}.count"][-1] >= 1
+        assert (run[f"margin.{joint}"][stands] > -1e-9).all()
+    assert np.abs(run["der(phi1)"][stands]).max() < 1e-14
+
+
+def test_a_crank_runs_down_and_stands_on_all_joints(crank: Path, built: Build) -> None:
+    """When the crank stops, its four joints do at one instant, and hold it with forces inside their cones."""
+    run = simulate(crank, start_values={"mu": 0.3, "der(phi1)": 5.0}, stop_time=4.0, step_size=0.05)
+    for joint in "ABCD":
+        assert run[f"sticks.{joint}"][-1]
+        assert run[f"sticking.{joint}.time"][-1] == run["sticking.A.time"][-1]
+        assert run[f"margin.{joint}"][-1] > -1e-12
+    assert run["der(phi1)"][-1] == pytest.approx(0, abs=1e-14)
 
 
 def test_joints_that_would_load_each_other_are_refused_by_name(crank: Path) -> None:

@@ -243,6 +243,7 @@ static Status friction_modes(Instance *x, const Solver *s) {
         const double length = hypot(mode->direction[0], mode->direction[1]);
         if (x->started && fabs(mode->sign) != 1) return restored_none(x, "sign", mode->sign);
         if (mode->sticks < 0 || mode->sticks > 1) return restored_none(x, "modes", mode->sticks);
+        if (mode->held < 0 || mode->held > 1) return restored_none(x, "modes", mode->held);
         if (!(mode->noise >= 0 && mode->noise <= DBL_MAX))
             return restored_none(x, "slip velocity of rounding", mode->noise);
         if (!(length <= 1 + 1e-9 && (!x->started || length >= 1 - 1e-9)))

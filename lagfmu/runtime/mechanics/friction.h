@@ -16,9 +16,10 @@
 static const double PAINLEVE_SAFE = 1e-9; /* 1 + A below this counts as not positive */
 
 /* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
- * slip velocity where that is zero or was last known; slip velocities up to `noise` [m/s] are rounding. */
+ * slip velocity where that is zero or was last known; slip velocities up to `noise` are rounding.  held: it does
+ * not stick, but what does leaves it no slip, as in a mechanism that stands. */
 typedef struct {
-    int sticks;
+    int sticks, held;
     double sign, direction[2], noise;
 } StickSlip;
 
@@ -28,6 +29,7 @@ struct FrictionForces {
     const StickSlip *stick_slip; /* (frictions) the modes that hold */
     int *acting;         /* (m) rows that act, those that stick by friction among them */
     int *loaded;         /* (frictions) 1: a normal force acts */
+    int *held;           /* (frictions) 1: of one row that those that act leave no slip: it bears what is static */
     double *mu;          /* (2 frictions) static, kinetic */
     double *part_load;   /* (normal_parts) components of the normal forces, ... */
     double *part_c;      /* (normal_rows) ... and what multipliers add to them */
@@ -103,6 +105,11 @@ static inline double friction_norms(const Mechanism *b, int i, double share, con
     for (int p = law->part, end; p < law->part + law->parts; p = end)
         sum += friction_norm(b, i, p, share, lambda, &end);
     return sum;
+}
+
+/* The coefficient of friction i, which does not stick. */
+static inline double friction_sliding(const struct FrictionForces *f, int i) {
+    return f->held[i] ? f->mu[2 * i] : f->mu[2 * i + 1];
 }
 
 /* The length of a vector in two rows, or, mostly, in one. */

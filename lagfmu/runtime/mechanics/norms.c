@@ -38,7 +38,7 @@ typedef struct {
 } Norms;
 
 static int friction_of(const Norms *x, int g) { return x->b->friction->sliding[x->first + g]; }
-static double kinetic_of(const Norms *x, int g) { return x->b->friction->mu[2 * friction_of(x, g) + 1]; }
+static double mu_of(const Norms *x, int g) { return friction_sliding(x->b->friction, friction_of(x, g)); }
 static double *response_to(const Norms *x, int g) {
     return x->b->friction->pushed + (x->first + g) * x->b->system->m;
 }
@@ -55,7 +55,7 @@ static void let_react(const Norms *x, int g) {
     memcpy(f->A, f->minor, (size_t)(x->first * x->first) * sizeof *f->A);
     (void)painleve_eliminate(x->first, f->A, f->right);
     for (int h = 0; h < x->first; h++) {
-        const double strength = f->mu[2 * f->sliding[h] + 1] * f->right[h];
+        const double strength = friction_sliding(f, f->sliding[h]) * f->right[h];
         for (int j = 0; j < s->nv; j++) answer[j] -= strength * f->answer[h * s->nv + j];
         for (int k = 0; k < s->m; k++) pushed[k] -= strength * f->pushed[h * s->m + k];
     }
@@ -66,7 +66,7 @@ static void find_bounds(const Norms *x) {
     for (int g = 0; g < x->count; g++) {
         const double *response = response_to(x, g);
         for (int i = 0; i < x->count; i++)
-            x->B[i * x->count + g] = kinetic_of(x, g) * friction_norms(x->b, friction_of(x, i), 0, response);
+            x->B[i * x->count + g] = mu_of(x, g) * friction_norms(x->b, friction_of(x, i), 0, response);
     }
 }
 
@@ -138,7 +138,7 @@ static double find_forces(const Norms *x, const double *N, double *next) {
     double away = 0;
     memcpy(x->lambda, x->b->lambda, (size_t)m * sizeof *x->lambda);
     for (int g = 0; g < x->count; g++) {
-        const double strength = kinetic_of(x, g) * N[g], *response = response_to(x, g);
+        const double strength = mu_of(x, g) * N[g], *response = response_to(x, g);
         for (int k = 0; k < m; k++) x->lambda[k] -= strength * response[k];
     }
     for (int i = 0; i < x->count; i++) {
@@ -174,7 +174,7 @@ static double find_by_newton(const Norms *x) {
         point_along(x, of);
         x->found[i] = friction_normal(x->b, of, x->b->lambda);
         for (int g = 0; g < count; g++)
-            f->A[i * count + g] = (i == g) + kinetic_of(x, g) * (friction_normal(x->b, of, response_to(x, g)) -
+            f->A[i * count + g] = (i == g) + mu_of(x, g) * (friction_normal(x->b, of, response_to(x, g)) -
                                                                  f->load[of]);
     }
     return painleve_eliminate(count, f->A, x->found);
@@ -209,7 +209,7 @@ static void add_forces(const Norms *x) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
     for (int g = 0; g < x->count; g++) {
-        const double strength = kinetic_of(x, g) * x->N[g];
+        const double strength = mu_of(x, g) * x->N[g];
         const double *answer = f->answer + (x->first + g) * s->nv, *response = response_to(x, g);
         f->normal[friction_of(x, g)] = x->N[g];
         for (int j = 0; j < s->nv; j++) b->vdot[j] -= strength * answer[j];
@@ -232,7 +232,7 @@ static void note_minor(const Norms *x) {
         for (int g = 0; g < count; g++) {
             const double own = friction_normal(b, i, f->pushed + g * b->system->m) - f->load[i];
             const int reacted = h < x->first && g >= x->first;
-            f->minor[h * count + g] = (h == g) + (reacted ? 0 : sign * f->mu[2 * f->sliding[g] + 1] * own);
+            f->minor[h * count + g] = (h == g) + (reacted ? 0 : sign * friction_sliding(f, f->sliding[g]) * own);
         }
     }
 }

@@ -129,7 +129,7 @@ static Status respond_to_row(Mechanism *b, int sliding, const int *rows, int cou
         K[j * count + r] = B[j * count + r] = f->first[rows[j]];
         for (int h = 0; h < sliding; h++)
             B[j * count + r] -=
-                f->mu[2 * f->sliding[h] + 1] * f->right[h] * f->pushed[h * s->m + rows[j]];
+                friction_sliding(f, f->sliding[h]) * f->right[h] * f->pushed[h * s->m + rows[j]];
     }
     return OK;
 }

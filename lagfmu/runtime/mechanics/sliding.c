@@ -15,6 +15,9 @@
 
 #include "digits.h"
 
+static const double FRICTION_HELD = 1e-12; /* of the acceleration that a push gives without constraints: none */
+static const double FRICTION_STILL = 1e-9; /* of the accelerations at work: a slip that does not change */
+
 static void layout_sliding(Mechanism *b, Arena *arena) {
     const System *s = b->system;
     const int n = s->nv, m = s->m, count = s->frictions;
@@ -23,6 +26,7 @@ static void layout_sliding(Mechanism *b, Arena *arena) {
     f->stick_slip = NULL;
     f->acting = arena_ints(arena, m);
     f->loaded = arena_ints(arena, count);
+    f->held = arena_ints(arena, count);
     f->mu = arena_doubles(arena, 2 * count);
     f->part_load = arena_doubles(arena, s->normal_parts);
     f->part_c = arena_doubles(arena, s->normal_rows);
@@ -103,6 +107,26 @@ static void find_push(Mechanism *b, int i) {
     for (int r = 0; r < s->friction[i].rows; r++) mechanism_push(b, s->friction[i].row[r], f->towards[2 * i + r], f->d);
 }
 
+/* Does friction i, whose push f->d alone accelerates the bodies by `answer` (nv), stand still by the rows that
+ * act?  Its row depends on them: the push gives it nothing of d M^-1 d, which it would without them; and its slip
+ * does not change, as it does at the dead centre of a crank that turns: |d vdot|^2 <= d M^-1 d F M^-1 F. */
+static int is_held(const Mechanism *b, int i, const double *answer) {
+    const System *s = b->system;
+    const struct FrictionForces *f = b->friction;
+    const int k = s->friction[i].row[0];
+    double gives = 0, alone = 0, drive = 0;
+    if (s->friction[i].rows > 1 || !(fabs(f->slip[2 * i]) <= f->stick_slip[i].noise)) return 0;
+    for (int j = 0; j < s->nv; j++) gives += f->d[j] * answer[j];
+    for (int e = 0; e < s->masses; e++) {
+        const int j = s->mass_row[e];
+        if (s->mass_column[e] != j || !(b->M[e] > 0)) continue;
+        alone += f->d[j] * f->d[j] / b->M[e];
+        drive += b->F[j] * b->F[j] / b->M[e];
+    }
+    const double floor = FRICTION_STILL * (fabs(b->gamma[k]) + sqrt(alone) * sqrt(drive));
+    return fabs(gives) <= FRICTION_HELD * alone && fabs(mechanism_row(b, k, b->vdot) - b->gamma[k]) <= floor;
+}
+
 /* The normal forces of the first `count` that slip, which are linear, and what they add to vdot and lambda. */
 static Status solve_linear(Mechanism *b, double t, int count, double *determinant) {
     const System *s = b->system;
@@ -113,7 +137,7 @@ static Status solve_linear(Mechanism *b, double t, int count, double *determinan
         f->right[h] = f->stick_slip[i].sign * friction_normal(b, i, b->lambda);
         for (int g = 0; g < count; g++) {
             const double own = friction_normal(b, i, f->pushed + g * m) - f->load[i];
-            f->A[h * count + g] = f->stick_slip[i].sign * f->mu[2 * f->sliding[g] + 1] * own;
+            f->A[h * count + g] = f->stick_slip[i].sign * friction_sliding(f, f->sliding[g]) * own;
         }
         const double own = f->A[h * count + h];
         const double least = s->friction[i].gated ? 1 + own : 1 - fabs(own);
@@ -125,7 +149,7 @@ static Status solve_linear(Mechanism *b, double t, int count, double *determinan
     if (!(*determinant > PAINLEVE_SAFE)) return painleve_paradox(b, t, f->sliding, count, *determinant);
     for (int g = 0; g < count; g++) {
         const int i = f->sliding[g];
-        const double strength = f->mu[2 * i + 1] * f->right[g];
+        const double strength = friction_sliding(f, i) * f->right[g];
         f->normal[i] = f->right[g];
         for (int j = 0; j < n; j++) b->vdot[j] -= strength * f->answer[g * n + j];
         for (int k = 0; k < m; k++) b->lambda[k] -= strength * f->pushed[g * m + k];
@@ -142,6 +166,7 @@ static Status solve_sliding(Mechanism *b, double t, int linear, int count) {
         find_push(b, f->sliding[g]);
         if (linear_solve(&b->linear, f->d, f->zero, f->answer + g * s->nv, f->pushed + g * s->m) != OK)
             return FAILED;
+        f->held[f->sliding[g]] = is_held(b, f->sliding[g], f->answer + g * s->nv);
     }
     if (solve_linear(b, t, linear, &determinant) != OK) return FAILED;
     if (count > linear && norms_slide(b, t, linear, count, &determinant) != OK) return FAILED;
@@ -149,7 +174,7 @@ static Status solve_sliding(Mechanism *b, double t, int linear, int count) {
         const int i = f->sliding[g];
         for (int r = 0; r < s->friction[i].rows; r++)
             b->lambda[s->friction[i].row[r]] =
-                -f->mu[2 * i + 1] * f->normal[i] * f->towards[2 * i + r];
+                -friction_sliding(f, i) * f->normal[i] * f->towards[2 * i + r];
     }
     return painleve_departures(b, t, count, determinant);
 }
@@ -222,7 +247,7 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
     if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
     if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) != OK) return FAILED;
     for (int i = 0; i < s->frictions; i++) {
-        f->normal[i] = f->reserve[i] = 0;
+        f->normal[i] = f->reserve[i] = f->held[i] = 0;
         friction_slip(b, i, v, f->slip + 2 * i);
         if (!f->loaded[i]) continue;
         sticking |= f->stick_slip[i].sticks;

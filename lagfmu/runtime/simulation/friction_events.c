@@ -11,6 +11,14 @@
 
 static const double UNDONE = 10; /* times what accelerations did since a slip was 0, at most */
 
+/* What forces of constraint, which are known by now, add to the noise of slip velocities. */
+static void add_noise_at_work(Solver *s) {
+    double *speed = s->work_contacts, *reach = speed + s->system->nv;
+    mechanism_at_work(&s->stepped, speed, reach);
+    for (int j = 0; j < s->system->nv; j++) speed[j] = sqrt(s->state.size[j]) * sqrt(reach[j]);
+    stick_slip_set_noise(s, speed, s->state.stick_slip);
+}
+
 static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
@@ -23,11 +31,12 @@ static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
             speed[j] = fmax(speed[j], sqrt(s->state.span[j]) * sqrt(fabs(b->F[j]) / b->M[e]));
     }
     for (int i = 0; i < system->frictions; i++)
-        s->state.stick_slip[i] = (StickSlip){0, 1, {1, 0}, 0};
+        s->state.stick_slip[i] = (StickSlip){0, 0, 1, {1, 0}, 0};
     stick_slip_set_noise(s, speed, s->state.stick_slip);
     for (int i = 0; i < system->frictions; i++) stick_slip_along(b, i, s->state.v, &s->state.stick_slip[i]);
     Settling x = stick_slip_try(s, at);
     if (stick_slip_finish(&x, stick_slip_settle(&x, closed, NULL, touching, NULL)) != OK) return FAILED;
+    add_noise_at_work(s);
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     for (int k = 0; k < system->m; k++)
         if (system->rows[k].friction != 0) s->state.offset[k] = b->f[k];
@@ -57,10 +66,12 @@ static Status change(Solver *s, Instant at, const int *left, int *closed, const 
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     for (int i = 0; i < system->frictions; i++) {
         const Friction *law = &system->friction[i];
-        const int stuck = s->state.stick_slip[i].sticks, sticks = x.modes[i].sticks;
+        const StickSlip *was = &s->state.stick_slip[i], *is = &x.modes[i];
+        const int stuck = was->sticks, sticks = is->sticks, stands = sticks || is->held;
         for (int r = 0; r < law->rows && sticks && !stuck; r++)
             s->state.offset[law->row[r]] = b->f[law->row[r]];
-        if (b->friction->loaded[i] && stuck != sticks) note_change(s, sticks ? STICKING : SLIPPING, i);
+        if (b->friction->loaded[i] && (stuck || was->held) != stands)
+            note_change(s, stands ? STICKING : SLIPPING, i);
     }
     return stick_slip_finish(&x, OK);
 }

@@ -93,7 +93,7 @@ static Status observe_residuals(const Solver *s, Instant at, Mechanism *b, Obser
 static void observe_frictions(const Solver *s, Observed *o) {
     const struct FrictionForces *f = s->stepped.friction;
     for (int i = 0; i < s->system->frictions; i++) {
-        const int slips = !f->stick_slip[i].sticks;
+        const int slips = !f->stick_slip[i].sticks && !f->held[i];
         const double *force = f->tangential + 2 * i, *slip = f->slip + 2 * i;
         o->sticks[i] = f->loaded[i] && !slips;
         o->slip[2 * i] = slip[0];

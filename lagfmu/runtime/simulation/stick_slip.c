@@ -231,29 +231,66 @@ static int bits(unsigned mask) {
     return count;
 }
 
-/* Every combination, those with most sticking first, each direction of slip both ways. */
+/* Does one of those that begin to slip stand by what sticks? */
+static int any_held(const Settling *x) {
+    int any = 0;
+    for (int i = 0; i < x->s->system->frictions; i++)
+        any |= x->still[i] && !x->sticking[i] && x->s->stepped.friction->held[i];
+    return any;
+}
+
+/* The least reserve of those that stick. */
+static double least_reserve(const Settling *x) {
+    double least = HUGE_VAL;
+    for (int i = 0; i < x->s->system->frictions; i++)
+        if (x->still[i] && x->sticking[i]) least = fmin(least, x->s->stepped.friction->reserve[i]);
+    return least;
+}
+
+/* Frictions at s = 0 that are tried together, and the directions in which they would slip. */
+typedef struct {
+    int which[FRICTION_MOST], count;
+    double straight[2 * FRICTION_MOST];
+} Tried;
+
+/* Those in `mask` slip, those in `back` against their direction; 0 if that agrees with no law. */
+static int try_combination(Settling *x, const Tried *tried, unsigned mask, unsigned back) {
+    for (int i = 0; i < x->s->system->frictions; i++) x->sticking[i] = x->still[i];
+    for (int i = 0; i < tried->count; i++) {
+        const int of = tried->which[i];
+        const double sense = back >> i & 1u ? -1 : 1;
+        if (mask >> i & 1u) x->sticking[of] = 0;
+        x->guess[2 * of] = sense * tried->straight[2 * i];
+        x->guess[2 * of + 1] = sense * tried->straight[2 * i + 1];
+    }
+    return try_modes(x) && furthest_out(x) < 0;
+}
+
+/* Every combination, those with most sticking first, each direction of slip both ways.  Of those that hold what
+ * stands in another way, the one with the largest reserve. */
 static int try_all(Settling *x) {
     const int frictions = x->s->system->frictions;
-    int which[FRICTION_MOST], count = 0;
-    double straight[2 * FRICTION_MOST];
-    for (int i = 0; i < frictions && count < FRICTION_MOST; i++)
-        if (x->still[i]) which[count++] = i;
-    for (int i = 0; i < count; i++) memcpy(straight + 2 * i, x->guess + 2 * which[i], 2 * sizeof *straight);
-    for (int slipping = 0; slipping <= count; slipping++)
-        for (unsigned mask = 0; mask < 1u << count; mask++) {
+    Tried tried = {.count = 0};
+    for (int i = 0; i < frictions && tried.count < FRICTION_MOST; i++)
+        if (x->still[i]) tried.which[tried.count++] = i;
+    for (int i = 0; i < tried.count; i++)
+        memcpy(tried.straight + 2 * i, x->guess + 2 * tried.which[i], 2 * sizeof *tried.straight);
+    for (int slipping = 0; slipping <= tried.count; slipping++) {
+        unsigned best = 0, best_back = 0;
+        double most = -HUGE_VAL;
+        for (unsigned mask = 0; mask < 1u << tried.count; mask++) {
             if (bits(mask) != slipping) continue;
-            for (unsigned back = 0; back < 1u << count; back++) {
-                if (back & ~mask) continue;
-                for (int i = 0; i < frictions; i++) x->sticking[i] = x->still[i];
-                for (int i = 0; i < count; i++) {
-                    const double sense = back >> i & 1u ? -1 : 1;
-                    if (mask >> i & 1u) x->sticking[which[i]] = 0;
-                    x->guess[2 * which[i]] = sense * straight[2 * i];
-                    x->guess[2 * which[i] + 1] = sense * straight[2 * i + 1];
-                }
-                if (try_modes(x) && furthest_out(x) < 0) return 1;
+            for (unsigned back = 0; back < 1u << tried.count; back++) {
+                if (back & ~mask || !try_combination(x, &tried, mask, back)) continue;
+                if (!any_held(x)) return 1;
+                if (!(least_reserve(x) > most)) continue;
+                most = least_reserve(x);
+                best = mask;
+                best_back = back;
             }
         }
+        if (most > -HUGE_VAL) return try_combination(x, &tried, best, best_back);
+    }
     return 0;
 }
 
@@ -406,6 +443,7 @@ Status stick_slip_settle(Settling *x, int *closed, const int *ended, const int *
     for (int round = 0; round < FRICTION_ROUNDS; round++) {
         system_active(s->system, closed, active);
         if (choose_modes(x, ended) != OK) return FAILED;
+        for (int i = 0; i < s->system->frictions; i++) x->modes[i].held = s->stepped.friction->held[i];
         memcpy(before, closed, bytes);
         if (s->system->contacts == 0) return OK;
         if (OPTIONAL.contacts_modes(s, x->at, s->state.q, s->state.v, closed, touching, departing) != OK)
