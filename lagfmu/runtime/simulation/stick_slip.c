@@ -251,17 +251,17 @@ static double least_reserve(const Settling *x) {
 typedef struct {
     int which[FRICTION_MOST], count;
     double straight[2 * FRICTION_MOST];
-} Tried;
+} Combined;
 
 /* Those in `mask` slip, those in `back` against their direction; 0 if that agrees with no law. */
-static int try_combination(Settling *x, const Tried *tried, unsigned mask, unsigned back) {
+static int try_combination(Settling *x, const Combined *combined, unsigned mask, unsigned back) {
     for (int i = 0; i < x->s->system->frictions; i++) x->sticking[i] = x->still[i];
-    for (int i = 0; i < tried->count; i++) {
-        const int of = tried->which[i];
+    for (int i = 0; i < combined->count; i++) {
+        const int of = combined->which[i];
         const double sense = back >> i & 1u ? -1 : 1;
         if (mask >> i & 1u) x->sticking[of] = 0;
-        x->guess[2 * of] = sense * tried->straight[2 * i];
-        x->guess[2 * of + 1] = sense * tried->straight[2 * i + 1];
+        x->guess[2 * of] = sense * combined->straight[2 * i];
+        x->guess[2 * of + 1] = sense * combined->straight[2 * i + 1];
     }
     return try_modes(x) && furthest_out(x) < 0;
 }
@@ -270,18 +270,18 @@ static int try_combination(Settling *x, const Tried *tried, unsigned mask, unsig
  * stands in another way, the one with the largest reserve. */
 static int try_all(Settling *x) {
     const int frictions = x->s->system->frictions;
-    Tried tried = {.count = 0};
-    for (int i = 0; i < frictions && tried.count < FRICTION_MOST; i++)
-        if (x->still[i]) tried.which[tried.count++] = i;
-    for (int i = 0; i < tried.count; i++)
-        memcpy(tried.straight + 2 * i, x->guess + 2 * tried.which[i], 2 * sizeof *tried.straight);
-    for (int slipping = 0; slipping <= tried.count; slipping++) {
+    Combined combined = {.count = 0};
+    for (int i = 0; i < frictions && combined.count < FRICTION_MOST; i++)
+        if (x->still[i]) combined.which[combined.count++] = i;
+    for (int i = 0; i < combined.count; i++)
+        memcpy(combined.straight + 2 * i, x->guess + 2 * combined.which[i], 2 * sizeof *combined.straight);
+    for (int slipping = 0; slipping <= combined.count; slipping++) {
         unsigned best = 0, best_back = 0;
         double most = -HUGE_VAL;
-        for (unsigned mask = 0; mask < 1u << tried.count; mask++) {
+        for (unsigned mask = 0; mask < 1u << combined.count; mask++) {
             if (bits(mask) != slipping) continue;
-            for (unsigned back = 0; back < 1u << tried.count; back++) {
-                if (back & ~mask || !try_combination(x, &tried, mask, back)) continue;
+            for (unsigned back = 0; back < 1u << combined.count; back++) {
+                if (back & ~mask || !try_combination(x, &combined, mask, back)) continue;
                 if (!any_held(x)) return 1;
                 if (!(least_reserve(x) > most)) continue;
                 most = least_reserve(x);
@@ -289,7 +289,7 @@ static int try_all(Settling *x) {
                 best_back = back;
             }
         }
-        if (most > -HUGE_VAL) return try_combination(x, &tried, best, best_back);
+        if (most > -HUGE_VAL) return try_combination(x, &combined, best, best_back);
     }
     return 0;
 }
