@@ -1,0 +1,83 @@
+"""What do redundant rows cost? Mechanisms whose hinges hold too much, and the same motion with as few rows.
+
+    python benchmarks/redundant.py [NAME ...]
+
+In place of the third hinge of a loop stands a universal joint and in place of the fourth a ball; of a door's
+two hinges one is left.  The motion is the same, and so are the forces that are determined.  Native FMUs:
+rows, internal steps, and processor time of a run of 20 s a step (the least of repetitions in turns) at 1e-8;
+the last column is that with redundant rows in that without.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from lagfmu import Scene, build_fmu
+from lagfmu.fmu.session import Session
+
+sys.path.insert(0, str(Path(__file__).parent / "independent"))
+from joints import across
+from linkage import Linkage, Tie
+from mechanisms import bennett, door, four_bar
+
+STOP, POINTS, TOLERANCE, REPEATS = 20.0, 20, 1e-8, 9
+
+
+def reduced(full: Linkage) -> Linkage:
+    """With as many rows as are independent."""
+    ties: dict[str, Tie] = dict(full.ties)
+    *_, third, fourth = ties
+    if len(ties) == 2:
+        del ties[fourth]
+    else:
+        axis = tuple(across(ties[third].axis)[0])
+        ties[third] = dataclasses.replace(ties[third], kind="universal", second_axis=axis)
+        ties[fourth] = dataclasses.replace(ties[fourth], kind="ball", axis=())
+    return dataclasses.replace(full, name=f"{full.name}Reduced", ties=ties)
+
+
+def main() -> None:
+    """The table."""
+    print("| | rows | steps | us a step | rows | steps | us a step | ratio |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    times = np.linspace(0, STOP, POINTS + 1)
+    for make in (door, four_bar, bennett):
+        if sys.argv[1:] and make.__name__ not in sys.argv[1:]:
+            continue
+        with tempfile.TemporaryDirectory() as out, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            sessions, least, cells = [], [np.inf, np.inf], []
+            for linkage in (make(), reduced(make())):
+                model = linkage.model()
+                scene = Scene(model.name, stop_time=STOP)
+                sessions.append(Session(build_fmu(model, out, scene, target="native", check=False)))
+            read = ["solver.steps"]
+            steps = [0.0, 0.0]
+            for _ in range(REPEATS):
+                for k, session in enumerate(sessions):
+                    begun = time.process_time()
+                    run = session.run(times, tolerance=TOLERANCE, read=read)
+                    least[k] = min(least[k], time.process_time() - begun)
+                    assert run.refusal is None, run.refusal
+                    steps[k] = float(run.rows["solver.steps"][-1])
+            each = [1e6 * seconds / n for seconds, n in zip(least, steps, strict=True)]
+            for linkage, n, us in zip((make(), reduced(make())), steps, each, strict=True):
+                mechanism, y = linkage.reference()
+                rows, rank = mechanism.rank(y)
+                cells.append(f"{rows} ({rank} count) | {n:.0f} | {us:.1f}")
+            print(
+                f"| {make.__name__} | {' | '.join(cells)} | {each[0] / each[1]:.2f} |", flush=True
+            )
+            for session in sessions:
+                session.close()
+
+
+if __name__ == "__main__":
+    main()
