@@ -201,16 +201,18 @@ class Draft:
 
     # ------------------------------------------------------------------ outputs
 
-    def report(self, name: str, expression: Expr, unit: str, text: str) -> None:
-        """An output of the FMU."""
-        self.outputs.append(Output(name, expression, unit, text))
+    def report(
+        self, name: str, expression: Expr, unit: str, text: str, unique: bool = False
+    ) -> None:
+        """An output of the FMU; `unique`: with unique.NAME."""
+        self.outputs.append(Output(name, expression, unit, text, unique=unique))
 
     def wrench(self, name: str) -> Wrench:
         """What the second body receives through that joint."""
         return self.wrenches.setdefault(name, Wrench())
 
     def report_wrenches(self) -> None:
-        """force.A.x, ..., torque.A.z of each joint."""
+        """force.A.x, ..., torque.A.z of each joint, and whether redundant rows leave them one value."""
         planar = len(self.components) == 2
         for name, wrench in self.wrenches.items():
             of = f"that the second body receives through {name}"
@@ -221,7 +223,8 @@ class Draft:
                 parts = [values[AXES.index(x)] for x in axes]
                 for x, value in zip(axes, parts, strict=True):
                     text = f"{kind} {of}, {x} axis of the first marker"
-                    self.report(f"{kind}.{name}.{x}", value, unit, text)
+                    self.report(f"{kind}.{name}.{x}", value, unit, text, unique=True)
                 if len(parts) > 1:
                     norm = sp.sqrt(sp.Add(*(p**2 for p in parts)))
-                    self.report(f"{kind}.{name}.norm", norm, unit, f"magnitude of the {kind} {of}")
+                    text = f"magnitude of the {kind} {of}"
+                    self.report(f"{kind}.{name}.norm", norm, unit, text, unique=True)
