@@ -31,6 +31,7 @@ LIVES = {  # steps that reach the event or the singular point in between
     "HalfCar": 0.05,  # a table, outputs of the model, a prescribed motion
     "SlippingSphere": 0.1,  # friction
     "FallingRod": 0.05,  # friction in an impact
+    "CrankWithBearingFriction": 0.05,  # friction of joints
     "PendulumNullspace": 0.1,
     "Platform": 0.1,  # one constraint too many
     "Isosceles": 0.37,  # a step that fails

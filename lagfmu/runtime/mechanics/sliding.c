@@ -179,6 +179,22 @@ static Status solve_sliding(Mechanism *b, double t, int linear, int count) {
     return painleve_departures(b, t, count, determinant);
 }
 
+/* Are the multipliers of a friction that sticks the only ones? */
+static int is_unique(const Mechanism *b, int i) {
+    const Friction *law = &b->system->friction[i];
+    int all = 1;
+    for (int r = 0; r < law->rows; r++) all &= b->linear.unique[law->row[r]];
+    return all;
+}
+
+/* Do frictions that stick share their forces with other rows? */
+static int shares_sticking(const Mechanism *b) {
+    int any = 0;
+    for (int i = 0; i < b->system->frictions; i++)
+        any |= b->friction->loaded[i] && b->friction->stick_slip[i].sticks && !is_unique(b, i);
+    return any;
+}
+
 /* FAILED where a norm of multipliers that are not the only ones would decide on the motion. */
 static Status check_norms(Mechanism *b, double t) {
     const System *s = b->system;
@@ -189,20 +205,15 @@ static Status check_norms(Mechanism *b, double t) {
             shared |= !b->linear.unique[s->normal_row[k]];
         if (law->parts == 1 || !shared || normal_is_unique(b, i)) continue;
         return fail(b->why,
-                    "friction '%s': its normal force, a norm of multipliers, is not unique at t = %s s, as its "
-                    "rows depend on others, and the motion would depend on it: leave out what is redundant, "
-                    "or take as normal force what is unique",
-                    law->name, digits(t).text);
+                    "friction '%s': its normal force, a norm of multipliers, is not unique at t = %s s, as %s, "
+                    "and the motion would depend on it: leave out what is redundant, or take as normal force "
+                    "what is unique",
+                    law->name, digits(t).text,
+                    shares_sticking(b) ? "more joints stick than hold the mechanism (six that stop together are "
+                                         "resolved at most)"
+                                       : "its rows depend on others");
     }
     return OK;
-}
-
-/* Are the multipliers of a friction that sticks the only ones? */
-static int is_unique(const Mechanism *b, int i) {
-    const Friction *law = &b->system->friction[i];
-    int all = 1;
-    for (int r = 0; r < law->rows; r++) all &= b->linear.unique[law->row[r]];
-    return all;
 }
 
 /* Normal force and reserve of those that stick. */
@@ -210,10 +221,7 @@ static void find_reserves(Mechanism *b) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
     const double *best = b->lambda;
-    int unique = 1;
-    for (int i = 0; i < s->frictions; i++)
-        if (f->loaded[i] && f->stick_slip[i].sticks) unique &= is_unique(b, i);
-    if (!unique) {
+    if (shares_sticking(b)) {
         nonunique_best(b, f->first);
         best = f->first;
     }
