@@ -74,6 +74,7 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     "FrictionOscillator": "friction_oscillator",
     "InclineFriction": "incline_friction",
     "RoughHemisphere": "rough_hemisphere",
+    "Arm": "arm",
     "Bennett": "bennett",
     "Door": "door",
     "Gyroscope": "gyroscope",

@@ -81,6 +81,7 @@ CHANGED = {  # far from the defaults, consistent or not: the projection and the 
         "der(phi)": -20,
         "tau": 0.5,
     },
+    "Arm": {"forearm.mass": 5.0, "gravity.z": -3.7, "rate": 3.0},
     "Bennett": {"one.mass": 2.0, "two.inertia.yy": 0.05, "gravity.z": 3.7},
     "Gyroscope": {"wheel.mass": 0.5, "wheel.inertia.zz": 0.003, "wheel.omega.x": 1.0},
     "Door": {"door.mass": 5.0, "gravity.z": -3.7, "door.inertia.zz": 2.0},
