@@ -199,16 +199,22 @@ OWN_NAMES = (  # functions and values, types, numbers
     re.compile(r"^(?!typedef|enum|return)\w[\w \*]*?\b(\w+)(?:\[\w*\])*(?: =|\()", re.MULTILINE),
     re.compile(r"^\} (\w+);", re.MULTILINE),
 )
-NUMBERS = re.compile(r"^(?:static const \w+ (\w+ = [^;]*);|enum \{([^}]*)\})", re.MULTILINE)
+NUMBERS = re.compile(
+    r"^(?:static const \w+ (\w+ = [^;]*);|(?:typedef )?enum \{([^}]*)\})", re.MULTILINE
+)
 
 
 def names_of(text: str) -> set[str]:
     """What a C file defines outside of functions."""
     bare = TOKENS.sub(lambda m: "" if m[0].startswith("/*") else '""', text)
     found = {name for pattern in OWN_NAMES for name in pattern.findall(bare)}
-    for several in NUMBERS.findall(bare):
-        found |= {part.split("=")[0].strip() for one in several for part in one.split(",")}
-    return found - {""}
+    return found | numbers_of(bare)
+
+
+def numbers_of(bare: str) -> set[str]:
+    """The constants and enumerators that a file without comments defines."""
+    several = (one.split(",") for found in NUMBERS.findall(bare) for one in found)
+    return {part.split("=")[0].strip() for parts in several for part in parts} - {""}
 
 
 def test_a_name_of_the_runtime_stands_in_one_file() -> None:
@@ -218,7 +224,8 @@ def test_a_name_of_the_runtime_stands_in_one_file() -> None:
         for name in names_of(path.read_text(encoding="utf-8")):
             places.setdefault(name, []).append(path.name)
     for path in sorted(ROOT.joinpath("runtime").rglob("*.h")):
-        for name in OWN_NAMES[0].findall(TOKENS.sub("", path.read_text(encoding="utf-8"))):
+        bare = TOKENS.sub("", path.read_text(encoding="utf-8"))
+        for name in {*OWN_NAMES[0].findall(bare), *numbers_of(bare)}:
             places.setdefault(name, []).append(path.name)
     assert {name: files for name, files in places.items() if len(files) > 1} == {}
 

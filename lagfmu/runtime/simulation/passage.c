@@ -30,7 +30,7 @@ static const double GAP[GAPS] = {0.026, 0.184, 0.467}; /* of a step over a cross
                                       * stages of dop853; the earlier, the longer the step, and the further
                                       * from it are its stages */
 static const double STRIDE = 0.1;    /* natural times, that a step over a crossing is tried with at least */
-static const double CLEAR = 0.28;    /* of the next step: how far before a crossing ends one that cannot pass */
+static const double ENDS_BEFORE = 0.28; /* of the next step: how far before a crossing ends one that cannot pass */
 static const double BACKED = 0.4;      /* of a step that ended in one: by so much it is shortened */
 static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how fast the angle falls */
 static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
@@ -83,7 +83,7 @@ static double longest(const Solver *s, double next) {
     if (!(until > 0) || !(next > 0)) return HUGE_VAL;
     for (int k = 0; k < GAPS; k++)
         if (until / GAP[k] <= next) return until / GAP[k];
-    return until - CLEAR * next;
+    return until - ENDS_BEFORE * next;
 }
 
 static int suspected(const Solver *s) {
