@@ -49,7 +49,7 @@ model = mechanism(
     description="Bennett's linkage: four hinges in space that move, though a count of freedoms denies it",
 )
 
-scenes = [Scene("Bennett", stop_time=2.0, step_size=0.02)]
+scenes = [Scene("Bennett", stop_time=0.5, step_size=0.01)]
 
 A, B, C, D = (output(f"angle.{j}") for j in "ABCD")
 ratio = sin((BETA + ALPHA) / 2) / sin((BETA - ALPHA) / 2)
