@@ -15,8 +15,10 @@ from lagfmu.bodies import (
     Cylindrical,
     Distance,
     Fixed,
+    Gear,
     Gravity,
     Ground,
+    Motor,
     Planar,
     PointOnPlane,
     Prismatic,
@@ -25,6 +27,7 @@ from lagfmu.bodies import (
     Universal,
     mechanism,
 )
+from lagfmu.errors import ModelError
 from lagfmu.testing import load
 
 g = 9.81  # m/s^2
@@ -195,3 +198,62 @@ def test_a_rough_sleeve_is_braked_against_the_way_of_its_surface():
     np.testing.assert_allclose(run["force.A.z"], -mu * N * v / speed, atol=1e-12)
     np.testing.assert_allclose(run["torque.A.z"], -r * mu * N * surface / speed, atol=1e-12)
     assert run["angle.A"][-1] > pi  # it goes on over turns, as the start names it
+
+
+def test_a_gear_in_space_counts_turns():
+    """7:3 between wheels on square shafts, 95 turns: the attitudes tell the angles modulo 2 pi alone."""
+    shaft = (0.01, 0.01, 0.02)
+    one, two = Body("one", 1.0, shaft), Body("two", 1.0, shaft)
+    side = ("rpy", pi / 2, 0, 0)
+    joints = [
+        Revolute("A", ground.at((0, 0, 0)), one.at((0, 0, 0))),
+        Revolute("B", ground.at((1, 0, 0), rotation=side), two.at((0, 0, 0), rotation=side)),
+        Gear("teeth", "A", "B", ratio=7 / 3),
+    ]
+    model = mechanism("Geared", bodies=[one, two], joints=joints, start={"der(angle.A)": 60.0})
+    run = simulate(model, 10.0, 1.0, tolerance=1e-9)
+    np.testing.assert_allclose(run["angle.A"], 60 * run["time"], rtol=1e-8)
+    np.testing.assert_allclose(run["angle.B"], 3 / 7 * run["angle.A"], rtol=1e-12, atol=1e-9)
+
+
+arm = Body("arm", 1.0, (0.1, 0.1, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("parts", "told"),
+    [
+        ({"bodies": [Body("b", 1.0, 0.1)]}, "'b' has the inertia 0.1, expected three numbers"),
+        (
+            {"bodies": [Body("b", 1.0, (0.1, 0.1, 0.5))]},
+            "principal moments of inertia 0.1, 0.1, 0.5 kg.m^2, expected positive ones",
+        ),
+        (
+            {"joints": [Revolute("A", ground.at((0, 0, 0), axis=(0, 0, 0)), arm.at((0, 0, 0)))]},
+            "axis (0, 0, 0) turns nothing, expected a direction",
+        ),
+        (
+            {
+                "joints": [
+                    Fixed("A", ground.at((0, 0, 0), rotation=(0, 0, 0, 0)), arm.at((0, 0, 0)))
+                ]
+            },
+            "expected a direction, or a rotation: a right-handed orthogonal matrix",
+        ),
+        (
+            {"joints": [Revolute("A", ground.at((0, 0)), arm.at((0, 0, 0)))]},
+            "A.first is (0, 0), expected 3 components (x, y, z)",
+        ),
+        (
+            {
+                "joints": [Cylindrical("A", ground.at((0, 0, 0)), arm.at((0, 0, 0)))],
+                "loads": [Motor("motor", "A")],
+            },
+            "Cylindrical 'A' has no angle or position or both, expected one of angle.A, position.A",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_mechanism_in_space_is_told_by_name(parts, told):
+    """A tensor that no mass has, a direction without length, two components, two motions to drive."""
+    with pytest.raises(ModelError) as caught:
+        mechanism("M", **{"bodies": [arm], **parts})
+    assert told in str(caught.value)

@@ -73,7 +73,9 @@ def turn(axis: int, angle: float) -> Any:
 
 
 def turned_by(e: Any) -> Any:
-    """The matrix of a quaternion (w, x, y, z)."""
+    """The matrix of a quaternion (w, x, y, z).  Raises ZeroDivisionError where it is 0."""
+    if not np.linalg.norm(e) > 0:
+        raise ZeroDivisionError(e)
     w, v = e[0] / np.linalg.norm(e), e[1:] / np.linalg.norm(e)
     return np.eye(3) + 2 * w * skew(v) + 2 * skew(v) @ skew(v)
 
@@ -86,6 +88,8 @@ def skew(v: Any) -> Any:
 def _oblique(axis: Any) -> Any:
     """The least rotation that turns z onto a direction."""
     a = np.array(axis, dtype=float)
+    if a.shape != (3,) or not np.linalg.norm(a) > 0:
+        raise ValueError(axis)
     return onto(np.array([0.0, 0.0, 1.0]), a / np.linalg.norm(a))
 
 
