@@ -137,7 +137,7 @@ closed_forms = [
             f"torque of pin {pin}",
             -mu * r * length(pin) * sign(omega),
             actual=output(f"lambda.{pin}.turn"),
-            when=1 - output(f"sticks.{pin}"),
+            when=(1 - output(f"sticks.{pin}")) * sign(omega) ** 2,
         )
         for pin, omega in turning.items()
     ),
@@ -145,7 +145,7 @@ closed_forms = [
         "friction of the guide",
         -mu * Abs(output("lambda.D.y")) * sign(x3.diff()),
         actual=output("lambda.D.slide"),
-        when=1 - output("sticks.D"),
+        when=(1 - output("sticks.D")) * sign(x3.diff()) ** 2,
     ),
     # Newton's law of the slider: the pin C pushes it with (-C.x, -C.y), its guide with (slide, D.y).
     ClosedForm(

@@ -138,7 +138,7 @@ def _shares(facts: Facts, run: Run) -> list[Check]:
     checks = []
     for q in facts.coordinates:
         whole = names.name(names.FORCE, "", q)
-        if whole not in facts.variables:
+        if whole not in facts.variables or not all(names.shared(c, q) for c in facts.constraints):
             continue
         found = [facts.share(c, q) for c in facts.constraints]
         shares = [run.rows[name] for name in found if name is not None]
