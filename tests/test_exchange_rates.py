@@ -62,7 +62,7 @@ def test_no_stabilization_is_quicker_than_the_motion(name, library):
     stepped, own, one, names = eigenvalues(library(name))
     variables = library(name).variables
     places = [v for v in variables.values() if v.causality == "parameter" and v.unit == "m"]
-    lengths = [float(v.start) for v in places if float(v.start)]
+    lengths = [abs(float(v.start)) for v in places if float(v.start)]
     rates = [np.abs(own).max()]
     for q in (n for n in names if f"der({n},2)" in variables):
         size = 1.0 if variables[q].unit == "rad" else max(lengths, default=np.inf)
