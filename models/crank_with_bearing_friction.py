@@ -12,6 +12,7 @@ from sympy import Abs, asin, cos, pi, sign, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
+    Arrow,
     ClosedForm,
     Conserved,
     Disk,
@@ -119,6 +120,11 @@ model = Model(
         Rod((0, 0), crank_end),
         Rod(crank_end, (x3, y3)),
         Line(*block(x3)),
+        *(
+            Arrow(pin, at, force=(multiplier(f"{pin}.x"), multiplier(f"{pin}.y")))
+            for pin, at in (("A", (0, 0)), ("B", crank_end))
+        ),
+        Arrow("D.y", (x3, y3)),
     ],
     page=Page(curves=["lambda.A.turn", "lambda.D.slide", "der(phi1)", "energy.dissipated"]),
 )

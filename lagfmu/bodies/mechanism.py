@@ -83,7 +83,7 @@ def mechanism(
         outputs=[*draft.outputs, *outputs],
         descriptions=descriptions,
         parts=lines_of(bodies, parts),
-        **{"picture": picture_of(draft), **more},
+        **{"picture": picture_of(draft, parts), **more},
     )
     return replace(model, start=assemble(draft, model, parts, start or {}))
 

@@ -83,12 +83,14 @@ class Arrow:
     """The force of constraint of `constraint` on the body at the point `at` [N].
 
     Its direction follows from virtual work: F . d(at)/dq_j = lambda a_kj for the coordinates that `at`
-    depends on.  Where that leaves it open, `along` gives it, with F = lambda along.
+    depends on.  Where that leaves it open, `along` gives it, with F = lambda along.  Or `force` is the vector
+    itself, of outputs: then `constraint` is only what it is called.
     """
 
     constraint: str
     at: Point
     along: Point | None = None
+    force: Point | None = None
 
 
 Shape = Line | Rod | Spring | Disk | Ground | Track | Arrow
@@ -105,7 +107,7 @@ def points_of(shape: Shape) -> list[Point]:
         return [shape.center]
     if isinstance(shape, Track):
         return [shape.point]
-    return [shape.at] if shape.along is None else [shape.at, shape.along]
+    return [shape.at, *(p for p in (shape.along, shape.force) if p is not None)]
 
 
 def check_picture(model: ModelFields, problems: list[str]) -> None:
@@ -158,7 +160,7 @@ def _is_point(point: object) -> bool:
 
 def _check_arrow(model: ModelFields, arrow: Arrow, what: str, problems: list[str]) -> None:
     known = [c.name for c in model.constraints if hasattr(c, "expression")]
-    if arrow.constraint not in known:
+    if arrow.constraint not in known and arrow.force is None:
         problems.append(
             f"{what}: no constraint is called {arrow.constraint!r}, expected one of "
             f"{', '.join(known) or 'none: the model has no constraint'}"

@@ -115,9 +115,12 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
             if value is not None:
                 found[key] = expression(value)
         return found | ({"trace": True} if shape.trace else {})
-    along = direction(model, shape) if shape.along is None else shape.along
-    force = multiplier(shape.constraint)
-    vector = [pack(in_variables(sp.sympify(x)) * force, numbers) for x in along]
+    if shape.force is not None:
+        vector = point(shape.force)
+    else:
+        along = direction(model, shape) if shape.along is None else shape.along
+        force = multiplier(shape.constraint)
+        vector = [pack(in_variables(sp.sympify(x)) * force, numbers) for x in along]
     return {"kind": "arrow", "name": shape.constraint, "at": point(shape.at), "vector": vector}
 
 
