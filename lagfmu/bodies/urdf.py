@@ -60,9 +60,7 @@ def _read(path: Path) -> Any:
     try:
         from yourdfpy import URDF
     except ImportError:
-        raise ModelError(
-            path.name, ["reading URDF needs yourdfpy: pip install 'lagfmu[urdf]'"]
-        ) from None
+        raise ModelError(path.name, ["reading URDF needs yourdfpy: pip install yourdfpy"]) from None
     try:
         content = path.read_bytes()
     except OSError as error:
