@@ -139,7 +139,7 @@ def test_the_archive_holds_what_it_needs_and_no_more(native_fmu):
 @pytest.mark.thorough
 def test_the_fmu_is_small(native_fmu, built_for):
     """Bounds that a library linked in by mistake would break, and code that only some models need."""
-    for name, most in (("PendulumCartesian", 270e3), ("Hemisphere", 300e3)):
+    for name, most in (("PendulumCartesian", 270e3), ("Hemisphere", 320e3)):
         assert native_fmu(name).stat().st_size < most
     everywhere = built_for("all")
     assert everywhere.stat().st_size < 800e3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from sympy import exp, log, sin, sqrt, symbols
@@ -20,8 +22,9 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import BuildError
-from lagfmu.testing import prepare, write
+from lagfmu.testing import load, prepare, write
 
+UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
 t = dynamicsymbols._t
 x, z, theta = dynamicsymbols("x z theta")
 m, g, L, w, F = symbols("m g L w F", positive=True)
@@ -194,3 +197,16 @@ def test_all_that_native_fmus_alone_do_is_refused_at_once(tmp_path):
         write(prepare(model, scene), tmp_path, target="python")
     for part in ("'grip'", "error bars", "peak.x", "'rk4'", "--target native"):
         assert part in str(refused.value)
+
+
+@pytest.mark.parametrize("inertia", [3e-3, 1e-30, 1e-300])
+def test_a_light_carrier_hides_no_teeth(inertia: float) -> None:
+    """A planetary gear whose ring is held, with Willis' equation besides: J carrier'' = i tau - c carrier'
+    with J = J_c + i^2 J_s + k^2 J_p and i = 3.5; a carrier next to no mass is the limit."""
+    model = load(UNSEEN / "planetary_gear.py").model
+    asked = {"stop_time": 0.05, "tolerance": 1e-10, "start_values": {"J_c": inertia}}
+    run = simulate(model, target="python", **asked)
+    J = inertia + 3.5**2 * 2e-4 + (7 / 3) ** 2 * 1e-4
+    speed = 3.5 * 0.5 / 0.02 * (1 - np.exp(-0.02 / J * run["time"]))
+    np.testing.assert_allclose(run["der(carrier)"], speed, rtol=0, atol=1e-9 * speed.max())
+    np.testing.assert_allclose(run["der(sun)"], 3.5 * speed, rtol=0, atol=1e-9 * speed.max())

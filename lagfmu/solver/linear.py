@@ -23,6 +23,7 @@ from ..numeric.failure import MasslessError
 from ..numeric.system import Matrix, Vector
 
 INDEPENDENT = 1e-10  # of the largest singular value: smaller ones are rounding of redundant rows
+LIGHT = 1e-15  # of the largest mass: a smaller one hides what others are held by
 ALONE = (
     1e-6  # part that a multiplier may have in lambda that push nothing, and still be called unique
 )
@@ -96,9 +97,11 @@ def solve(
 
 
 def _scale(M: Matrix, G: Matrix) -> Vector:
-    """D (n): diag(M)^(-1/2); without a mass of its own a coordinate counts as the others in its rows."""
+    """D (n): diag(M)^(-1/2); without a mass of its own a coordinate counts as the others in its rows, and so
+    does one so light that the rows which hold it would seem alike."""
     mass = M.diagonal()
-    D = np.where(mass > 0, 1 / np.sqrt(np.where(mass > 0, mass, 1.0)), 0.0)
+    heavy = mass > LIGHT * mass.max(initial=0.0)
+    D = np.where(heavy, 1 / np.sqrt(np.where(heavy, mass, 1.0)), 0.0)
     for j in np.flatnonzero(D == 0):
         k = int(np.argmax(np.abs(G[:, j]))) if len(G) else -1
         others = float(np.abs(G[k] * D).max()) if k >= 0 else 0.0
