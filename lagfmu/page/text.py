@@ -15,7 +15,7 @@ from ..mechanics.integrability.classify import Classification, classify
 from ..model.model import Contact, Nonholonomic, name_of
 from ..names import FORCE, MULTIPLIER, OWN
 from ..numeric.start_priority import OMITTED
-from ..prepare.consistency import of_undecided
+from ..prepare.consistency import of_undecided, remedy_of
 from ..prepare.steps import Lowered, Prepared
 from .documentation import as_given, shown
 from .savings import Savings, savings
@@ -47,6 +47,7 @@ def show(prepared: Prepared, console: Console, untried: str = "") -> None:
         text = (
             f"redundant: {names}; λ is not unique for {shared}: of all λ with the same Q the one with "
             "the least norm, rows scaled so that g M⁻¹ gᵀ = 1; Q is unique"
+            + remedy_of(prepared.equations)
         )
         _print(console, "  ", text)
     if structure.undecided:

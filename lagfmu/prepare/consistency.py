@@ -128,7 +128,7 @@ def structure_of(posed: Posed) -> Structure:
             f"model {eom.model.name!r}: constraint{'s' if len(redundant) > 1 else ''} "
             f"{', '.join(map(repr, redundant))} follow{'' if len(redundant) > 1 else 's'} from the "
             f"others; lambda of {', '.join(map(repr, shared))} is shared with least norm and flagged by "
-            "unique.*, Q is right",
+            f"unique.*, Q is right{remedy_of(eom)}",
             RedundantConstraintWarning,
             stacklevel=5,
         )
@@ -143,6 +143,14 @@ def structure_of(posed: Posed) -> Structure:
         )
     missed = _missed(posed, begun)
     return Structure(eom.nv, eom.m, found.rank, redundant, shared, undecided, begun, missed)
+
+
+def remedy_of(eom: EquationsOfMotion) -> str:
+    """What makes the forces of a mechanism's joints unique; nothing for a model of equations."""
+    if not eom.model.parts:
+        return ""
+    wanted = "give the mechanism its plane (plane='xy'), or make a hinge Spherical"
+    return f"; to know the force of each joint, {wanted}"
 
 
 def of_undecided(frictions: Sequence[str], redundant: Sequence[str]) -> str:
