@@ -8,10 +8,10 @@ about the pivot, without a multiplier.
 
 from math import cos, sin
 
-from sympy import Matrix, symbols
+from sympy import Matrix, Symbol, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Scene, output
+from lagfmu import ClosedForm, Conserved, Parameter, Scene, output
 from lagfmu.bodies import Body, Gravity, Ground, Spherical, mechanism
 
 MASS, ACROSS, ALONG, ARM, G = 1.2, 0.004, 0.006, 0.1, 9.81  # kg, kg m^2, m, m/s^2
@@ -19,7 +19,9 @@ THETA, PRECESSION = 0.8, 2.5  # rad, rad/s
 SPIN = MASS * G * ARM / PRECESSION + (ACROSS + MASS * ARM**2) * PRECESSION * cos(THETA)
 
 ground = Ground()
-wheel = Body("wheel", mass=MASS, inertia=(ACROSS, ACROSS, ALONG))
+across = Symbol("across", positive=True)
+both = Parameter(across, ACROSS, "kg.m^2", "moments of inertia of the wheel across its axis")
+wheel = Body("wheel", mass=MASS, inertia=(both, both, ALONG))
 model = mechanism(
     "Gyroscope",
     bodies=[wheel],
@@ -34,7 +36,8 @@ model = mechanism(
 
 scenes = [Scene("Gyroscope", stop_time=2.0, step_size=0.01)]
 
-m, J, C, g = symbols("wheel.mass wheel.inertia.xx wheel.inertia.zz gravity.z", real=True)
+J = across
+m, C, g = symbols("wheel.mass wheel.inertia.zz gravity.z", real=True)
 arm = -output("pivot.second.z")
 A = J + m * arm**2
 

@@ -150,8 +150,10 @@ def check_end(shown: dict[str, Any], expected: Run) -> None:
 
 
 def test_a_page_is_small(name: str, page_file: Callable[[str], Path]) -> None:
-    """Solver, pictures, curves and equations in less than 300 kB."""
-    assert page_file(name).stat().st_size < 300_000
+    """Solver, pictures, curves and equations in less than 300 kB; of a mechanism in space, or whose joints
+    rub, in less than 500 kB."""
+    most = 500_000 if name in ("Arm", "Bennett", "CrankWithBearingFriction") else 300_000
+    assert page_file(name).stat().st_size < most
 
 
 def test_the_page_shows_the_native_fmus_run(page: Page, described: Run) -> None:

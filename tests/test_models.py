@@ -268,6 +268,9 @@ def test_the_table_above_names_every_scene() -> None:
     assert set(CHANGED) == set(EVERY) - {"FallingRod"}
 
 
+OVERCONSTRAINED = ("Bennett", "Door")  # which close with these lengths, and with no others
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", EVERY)
 def test_statements_hold_with_parameters_and_starts_drawn_at_random(name: str, native_fmu) -> None:
@@ -276,6 +279,8 @@ def test_statements_hold_with_parameters_and_starts_drawn_at_random(name: str, n
     path, rng, accepted = native_fmu(name), np.random.default_rng(7), 0
     known = read_description(path).modelVariables
     numbers = [v for v in known if v.type == "Real" and float(v.start or 0)]
+    if name in OVERCONSTRAINED:
+        numbers = [v for v in numbers if ".first." not in v.name and ".second." not in v.name]
     parameters = [v for v in numbers if v.causality == "parameter" and "solver." not in v.name]
     starts = [v for v in numbers if v.initial in ("exact", "approx") and v.causality == "output"]
     for drawn in (parameters, [*parameters, *starts], [*parameters, *starts]):

@@ -139,10 +139,10 @@ def test_the_archive_holds_what_it_needs_and_no_more(native_fmu):
 @pytest.mark.thorough
 def test_the_fmu_is_small(native_fmu, built_for):
     """Bounds that a library linked in by mistake would break, and code that only some models need."""
-    for name, most in (("PendulumCartesian", 270e3), ("Hemisphere", 320e3)):
+    for name, most in (("PendulumCartesian", 290e3), ("Hemisphere", 320e3)):
         assert native_fmu(name).stat().st_size < most
     everywhere = built_for("all")
-    assert everywhere.stat().st_size < 800e3
+    assert everywhere.stat().st_size < 840e3
     with zipfile.ZipFile(everywhere) as archive:
         carried = [i for i in archive.infolist() if i.filename.startswith("sources/")]
         here = f"binaries/{host().folder}/Hemisphere{host().suffix}"
@@ -152,7 +152,7 @@ def test_the_fmu_is_small(native_fmu, built_for):
             if i.filename.startswith("binaries/") and i.filename != here
         ]
     sources = sum(i.compress_size for i in carried)
-    assert everywhere.stat().st_size - sources < 600e3
+    assert everywhere.stat().st_size - sources < 640e3
     assert everywhere.stat().st_size - sources - sum(i.compress_size for i in others) < 130e3
 
 
