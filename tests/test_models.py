@@ -234,8 +234,21 @@ WORLDS: dict[
 }
 
 
-@pytest.mark.parametrize("tolerance", [1e-8, 1e-12])
-@pytest.mark.parametrize("name", sorted(CHANGED))
+SLOW = {
+    ("Arm", 1e-8),
+    ("Arm", 1e-12),
+    ("Bennett", 1e-12),
+}  # tests/test_rigid_bodies.py has their like
+
+
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    [
+        pytest.param(n, tol, marks=pytest.mark.thorough if (n, tol) in SLOW else ())
+        for n in sorted(CHANGED)
+        for tol in (1e-8, 1e-12)
+    ],
+)
 def test_outputs_equal_the_closed_forms(name: str, tolerance: float, native_fmu: Any) -> None:
     """As it is built, changed, and in each of its worlds; over long steps, so that it is the integrator's
     tolerance that counts."""
