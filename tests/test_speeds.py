@@ -218,3 +218,25 @@ def test_joints_of_a_kind_share_their_code() -> None:
     texts = [model_source(Form(derive(chain(n)))) for n in (4, 5, 6)]
     lines = [text.count(" = ") for text in texts]
     assert lines[2] - lines[1] == lines[1] - lines[0] < 0.2 * lines[0]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_free_body_flies_straight_in_the_velocities_of_its_own_frame(target: str) -> None:
+    """Velocities along a body's axes, as of an aircraft, turn with it: m (u' + w x u) = 0, so that in space
+    its centre goes straight on however it tumbles."""
+    place, u = dynamicsymbols("x y z"), dynamicsymbols("u v w")
+    R = rotation_matrix(E)
+    moving = dict(zip(place, R * sp.Matrix(u), strict=True))
+    energy = m * sum(s**2 for s in u) / 2 + k * (W[0] ** 2 + 2 * W[1] ** 2 + 3 * W[2] ** 2) / 2
+    model = Model(
+        "Aircraft",
+        coordinates={**dict.fromkeys(place, "m"), **dict.fromkeys(E, "1")},
+        speeds={**dict.fromkeys(u, "m/s"), **dict.fromkeys(W, "rad/s")},
+        kinematics={**moving, **turning()},
+        kinetic_energy=energy,
+        parameters=[Parameter(m, 2.0, "kg"), Parameter(k, 0.1, "kg.m2")],
+        start={E[0]: 1.0, u[0]: 3.0, u[1]: -1.0, W[0]: 0.5, W[1]: 2.0, W[2]: -1.0},
+    )
+    run = simulate(model, target=target, stop_time=3.0, tolerance=1e-11)
+    for name, velocity in (("x", 3.0), ("y", -1.0), ("z", 0.0)):
+        np.testing.assert_allclose(run[name], velocity * run["time"], rtol=0, atol=1e-8)

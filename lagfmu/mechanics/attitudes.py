@@ -19,12 +19,10 @@ from ..model.speeds import quaternions
 
 @dataclass(frozen=True)
 class Closed:
-    """Elements of rotation matrices -> symbols, and the rates of these; of each quaternion the components
-    of w."""
+    """Elements of rotation matrices -> symbols, and the rates of these."""
 
     symbols: Mapping[Expr, Expr]
     rates: Mapping[Expr, Expr]
-    turning: tuple[tuple[Expr, Expr, Expr], ...]
 
 
 def attitudes(model: Model, table: Mapping[Expr, Expr]) -> Closed:
@@ -35,21 +33,17 @@ def attitudes(model: Model, table: Mapping[Expr, Expr]) -> Closed:
     found = {a.quaternion for e in expressions for a in e.atoms(Attitude)}
     symbols: dict[Expr, Expr] = {}
     rates: dict[Expr, Expr] = {}
-    turning = []
     for k, four in enumerate(quaternions(model)):
-        w = _angular_velocity(model, four)
+        w = _angular_velocity(model, four) if four in found else None
         if w is None:
             continue
         e, x, y, z = [table[s] for s in four], *(s.xreplace(table) for s in w)
-        turning.append((x, y, z))
-        if four not in found:
-            continue
         R = [[sp.Symbol(f"R{i}{j} of {k}", real=True) for j in range(3)] for i in range(3)]
         for i, row in enumerate(R):
             symbols |= {Attitude(i, j, *e): s for j, s in enumerate(row)}
             turned = row[1] * z - row[2] * y, row[2] * x - row[0] * z, row[0] * y - row[1] * x
             rates |= dict(zip(row, turned, strict=True))
-    return Closed(symbols, rates, tuple(turning))
+    return Closed(symbols, rates)
 
 
 def _angular_velocity(model: Model, four: tuple[Expr, ...]) -> tuple[Expr, ...] | None:

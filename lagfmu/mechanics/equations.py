@@ -398,7 +398,7 @@ def derive(model: Model) -> EquationsOfMotion:
     places = frozenset(j for j, s in enumerate(q) if s in angles)
     closed = attitudes(model, table)
     moving = Kinematics(q, v, tuple(r.xreplace(closed.symbols) for r in qdot), TIME, rates, places)
-    moving = moving.beside(closed.rates, closed.turning)
+    moving = moving.beside(closed.rates)
     clock = _Clock(moving.q, moving.rates, rates)
     problems: list[str] = []
 

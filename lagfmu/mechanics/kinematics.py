@@ -23,7 +23,6 @@ import sympy as sp
 from ..model.elements import Expr
 
 TRIALS = 3
-Inverse = Callable[[Mapping[int, Expr]], dict[int, Expr] | None]
 Turning = list[list[tuple[int, Expr]]]  # of each speed r: (i, sum_k c^r_ki v_k)
 
 
@@ -32,8 +31,7 @@ class Kinematics:
     """q' = B v + b of coordinates q (nq) and speeds v (nv), in plain symbols.
 
     `rates` (nq) are the expressions of q', `time` is the symbol of time, `drift` the rates of prescribed
-    inputs. `unwrapped` are the places of what follows from other coordinates, `turning` the angular
-    velocities (speeds) of which the coefficients c are known.
+    inputs. `unwrapped` are the places of what follows from other coordinates.
     """
 
     q: tuple[Expr, ...]
@@ -42,15 +40,12 @@ class Kinematics:
     time: Expr
     drift: Mapping[Expr, Expr]
     unwrapped: frozenset[int] = frozenset()
-    turning: tuple[tuple[Expr, Expr, Expr], ...] = ()
 
-    def beside(
-        self, more: Mapping[Expr, Expr], turning: tuple[tuple[Expr, Expr, Expr], ...]
-    ) -> Kinematics:
+    def beside(self, more: Mapping[Expr, Expr]) -> Kinematics:
         """The same with quantities that follow from the coordinates as further coordinates: their rates."""
         follow = frozenset(range(len(self.q), len(self.q) + len(more)))
         q, rates = (*self.q, *more), (*self.rates, *more.values())
-        return replace(self, q=q, rates=rates, unwrapped=self.unwrapped | follow, turning=turning)
+        return replace(self, q=q, rates=rates, unwrapped=self.unwrapped | follow)
 
     @cached_property
     def B(self) -> dict[tuple[int, int], Expr]:
@@ -115,17 +110,12 @@ class Kinematics:
         kinematics restrict the motion as a nonholonomic constraint does.
         """
         found: Turning = [[] for _ in self.v]
-        place = {s: i for i, s in enumerate(self.v)}
-        known = [[place[s] for s in w] for w in self.turning if place.keys() >= {*w}]
-        for x, y, z in known:
-            for first, second, third in ((x, y, z), (y, z, x), (z, x, y)):
-                found[third] += [(second, self.v[first]), (first, -self.v[second])]
-        for group in self._groups({i for w in known for i in w}):
-            inverse = self._inverse(group)
+        for group in self._groups():
+            solve = self._solver(group)
             for i in group:
                 for k in (None, *group):
                     bracket = self._bracket(k, i) if k != i else {}
-                    c = (inverse(bracket) if inverse else None) if bracket else {}
+                    c = solve(bracket) if bracket else {}
                     if c is None:
                         names = " and ".join(
                             "time" if x is None else str(self.v[x]) for x in (k, i)
@@ -139,18 +129,21 @@ class Kinematics:
                         found[r].append((i, x if k is None else x * self.v[k]))
         return found, []
 
-    def _groups(self, known: set[int]) -> list[list[int]]:
-        """Speeds that share coordinates in B, or in what it depends on; without those that are rates, and
-        those whose coefficients are known."""
+    def _groups(self) -> list[list[int]]:
+        """Speeds that share coordinates in B, or one of which moves what B of another depends on; without
+        those that are rates and meet no other."""
         plain = {i for i, column in enumerate(self.columns) if list(column.values()) == [sp.S.One]}
         of = {s: j for j, s in enumerate(self.q)}
-        touched = []
-        for i, column in enumerate(self.columns):
-            if i in plain or i in known:
-                continue
-            kept = {j: a for j, a in column.items() if j not in self.unwrapped}
-            inside = {of[s] for a in kept.values() for s in a.free_symbols if s in of}
-            touched.append(({i}, set(kept) | inside))
+        kept = [
+            {j: a for j, a in column.items() if j not in self.unwrapped} for column in self.columns
+        ]
+        inside = [{of[s] for a in c.values() for s in a.free_symbols if s in of} for c in kept]
+        dependent = set().union(*inside)
+        touched = [
+            ({i}, {*kept[i]} | inside[i] | (column.keys() & dependent))
+            for i, column in enumerate(self.columns)
+            if i not in plain
+        ]
         groups: list[tuple[set[int], set[int]]] = []
         for speeds, places in touched:
             for other in [g for g in groups if g[1] & places]:
@@ -177,27 +170,53 @@ class Kinematics:
                 found[j] = entry
         return found
 
-    def _inverse(self, group: list[int]) -> Inverse | None:
-        """bracket -> {r: c^r}, by (B^T B)^-1 B^T of the group's speeds; None for a bracket that is none of
-        theirs."""
+    def _solver(self, group: list[int]) -> Callable[[Mapping[int, Expr]], dict[int, Expr] | None]:
+        """bracket -> {r: c^r} of the group's speeds; None for a bracket that is none of theirs."""
         rows = sorted({j for i in group for j in self.columns[i]} - self.unwrapped)
         B = sp.Matrix(
             len(rows), len(group), lambda a, c: self.columns[group[c]].get(rows[a], sp.S.Zero)
         )
-        gram = (B.T * B).applyfunc(sp.factor)
-        try:
-            left = gram.inv() * B.T
-        except (sp.matrices.exceptions.NonInvertibleMatrixError, ZeroDivisionError):
-            return None
 
         def solve(bracket: Mapping[int, Expr]) -> dict[int, Expr] | None:
             right = sp.Matrix([bracket.get(j, sp.S.Zero) for j in rows])
-            c = (left * right).applyfunc(lambda e: sp.cancel(sp.trigsimp(e)))
-            if set(bracket) - set(rows) or not _vanishes(B * c - right):
+            if set(bracket) - set(rows):
                 return None
-            return {group[r]: x for r, x in enumerate(c) if x != 0}
+            c = _constant(B, right)
+            if c is None:
+                c = _symbolic(B, right)
+            return None if c is None else {group[r]: x for r, x in enumerate(c) if x != 0}
 
         return solve
+
+
+def _constant(B: Expr, right: Expr) -> Expr | None:
+    """The c of B c = right that is the same at random points, as those of rotations are; None where there is
+    none, or B is no polynomial."""
+    symbols = sorted(B.free_symbols | right.free_symbols, key=str)
+    if not all(e.is_polynomial(*symbols) for e in (*B, *right)):
+        return None
+    generator, found = random.Random(3), None
+    for _ in range(TRIALS):
+        at = {s: sp.Rational(generator.randint(100, 999), 331) for s in symbols}
+        here, b = B.xreplace(at), right.xreplace(at)
+        gram = here.T * here
+        if gram.det() == 0:
+            return None
+        c = gram.LUsolve(here.T * b)
+        if here * c != b or (found is not None and c != found):
+            return None
+        found = c
+    return found
+
+
+def _symbolic(B: Expr, right: Expr) -> Expr | None:
+    """The c of B c = right by (B^T B)^-1 B^T; None where there is none."""
+    try:
+        left = (B.T * B).applyfunc(sp.factor).inv() * B.T
+    except (sp.matrices.exceptions.NonInvertibleMatrixError, ZeroDivisionError):
+        return None
+    c = (left * right).applyfunc(lambda e: sp.cancel(sp.trigsimp(e)))
+    return c if _vanishes(B * c - right) else None
 
 
 def _vanishes(entries: Expr) -> bool:
