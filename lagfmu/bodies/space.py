@@ -14,13 +14,13 @@ from typing import Any
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
-from ..model.attitude import rotation_matrix
+from ..model.attitude import quaternion_rates, rotation_matrix
 from ..model.elements import Expr
 from .body import Body, Ground, Marker
 from .draft import Draft
 from .motion import Motion, Placed
 from .rotation import Rotation, rotation_of
-from .vectors import AXES, ZERO, Vector, cross, dot, minus, plus, times
+from .vectors import AXES, ZERO, Vector, dot, minus
 
 TIME = dynamicsymbols._t
 STILL: Rotation = tuple(tuple(sp.Integer(i == j) for j in range(3)) for i in range(3))  # type: ignore[assignment]
@@ -53,7 +53,7 @@ class SpaceMotion(Motion):
         e = tuple(dynamicsymbols(f"{name}.orientation.{x}") for x in "wxyz")
         self.coordinates = {**dict.fromkeys(r, "m"), **dict.fromkeys(e, "1")}
         self.speeds = dict.fromkeys(w, "rad/s")
-        self.kinematics = dict(zip(e, _rates(e, w), strict=True))
+        self.kinematics = dict(zip(e, quaternion_rates(e, w), strict=True))
         self.descriptions = {
             **{s: f"{x} of the centre of mass of {name}" for s, x in zip(r, AXES, strict=True)},
             **{s: f"{x} of the unit quaternion of {name}" for s, x in zip(e, "wxyz", strict=True)},
@@ -107,12 +107,6 @@ class SpaceMotion(Motion):
         for k, speed in enumerate(self.speeds):
             column = (self.rotation[0][k], self.rotation[1][k], self.rotation[2][k])
             yield speed, dot(column, torque)
-
-
-def _rates(e: Sequence[Expr], w: Sequence[Expr]) -> tuple[Expr, ...]:
-    vector: Vector = (e[1], e[2], e[3])
-    rate = plus(times(e[0], (w[0], w[1], w[2])), cross(vector, (w[0], w[1], w[2])))
-    return (-dot(vector, (w[0], w[1], w[2])) / 2, *(x / 2 for x in rate))
 
 
 def _matrix(e: Sequence[Any]) -> Rotation:

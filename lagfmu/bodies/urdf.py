@@ -21,9 +21,11 @@ from ..errors import ModelError
 from .body import Body, Ground, Marker
 from .joints import Fixed, Joint, Prismatic, Revolute
 from .loads import Torsion
+from .rotation import onto
 
 KINDS = {"revolute": Revolute, "continuous": Revolute, "prismatic": Prismatic, "fixed": Fixed}
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx, yy, zz, xy, xz, yz
+UP = np.array([0.0, 0.0, 1.0])
 Pose = NDArray[np.float64]  # (4, 4) homogeneous
 
 
@@ -198,7 +200,7 @@ class _Builder:
         turned = np.eye(4)
         if joint.type != "fixed":
             axis = (1.0, 0.0, 0.0) if joint.axis is None else joint.axis
-            turned[:3, :3] = _onto(np.array(axis, dtype=float))
+            turned[:3, :3] = onto(UP, np.array(axis, dtype=float) / np.linalg.norm(axis))
         kind = KINDS[joint.type]
         stops = joint.limit if self.limits and joint.type in ("revolute", "prismatic") else None
         limits = None if stops is None else (stops.lower or 0.0, stops.upper or 0.0)
@@ -221,13 +223,3 @@ def _body(link: Any) -> Body:
 def _marker(carrier: Body | Ground, pose: Pose) -> Marker:
     rotation = None if np.array_equal(pose[:3, :3], np.eye(3)) else pose[:3, :3].tolist()
     return carrier.at(tuple(map(float, pose[:3, 3])), rotation=rotation)
-
-
-def _onto(axis: Pose) -> Pose:
-    """The rotation that takes z onto that direction by the least turn (Rodrigues' formula)."""
-    x, y, z = axis / np.linalg.norm(axis)
-    if z <= -1.0:
-        return np.diag([1.0, -1.0, -1.0])
-    K = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
-    turned: Pose = np.eye(3) + K + K @ K / (1.0 + z)
-    return turned

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..model.attitude import Attitude
+from ..model.attitude import Attitude, quaternion_rates
 from ..model.elements import Expr
 from ..model.model import Model
 from ..model.speeds import quaternions
@@ -50,14 +50,8 @@ def _angular_velocity(model: Model, four: tuple[Expr, ...]) -> tuple[Expr, ...] 
     """w (3) in the frame of the body; None if the kinematics are others."""
     if not all(s in model.kinematics for s in four):
         return None
-    e0, e1, e2, e3 = four
     given = [sp.expand(model.kinematics[s]) for s in four]
-    x, y, z = (2 * given[k].diff(e0) for k in (1, 2, 3))
-    expected = (
-        -(e1 * x + e2 * y + e3 * z) / 2,
-        (e0 * x + e2 * z - e3 * y) / 2,
-        (e0 * y + e3 * x - e1 * z) / 2,
-        (e0 * z + e1 * y - e2 * x) / 2,
-    )
+    w = tuple(2 * rate.diff(four[0]) for rate in given[1:])
+    expected = quaternion_rates(four, w)
     alike = all(sp.expand(a - b) == 0 for a, b in zip(given, expected, strict=True))
-    return (x, y, z) if alike else None
+    return w if alike else None

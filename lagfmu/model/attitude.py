@@ -61,6 +61,14 @@ class Attitude(sp.Function):  # type: ignore[misc]
         return f"R{i + 1}{j + 1}({printer.doprint(self.quaternion[0])})"
 
 
+def quaternion_rates(e: Sequence[Expr], w: Sequence[Expr]) -> tuple[Expr, ...]:
+    """e' (4) = e (0, w) / 2 of a unit quaternion; w (3): the angular velocity in the frame of the body."""
+    e0, x, y, z = e
+    across = y * w[2] - z * w[1], z * w[0] - x * w[2], x * w[1] - y * w[0]
+    rest = ((e0 * along + turn) / 2 for along, turn in zip(w, across, strict=True))
+    return (-(x * w[0] + y * w[1] + z * w[2]) / 2, *rest)
+
+
 def rotation_matrix(quaternion: Sequence[Expr]) -> Expr:
     """R (3, 3) of the unit quaternion (e0, e1, e2, e3): components in a body's frame become those in
     space."""
