@@ -575,3 +575,12 @@ def test_a_rough_slide_holds_a_block_up_to_the_angle_of_friction():
     expected = g * (sin(alpha) - 0.4 * cos(alpha))
     assert slides["der(position.D,2)"][1:] == pytest.approx(expected, rel=1e-11)
     assert slides["force.D.x"][1:] == pytest.approx(-0.4 * 2 * g * cos(alpha), rel=1e-11)
+
+
+def test_a_mechanism_of_the_plane_is_not_told_to_take_one():
+    """Two hinges at one point: the rows that are too many are named, without the remedy of one in space."""
+    bar = Body("bar", 1.0, 0.1)
+    joints = [Revolute(n, ground.at((0, 0)), bar.at((-0.5, 0))) for n in ("A", "B")]
+    with pytest.warns(UserWarning, match="follow from the others") as told:
+        prepare(plane(bodies=[bar], joints=joints))
+    assert not any("Spherical" in str(w.message) for w in told)

@@ -146,8 +146,8 @@ def structure_of(posed: Posed) -> Structure:
 
 
 def remedy_of(eom: EquationsOfMotion) -> str:
-    """What makes the forces of a mechanism's joints unique; nothing for a model of equations."""
-    if not eom.model.parts:
+    """What makes the forces of the joints of a mechanism in space unique; nothing for others."""
+    if not eom.model.parts or not eom.quaternions:
         return ""
     wanted = "give the mechanism its plane (plane='xy'), or make a hinge Spherical"
     return f"; to know the force of each joint, {wanted}"
