@@ -27,9 +27,9 @@ from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
 from .study.sweep.sweep import sweep
+from .verification.check import Verification
 from .verification.result import Result
 from .verification.simulate import simulate
-from .verification.verify import Verification
 
 __all__ = [
     "Arrow",

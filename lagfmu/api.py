@@ -29,8 +29,8 @@ from .page.text import show as show_prepared
 from .prepare.prepare import Prepared, prepare
 from .study.tradeoff.choose import Choice, Tick, choose
 from .study.tradeoff.page import section
+from .verification.check import Verification
 from .verification.crosscheck import layered
-from .verification.verify import Verification
 from .verification.verify import verify as verify_fmu
 
 
@@ -122,6 +122,7 @@ def verify(
     tolerance: float | None = None,
     inputs: Any = None,
     reference: Any = None,
+    statements: str | os.PathLike[str] | None = None,
     *,
     closed_forms: Sequence[ClosedForm | Conserved] = (),
     scene: Scene | None = None,
@@ -129,7 +130,9 @@ def verify(
     """verification.verify.verify() of an FMU; a model, or a model file with its closed forms, is built first
     (natively where a compiler is at hand)."""
     with as_fmu(source, scene, closed_forms) as fmu:
-        return verify_fmu(fmu, start_values, stop_time, step_size, tolerance, inputs, reference)
+        return verify_fmu(
+            fmu, start_values, stop_time, step_size, tolerance, inputs, reference, statements
+        )
 
 
 def package(

@@ -57,6 +57,7 @@ from .model.goal import Goal
 from .model.goal import parse as parse_goal
 from .model.library import known
 from .model.model import name_of
+from .model.named import read_named
 from .model.spline import SplineBase
 from .model.units import (
     ENERGY,
@@ -129,9 +130,10 @@ from .study.tradeoff.quantities import OWN, quantities
 from .study.tradeoff.reference import refer
 from .study.tradeoff.report import table as tradeoff_table
 from .study.tradeoff.setting import Setting
+from .verification.closed_forms import applies, check_closed_form, landed
 from .verification.evaluate import Compiled
 from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
 from .verification.simulate import ErrorBarWarning
-from .verification.verify import RECORD, applies, check_closed_form, landed
+from .verification.verify import RECORD

@@ -10,8 +10,8 @@ from rich.markup import escape
 
 from ..fmu.write import write_whole
 from ..page.table import new_table, print_whole
+from ..verification.check import Verification
 from ..verification.junit import Report, as_json, as_junit, exit_code
-from ..verification.verify import Verification
 from .terminal import console, errors, say, say_error
 
 

@@ -1,13 +1,11 @@
 """An output as one writes it on a command line:  tension = -2*L*lambda.rod [N]
 
 Names are those of the FMU's variables: coordinates and parameters, der(x), der(x,2), lambda.rod, Q.x,
-time.  The text is read as an expression of names, numbers, + - * / ** (or ^) and functions, and is never
-executed (expression.py).
+time (named.py).
 """
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,16 +16,12 @@ from sympy.physics.vector import dynamicsymbols
 from ..errors import RequestError
 from ..names import derivative
 from .elements import Expr, Input, Output, name_of
-from .expression import read_formula
 from .model import Model
+from .named import UnknownNameError, read_named
 from .reactions import force_of_constraint, multiplier
 
 TEXT = re.compile(r"\s*([^=\s]+)\s*=(.*)\[([^\[\]]*)\]\s*\Z", re.S)
-NAMES = re.compile(
-    r"der\(\s*[A-Za-z_][\w.]*\s*(?:,\s*2\s*)?\)|(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*(?!\w|\s*\()"
-)
 EXAMPLE = "'tension = -2*L*lambda.rod [N]'"
-CAPITALS = re.compile(r"\b(abs|min|max)(?=\s*\()")  # SymPy's names of these begin with one
 
 
 def with_outputs(model: Model, texts: Sequence[str]) -> Model:
@@ -47,9 +41,11 @@ def _output(text: str, model: Model, problems: list[str]) -> Output | None:
         return None
     name, formula, unit = found.groups()
     try:
-        return Output(name, _read(formula.strip(), _known(model)), unit.strip())
-    except ValueError as error:
+        return Output(name, read_named(formula.strip(), _known(model)), unit.strip())
+    except UnknownNameError as error:
         problems.append(f"--add-output {text!r}: {error}")
+    except ValueError as error:
+        problems.append(f"--add-output {text!r}: {error}, expected an expression as in {EXAMPLE}")
     return None
 
 
@@ -73,26 +69,3 @@ def _known(model: Model) -> dict[str, Expr]:
 def _moves(model: Model, symbol: Expr) -> bool:
     prescribed: tuple[Input, ...] = model.prescribed
     return symbol in {i.symbol for i in prescribed}
-
-
-def _read(formula: str, known: dict[str, Expr]) -> Expr:
-    """The expression.  Raises ValueError with what cannot be read, and what was expected."""
-    meant: dict[str, Expr] = {}
-    named: list[str] = []
-
-    def stand_in(match: re.Match[str]) -> str:
-        name = re.sub(r"\s+", "", match[0])
-        if name not in known:
-            near = difflib.get_close_matches(name, known, 3, 0.5) or list(known)[:8]
-            raise ValueError(f"{name!r} is unknown; did you mean {', '.join(map(repr, near))}?")
-        named.append(name)
-        meant[f"x{len(meant)}"] = known[name]
-        return f"x{len(meant) - 1}"
-
-    plain = CAPITALS.sub(lambda m: m[0].capitalize(), formula.replace("^", "**"))
-    plain = NAMES.sub(stand_in, plain)
-    try:
-        return read_formula(plain, meant)
-    except ValueError as error:
-        text = re.sub(r"\bx(\d+)\b", lambda m: named[int(m[1])], str(error))
-        raise ValueError(f"{text}, expected an expression as in {EXAMPLE}") from None

@@ -19,10 +19,10 @@ from .. import names
 from ..errors import SimulationError
 from ..fmu.read import Trajectory, communication_points, experiment_of, read_description
 from ..fmu.write import REFERENCES, write_whole
+from .check import Verification
 from .junit import as_json
 from .report import report
 from .simulate import simulate
-from .verify import Verification
 
 TOLERANCE = 1e-12
 DIGITS = 14

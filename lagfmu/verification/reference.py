@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import SettingError
 from ..fmu.read import Trajectory
-from .verify import Check
+from .check import Check
 
 TRUTH = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 
@@ -30,7 +30,17 @@ class Reference:
     atol: float = 0.0
     own: Mapping[str, float] = field(default_factory=dict)
 
-    def checks(self, result: Trajectory) -> list[Check]:
+    @property
+    def variables(self) -> set[str]:
+        """Its columns."""
+        return {n for n in self.table.dtype.names or () if n != "time"}
+
+    @property
+    def stop_time(self) -> float | None:
+        """The last time [s]; None of a table of the start alone."""
+        return float(self.table["time"][-1]) or None
+
+    def checks(self, result: Trajectory, values: Mapping[str, float]) -> list[Check]:
         """One statement a column.  Raises SettingError for columns that the FMU does not have."""
         names = [n for n in self.table.dtype.names or () if n != "time"]
         known = result.dtype.names or ()

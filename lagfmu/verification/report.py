@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+from .check import Check, Verification
 from .junit import Case, Report
-from .verify import Check, Verification
 
 
 def report(file: str, found: Verification) -> Report:

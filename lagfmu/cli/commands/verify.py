@@ -42,10 +42,13 @@ def verify(
     atol: Annotated[
         float, typer.Option(help="Allowed absolute error, in the column's unit.")
     ] = 0.0,
+    statements: Annotated[
+        Path | None, typer.Option(help="TOML of statements that must hold, for any FMU.")
+    ] = None,
     json: JsonFile = None,
     junit: JunitFile = None,
 ) -> None:
-    """Simulate FMUs through fmpy and check them against their closed forms and a reference.
+    """Simulate FMUs through fmpy and check them against closed forms, statements and a reference.
 
     The exit code is the largest of all FMUs'.
     """
@@ -71,7 +74,9 @@ def verify(
         done = []
         for fmu in fmus:  # one that cannot be run does not keep the others from it
             try:
-                found = held(fmu, values, stop_time, step_size, tolerance, signals, table)
+                found = held(
+                    fmu, values, stop_time, step_size, tolerance, signals, table, statements
+                )
             except LagfmuError as error:
                 done.append(refused(str(fmu), error))
             else:

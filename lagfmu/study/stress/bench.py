@@ -25,8 +25,8 @@ from ... import names
 from ...fmu.archive import unpack
 from ...fmu.session import RefusalError, Session
 from ...fmu.target import PYTHON
+from ...verification.closed_forms import applies
 from ...verification.evaluate import alone
-from ...verification.verify import applies
 from .closed_forms import EQUATION, judged, laws
 from .facts import Facts, facts_of
 from .judge import EPS, Check, invariants, lost

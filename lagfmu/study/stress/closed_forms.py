@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from ... import names
 from ...fmu.closed_forms import CarriedForm
 from ...model.elements import Expr
+from ...verification.closed_forms import applies
 from ...verification.evaluate import Compiled
-from ...verification.verify import applies
 from .player import Run
 
 LEEWAY = 10.0

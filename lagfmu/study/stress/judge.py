@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import names
-from ...verification.verify import landed
+from ...verification.closed_forms import landed
 from .closed_forms import JudgedForm
 from .facts import Facts
 from .player import Run

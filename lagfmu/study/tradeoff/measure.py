@@ -19,8 +19,9 @@ from ...fmu.closed_forms import CarriedForm
 from ...fmu.read import file_stem, numbers_of, target_in
 from ...fmu.session import Session
 from ...methods import FIXED_STEP, INTEGRATORS
+from ...verification.closed_forms import check_closed_form
 from ...verification.simulate import steps_of
-from ...verification.verify import check_closed_form, closed_forms_in
+from ...verification.verify import closed_forms_in
 from .choose import Tick
 from .observe import observe, opened, seconds
 from .quantities import GROUPS, MULTIPLIER

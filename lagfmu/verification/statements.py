@@ -1,0 +1,187 @@
+"""What must hold of any FMU, from a TOML file: a list of tables, each of one of the KINDS.
+
+    [[bounds]]
+    of = "lambda.rod"
+    at_least = 0
+
+Formulas are read as text that is never run (model/named.py); what comes of a statement: claim.py.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from .. import names
+from ..errors import SettingError
+from ..fmu.read import numbers_of
+from ..model.closed_form import output
+from ..model.elements import Expr
+from ..model.named import read_named
+from .check import Against
+from .claim import Claim
+from .reference import Reference, read_table
+
+WITHIN = 1e-6  # relative error that is allowed where nothing is said
+DIRECTIONS = {"rising": 1.0, "falling": -1.0}
+LARGEST = 1_000_000  # bytes of a file
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of statement: keys that it must have and may have, besides those of all, and its title."""
+
+    needed: tuple[str, ...]
+    optional: tuple[str, ...]
+    title: Callable[[Mapping[str, Any]], str]
+
+
+def _limits(said: Mapping[str, Any]) -> str:
+    low = f"{said['at_least']} <= " if "at_least" in said else ""
+    high = f" <= {said['at_most']}" if "at_most" in said else ""
+    return f"{low}{said.get('of')}{high}"
+
+
+KINDS = {
+    "equal": Kind(("of", "to"), (), lambda s: f"{s.get('of')} = {s.get('to')}"),
+    "bounds": Kind(("of",), ("at_least", "at_most"), _limits),
+    "conserved": Kind(("of",), (), lambda s: f"{s.get('of')} is conserved"),
+    "monotone": Kind(
+        ("of", "direction"), (), lambda s: f"{s.get('of')} is {s.get('direction')} or rests"
+    ),
+    "event": Kind(
+        ("becomes", "at"), ("occurrence",), lambda s: f"{s.get('becomes')} at {s.get('at')} s"
+    ),
+    "reference": Kind(("file",), (), lambda s: f"reference {s.get('file')}"),
+}
+OF_ALL = ("name", "when", "scale", "within", "absolute")
+FORMULAS = ("of", "to", "at_least", "at_most", "becomes", "at", "when", "scale")
+POSITIVE = ("within", "absolute", "occurrence")
+TEXTS = ("name", "direction", "file")
+
+
+def read_statements(path: Path, description: Any) -> list[Against]:
+    """The statements of a file, on the FMU of that description.  Raises SettingError with all
+    that is wrong."""
+    said = _read(path)
+    known = _known(description)
+    problems: list[str] = []
+    common = said.pop("within", WITHIN)
+    if not _is_number(common) or common < 0:
+        problems.append(f"within = {common!r}, expected a number from 0")
+    found: list[Against] = []
+    for kind, entries in said.items():
+        if kind not in KINDS:
+            problems.append(f"[[{kind}]] is {_unknown(kind, KINDS)}")
+        elif not isinstance(entries, list) or not all(isinstance(e, dict) for e in entries):
+            problems.append(f"{kind!r}: expected tables [[{kind}]]")
+        else:
+            for k, entry in enumerate(entries):
+                wrong = _wrong(kind, entry)
+                if not wrong:
+                    try:
+                        found.append(_made(kind, entry, common, known, path))
+                    except (ValueError, SettingError) as error:
+                        wrong = [str(error)]
+                problems += [f"[[{kind}]] {k + 1}: {text}" for text in wrong]
+    if not problems and not found:
+        problems.append("it says nothing, expected tables such as [[bounds]]")
+    if problems:
+        raise SettingError(f"{str(path)!r}: " + "; ".join(problems))
+    return found
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content = path.read_bytes()
+        if len(content) > LARGEST:
+            raise SettingError(
+                f"{str(path)!r} has {len(content)} bytes, expected at most {LARGEST}"
+            )
+        return tomllib.loads(content.decode("utf-8"))
+    except OSError as error:
+        raise SettingError(f"{str(path)!r} cannot be read: {error.strerror or error}") from None
+    except (ValueError, RecursionError) as error:
+        raise SettingError(f"{str(path)!r} is no TOML: {error}") from None
+
+
+def _known(description: Any) -> dict[str, Expr]:
+    """The names of a formula: variables of a run and parameters, numbers all."""
+    parameters = numbers_of(description)
+    of_a_run = ("output", "local", "input", "calculatedParameter")
+    run = [
+        v.name
+        for v in description.modelVariables
+        if v.causality in of_a_run and v.type not in ("String", "Binary", "Clock")
+    ]
+    known = {"pi": sp.pi, "time": output("time")}
+    known |= {n: output(n) for n in (*parameters, *run)}
+    return known | {names.initial(n): output(names.initial(n)) for n in run}
+
+
+def _wrong(kind: str, entry: Mapping[str, Any]) -> list[str]:
+    """What is wrong with a table, of its keys and of the types of their values."""
+    keys = (*KINDS[kind].needed, *KINDS[kind].optional, *OF_ALL)
+    problems = [f"{key!r} is {_unknown(key, keys)}" for key in entry if key not in keys]
+    problems += [f"{key!r} is missing" for key in KINDS[kind].needed if key not in entry]
+    if kind == "bounds" and not {"at_least", "at_most"} & set(entry):
+        problems.append("'at_least' or 'at_most' is missing")
+    for key, value in entry.items():
+        if key in FORMULAS and not (isinstance(value, str) or _is_number(value)):
+            problems.append(f"{key} = {value!r}, expected a formula in quotes, or a number")
+        if key in POSITIVE and not (_is_number(value) and value >= 0):
+            problems.append(f"{key} = {value!r}, expected a number from 0")
+        if key in TEXTS and not isinstance(value, str):
+            problems.append(f"{key} = {value!r}, expected text")
+    if entry.get("direction", "rising") not in DIRECTIONS:
+        problems.append(f"direction = {entry['direction']!r}, expected {' or '.join(DIRECTIONS)}")
+    occurrence = entry.get("occurrence", 1)
+    if _is_number(occurrence) and not (occurrence >= 1 and float(occurrence).is_integer()):
+        problems.append(f"occurrence = {occurrence!r}, expected 1, 2, ...")
+    return problems
+
+
+def _made(
+    kind: str, entry: Mapping[str, Any], common: float, known: Mapping[str, Expr], path: Path
+) -> Against:
+    """Raises ValueError or SettingError with what is wrong with a formula or a table."""
+    within, absolute = float(entry.get("within", common)), float(entry.get("absolute", 0.0))
+    if kind == "reference":
+        if extra := sorted({"when", "scale", "name"} & set(entry)):
+            raise ValueError(f"{', '.join(map(repr, extra))} is not for a reference")
+        return Reference(read_table(path.parent / entry["file"]), within, absolute)
+    formulas, problems = {}, []
+    for key in FORMULAS:
+        if key in entry:
+            try:
+                formulas[key] = sp.sympify(read_named(str(entry[key]), known))
+            except ValueError as error:
+                problems.append(f"{key}: {error}")
+    if problems:
+        raise ValueError("; ".join(problems))
+    return Claim(
+        kind,
+        entry.get("name") or KINDS[kind].title(entry),
+        formulas,
+        within,
+        absolute,
+        DIRECTIONS[entry.get("direction", "rising")],
+        int(entry.get("occurrence", 1)),
+    )
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
+
+
+def _unknown(what: str, known: Any) -> str:
+    near = difflib.get_close_matches(what, known, 1)
+    meant = f"; did you mean {near[0]!r}?" if near else ""
+    return f"unknown, expected one of {', '.join(known)}{meant}"
