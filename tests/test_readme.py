@@ -52,8 +52,8 @@ LONG = ("tradeoff", "stress", "sweep", "page")  # studies: tried in tests of the
 
 
 def quick(command: list[str]) -> bool:
-    """Whether a command takes seconds: pages, films and choices have tests of their own."""
-    slow = {"all", "--accuracy", "--page", "--animate"}
+    """Whether a command takes seconds: pages, films, choices and statements have tests of their own."""
+    slow = {"all", "--accuracy", "--page", "--animate", "--statements"}
     long = slow & set(command) or command[0] in LONG
     return not long and Path(command[1]).suffix in (".py", ".fmu") and command[1] != "model.py"
 
