@@ -181,7 +181,7 @@ def _row(v: Variable, place: Place, states: dict[str, int]) -> str:
     high = "HUGE_VAL" if v.maximum is None else repr(float(v.maximum))
     fields = [
         string(v.name),
-        f"TYPE_{'INTEGER' if v.kind == 'Enumeration' else v.kind.upper()}",
+        f"TYPE_{v.kind.upper()}",
         f"ROLE_{'OUTPUT' if v.role == 'estimate' else v.role.upper()}",
         f"AT_{where}",
         str(index),

@@ -6,8 +6,7 @@
 
 /* NULL, and the cause, if there is no such number. */
 static const Variable *variable_of(Instance *x, unsigned reference) {
-    if (reference < (unsigned)VARIABLE_COUNT && VARIABLES[reference].type != TYPE_STRING)
-        return &VARIABLES[reference];
+    if (reference < (unsigned)VARIABLE_COUNT) return &VARIABLES[reference];
     (void)fail(&x->solver.why, "value reference %u is no number of this FMU", reference);
     return NULL;
 }

@@ -1,20 +1,26 @@
-/* fmi2.c -- the Functional Mock-up Interface 2.0.4, co-simulation and Model Exchange, around an
- * instance (instance*.c, exchange.c): inquiry, creation, life cycle.  The rest of the interface: fmi2_*.c.
+/* fmi2.c -- the Functional Mock-up Interface 2.0.4, co-simulation and Model Exchange, around an importer's
+ * instance (component.h): inquiry, creation, life cycle.  The rest of the interface: fmi2_*.c.
  *
- * Life cycle: which function may be called in which mode is what the tables of sections 2.1.6, 3.2.3
- * and 4.2.4 allow.  A call that is refused returns fmi2Error with its reason in the log and leaves the
- * instance as it was, so that the importer may correct it; a communication step that cannot be done
- * returns fmi2Discard, likewise.  Three things are allowed beyond the tables, since nothing is lost by
- * it: what can be set may be read from the beginning, every start value may also be set in
- * initialization mode, and after a discarded step another one may be tried without going back to a
- * saved state (the instance stands where it stood before).
+ * Which function may be called in which mode: fmi2_calls.h.  A call that is refused returns fmi2Error with its
+ * reason in the log and leaves the instance as it was, so that the importer may correct it; a communication step
+ * that cannot be done returns fmi2Discard, likewise.
  *
  * Memory: one block in fmi2Instantiate, one in fmi2GetFMUstate or fmi2DeSerializeFMUstate, and
  * one for the time of lagfmu_runs (fmi2_steps.c), all by the importer's callbacks. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmi2_component.h"
+#include "component.h"
+#include "fmi2.h"
+#include "fmi2_calls.h"
+
+typedef struct {
+    Component common; /* first, so that either is found from the other */
+    fmi2CallbackFunctions callbacks;
+} Component2;
+
+#define FMI2_ROW(function, exchange, steps) {#function, exchange, steps},
+SHARED_VALUE const Call FMI2_CALLS[FMI2_CALL_COUNT] = {FMI2_TABLE(FMI2_ROW)};
 
 /* ------------------------------------------------------------------ inquiry, logging */
 
@@ -22,35 +28,25 @@ const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return fmi2Version; }
 
-static void listen(Component *c, unsigned categories) {
-    c->logging = categories;
-    c->instance.quiet = !(categories & (1u << LOG_EVENTS | 1u << LOG_ALL));
-}
-
-static int category_of(const char *name) {
-    for (int k = 0; name != NULL && k < LOG_CATEGORIES; k++)
-        if (strcmp(name, CATEGORIES[k]) == 0) return k;
-    return -1;
-}
-
 fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-    Component *c = component;
-    unsigned chosen = nCategories == 0 ? ~0u : 0u;
-    Why text;
-    if (!component_allowed(c, ANY_MODE)) return component_forbidden(c, "fmi2SetDebugLogging");
-    if (nCategories > 0 && categories == NULL) return component_missing(c, "fmi2SetDebugLogging");
-    for (size_t k = 0; k < nCategories; k++) {
-        const int found = category_of(categories[k]);
-        if (found < 0) {
-            (void)fail(&text, "fmi2SetDebugLogging: no log category is called '%s'",
-                       categories[k] == NULL ? "" : categories[k]);
-            return component_refuse(c, text.text);
-        }
-        chosen |= 1u << found;
-    }
-    listen(c, loggingOn ? chosen : c->logging & ~(chosen | 1u << LOG_ALL)); /* only those (2.1.5) */
-    return fmi2OK;
+    return component_listen(component, FMI2_CALL(fmi2SetDebugLogging), loggingOn, nCategories, categories);
+}
+
+/* The logger takes printf's format.  A text without % is one as it stands, which also serves importers
+ * that do not look for further arguments. */
+static void send_by(const fmi2CallbackFunctions *callbacks, const char *name, fmi2Status status, int category,
+                    const char *text) {
+    const fmi2ComponentEnvironment environment = callbacks->componentEnvironment;
+    if (callbacks->logger == NULL) return;
+    if (strchr(text, '%') == NULL)
+        callbacks->logger(environment, name, status, CATEGORIES[category], text);
+    else
+        callbacks->logger(environment, name, status, CATEGORIES[category], "%s", text);
+}
+
+static void send_of(const Component *c, int status, int category, const char *text) {
+    send_by(&((const Component2 *)c)->callbacks, c->name, (fmi2Status)status, category, text);
 }
 
 /* ------------------------------------------------------------------ creation */
@@ -58,7 +54,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, s
 /* Nothing can be instantiated: told by the logger that was passed. */
 static fmi2Component none(const fmi2CallbackFunctions *callbacks, fmi2String name,
                           const char *text) {
-    if (callbacks != NULL) component_send(callbacks, name == NULL ? "" : name, fmi2Error, LOG_ERRORS, text);
+    if (callbacks != NULL) send_by(callbacks, name == NULL ? "" : name, fmi2Error, LOG_ERRORS, text);
     return NULL;
 }
 
@@ -101,7 +97,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 
     const size_t name_size = strlen(instanceName) + 1;
     memset(&draft, 0, sizeof draft);
-    (void)arena_take(&arena, 1, sizeof(Component));
+    (void)arena_take(&arena, 1, sizeof(Component2));
     (void)arena_take(&arena, name_size, 1);
     instance_layout(&draft, &arena);
     const size_t size = arena.used;
@@ -111,25 +107,24 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         return none(functions, instanceName, text.text);
     }
     memset(arena.base, 0, size);
-    Component *c = arena_take(&arena, 1, sizeof *c);
+    Component2 *made = arena_take(&arena, 1, sizeof *made);
+    Component *c = &made->common;
     char *name = arena_take(&arena, name_size, 1);
     memcpy(name, instanceName, name_size);
     instance_layout(&c->instance, &arena);
-    c->callbacks = callbacks;
+    made->callbacks = callbacks;
     c->name = name;
-    listen(c, loggingOn ? ~0u : 0u);
-    c->instance.tell = component_told;
-    c->instance.context = c;
-    c->instance.exchange = fmuType == fmi2ModelExchange;
-    instance_reset(&c->instance);
-    c->instance.phase = INSTANTIATED;
+    c->send = send_of;
+    c->allocate = callbacks.allocateMemory;
+    c->release = callbacks.freeMemory;
+    component_begin(c, fmuType == fmi2ModelExchange, loggingOn);
     return c;
 }
 
 void fmi2FreeInstance(fmi2Component component) {
     Component *c = component;
     if (c == NULL) return;
-    c->callbacks.freeMemory(c);
+    c->release(c);
 }
 
 /* ------------------------------------------------------------------ life cycle */
@@ -137,40 +132,30 @@ void fmi2FreeInstance(fmi2Component component) {
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDefined,
                                fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
+    const Call *call = FMI2_CALL(fmi2SetupExperiment);
     Component *c = component;
     const double *dial = toleranceDefined ? &tolerance : NULL, *stop = stopTimeDefined ? &stopTime : NULL;
-    if (!component_allowed(c, INSTANTIATED)) return component_forbidden(c, "fmi2SetupExperiment");
-    if (instance_set_up(&c->instance, dial, startTime, stop) != OK)
-        return component_refused(c, "fmi2SetupExperiment");
+    if (component_forbids(c, call)) return fmi2Error;
+    if (instance_set_up(&c->instance, dial, startTime, stop) != OK) return component_refused(c, call);
     return fmi2OK;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component component) {
-    Component *c = component;
-    if (!component_allowed(c, INSTANTIATED)) return component_forbidden(c, "fmi2EnterInitializationMode");
-    c->instance.phase = INITIALIZATION;
-    return fmi2OK;
+    return component_turn(component, FMI2_CALL(fmi2EnterInitializationMode), INITIALIZATION);
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component component) {
-    Component *c = component;
-    if (!component_allowed(c, INITIALIZATION)) return component_forbidden(c, "fmi2ExitInitializationMode");
-    if (instance_initialize(&c->instance) != OK) return component_failed(c, fmi2Error);
-    c->instance.phase = c->instance.exchange ? EVENT : STEP_COMPLETE;
-    return fmi2OK;
+    const Component *c = component;
+    const int next = c != NULL && c->instance.exchange ? EVENT : STEP_COMPLETE;
+    return component_initialize(component, FMI2_CALL(fmi2ExitInitializationMode), next);
 }
 
 fmi2Status fmi2Terminate(fmi2Component component) {
-    Component *c = component;
-    if (!component_allowed(c, STEPPING | EXCHANGE)) return component_forbidden(c, "fmi2Terminate");
-    c->instance.phase = TERMINATED;
-    return fmi2OK;
+    return component_turn(component, FMI2_CALL(fmi2Terminate), TERMINATED);
 }
 
 fmi2Status fmi2Reset(fmi2Component component) {
-    Component *c = component;
-    if (!component_allowed(c, ANY_MODE)) return component_forbidden(c, "fmi2Reset");
-    instance_reset(&c->instance);
-    c->instance.phase = INSTANTIATED;
+    if (component_forbids(component, FMI2_CALL(fmi2Reset))) return fmi2Error;
+    component_reset(component);
     return fmi2OK;
 }

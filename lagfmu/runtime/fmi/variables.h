@@ -6,7 +6,7 @@
 #include "linkage.h"
 #include "state.h"
 
-typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN, TYPE_STRING } Type;
+typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_ENUMERATION, TYPE_BOOLEAN } Type;
 
 /* what may set it */
 typedef enum { ROLE_PARAMETER, ROLE_START, ROLE_INPUT, ROLE_SOLVER, ROLE_OUTPUT } Role;
