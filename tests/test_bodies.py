@@ -85,6 +85,7 @@ def test_a_pin_carries_a_compound_pendulum():
         joints=[Revolute("A", ground.at((0, 0), rotation=-pi / 2), bob.at((-d, 0)))],
         loads=[Gravity((0, -g))],
         start={"angle.A": start, "der(angle.A)": -0.7},
+        read={"end": bob.at((0.3, 0))},
     )
     run = moved(model)
     phi, rate, acceleration = (run[n] for n in ("angle.A", "der(angle.A)", "der(angle.A,2)"))
@@ -103,6 +104,11 @@ def test_a_pin_carries_a_compound_pendulum():
     assert run["unique.A.x"].all()
     assert run["unique.A.y"].all()
     assert run["bob.omega.z"] == pytest.approx(rate, rel=1e-14)
+    out, aside = (np.sin(phi), -np.cos(phi)), (np.cos(phi), np.sin(phi))  # of the rod
+    for k, x in enumerate("xy"):
+        end = 0.7 * np.array([out[k], rate * aside[k], acceleration * aside[k] - rate**2 * out[k]])
+        told = [run[f"end.{what}.{x}"] for what in ("position", "velocity", "acceleration")]
+        np.testing.assert_allclose(told, end, rtol=1e-10, atol=1e-12)
 
 
 def test_a_bracket_carries_what_hangs_on_it():
@@ -514,6 +520,9 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
         ),
         ({"joints": [pin, Gear("G", "A", "A", 2.0)]}, "Gear 'G' ties 'A' to itself"),
         ({"plane": "yz"}, "plane = 'yz', expected 'xy'"),
+        ({"read": {"tip": pin}}, "Reading 'tip': at is Revolute("),
+        ({"read": {"tip": ground.at((0, 0))}}, "'tip': its marker is on the ground"),
+        ({"read": {"arm": arm}}, "'arm' is used twice, by a Body and a Reading"),
         ({"start": {"angle.B": 1.0}}, "start names 'angle.B', which does not begin anywhere"),
         ({"start": {"arm.position": 1.0}}, "start of 'arm.position' is 1.0, expected 2 numbers"),
         ({"start": {"arm.position.x": "left"}}, "is 'left', expected finite numbers"),

@@ -49,7 +49,7 @@ KINDS = [
 ]
 
 
-def pair(kind):
+def pair(kind, **more):
     """A first body on a ball joint, a second on it by the joint of that kind, both with products of inertia,
     centres of mass aside and oblique markers."""
     one = Body("one", 1.5, (0.04, 0.05, 0.06, 0.004, -0.003, 0.002), center=(0.02, 0.01, -0.03))
@@ -67,6 +67,7 @@ def pair(kind):
             joints=[pivot, kind("K", at, end)],
             loads=[Gravity(FALL)],
             start=start,
+            **{name: of(one, two) for name, of in more.items()},
         )
 
 
@@ -127,6 +128,59 @@ def test_newton_and_euler_hold_with_the_reported_wrenches(kind):
             J = np.array(inertia[b])
             moment = sum(t + np.cross(p - r[b], f) for f, t, p in wrenches[b])
             np.testing.assert_allclose(R[b].T @ moment, J @ rate + np.cross(w, J @ w), atol=1e-12)
+
+
+def test_a_marker_is_told_as_its_body_carries_it():
+    """r + R s, r' + R (w x s), r'' + R (w' x s + w x (w x s)) along the ground's axes, and URDF's angles of R
+    and of the marker's own rotation."""
+    run = simulate(
+        pair(
+            Revolute, read=lambda one, two: {"end": two.at((0.05, -0.2, 0.1), TILT), "frame": one}
+        ),
+        0.2,
+        0.1,
+        tolerance=1e-10,
+        target="python",
+    )
+    for row in run:
+        R, w = turning(row, "two"), vector(row, "two.omega")
+        rates = np.array([row[f"der(two.omega.{x})"] for x in "xyz"])
+        acceleration = np.array([row[f"der(two.position.{x},2)"] for x in "xyz"])
+        s = np.array([0.06, -0.25, 0.08])
+        told = {
+            "position": vector(row, "two.position") + R @ s,
+            "velocity": vector(row, "two.velocity") + R @ np.cross(w, s),
+            "acceleration": acceleration + R @ (np.cross(rates, s) + np.cross(w, np.cross(w, s))),
+        }
+        for what, expected in told.items():
+            np.testing.assert_allclose(vector(row, f"end.{what}"), expected, atol=1e-12)
+        for name, axes in (("end", R @ rpy(0.3, -0.4, 0.2)), ("frame", turning(row, "one"))):
+            np.testing.assert_allclose(rpy(*turned(row, name)), axes, atol=1e-14)
+
+
+def turned(row, name):
+    return [row[f"{name}.rpy.{x}"] for x in ("roll", "pitch", "yaw")]
+
+
+def test_roll_pitch_and_yaw_begin_and_are_told_at_gimbal_lock_too():
+    """At a pitch of 90 degrees roll and yaw turn about one line: the attitude alone determines the three
+    together, which are told so that they are it; elsewhere they are what was given."""
+    box = Body("box", 1.0, (0.1, 0.1, 0.1))
+
+    side = {"side": box.at((0, 0, 0), rotation=TILT)}
+    for angles in [(0.3, -0.4, 3.0), (-3.0, 1.5, 0.2)]:
+        model = mechanism("Box", bodies=[box], start={"side.rpy": angles}, read=side)
+        row = simulate(model, 0.001, 0.001, target="python")[0]
+        assert turned(row, "side") == pytest.approx(angles, rel=1e-13)
+    at_lock = (
+        ((0, pi / 2, 0), "python"),
+        ((0.3, pi / 2, 0.5), "native"),
+        ((0.7, -pi / 2, 0), "python"),
+    )
+    for angles, target in at_lock:
+        model = mechanism("Box", bodies=[box], start={"box.rpy": angles}, read={"frame": box})
+        row = simulate(model, 0.001, 0.001, target=target)[0]
+        np.testing.assert_allclose(rpy(*turned(row, "frame")), rpy(*angles), atol=1e-14)
 
 
 def slider_crank(hinge=Revolute):
@@ -249,6 +303,11 @@ arm = Body("arm", 1.0, (0.1, 0.1, 0.1))
                 "loads": [Motor("motor", "A")],
             },
             "Cylindrical 'A' has no angle or position or both, expected one of angle.A, position.A",
+        ),
+        ({"start": {"arm.rpy": 0.3}}, "start of 'arm.rpy' is 0.3, expected three numbers: roll"),
+        (
+            {"start": {"arm.rpy": (0, 0, 1), "arm.orientation.w": 1.0}},
+            "the attitude of 'arm' is given twice",
         ),
     ],
 )

@@ -10,20 +10,18 @@ each that does is told with both numbers.
 
 from __future__ import annotations
 
-import difflib
-import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from ..errors import LagfmuWarning, ModelError
-from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, is_number, name_of
+from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, name_of
 from ..model.model import Model
-from ..names import derivative
 from .draft import Draft
+from .given import given_values, known_names
 from .guess import guessed
 from .rows import TIME, Array, Rows, condition, numbers_of
 
@@ -45,8 +43,8 @@ def assemble(
 
     Raises ModelError if a name is unknown, or the joints cannot be closed.
     """
-    known = _known(draft, model)
-    given = _given(model, known, start)
+    known = known_names(draft, model)
+    given = given_values(draft, model, known, start)
     places = {n: x for n, x in given.items() if not known[n].of_velocities}
     rates = {n: x for n, x in given.items() if known[n].of_velocities}
     acting = [
@@ -179,57 +177,6 @@ class _Moving:
         missing = wanted - np.concatenate([r.drifts(q) for r in rows]) - A @ v
         size = self._sizes(A)
         return v + self._least(A / size[:, None], missing / size)
-
-
-class Beginning(NamedTuple):
-    """What may begin somewhere: its value and its rate; `of_velocities`: the rate is what begins."""
-
-    value: Expr
-    rate: Expr
-    of_velocities: bool
-
-
-def _known(draft: Draft, model: Model) -> dict[str, Beginning]:
-    """By their names in the FMU."""
-    found: dict[str, Beginning] = {}
-    for q in model.coordinates:
-        rate = model.kinematics.get(q, q.diff(TIME))
-        found[name_of(q)] = Beginning(q, rate, False)
-        found[derivative(name_of(q))] = Beginning(sp.S.Zero, rate, True)
-    found |= {name_of(w): Beginning(sp.S.Zero, w, True) for w in model.speeds}
-    for of in draft.relative.values():
-        value, rate, _ = of.values
-        found[of.name] = Beginning(value, rate, False)
-        found[derivative(of.name)] = Beginning(sp.S.Zero, rate, True)
-    moving = re.compile(r"\w+\.(velocity|omega)\.\w")
-    outputs = (o for o in draft.outputs if moving.fullmatch(o.name))
-    return found | {o.name: Beginning(sp.S.Zero, o.expression, True) for o in outputs}
-
-
-def _given(model: Model, known: Mapping[str, Any], start: Mapping[str, Any]) -> dict[str, float]:
-    """Each component by itself.  Raises ModelError for names and values that cannot be."""
-    found: dict[str, float] = {}
-    problems = []
-    for name, value in start.items():
-        parts = [n for n in known if n.startswith(f"{name}.")]
-        values = [value] if name in known else value
-        if name not in known and not parts:
-            near = difflib.get_close_matches(str(name), known, 1)
-            problems.append(
-                f"start names {name!r}, which does not begin anywhere, expected a coordinate, the angle or "
-                f"the position of a joint, or a rate of these{f'; did you mean {near[0]!r}?' if near else ''}"
-            )
-        elif not isinstance(values, Sequence) or len(values) != len(parts or values):
-            problems.append(f"start of {name!r} is {value!r}, expected {len(parts)} numbers")
-        elif not all(map(is_number, values)):
-            problems.append(f"start of {name!r} is {value!r}, expected finite numbers")
-        else:
-            names = [name] if name in known else parts
-            norm = float(np.linalg.norm(values)) if len(parts) == 4 else 1.0
-            found |= {n: float(x) / (norm or 1.0) for n, x in zip(names, values, strict=True)}
-    if problems:
-        raise ModelError(model.name, problems)
-    return found
 
 
 def _open(names: Sequence[str], values: Array, missed: Array) -> Iterator[str]:

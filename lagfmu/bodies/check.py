@@ -13,6 +13,7 @@ from .body import Body, Ground, Marker
 from .contacts import Contact
 from .joints import Distance, Gear, Joint, Rolling, Universal, name_of_joint
 from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
+from .readings import Reading
 from .rotation import problem_of
 from .space import PAIRS
 from .vectors import AXES
@@ -33,7 +34,7 @@ def problems_of(plane: object, bodies: Sequence[Any], parts: Sequence[Any]) -> l
     problems += [
         f"joints and loads hold {p!r}, expected one of {', '.join(k.__name__ for k in PARTS)}"
         for p in parts
-        if not isinstance(p, PARTS)
+        if not isinstance(p, (*PARTS, Reading))
     ]
     if problems:
         return problems
@@ -137,6 +138,8 @@ def _of_markers(part: Any, bodies: Sequence[Body], planar: bool) -> Iterator[str
             yield f"{what}: its {field} marker is turned by {turned!r}, expected an angle in the plane [rad]"
         elif not planar and (wrong := problem_of(marker)):
             yield f"{what}: its {field} marker: {wrong}"
+    if isinstance(part, Reading) and isinstance(part.at, Marker) and part.at.body == Ground():
+        yield f"{what}: its marker is on the ground, which does not move: read one on a body"
     first, second = found.get("first"), found.get("second")
     if isinstance(first, Marker) and isinstance(second, Marker) and first.body == second.body:
         yield (

@@ -81,6 +81,7 @@ class Draft:
         self.wound: set[str] = set()  # angles that something needs over many turns
         self.unwrapped: dict[Expr, tuple[Expr, Expr]] = {}  # in space: rate, and value modulo 2 pi
         self.placed: dict[Marker, Placed] = {}
+        self.readings: dict[str, Placed] = {}  # markers that are read on request, by name
 
     # ------------------------------------------------------------------ numbers
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import sympy as sp
 
+from .. import names
 from ..errors import ModelError
 from ..model.elements import Input, Output, Parameter
 from ..model.model import Model
-from ..names import read
 from .assembly import assemble
 from .body import Body, Ground
 from .check import problems_of
@@ -20,6 +20,7 @@ from .joints import Gear, Joint
 from .loads import Motor, Torsion
 from .picture import picture_of
 from .plane import PlaneMotion
+from .readings import readings_of
 from .space import SpaceMotion
 from .told import lines_of
 from .vectors import AXES
@@ -34,6 +35,7 @@ def mechanism(
     contacts: Sequence[Any] = (),
     plane: str | None = None,
     start: Mapping[str, Any] | None = None,
+    read: Mapping[str, Any] | None = None,
     parameters: Sequence[Parameter] = (),
     inputs: Sequence[Input] = (),
     outputs: Sequence[Output] = (),
@@ -42,14 +44,16 @@ def mechanism(
     """The Model of a mechanism in space; with `plane` = 'xy' all points, forces and axes are of that plane.
 
     `start` maps names of the FMU to where they begin: 'angle.A', 'der(angle.A)', 'rod.position.x', or
-    'rod.position' to all of its components.  The rest is assembled: what is omitted moves first.
+    'rod.position' to all of its components; in space 'rod.rpy' to roll, pitch and yaw [rad].  The rest is
+    assembled: what is omitted moves first.  `read` maps names to markers (to a body: its own frame), of which
+    the FMU then tells NAME.position.x, NAME.velocity.x, NAME.acceleration.x and, in space, NAME.rpy.roll.
     `parameters`, `inputs`, `outputs` and `more` (a description, an author, a page) go to the Model as they
     are.
 
     Raises ModelError with every problem at once; of a mechanism that cannot be closed, by how much which
     joint misses.
     """
-    parts = [*joints, *loads, *contacts]
+    parts = [*joints, *loads, *contacts, *readings_of(read or {}, plane is not None)]
     problems = problems_of(plane, bodies, parts)
     if problems:
         raise ModelError(str(name), problems)
@@ -94,6 +98,6 @@ def _wound(parts: Sequence[Any], start: Mapping[str, Any]) -> set[str]:
     named: list[Any] = [j for j in joints.values() if j.limits is not None]
     named += [j for p in parts if isinstance(p, Gear) for j in (p.first, p.second)]
     named += [p.joint for p in parts if isinstance(p, Motor | Torsion)]
-    names = {j if isinstance(j, str) else j.name for j in named}
-    found = {n if n.startswith("angle.") else f"angle.{n}" for n in names}
-    return found | {read(name).coordinate for name in start if "angle." in name}
+    called = {j if isinstance(j, str) else j.name for j in named}
+    found = {n if n.startswith("angle.") else f"angle.{n}" for n in called}
+    return found | {names.read(name).coordinate for name in start if "angle." in name}

@@ -18,7 +18,7 @@ ROUNDING = 1e-15
 
 def rotation_of(marker: Marker) -> Rotation:
     """The matrix whose columns are the marker's axes in the body's frame."""
-    R = _oblique(marker.axis) if marker.axis is not None else _given(marker.rotation)
+    R = _oblique(marker.axis) if marker.axis is not None else given_rotation(marker.rotation)
     return tuple(tuple(_number(x) for x in row) for row in R)  # type: ignore[return-value]
 
 
@@ -27,7 +27,7 @@ def problem_of(marker: Marker) -> str:
     if marker.axis is not None and marker.rotation is not None:
         return "it has a rotation and an axis: leave out one of them"
     try:
-        R = _oblique(marker.axis) if marker.axis is not None else _given(marker.rotation)
+        R = _oblique(marker.axis) if marker.axis is not None else given_rotation(marker.rotation)
         R = np.array(R, dtype=float)
     except (TypeError, ValueError, ZeroDivisionError):
         R = np.zeros((3, 3))
@@ -53,7 +53,8 @@ def _number(x: Any) -> Expr:
     return sp.Integer(nearest) if abs(value - nearest) < ROUNDING else sp.Float(value, 17)
 
 
-def _given(rotation: Any) -> Any:
+def given_rotation(rotation: Any) -> Any:
+    """Of a matrix, a quaternion or ('rpy', roll, pitch, yaw)."""
     if rotation is None:
         return np.eye(3)
     if isinstance(rotation, Sequence) and len(rotation) == 4 and rotation[0] == "rpy":
