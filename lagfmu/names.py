@@ -46,6 +46,7 @@ ENERGY, SOLVER = "energy", "solver"
 RATE = re.compile(r"der\((?!energy\.)([\w.]+)(?:,(\d+))?\)")
 ERROR = "error"  # how far off another variable may be: error.lambda.rod
 STEPS = "solver.steps"
+TIME, INDICATOR, CLOCK = "time", "indicator", "clock"  # what FMI 3.0 has variables for, besides
 FOLLOWS = "unless another start is set"  # ends the description of a start that is an expression
 METHOD, TOLERANCE, STEP = "solver.method", "solver.tolerance", "solver.step"
 MAXIMUM_STEP, MAXIMUM_STEPS = "solver.maximum_step", "solver.maximum_steps"

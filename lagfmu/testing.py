@@ -23,8 +23,10 @@ from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch
 from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
 from .fmu.description import model_description
+from .fmu.description3 import build_description
 from .fmu.exchange import by_fmpy
-from .fmu.native import GENERATED
+from .fmu.face import Face
+from .fmu.native import GENERATED, sources_of
 from .fmu.read import (
     Trajectory,
     communication_points,
@@ -35,7 +37,7 @@ from .fmu.read import (
 )
 from .fmu.session import RefusalError, Session
 from .fmu.target import NoCompilerWarning
-from .fmu.write import write
+from .fmu.write import as_built, write
 from .interface.rules import problems_of
 from .live import moving, wasm
 from .live.moving import Moving

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .binary import BATCH, listen
+from .binary import BATCH, is_ours, listen
 from .session import WARNING, RefusalError, Run, Session
 
 LAST, MAX, MIN, MEAN, TIME_OF_MAX = range(5)  # Keep in batch.h
@@ -59,7 +59,7 @@ def run_batch(session: Session, plan: Plan, values: NDArray[np.float64]) -> Outc
         {},
     )
     values = np.ascontiguousarray(values, dtype=np.float64)
-    if hasattr(getattr(session.instance, "dll", None), BATCH):
+    if is_ours(session.instance):
         _in_library(session, plan, values, found)
     else:
         in_session(session, plan, values, found)

@@ -19,13 +19,17 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
+from .binary3 import Slave3
+
 BATCH = "lagfmu_runs"  # many runs in one call (runtime/fmi/batch.h)
 Hear = Callable[[int, str], None]  # the status of a message, and its text
 
 _here = threading.local()  # fmpy's proxy of the logger knows one logger a process
 
 
-def _log(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
+def _log(*told: Any) -> None:
+    """As the callback of either version, whose last are the status, the category and the message."""
+    status, _, message = told[-3:]
     hear = getattr(_here, "hear", None)
     if hear is not None:
         hear(status, " ".join(message.decode(errors="replace").split()))
@@ -39,20 +43,34 @@ def listen(hear: Hear | None) -> None:
     _here.hear = hear
 
 
-def instantiated(folder: Path, description: Any, name: str, log: bool) -> FMU2Slave:
+def instantiated(folder: Path, description: Any, name: str, log: bool) -> FMU2Slave | Slave3:
     """An instance for co-simulation of the FMU that lies unpacked in `folder`; one of lagfmu gives its
     reasons unasked, and logs what it need not say only with `log`.  Raises what fmpy raises."""
+    library = {
+        "instanceName": name,
+        "guid": description.guid,
+        "modelIdentifier": description.coSimulation.modelIdentifier,
+        "unzipDirectory": str(folder),
+    }
+    with contextlib.chdir("."):  # fmpy stays in the folder of a library that it cannot load
+        if description.fmiVersion == "2.0":
+            slave = FMU2Slave(**library)
+            slave.instantiate(callbacks=_callbacks(), loggingOn=log or not is_ours(slave))
+            return slave
+        slave = Slave3(description.modelVariables, **library)
+        slave.begin(_log, log or not is_ours(slave))
+    return slave
+
+
+def is_ours(slave: Any) -> bool:
+    """Whether the library of an instance is lagfmu's."""
+    return hasattr(getattr(slave, "dll", None), BATCH)
+
+
+def _callbacks() -> fmi2CallbackFunctions:
     callbacks = fmi2CallbackFunctions()
     callbacks.logger = LOGGER
     callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
     addLoggerProxy(ctypes.byref(callbacks))  # formats a message with its arguments
-    with contextlib.chdir("."):  # fmpy stays in the folder of a library that it cannot load
-        slave = FMU2Slave(
-            instanceName=name,
-            guid=description.guid,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            unzipDirectory=str(folder),
-        )
-        slave.instantiate(callbacks=callbacks, loggingOn=log or not hasattr(slave.dll, BATCH))
-    return slave
+    return callbacks

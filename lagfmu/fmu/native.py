@@ -13,24 +13,14 @@ from ..codegen.c.variables import variables_source
 from ..errors import BuildError
 from ..prepare.prepare import Prepared
 from .archive import pack, tool
+from .capabilities import interfaces_of
 from .compiler import HOST, Platform, chosen, compile_libraries, host, is_first
 from .description import guid_of, model_description
+from .description3 import build_description
+from .face import FMI2, Face
 from .target import missing_for_native
 from .trial import check_start
 
-CAPABILITIES = {
-    "needsExecutionTool": "false",
-    "canBeInstantiatedOnlyOncePerProcess": "false",
-    "canNotUseMemoryManagementFunctions": "false",
-    "canGetAndSetFMUstate": "true",
-    "canSerializeFMUstate": "true",
-}
-CO_SIMULATION = {
-    "canHandleVariableCommunicationStepSize": "true",
-    "canInterpolateInputs": "true",
-    "canRunAsynchronuously": "false",
-}
-MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "false"}
 ALL = "all.c"
 INCLUDING = """/* {file} -- the file to compile: it includes all others, whose names are static here. */
 #define LAGFMU_IN_ONE_FILE
@@ -74,29 +64,35 @@ def build(
     extra: Mapping[str, bytes],
     platforms: Sequence[str] = (HOST,),
     sources: bool = True,
+    face: Face = FMI2,
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content; `sources`: it
     carries its C files.  Raises CannotStartError for one that refuses its own start."""
     wanted, scene = chosen(platforms), prepared.scene
-    made = sources_of(prepared, sources)
+    made = sources_of(prepared, sources, face)
     libraries = made.compiled(scene.name, wanted)
-    _check_start(prepared, made, libraries)
+    _check_start(prepared, made, libraries, face)
     contents = {"modelDescription.xml": made.description, **extra}
     for platform in wanted:
-        path = f"binaries/{platform.folder}/{scene.name}{platform.suffix}"
+        path = f"{face.binaries(platform)}/{scene.name}{platform.suffix}"
         contents[path] = libraries[platform.folder]
     for name, text in made.shipped.items() if sources else ():
         contents[f"sources/{name}"] = text
+    if sources and face.fmi == 3:
+        contents["sources/buildDescription.xml"] = build_description(scene.name, (ALL,))
     return pack(contents)
 
 
-def _check_start(prepared: Prepared, made: Sources, libraries: Mapping[str, bytes]) -> None:
+def _check_start(
+    prepared: Prepared, made: Sources, libraries: Mapping[str, bytes], face: Face = FMI2
+) -> None:
     """Raises CannotStartError; of an FMU for other machines alone it is asked where there are frictions."""
     here = host()
     if here.folder not in libraries and prepared.system.frictions:
         libraries = made.compiled(prepared.scene.name, [here])
     if here.folder in libraries:
-        check_start(prepared, made.description, libraries[here.folder])
+        place = f"{face.binaries(here)}/{prepared.scene.name}{here.suffix}"
+        check_start(prepared, made.description, libraries[here.folder], place)
 
 
 def try_start(prepared: Prepared) -> str:
@@ -108,12 +104,7 @@ def try_start(prepared: Prepared) -> str:
     return missing
 
 
-def offers_exchange(prepared: Prepared) -> bool:
-    """Model exchange besides co-simulation: not where the FMU runs twice, or keeps points of an input."""
-    return not (prepared.system.estimated or prepared.scene.error_bars)
-
-
-def sources_of(prepared: Prepared, listed: bool = True) -> Sources:
+def sources_of(prepared: Prepared, listed: bool = True, face: Face = FMI2) -> Sources:
     """The C files and the description, which has them `listed` where the FMU carries them.
 
     Raises BuildError for a method that cannot step the model.
@@ -134,30 +125,22 @@ def sources_of(prepared: Prepared, listed: bool = True) -> Sources:
         "variables.c": variables_source(table, form, scene, system).encode(),
         "optional.c": optional_source(scene, system, integrators, bool(table.measured)).encode(),
     }
-    gone |= generated.keys()
+    gone |= generated.keys() | {file for file in everything if not face.holds(file)}
     runtime = {file: text for file, text in everything.items() if file not in gone}
-    differentiable = scene.differentiable and not system.frictions
-    common = {
-        "modelIdentifier": scene.name,
-        **CAPABILITIES,
-        "providesDirectionalDerivative": "true" if differentiable else "false",
-    }
-    order = {"maxOutputDerivativeOrder": "1" if differentiable else "0"}
-    exchanged = offers_exchange(prepared)
     watched = len(system.contacts) + len(system.switches) + 2 * len(system.frictions)
+    interfaces = interfaces_of(prepared, face)
+    exchanged = "ModelExchange" in interfaces
     description = model_description(
         table,
         scene,
         prepared.model,
         tool(),
-        {
-            **({"ModelExchange": {**common, **MODEL_EXCHANGE}} if exchanged else {}),
-            "CoSimulation": {**common, **CO_SIMULATION, **order},
-        },
+        interfaces,
         b"".join(name.encode() + text for name, text in (runtime | generated).items()),
         sources=(ALL,) if listed else (),
         event_indicators=watched if exchanged else 0,
         reinitialized=table.states if exchanged and system.rows else (),
+        fmi=face.fmi,
     )
     identity = {"identity.h": IDENTITY.format(guid=guid_of(description)).encode()}
     return Sources(description, runtime, generated | identity)

@@ -18,6 +18,8 @@ from ..model.rule import Rule
 from .archive import opened, platforms
 from .target import NATIVE, PYTHON
 
+PLATFORMS = {"2": fmpy.platform, "3": fmpy.platform_tuple}  # of this machine, by version of FMI
+TYPES = {"Float64": "Real", "Int32": "Integer"}  # types of FMI 3.0 as FMI 2.0 calls them
 MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
@@ -59,14 +61,21 @@ def communication_points(stop_time: float, step_size: float) -> NDArray[np.float
 
 def obstacle(path: Path, description: Any) -> str:
     """Why a session cannot step an FMU, a file or an unpacked folder, on this machine; empty if it can."""
-    if description.fmiVersion != "2.0":
-        return f"is an FMU of FMI {description.fmiVersion}, expected FMI 2.0"
+    version = description.fmiVersion
+    here = PLATFORMS.get(version.partition(".")[0])
+    if here is None:
+        return f"is an FMU of FMI {version}, expected FMI 2.0 or 3.0"
     if description.coSimulation is None:
         return "has no co-simulation"
     found = platforms(path)
-    if fmpy.platform in found:
+    if here in found:
         return ""
-    return f"has no binary for this machine ({fmpy.platform}), but for {', '.join(found) or 'none'}"
+    return f"has no binary for this machine ({here}), but for {', '.join(found) or 'none'}"
+
+
+def kind_of(v: Any) -> str:
+    """What a variable of fmpy's is, in the words of FMI 2.0; an array is none of what is read here."""
+    return "Array" if v.dimensions else TYPES.get(v.type, v.type)
 
 
 def numbers_of(description: Any) -> dict[str, float]:
@@ -74,7 +83,7 @@ def numbers_of(description: Any) -> dict[str, float]:
     return {
         v.name: float(v.start)
         for v in description.modelVariables
-        if v.type == "Real" and v.causality in ("parameter", "input") and v.start is not None
+        if kind_of(v) == "Real" and v.causality in ("parameter", "input") and v.start is not None
     }
 
 
@@ -101,15 +110,15 @@ def described_rules(description: Any) -> dict[str, Rule]:
 
 
 def _rule(v: Any) -> Rule:
-    items = getattr(v.declaredType, "items", None) or [] if v.type == "Enumeration" else []
+    items = getattr(v.declaredType, "items", None) or [] if kind_of(v) == "Enumeration" else []
     return Rule(
         v.name,
-        v.type,
+        kind_of(v),
         v.causality in ("parameter", "input") or v.initial in ("exact", "approx"),
         None if v.min is None else float(v.min),
         None if v.max is None else float(v.max),
         items={item.name: int(item.value) for item in items},
-        start=float(v.start) if v.type == "Real" and v.start is not None else None,
+        start=float(v.start) if kind_of(v) == "Real" and v.start is not None else None,
         follows=(v.description or "").endswith(names.FOLLOWS),
     )
 

@@ -11,16 +11,15 @@ from pathlib import Path
 
 from ..errors import CannotStartError
 from ..prepare.prepare import Prepared
-from .compiler import host
 from .session import RefusalError, Session
 
 
-def check_start(prepared: Prepared, description: bytes, library: bytes) -> None:
-    """Initialize an instance of `library`, that of this machine.  Raises CannotStartError with its reason."""
-    here = host()
+def check_start(prepared: Prepared, description: bytes, library: bytes, path: str) -> None:
+    """Initialize an instance of `library`, that of this machine, whose place in the FMU is `path`.  Raises
+    CannotStartError with its reason."""
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         Path(folder, "modelDescription.xml").write_bytes(description)
-        place = Path(folder, "binaries", here.folder, prepared.scene.name + here.suffix)
+        place = Path(folder, path)
         place.parent.mkdir(parents=True)
         place.write_bytes(library)
         try:

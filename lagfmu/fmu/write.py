@@ -15,6 +15,7 @@ import numpy as np
 
 from .. import names
 from ..errors import BuildError, SettingError
+from ..interface.further import with_further
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import load
 from ..model.model import Contact, Model, Peak
@@ -28,8 +29,10 @@ from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
+from .capabilities import offers_exchange
 from .closed_forms import pack_closed_forms
 from .compiler import HOST
+from .face import FMI2, Face
 from .target import NATIVE, target_of
 
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
@@ -48,6 +51,7 @@ def write(
     choice: str = "",
     live: str = "",
     sources: bool = True,
+    face: Face = FMI2,
 ) -> Path:
     """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
 
@@ -57,10 +61,11 @@ def write(
     ModelError if one in the model's `start` moves by more than 1e-6 of its coordinate's size.
     """
     target = target_of(target)
+    face.check_target(target)
     moved, missed = prepared.structure.start.moved, prepared.structure.missed
     check_given(prepared.model.name, moved, missed)
     tell(moved)
-    prepared = as_built(prepared, target)
+    prepared = as_built(prepared, target, face)
     extra = {
         PAGE: page(prepared, choice, bool(live)).encode(),
         "resources/lagfmu.json": pack_closed_forms(
@@ -81,7 +86,7 @@ def write(
     if (preset := presets.preset_of(prepared)) is not None:
         extra[presets.IN_FMU] = presets.as_bytes(preset)
     if target == NATIVE:
-        content = native.build(prepared, extra, platforms, sources)
+        content = native.build(prepared, extra, platforms, sources, face)
     else:
         content = python.build(prepared, extra)
     path = Path(out)
@@ -164,12 +169,17 @@ def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]
     write_whole(path, pack(contents))
 
 
-def as_built(prepared: Prepared, target: str) -> Prepared:
-    """With the nominal values of states; a python FMU has no model exchange and no native variables."""
+def as_built(prepared: Prepared, target: str, face: Face = FMI2) -> Prepared:
+    """With the nominal values of states, and what the interface has variables for; a python FMU has no model
+    exchange and no native variables."""
     table = prepared.table if target == NATIVE else python.offered(prepared)
     table = table.with_nominals(_nominals(prepared))
-    if target != NATIVE or not native.offers_exchange(prepared):
+    exchanged = target == NATIVE and offers_exchange(prepared)
+    if not exchanged:
         table = table.without_local_derivatives()
+    if face.fmi == 3:
+        model, more = prepared.model.name, (exchanged, face.clocks, face.arrays)
+        table = with_further(table, prepared.system, model, *more)
     return replace(prepared, table=table)
 
 

@@ -1,4 +1,4 @@
-"""What a variable depends on: inputs and states at a communication point, and what says its start."""
+"""What a variable depends on: inputs, states and the time at a communication point; what says its start."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from functools import cached_property
 
 import sympy as sp
 
+from .. import names
 from ..mechanics.coupling import coupled
-from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.form import Form
 from ..model.elements import Expr
 
@@ -34,11 +35,12 @@ class Dependencies:
         self.starts = {name: self.given.get(name, sp.S.Zero) for name in self.states}
 
     def symbols(self, *expressions: Expr) -> set[str]:
-        """Names of the symbols that the expressions hold, reduced coordinates put in."""
+        """Names of the symbols that the expressions hold, reduced coordinates put in; of the time, `time`."""
         found: set[str] = set()
         for e in expressions:
             if e is not None:
-                found |= {str(s) for s in sp.sympify(e).xreplace(self.into).free_symbols}
+                held = sp.sympify(e).xreplace(self.into).free_symbols
+                found |= {names.TIME if s == TIME else str(s) for s in held}
         return found
 
     def rates(self, k: int) -> set[str]:
@@ -97,11 +99,11 @@ class Dependencies:
         return moved | {str(eom.q[j]) for j in settled}
 
     def at_points(self, symbols: Iterable[str]) -> tuple[str, ...]:
-        """Inputs and states behind a value at a communication point."""
-        return self._sorted(self.known.intersection(symbols))
+        """Inputs, states and the time behind a value at a communication point."""
+        return self._sorted((self.known | {names.TIME}).intersection(symbols))
 
     def at_start(self, symbols: Iterable[str]) -> tuple[str, ...]:
-        """Inputs, parameters and exact start values behind a value at the start."""
+        """Inputs, parameters, exact start values and the time behind a value at the start."""
         found = set(symbols)
         for own, behind in self._stepped_groups:
             if found & own & self.movable:
@@ -110,11 +112,11 @@ class Dependencies:
         formulas = {name for name, e in self.starts.items() if e.free_symbols}
         found |= self.symbols(*(self.starts[name] for name in found & formulas))
         exact = set(self.states) - self.movable - formulas
-        return self._sorted(found & (parameters | exact | set(self.inputs)))
+        return self._sorted(found & (parameters | exact | {*self.inputs, names.TIME}))
 
-    def _sorted(self, names: set[str]) -> tuple[str, ...]:
-        order = [*(str(p) for p in self.eom.p), *self.inputs, *self.states]
-        return tuple(n for n in order if n in names)
+    def _sorted(self, found: set[str]) -> tuple[str, ...]:
+        order = [*(str(p) for p in self.eom.p), *self.inputs, *self.states, names.TIME]
+        return tuple(n for n in order if n in found)
 
 
 def _moved(eom: EquationsOfMotion, speeds: Collection[int]) -> set[str]:

@@ -17,7 +17,7 @@ from ..model.rule import Rule, missing
 if TYPE_CHECKING:  # who runs an FMU needs no SymPy
     from .variables import VariableTable
 
-CALCULATED = ("output", "estimate")  # roles of what nobody sets
+CALCULATED = ("output", "estimate", "interface")  # roles of what nobody sets
 
 
 def rules_of(table: VariableTable) -> dict[str, Rule]:

@@ -25,7 +25,7 @@ def variable_table(form: Form, scene: Scene) -> VariableTable:
     table = _table(form, scene)
     if scene.reals_only:
         table = table.as_reals()
-    problems = _collisions([v.name for v in table.variables])
+    problems = collisions([v.name for v in table.variables])
     for v in table.variables:
         if v.unit is not None and any(e.denominator != 1 for e in v.unit.exponents):
             problems.append(
@@ -72,7 +72,8 @@ def _displayed(v: Variable, text: str | None) -> DisplayUnit | None:
     return shown if shown is not None and shown.unit.same_dimension(v.unit) else None
 
 
-def _collisions(known: Sequence[str]) -> list[str]:
+def collisions(known: Sequence[str]) -> list[str]:
+    """What is wrong with these names: two that are the same, or a variable that is a group too."""
     problems = []
     seen = set()
     for name in known:

@@ -24,11 +24,12 @@ class Variable:
 
     `of` says what it is of, and so its name.  `kind` is Real, Integer, Boolean or Enumeration (its
     `items` are methods, `start` one by name); `role` says what may set it: parameter, start, input,
-    solver, or output (nothing).  `depends` are the inputs and states that it is computed from at a
-    communication point, `depends_initially` the inputs and exact start values at the start.  `positive`:
-    zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's `start` says
-    it; otherwise it is 0 because nobody did.  `display`: the unit in which the model gives it, a multiple of
-    `unit`.  `measured`: the variable whose extreme it is.
+    solver, output (nothing), or interface (further.py).  `depends` are the inputs and states that it is
+    computed from at a communication point, `depends_initially` the inputs and exact start values at the
+    start; with them `time`, where it stands in the equations.  `members`: of an array, what is in it.
+    `positive`: zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's
+    `start` says it; otherwise it is 0 because nobody did.  `display`: the unit in which the model gives it, a
+    multiple of `unit`.  `measured`: the variable whose extreme it is.
     """
 
     of: Subject
@@ -51,6 +52,7 @@ class Variable:
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
     measured: Variable | None = None
+    members: tuple[str, ...] = ()
 
     @cached_property
     def name(self) -> str:

@@ -13,7 +13,7 @@ import fmpy
 
 from .. import names
 from ..fmu.archive import pack
-from ..fmu.read import described_rules, experiment_of
+from ..fmu.read import described_rules, experiment_of, kind_of
 from ..model.rule import MESSAGES, Rule
 from ..model.units import for_reading
 from ..page.preset import SETTABLE
@@ -85,7 +85,7 @@ def _variable(v: Any, rule: Rule, named: set[str]) -> dict[str, Any]:
     return {
         "name": v.name,
         "reference": int(v.valueReference),
-        "type": v.type,
+        "type": kind_of(v),
         "role": role,
         "group": _group(v, role, named),
         "unit": for_reading(v.unit),
@@ -102,7 +102,7 @@ def _variable(v: Any, rule: Rule, named: set[str]) -> dict[str, Any]:
 
 
 def _is_column(v: Any) -> bool:
-    return v.causality == "output" and v.type in NUMBERS
+    return v.causality == "output" and kind_of(v) in NUMBERS
 
 
 def _role(v: Any) -> str:
@@ -115,9 +115,9 @@ def _role(v: Any) -> str:
 
 
 def _number(v: Any) -> float | str | None:
-    if v.start is None or v.type == "String":
+    if v.start is None or kind_of(v) == "String":
         return None if v.start is None else str(v.start)
-    if v.type == "Boolean":
+    if kind_of(v) == "Boolean":
         return float(str(v.start).lower() in ("true", "1"))
     return float(v.start)
 

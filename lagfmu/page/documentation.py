@@ -14,6 +14,7 @@ from latex2mathml.converter import convert
 from markupsafe import Markup
 
 from .. import names
+from ..interface.further import INTERFACE
 from ..interface.variables import Variable
 from ..model.model import Contact, Holonomic, Nonholonomic
 from ..model.units import Unit, for_reading
@@ -48,6 +49,7 @@ GROUPS = (
     ("Extremes", "Of the continuous motion so far, between communication points too."),
     ("Friction", "Sticking, slip velocities, and what is left before a contact slips."),
     ("Solver", "Method, accuracy, and what was done."),
+    ("Of FMI 3.0 alone", "Time, event indicators, clocks and arrays."),
 )
 AFTER_FACTOR = re.compile(r"(?<=[\w})]) (?=\\(?:a?(?:sin|cos|tan)h?|log|exp|operatorname)\b)")
 TITLES = {  # by the kind of what a variable is of
@@ -161,7 +163,7 @@ def _grouped(variables: Sequence[Variable]) -> list[tuple[str, str, list[Line]]]
 
 def _group(v: Variable) -> str:
     by_role = {"parameter": "Parameters", "input": "Inputs", "start": "Motion"}
-    by_role["estimate"] = "Inputs"
+    by_role |= {"estimate": "Inputs", INTERFACE: "Of FMI 3.0 alone"}
     return by_role.get(v.role) or TITLES.get(v.of.head, "Motion")
 
 

@@ -16,7 +16,7 @@ from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.archive import opened
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
-from ..fmu.read import Trajectory, experiment_of, numbers_of, read_description
+from ..fmu.read import Trajectory, experiment_of, kind_of, numbers_of, read_description
 from .check import Against, Check, Verification
 from .closed_forms import check_closed_form
 from .reference import Reference
@@ -120,7 +120,7 @@ def is_ours(path: Path) -> bool:
 
 def _check_texts(description: Any, given: Mapping[str, Any]) -> None:
     """A text is a value for an Enumeration only."""
-    texts = {v.name for v in description.modelVariables if v.type == "Enumeration"}
+    texts = {v.name for v in description.modelVariables if kind_of(v) == "Enumeration"}
     wrong = [f"{k} = {v!r}" for k, v in given.items() if isinstance(v, str) and k not in texts]
     if wrong:
         raise SettingError(f"{', '.join(wrong)}: expected a number")
@@ -144,9 +144,9 @@ def closed_forms_in(path: Path) -> list[CarriedForm]:
                 problems.append(
                     f"closed form {closed_form.name!r} uses {name!r}, which is no variable"
                 )
-            elif v.type not in (MODES if names.read(name).quantity in names.MODES else NUMBERS):
+            elif kind_of(v) not in (MODES if names.read(name).quantity in names.MODES else NUMBERS):
                 problems.append(
-                    f"closed form {closed_form.name!r} uses {name!r}, which is a {v.type}"
+                    f"closed form {closed_form.name!r} uses {name!r}, which is a {kind_of(v)}"
                 )
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
@@ -168,7 +168,7 @@ def _starts(description: Any, given: Mapping[str, Any], result: Trajectory) -> C
     """Outputs with an exact start begin with it."""
     worst, count, missed = 0.0, 0, []
     for v in description.modelVariables:
-        if v.initial == "exact" and v.causality == "output" and v.type == "Real":
+        if v.initial == "exact" and v.causality == "output" and kind_of(v) == "Real":
             expected = float(given.get(v.name, v.start))
             error = abs(float(result[v.name][0]) - expected)
             count += 1

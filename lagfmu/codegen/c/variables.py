@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 from ... import names
+from ...interface.rules import CALCULATED
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.form import Form
 from ...model.scene import Scene
@@ -57,8 +58,18 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
     number = {v.name: k for k, v in enumerate(v for v in table.variables if v.bar_of)}
     peaks = {name: k for k, name in enumerate(table.measured)}
     rows = []
+    answered = {
+        v.name: (quantity.upper(), k, NONE)
+        for quantity in (names.TIME, names.INDICATOR, names.CLOCK)
+        for k, v in enumerate(table.those(quantity))
+    }
     for v in table.variables:
-        at = ("ERROR", position[v.bar_of], number[v.name]) if v.bar_of else place.of(v, peaks)
+        if v.members:  # the interface puts arrays together
+            continue
+        if v.bar_of:
+            at = "ERROR", position[v.bar_of], number[v.name]
+        else:
+            at = answered.get(v.name) or place.of(v, peaks)
         rows.append(f"    {_row(v, at, states)},\n")
     measured = [f"    {_row(v, place.of(v), states)},\n" for v in table.measured.values()]
     return HEAD.format(
@@ -182,7 +193,7 @@ def _row(v: Variable, place: Place, states: dict[str, int]) -> str:
     fields = [
         string(v.name),
         f"TYPE_{v.kind.upper()}",
-        f"ROLE_{'OUTPUT' if v.role == 'estimate' else v.role.upper()}",
+        f"ROLE_{'OUTPUT' if v.role in CALCULATED else v.role.upper()}",
         f"AT_{where}",
         str(index),
         str(contact),

@@ -10,7 +10,7 @@ from typing import Any
 from ... import names
 from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm, unpack_closed_forms
-from ...fmu.read import experiment_of, file_stem, read_description, target_in
+from ...fmu.read import experiment_of, file_stem, kind_of, read_description, target_in
 from ...methods import integrators
 from ...verification.verify import closed_forms_in
 
@@ -100,7 +100,7 @@ def facts_of(path: Path) -> Facts:
             f"{str(path)!r} was not built by lagfmu, or for a scene that leaves out what it would be "
             "judged by: stress the model's full FMU"
         )
-    reals = [v for v in description.modelVariables if v.type == "Real"]
+    reals = [v for v in description.modelVariables if kind_of(v) == "Real"]
     bases = {
         u.name: tuple(int(getattr(u.baseUnit, b, 0) or 0) for b in BASE)
         for u in description.unitDefinitions
@@ -122,7 +122,7 @@ def facts_of(path: Path) -> Facts:
         outputs=tuple(
             v
             for v in description.modelVariables
-            if (v.causality == "output" and v.type in ("Real", "Integer", "Boolean"))
+            if (v.causality == "output" and kind_of(v) in ("Real", "Integer", "Boolean"))
             or (v.causality == "local" and v.name in estimated)
         ),
         parameters=tuple(

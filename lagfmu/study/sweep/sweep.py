@@ -26,6 +26,7 @@ from ...fmu.read import (
     communication_points,
     described_rules,
     experiment_of,
+    kind_of,
     obstacle,
     read_description,
 )
@@ -174,7 +175,7 @@ def _study(
     rules = described_rules(description)
     variables = {v.name: v for v in description.modelVariables}
     outputs = [n for n, v in variables.items() if v.causality == "output"]
-    kept = parsed(keep, {n: v.type for n, v in variables.items()}, outputs)
+    kept = parsed(keep, {n: kind_of(v) for n, v in variables.items()}, outputs)
     check_inputs(inputs, rules, [n for n, v in variables.items() if v.causality == "input"])
     driven = columns_at(inputs, times, rules)
     _check(varied, rules, driven)

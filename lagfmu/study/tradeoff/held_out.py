@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.read import Trajectory
+from ...fmu.read import Trajectory, kind_of
 from ...fmu.session import Session
 from .observe import observe
 from .reference import Reference, refer
@@ -67,7 +67,7 @@ def _drawn(session: Session, scene: Trajectory, chance: random.Random) -> dict[s
     given = [
         v
         for v in session.description.modelVariables
-        if v.type == "Real" and v.start is not None and names.read(v.name).head != names.SOLVER
+        if kind_of(v) == "Real" and v.start is not None and names.read(v.name).head != names.SOLVER
     ]
     outputs = scene.dtype.names or ()
     starts = [v for v in given if v.initial in ("exact", "approx") and v.name in outputs]

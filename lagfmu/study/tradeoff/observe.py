@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import SimulationError, VerificationError
-from ...fmu.read import Trajectory, communication_points
+from ...fmu.read import Trajectory, communication_points, kind_of
 from ...fmu.session import RefusalError, Run, Session
 from ...names import TOLERANCE
 from .setting import Setting
@@ -61,4 +61,4 @@ def _run(
 
 
 def _is_read(v: Any) -> bool:
-    return v.causality in ("output", "local") and v.type in ("Real", "Integer", "Boolean")
+    return v.causality in ("output", "local") and kind_of(v) in ("Real", "Integer", "Boolean")

@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.read import Trajectory
+from ...fmu.read import Trajectory, kind_of
 
 MULTIPLIER, FORCE, MOTION, EVENT = "lambda", "Q", "coordinates", "event time"
 OWN = "outputs"
@@ -36,7 +36,7 @@ class Quantity:
 def quantities(description: Any) -> tuple[Quantity, ...]:
     """Every output of an FMU (fmpy's ModelDescription) that is a lambda, Q, coordinate, departure time
     or output of the model's own."""
-    reals = [v for v in description.modelVariables if v.type == "Real"]
+    reals = [v for v in description.modelVariables if kind_of(v) == "Real"]
     units = {v.name: v.unit or "1" for v in reals if v.causality == "output"}
     known = {v.name for v in description.modelVariables}
     own = [n for n in units if _is_own(n, known)]

@@ -1,0 +1,63 @@
+"""The interface of an FMU: which version of FMI, and what of 3.0 it has besides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import UsageError
+from .compiler import Platform
+from .target import NATIVE
+
+VERSIONS = (2, 3)
+TUPLES = {  # the folders of FMI 3.0 (section 2.5.1.4) where FMI 2.0 has other names
+    "linux64": "x86_64-linux",
+    "win64": "x86_64-windows",
+    "darwin64": "x86_64-darwin",
+}
+
+
+@dataclass(frozen=True)
+class Face:
+    """`fmi`: 2 or 3.  Of 3 with `clocks`, one ticks at the events of each contact and friction, and the
+    importer must use event mode; with `arrays` there are further outputs, one for each unit of lambda, Q and
+    residuals.
+
+    Raises UsageError.
+    """
+
+    fmi: int = 2
+    clocks: bool = False
+    arrays: bool = False
+
+    def __post_init__(self) -> None:
+        if self.fmi not in VERSIONS:
+            expected = " or ".join(map(str, VERSIONS))
+            raise UsageError(f"fmi = {self.fmi!r} is no version that is known, expected {expected}")
+        further = [n for n in ("clocks", "arrays") if getattr(self, n)]
+        if self.fmi == 2 and further:
+            raise UsageError(
+                f"{' and '.join(further)}: FMI 2.0 has none: ask for FMI 3.0 (fmi = 3) too"
+            )
+
+    def check_target(self, target: str) -> None:
+        """Raises UsageError where there is no FMU of the target with this interface."""
+        if self.fmi == 3 and target != NATIVE:
+            raise UsageError(
+                f"the target {target} has FMI 2.0 alone: FMI 3.0 is for --target native"
+            )
+
+    def folder(self, target: str) -> str:
+        """Where FMUs of a target stand, one of each version beside the other."""
+        return target if self.fmi == 2 else f"{target}-fmi{self.fmi}"
+
+    def binaries(self, platform: Platform) -> str:
+        """The folder of a library in the FMU."""
+        name = platform.folder if self.fmi == 2 else TUPLES.get(platform.folder, platform.folder)
+        return f"binaries/{name}"
+
+    def holds(self, file: str) -> bool:
+        """Whether a C file of the runtime is none of the other version's."""
+        return not any(file.startswith(f"fmi{other}") for other in VERSIONS if other != self.fmi)
+
+
+FMI2 = Face()
