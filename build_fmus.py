@@ -22,6 +22,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Annotated
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: the processes share the cores
+
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn

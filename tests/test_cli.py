@@ -303,15 +303,20 @@ def test_the_version_is_that_of_the_package():
 
 @pytest.mark.parametrize("words", [["--version"], ["--help"], ["sweep", "--help"]])
 def test_help_and_version_are_told_without_waiting(words):
-    """`python -m lagfmu` imports nothing that calculates for what can be said without it."""
+    """`python -m lagfmu` imports nothing that calculates for what can be said without it, and keeps NumPy to
+    one thread."""
     code = (
         f"import runpy, sys\nsys.argv = {['lagfmu', *words]!r}\n"
         "try: runpy.run_module('lagfmu', run_name='__main__')\n"
         "except SystemExit as end: assert end.code == 0\n"
         "heavy = {'sympy', 'numpy', 'scipy', 'pint', 'fmpy', 'matplotlib', 'xarray'}\n"
         "assert not heavy & sys.modules.keys(), heavy & sys.modules.keys()\n"
+        "import os; assert os.environ['OPENBLAS_NUM_THREADS'] == '1'  # before NumPy reads it\n"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    without = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=without, capture_output=True, text=True, check=False
+    )
     assert run.returncode == 0, run.stderr
     assert run.stdout
 
