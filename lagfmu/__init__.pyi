@@ -22,7 +22,19 @@ from .model.model import (
 )
 from .model.norms import norm
 from .model.page import Page
-from .model.picture import Arrow, Disk, Ground, Line, Rod, Spring, Track
+from .model.picture import (
+    Arrow,
+    Box,
+    Direction,
+    Disk,
+    Ground,
+    Line,
+    Pivot,
+    Rod,
+    Sphere,
+    Spring,
+    Track,
+)
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
@@ -33,9 +45,11 @@ from .verification.simulate import simulate
 
 __all__ = [
     "Arrow",
+    "Box",
     "ClosedForm",
     "Conserved",
     "Contact",
+    "Direction",
     "Disk",
     "Embedding",
     "EquationsOfMotion",
@@ -51,9 +65,11 @@ __all__ = [
     "Page",
     "Parameter",
     "Peak",
+    "Pivot",
     "Result",
     "Rod",
     "Scene",
+    "Sphere",
     "Spline",
     "Spring",
     "Track",

@@ -3,6 +3,7 @@
 What users need is in `lagfmu`.
 """
 
+from .bodies.solid import solid
 from .cli import film
 from .cli import stress as stress_command
 from .cli.app import COMMANDS, app

@@ -6,7 +6,7 @@ A point and an axis of inertia count from the body's own frame; `center` is the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..model.elements import Expr, Parameter
@@ -42,9 +42,10 @@ class _Carrier:
 
 @dataclass(frozen=True)
 class Ground(_Carrier):
-    """What does not move: the frame in which everything is counted."""
+    """What does not move: the frame in which everything is counted; `shape` as of a body."""
 
     name: str = "ground"
+    shape: Any = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,8 @@ class Body(_Carrier):
     """A rigid body of `mass` [kg] and `inertia` [kg.m^2] about its centre of mass `center` [m].
 
     The inertia is one number in the plane; in space xx, yy, zz, or these and xy, xz, yz: elements of the
-    tensor, so that a product of inertia has URDF's sign.
+    tensor, so that a product of inertia has URDF's sign.  `shape` is how it looks, in its own frame: a
+    lagfmu.Box, Rod, Sphere, Disk or Line, or several; without it bodies/solid.py chooses in space.
     """
 
     name: str
@@ -60,3 +62,4 @@ class Body(_Carrier):
     inertia: Any
     center: Sequence[Number] | None = None
     description: str = ""
+    shape: Any = None

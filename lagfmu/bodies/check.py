@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..model.elements import NAME, Parameter, is_number
+from ..model.picture import Box, points_of
 from ..names import RESERVED
 from .body import Body, Ground, Marker
 from .contacts import Contact
 from .joints import Distance, Gear, Joint, Rolling, Universal, name_of_joint
 from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
+from .picture import CARRIED, shapes_of
 from .readings import Reading
 from .rotation import problem_of
 from .space import PAIRS
@@ -42,6 +44,7 @@ def problems_of(plane: object, bodies: Sequence[Any], parts: Sequence[Any]) -> l
         *_names([*bodies, *parts]),
         *(problem for body in bodies for problem in _of_body(body, plane is not None)),
         *(problem for part in parts for problem in _of_markers(part, bodies, plane is not None)),
+        *(p for of in (*bodies, *_grounds(parts)) for p in _of_shape(of, plane is not None)),
         *(
             p
             for part in parts
@@ -97,6 +100,21 @@ def _of_body(body: Body, planar: bool) -> Iterator[str]:
             )
 
 
+def _of_shape(body: Body | Ground, planar: bool) -> Iterator[str]:
+    """Shapes that no body has, or with points of another space."""
+    what, count = f"{body.name!r} has the shape", 2 if planar else 3
+    for shape in () if body.shape is None else shapes_of(body):
+        if not isinstance(shape, CARRIED):
+            known = ", ".join(f"lagfmu.{k.__name__}" for k in CARRIED)
+            yield f"{what} {shape!r}, expected one of {known}, or several, in the body's own frame"
+        elif any(not isinstance(p, Sequence) or len(p) != count for p in points_of(shape)):
+            yield f"{what} {shape!r}, expected points and sizes of {count} numbers"
+        elif isinstance(shape, Box):
+            turned = body.at((0,) * count, rotation=shape.rotation)
+            if wrong := "" if planar and _is_angle(shape.rotation) else problem_of(turned):
+                yield f"{what} {shape!r}: {wrong}"
+
+
 def _value(value: Any) -> Any:
     return value.value if isinstance(value, Parameter) else value
 
@@ -120,6 +138,12 @@ def _markers(part: Any) -> Iterator[tuple[str, Any]]:
     for field in ("first", "second", "at"):
         if hasattr(part, field) and not isinstance(part, Gear):
             yield field, getattr(part, field)
+
+
+def _grounds(parts: Sequence[Any]) -> list[Ground]:
+    """The grounds that markers are on, and that may look differently."""
+    found = [getattr(marker, "body", None) for part in parts for _, marker in _markers(part)]
+    return list({id(ground): ground for ground in found if isinstance(ground, Ground)}.values())
 
 
 def _of_markers(part: Any, bodies: Sequence[Body], planar: bool) -> Iterator[str]:

@@ -8,8 +8,9 @@ along the file's axis.  The root link is the ground.
 from __future__ import annotations
 
 import os
+import warnings
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModelError
+from ..errors import LagfmuWarning, ModelError
+from ..model.picture import Box, Rod, Shape, Sphere
 from .body import Body, Ground, Marker
 from .joints import Fixed, Joint, Prismatic, Revolute
 from .loads import Torsion
@@ -34,7 +36,7 @@ class Parts:
     """What a URDF file holds: pass it on to `mechanism`, with loads and motors of your own beside it.
 
     `loads` are the dampers of its joints; `frames` names the links without mass that are fixed to another:
-    each is a marker, not a body.
+    each is a marker, not a body.  Bodies and ground look as the file says, by boxes, cylinders and spheres.
     """
 
     name: str
@@ -55,6 +57,7 @@ def from_urdf(file: str | os.PathLike[str], limits: bool = True) -> Parts:
     problems = _problems_of_tree(robot) or _problems_of_parts(robot)
     if problems:
         raise ModelError(str(robot.name), problems)
+    _tell_of_meshes(robot)
     return _Builder(robot, limits).parts()
 
 
@@ -162,7 +165,8 @@ class _Builder:
     def __init__(self, robot: Any, limits: bool) -> None:
         self.robot, self.limits = robot, limits
         self.links = {link.name: link for link in robot.links}
-        self.ground = Ground()
+        self.shapes = self._shapes()
+        self.ground = Ground(shape=self.shapes[_root(robot)] or None)
         self.carrier: dict[str, tuple[Body | Ground, Pose]] = {}  # of each link's frame
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
@@ -186,15 +190,31 @@ class _Builder:
             self.frames,
         )
 
+    def _shapes(self) -> dict[str, list[Shape]]:
+        """What each link looks like, with the links that are markers on it."""
+        found: dict[str, list[Shape]] = {}
+        for name, link in self.links.items():
+            pose = np.eye(4)
+            while (joint := self._marker_joint(link)) is not None:
+                pose = _pose(joint.origin) @ pose
+                link = self.links[joint.parent]
+            found.setdefault(link.name, []).extend(_shapes(self.links[name], pose))
+        return found
+
+    def _marker_joint(self, link: Any) -> Any:
+        """The fixed joint that makes a link without mass a marker on another."""
+        to = (j for j in self.robot.joints if j.child == link.name and j.type == "fixed")
+        return None if _mass(link) else next(to, None)
+
     def _add(self, joint: Any) -> None:
         carrier, pose = self.carrier[joint.parent]
-        pose = pose @ (np.eye(4) if joint.origin is None else joint.origin)
+        pose = pose @ _pose(joint.origin)
         link = self.links[joint.child]
-        if joint.type == "fixed" and not _mass(link):
+        if self._marker_joint(link) is not None:
             self.carrier[link.name] = carrier, pose
             self.frames[link.name] = _marker(carrier, pose)
             return
-        body = _body(link)
+        body = _body(link, self.shapes[link.name])
         self.bodies.append(body)
         self.carrier[link.name] = body, np.eye(4)
         turned = np.eye(4)
@@ -211,13 +231,56 @@ class _Builder:
             self.loads.append(Torsion(f"{joint.name}.damper", joint.name, damping=damping))
 
 
-def _body(link: Any) -> Body:
+def _body(link: Any, shapes: list[Shape]) -> Body:
     """The link's mass, centre and inertia, which the file gives in axes of their own, in the link's frame."""
-    origin = np.eye(4) if link.inertial.origin is None else link.inertial.origin
+    origin = _pose(link.inertial.origin)
     R = origin[:3, :3]
     J = R @ np.array(link.inertial.inertia, dtype=float) @ R.T
     inertia = tuple(float(J[pair]) for pair in PAIRS)
-    return Body(link.name, _mass(link), inertia, center=tuple(map(float, origin[:3, 3])))
+    center = tuple(map(float, origin[:3, 3]))
+    return Body(link.name, _mass(link), inertia, center=center, shape=shapes or None)
+
+
+def _pose(origin: Any) -> Pose:
+    return np.eye(4) if origin is None else np.array(origin, dtype=float)
+
+
+def _drawn(link: Any) -> list[Any]:
+    """The elements by which a link is drawn: <visual>, or <collision> if none of those can be."""
+    found = [[e for e in es if e.geometry.mesh is None] for es in (link.visuals, link.collisions)]
+    return found[0] or found[1]
+
+
+def _shapes(link: Any, pose: Pose) -> Iterator[Shape]:
+    """Boxes, cylinders (along z) and spheres of a link, at a pose."""
+    for element in _drawn(link):
+        there = pose @ _pose(element.origin)
+        R, center, geometry = there[:3, :3], there[:3, 3], element.geometry
+        if geometry.box is not None:
+            yield Box(tuple(center.tolist()), tuple(map(float, geometry.box.size)), R.tolist())
+        elif geometry.cylinder is not None:
+            half = R[:, 2] * float(geometry.cylinder.length) / 2
+            low, high = (tuple((center + sign * half).tolist()) for sign in (-1, 1))
+            yield Rod(low, high, float(geometry.cylinder.radius))
+        elif geometry.sphere is not None:
+            yield Sphere(tuple(center.tolist()), float(geometry.sphere.radius))
+
+
+def _tell_of_meshes(robot: Any) -> None:
+    """A mesh is not read, and that is no reason to refuse the file."""
+    left = [
+        f"{element.geometry.mesh.filename!r} of link {link.name!r}"
+        for link in robot.links
+        for element in link.visuals
+        if element.geometry.mesh is not None
+    ]
+    if left:
+        warnings.warn(
+            f"{robot.name!r}: meshes are left out of the picture, {', '.join(left)}: a link without box, "
+            "cylinder or sphere in the file is drawn by its mass and inertia",
+            LagfmuWarning,
+            stacklevel=3,
+        )
 
 
 def _marker(carrier: Body | Ground, pose: Pose) -> Marker:

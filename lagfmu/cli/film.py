@@ -83,7 +83,9 @@ def _draw(
             return np.interp(times, run["time"], run[name].astype(float))
         return known.get(name, np.nan)
 
-    shapes = [Moving(s, look, len(times)) for s in picture["shapes"]]
+    shapes = [Moving(s, look, len(times)) for s in picture["shapes"] if s["kind"] != "direction"]
+    solids = [s for s in shapes if s.facets]
+    others = [s for s in shapes if not s.facets]
     view = View(shapes, labels=bool(title))
     figure, axes, marks = _panels(view, run, curve, bool(title))
     FigureCanvasAgg(figure)
@@ -99,7 +101,7 @@ def _draw(
         ):
             for k, t in enumerate(times):
                 view.set(axes, np.concatenate([s.covers(k) for s in shapes]))
-                for shape in shapes:
+                for shape in (*sorted(solids, key=lambda s: s.depth(k)), *others):
                     shape.draw(axes, k, view)
                 if picture["dimensions"] == 3:
                     view.axes_of_space(axes, shapes[0].seen)

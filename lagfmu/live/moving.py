@@ -10,12 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..page.picture import values
+from .solids import SQUARE, ball, box, cylinder, shade
 
 INK, FORCE, FILL, BOB = "#48525e", "#c2410c", "#dbe3ec", "#1f5fa8"
+SOLID = "#c3d2e2"
 LONGEST = 0.2  # of what moves: the arrow of the largest force
 LETTER, LINE = 7.5, 15  # pixels at 100 a inch, of a label
 TINY = 1e-300  # N
 AZIMUTH, ELEVATION = -1.05, 0.42  # rad, from which a picture in space is seen, as on the page
+TOWARDS = np.array(
+    [
+        np.cos(AZIMUTH) * np.cos(ELEVATION),
+        np.sin(AZIMUTH) * np.cos(ELEVATION),
+        np.sin(ELEVATION),
+    ]
+)
+PIVOT = 0.025  # of what moves: half the length of a joint's axis
 Array = NDArray[np.float64]
 
 
@@ -38,6 +48,11 @@ class Moving:
                 self.points = self._hanging(keys, self._all(values(shape["length"], look)), look)
         single = {k: self._all(values(shape[k], look)) for k in ("radius", "angle") if k in shape}
         self.radius, self.angle = single.get("radius"), single.get("angle")
+        self.axis = self._point(shape["axis"], look)[0] if "axis" in shape else None
+        self.facets = self._facets(look)
+        if self.facets:
+            flat = [f.transpose(1, 2, 0) for f in self.facets]  # corners, components, frames
+            self.points = [self.seen(list(corner))[0] for f in flat for corner in f]
         self.force: Array | None = None
         if self.kind == "arrow":
             self.force, self.length = self._point(shape["vector"], look)
@@ -53,6 +68,38 @@ class Moving:
             short = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum(axis=0) < length
             low, high = np.where(short, sag, low), np.where(short, high, sag)
         return [self.seen(list(point))[0] for point in _hung(a, b, low, part)]
+
+    def _facets(self, look: Callable[[str], Any]) -> list[Array]:
+        """Of a solid: its faces (frames, corners, 2 or 3)."""
+
+        def vector(point: Any) -> Array:
+            return np.stack([self._all(values(e, look)) for e in point], axis=1)
+
+        if self.kind == "box":
+            axes = [vector(axis) for axis in self.shape["axes"]]
+            center, size = vector(self.shape["center"]), vector(self.shape["size"])
+            if len(axes) == 3:
+                return box(center, size, axes)
+            u, v = (a * size[:, [k]] / 2 for k, a in enumerate(axes))
+            return [np.stack([center + i * u + j * v for i, j in SQUARE], axis=1)]
+        if self.kind == "rod" and self.radius is not None:
+            start, end = map(vector, self.shape["points"])
+            if start.shape[1] == 3:
+                return cylinder(start, end, np.abs(self.radius))
+            way = end - start
+            across = np.stack([-way[:, 1], way[:, 0]], axis=1)
+            size = np.linalg.norm(way, axis=1)
+            across *= (np.abs(self.radius) / np.where(size > 0, size, 1.0))[:, None]
+            corners = [start + across, start - across, end - across, end + across]
+            return [np.stack(corners, axis=1)]
+        if self.kind == "disk" and self.radius is not None and len(self.shape["center"]) == 3:
+            return ball(vector(self.shape["center"]), np.abs(self.radius))
+        return []
+
+    def depth(self, k: int) -> float:
+        """How near a solid is to the reader in frame k."""
+        middle = np.mean([f[k].mean(axis=0) for f in self.facets], axis=0)
+        return float(middle @ TOWARDS[: len(middle)]) if len(middle) == 3 else 0.0
 
     def _all(self, value: Any) -> Array:
         return np.broadcast_to(np.asarray(value, dtype=float), (self.frames,))
@@ -80,6 +127,8 @@ class Moving:
     def covers(self, k: int) -> Array:
         """Circles (x, y, radius) of the picture that it covers (n, 3), where no label shall stand."""
         path = np.array([p[k] for p in self.points])
+        if self.facets or self.kind == "pivot":
+            return np.hstack([path, np.zeros_like(path[:, :1])])
         if self.kind == "disk":
             radius = 0.0 if self.radius is None else abs(self.radius[k])
             return np.array([[*path[0], radius]])
@@ -94,7 +143,16 @@ class Moving:
         from matplotlib.patches import Circle
 
         path = np.array([p[k] for p in self.points])
-        if self.kind in ("line", "path"):
+        if self.facets:
+            self._solid(axes, k)
+            if self.shape.get("trace"):
+                center = np.mean([f.mean(axis=1) for f in self.facets], axis=0)[: k + 1]
+                axes.plot(*self.seen(list(center.T))[0].T, color=BOB, lw=0.9, alpha=0.6)
+        elif self.kind == "pivot":
+            way = np.zeros(2) if self.axis is None else PIVOT * view.size * self.axis[k]
+            ends = np.array([path[0] - way, path[0] + way])
+            axes.plot(*ends.T, color=BOB, lw=4, solid_capstyle="round")
+        elif self.kind in ("line", "path"):
             axes.plot(*path.T, color=INK, lw=1.3)
         elif self.kind == "rod":
             axes.plot(*path.T, color=INK, lw=4.5, solid_capstyle="round")
@@ -119,6 +177,21 @@ class Moving:
                     axes.plot(*np.array([path[0], spoke]).T, color=INK, lw=1.3)
         elif self.force is not None:
             self._arrow(axes, path[0], self.force[k], float(self.length[k]), view)
+
+    def _solid(self, axes: Any, k: int) -> None:
+        """Those of its facets that are seen, lit from above."""
+        from matplotlib.collections import PolyCollection
+        from matplotlib.colors import to_rgb
+
+        polygons, colours = [], []
+        for facet in (f[k] for f in self.facets):
+            flat = facet.shape[1] == 2
+            light = 1.0 if flat else shade(facet, TOWARDS)
+            if light is not None:
+                polygons.append(self.seen(list(facet.T))[0])
+                colours.append(light * np.array(to_rgb(FILL if flat else SOLID)))
+        edges = INK if len(self.facets) < 7 else colours
+        axes.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors=edges, lw=0.7))
 
     def _arrow(self, axes: Any, at: Array, force: Array, size: float, view: View) -> None:
         tip = at + view.long(force)

@@ -32,6 +32,7 @@ APPLICATION = (
     "lead.js",
     "expression.js",
     "labels.js",
+    "solids.js",
     "picture.js",
     "player.js",
     "accuracy.js",

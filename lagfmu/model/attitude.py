@@ -34,15 +34,8 @@ class Attitude(sp.Function):  # type: ignore[misc]
         return True
 
     def polynomial(self) -> Expr:
-        """The element written out (Goldstein, Classical Mechanics, eq. 4.47): R' = R [w]x of whatever
-        norm."""
-        i, j = self.place
-        e0, *e = self.quaternion
-        if i == j:
-            return e0**2 + sum(x**2 if k == i else -(x**2) for k, x in enumerate(e))
-        k = 3 - i - j
-        sign = 1 if (i + 1) % 3 == j else -1
-        return 2 * (e[i] * e[j] - sign * e0 * e[k])
+        """The element written out."""
+        return element(*self.place, self.quaternion)
 
     def fdiff(self, argindex: int = 1) -> Expr:
         """The derivative by a component of the quaternion."""
@@ -59,6 +52,17 @@ class Attitude(sp.Function):  # type: ignore[misc]
     def _sympystr(self, printer: Any) -> str:
         i, j = self.place
         return f"R{i + 1}{j + 1}({printer.doprint(self.quaternion[0])})"
+
+
+def element(i: int, j: int, quaternion: Sequence[Any]) -> Any:
+    """R[i, j] of (e0, e1, e2, e3) (Goldstein, Classical Mechanics, eq. 4.47): R' = R [w]x of whatever
+    norm."""
+    e0, *e = quaternion
+    if i == j:
+        return e0**2 + sum(x**2 if k == i else -(x**2) for k, x in enumerate(e))
+    k = 3 - i - j
+    sign = 1 if (i + 1) % 3 == j else -1
+    return 2 * (e[i] * e[j] - sign * e0 * e[k])
 
 
 def quaternion_rates(e: Sequence[Expr], w: Sequence[Expr]) -> tuple[Expr, ...]:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 
+from .attitude import rotation_matrix
 from .elements import Expr, ModelFields, name_of
 from .symbols import known_symbols, symbols_in
 
@@ -34,10 +36,11 @@ class Line:
 
 @dataclass(frozen=True)
 class Rod:
-    """A bar between two joints."""
+    """A bar between two joints; with a `radius` [m] a cylinder."""
 
     start: Point
     end: Point
+    radius: Expr | None = None
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,42 @@ class Disk:
     radius: Expr | None = None
     angle: Expr | None = None
     trace: bool = False
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball of `radius` [m]; in the plane a disk."""
+
+    center: Point
+    radius: Expr
+
+
+@dataclass(frozen=True)
+class Box:
+    """A block of `size` [m] along its own axes.
+
+    `rotation` turns them: in the plane an angle [rad]; in space a matrix whose columns are the axes, or a
+    unit quaternion (w, x, y, z).
+    """
+
+    center: Point
+    size: Point
+    rotation: Any = None
+
+    @property
+    def axes(self) -> list[Point]:
+        """Unit vectors along its sides."""
+        if len(self.center) == 2:
+            angle = sp.sympify(self.rotation or 0)
+            c, s = sp.cos(angle), sp.sin(angle)
+            return [(c, s), (-s, c)]
+        if self.rotation is None:
+            R = sp.eye(3)
+        elif len(self.rotation) == 4:
+            R = rotation_matrix([sp.sympify(e) for e in self.rotation])
+        else:
+            R = sp.Matrix(self.rotation)
+        return [tuple(R[:, k]) for k in range(3)]
 
 
 @dataclass(frozen=True)
@@ -93,8 +132,26 @@ class Arrow:
     force: Point | None = None
 
 
-Shape = Line | Rod | Spring | Disk | Ground | Track | Arrow
-SHAPES = (Line, Rod, Spring, Disk, Ground, Track, Arrow)
+@dataclass(frozen=True)
+class Pivot:
+    """A joint, as large as the picture needs it: a ball, or along its `axis` a `kind` of PIVOTS."""
+
+    at: Point
+    axis: Point | None = None
+    kind: str = "pin"
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction beside the axes of a picture in space, as that of gravity."""
+
+    name: str
+    vector: Point
+
+
+Shape = Line | Rod | Spring | Disk | Sphere | Box | Ground | Track | Pivot | Arrow | Direction
+SHAPES = (Line, Rod, Spring, Disk, Sphere, Box, Ground, Track, Pivot, Arrow, Direction)
+PIVOTS = ("pin", "sleeve", "plate")  # turns about its axis, slides along it, slides across it
 
 
 def points_of(shape: Shape) -> list[Point]:
@@ -103,11 +160,16 @@ def points_of(shape: Shape) -> list[Point]:
         return list(shape.points)
     if isinstance(shape, Rod | Spring | Ground):
         return [shape.start, shape.end]
-    if isinstance(shape, Disk):
+    if isinstance(shape, Disk | Sphere):
         return [shape.center]
+    if isinstance(shape, Box):
+        return [shape.center, shape.size]
     if isinstance(shape, Track):
         return [shape.point]
-    return [shape.at, *(p for p in (shape.along, shape.force) if p is not None)]
+    if isinstance(shape, Direction):
+        return [shape.vector]
+    given = (shape.axis,) if isinstance(shape, Pivot) else (shape.along, shape.force)
+    return [shape.at, *(p for p in given if p is not None)]
 
 
 def check_picture(model: ModelFields, problems: list[str]) -> None:
@@ -137,6 +199,16 @@ def check_picture(model: ModelFields, problems: list[str]) -> None:
             )
         if isinstance(shape, Arrow):
             _check_arrow(model, shape, what, problems)
+        if isinstance(shape, Box) and not _is_rotation(shape):
+            problems.append(
+                f"{what}: its rotation is {shape.rotation!r}, expected an angle in the plane; in space a "
+                "matrix of 3 rows whose columns are its axes, or a unit quaternion (w, x, y, z)"
+            )
+            continue
+        if isinstance(shape, Pivot) and shape.kind not in PIVOTS:
+            problems.append(
+                f"{what}: its kind is {shape.kind!r}, expected one of {', '.join(PIVOTS)}"
+            )
         problems += [
             f"{what}: {name} is neither coordinate, parameter nor input: declare it, or use output(name)"
             for name in sorted(set(_unknown(model, shape)))
@@ -158,6 +230,13 @@ def _is_point(point: object) -> bool:
     )
 
 
+def _is_rotation(box: Box) -> bool:
+    try:
+        return all(map(_is_point, box.axes)) and len(box.size) == len(box.center)
+    except (TypeError, ValueError, sp.SympifyError):
+        return False
+
+
 def _check_arrow(model: ModelFields, arrow: Arrow, what: str, problems: list[str]) -> None:
     known = [c.name for c in model.constraints if hasattr(c, "expression")]
     if arrow.constraint not in known and arrow.force is None:
@@ -171,10 +250,11 @@ def expressions_of(shape: Shape) -> Iterator[Expr]:
     """Every expression of a shape."""
     for point in points_of(shape):
         yield from (sp.sympify(x) for x in point)
-    if isinstance(shape, Disk):
-        yield from (sp.sympify(x) for x in (shape.radius, shape.angle) if x is not None)
-    if isinstance(shape, Line) and shape.length is not None:
-        yield sp.sympify(shape.length)
+    for name in ("radius", "angle", "length"):
+        if (value := getattr(shape, name, None)) is not None:
+            yield sp.sympify(value)
+    if isinstance(shape, Box):
+        yield from (sp.sympify(x) for axis in shape.axes for x in axis)
     if isinstance(shape, Track):
         yield from (sp.sympify(x) for x in (shape.first, shape.last))
 

@@ -17,11 +17,27 @@ import sympy as sp
 
 from ..errors import BuildError, ModelError
 from ..mechanics.equations import TIME
-from ..model.attitude import Attitude
+from ..model.attitude import Attitude, element
 from ..model.closed_form import in_variables
 from ..model.elements import Expr
 from ..model.model import Model, Nonholonomic
-from ..model.picture import Arrow, Disk, Ground, Line, Point, Rod, Shape, Spring, Track, points_of
+from ..model.picture import (
+    PIVOTS,
+    Arrow,
+    Box,
+    Direction,
+    Disk,
+    Ground,
+    Line,
+    Pivot,
+    Point,
+    Rod,
+    Shape,
+    Sphere,
+    Spring,
+    Track,
+    points_of,
+)
 from ..model.reactions import multiplier
 from ..model.spline import SplineBase
 from ..numeric.cubic import Cubic
@@ -50,18 +66,22 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in ("exp", "log", "sign", "abs")},
     **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2},
     "spline": _spline,
+    "attitude": lambda i, j, *e: element(int(i), int(j), e),
     **{"min": lambda *x: np.minimum.reduce(x), "max": lambda *x: np.maximum.reduce(x)},
 }
 FIELDS = {  # kind -> names of its points, lists of points, single expressions, and the rest
     "line": ((), ("points",), ("length",), ()),
-    "rod": ((), ("points",), (), ()),
+    "rod": ((), ("points",), ("radius",), ()),
+    "box": (("center", "size"), ("axes",), (), ()),
     "spring": ((), ("points",), (), ("coils",)),
     "ground": ((), ("points",), (), ()),
     "disk": (("center",), (), ("radius", "angle"), ("trace",)),
     "path": (("point",), (), (), ("over", "range")),
+    "pivot": (("at", "axis"), (), (), ("of",)),
     "arrow": (("at", "vector"), (), (), ("name",)),
+    "direction": (("vector",), (), (), ("name",)),
 }
-NEEDED = ("points", "center", "point", "over", "range", "at", "vector", "name")
+OPTIONAL = ("length", "radius", "angle", "axis", "coils", "trace")
 DEEPEST = 200
 IN_FMU = "resources/picture.json"
 
@@ -98,23 +118,41 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
     def point(p: Point) -> list[Packed]:
         return [expression(x) for x in p]
 
+    def single(**values: Expr | None) -> dict[str, Any]:
+        return {key: expression(sp.sympify(e)) for key, e in values.items() if e is not None}
+
+    kind = type(shape).__name__.lower()
     if isinstance(shape, Line):
-        slack = {} if shape.length is None else {"length": expression(sp.sympify(shape.length))}
-        return {"kind": "line", "points": [point(p) for p in shape.points], **slack}
+        points = [point(p) for p in shape.points]
+        return {"kind": kind, "points": points, **single(length=shape.length)}
     if isinstance(shape, (Rod, Ground, Spring)):
-        ends = [point(shape.start), point(shape.end)]
-        more = {"coils": int(shape.coils)} if isinstance(shape, Spring) else {}
-        return {"kind": type(shape).__name__.lower(), "points": ends, **more}
+        found: dict[str, Any] = {"kind": kind, "points": [point(shape.start), point(shape.end)]}
+        if isinstance(shape, Spring):
+            found["coils"] = int(shape.coils)
+        return found | (single(radius=shape.radius) if isinstance(shape, Rod) else {})
     if isinstance(shape, Track):
         reach = [expression(shape.first), expression(shape.last)]
         over = {"over": str(shape.over), "range": reach}
         return {"kind": "path", "point": point(shape.point), **over}
     if isinstance(shape, Disk):
-        found: dict[str, Any] = {"kind": "disk", "center": point(shape.center)}
-        for key, value in (("radius", shape.radius), ("angle", shape.angle)):
-            if value is not None:
-                found[key] = expression(value)
-        return found | ({"trace": True} if shape.trace else {})
+        found = single(radius=shape.radius, angle=shape.angle)
+        found |= {"trace": True} if shape.trace else {}
+        return {"kind": kind, "center": point(shape.center), **found}
+    if isinstance(shape, Sphere):
+        return {"kind": "disk", "center": point(shape.center), **single(radius=shape.radius)}
+    if isinstance(shape, Box):
+        axes = [point(axis) for axis in shape.axes]
+        return {
+            "kind": kind,
+            "center": point(shape.center),
+            "size": point(shape.size),
+            "axes": axes,
+        }
+    if isinstance(shape, Pivot):
+        of = {"of": "ball"} if shape.axis is None else {"of": shape.kind, "axis": point(shape.axis)}
+        return {"kind": kind, "at": point(shape.at), **of}
+    if isinstance(shape, Direction):
+        return {"kind": kind, "name": shape.name, "vector": point(shape.vector)}
     if shape.force is not None:
         vector = point(shape.force)
     else:
@@ -169,7 +207,7 @@ def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
         ]
         return ["spline", pack(expression.args[0], numbers), float(table.periodic), *rows]
     if isinstance(expression, Attitude):
-        return pack(expression.polynomial(), numbers)
+        return ["attitude", *(pack(a, numbers) for a in expression.args)]
     operation = FUNCTIONS.get(expression.func)
     if operation is None:
         known = ", ".join(sorted(f for f in FUNCTIONS.values() if f.isalpha()))
@@ -182,7 +220,8 @@ def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
 def _names(packed: Any) -> set[str]:
     """The variables of a shape, and what its path runs over."""
     if isinstance(packed, Mapping):
-        keys = ("points", "length", "center", "radius", "angle", "point", "range", "at", "vector")
+        points, lists, single, _ = FIELDS[packed["kind"]]
+        keys = (*points, *lists, *single, "range")
         return set().union(*(_names(packed[k]) for k in keys if k in packed))
     if isinstance(packed, str):
         return set() if packed in OPERATIONS else {packed}
@@ -223,7 +262,7 @@ def _checked_shape(shape: Mapping[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {"kind": str(shape["kind"])}
     for key in (*points, *lists, *single, *rest):
         if key not in shape:
-            if key in NEEDED:
+            if key not in OPTIONAL:
                 raise ValueError(f"a {shape['kind']} without {key}")
             continue
         value = shape[key]
@@ -235,12 +274,20 @@ def _checked_shape(shape: Mapping[str, Any]) -> dict[str, Any]:
             value = _checked(value)
         elif key in ("over", "name"):
             value = str(value)
+        elif key == "of":
+            value = _one_of(value, ("ball", *PIVOTS))
         elif key == "coils":
             value = min(max(int(value), 1), 100)
         else:
             value = bool(value)
         found[key] = value
     return found
+
+
+def _one_of(value: object, known: tuple[str, ...]) -> str:
+    if value not in known:
+        raise ValueError(f"{value!r}, expected one of {', '.join(known)}")
+    return str(value)
 
 
 def _checked(packed: Any, depth: int = 0) -> Packed:
@@ -251,6 +298,8 @@ def _checked(packed: Any, depth: int = 0) -> Packed:
     if isinstance(packed, list) and packed and packed[0] in OPERATIONS and len(packed) > 1:
         if packed[0] == "spline" and (len(packed) < 8 or len(packed) % 5 != 3):
             raise ValueError(f"a table of {len(packed) - 3} numbers, expected five a row")
+        if packed[0] == "attitude" and (len(packed) != 7 or {*packed[1:3]} - {0, 1, 2}):
+            raise ValueError(f"an attitude {packed[1:]}, expected row, column and a quaternion")
         return [packed[0], *(_checked(p, depth + 1) for p in packed[1:])]
     if isinstance(packed, int | float) and not isinstance(packed, bool) and math.isfinite(packed):
         return float(packed)

@@ -15,6 +15,13 @@ function spline(x, periodic, ...rows) {
   return s < 0 ? c0 + s * c1 : c0 + s * (c1 + s * (c2 + s * c3));
 }
 
+/* An element of the rotation matrix of a unit quaternion (model/attitude.py). */
+function attitude(i, j, e0, ...e) {
+  if (i === j) return e.reduce((sum, x, k) => sum + (k === i ? x * x : -x * x), e0 * e0);
+  const sign = (i + 1) % 3 === j ? 1 : -1;
+  return 2 * (e[i] * e[j] - sign * e0 * e[3 - i - j]);
+}
+
 const OPERATIONS = {
   "+": (...x) => x.reduce((a, b) => a + b, 0),
   "*": (...x) => x.reduce((a, b) => a * b, 1),
@@ -36,6 +43,7 @@ const OPERATIONS = {
   min: Math.min,
   max: Math.max,
   spline,
+  attitude,
 };
 
 /* A function of a look-up of names; NaN where a name is unknown. */

@@ -6,6 +6,7 @@ const HANGING = 24; // pieces of a slack string
 const HALVINGS = 20; // until its length is found, to a millionth
 const MARGIN = 16;
 const AXES = 26; // CSS pixels: the axes of a picture in space
+const PIVOT = 7; // half the length of a joint's axis
 const LONGEST = 0.22; // of the view: the arrow of the largest force
 
 function svg(tag, attributes = {}) {
@@ -25,13 +26,17 @@ const SHAPES = {
     draw: ([line], s, look, view) => drawn(line, linePoints(s, look).map(view.screen)),
   },
   rod: {
-    make: () => [
-      svg("line", { class: "rod" }),
-      svg("circle", { class: "joint", r: 3.5 }),
-      svg("circle", { class: "joint", r: 3.5 }),
-    ],
-    points: (s, look) => s.points.map((p) => p(look)),
+    make: (s) =>
+      s.radius !== undefined
+        ? [svg("path", { class: "solid" })]
+        : [
+            svg("line", { class: "rod" }),
+            svg("circle", { class: "joint", r: 3.5 }),
+            svg("circle", { class: "joint", r: 3.5 }),
+          ],
+    points: (s, look) => (s.radius ? rodFaces(s, look).flat() : s.points.map((p) => p(look))),
     draw([bar, ...joints], s, look, view) {
+      if (s.radius) return drawnSolid(bar, rodFaces(s, look), view);
       const ends = s.points.map((p) => view.screen(p(look)));
       setLine(bar, ends[0], ends[1]);
       joints.forEach((joint, k) => setCenter(joint, ends[k]));
@@ -79,6 +84,25 @@ const SHAPES = {
       }
       if (s.trace) drawn(trace, view.past(s.center).map(view.screen));
       return [[...c, r + 1]];
+    },
+  },
+  box: {
+    make: () => [svg("path", { class: "solid" })],
+    points: (s, look) => boxFaces(s, look).flat(),
+    draw: ([path], s, look, view) => drawnSolid(path, boxFaces(s, look), view),
+  },
+  pivot: {
+    make: (s) => [
+      isLong(s) ? svg("line", { class: "pivot" }) : svg("circle", { class: "joint", r: 4 }),
+    ],
+    points: (s, look) => [s.at(look)],
+    draw([mark], s, look, view) {
+      const at = view.screen(s.at(look));
+      if (isLong(s)) {
+        const [x, y] = view.flat(s.axis(look)).map((c) => c * PIVOT);
+        setLine(mark, [at[0] - x, at[1] + y], [at[0] + x, at[1] - y]);
+      } else setCenter(mark, at);
+      return [[...at, PIVOT]];
     },
   },
   ground: {
@@ -139,6 +163,14 @@ function drawn(line, points) {
   line.setAttribute("points", pointsOf(points));
   return covered(points);
 }
+
+function drawnSolid(path, faces, view) {
+  const seen = faces.map((face) => face.map(view.screen));
+  path.setAttribute("d", solidPath(seen));
+  return [];
+}
+
+const isLong = (pivot) => Boolean(pivot.axis) && pivot.of !== "plate";
 
 function setLine(line, [x1, y1], [x2, y2]) {
   for (const [key, value] of Object.entries({ x1, y1, x2, y2 })) line.setAttribute(key, value);
@@ -205,7 +237,8 @@ const compiledPoint = (point) => {
 function compiledShape(s) {
   const found = { ...s };
   if (s.points) found.points = s.points.map(compiledPoint);
-  for (const key of ["center", "at", "point", "vector"]) if (s[key]) found[key] = compiledPoint(s[key]);
+  if (s.axes) found.axes = s.axes.map(compiledPoint);
+  for (const key of ["center", "size", "at", "axis", "point", "vector"]) if (s[key]) found[key] = compiledPoint(s[key]);
   for (const key of ["radius", "angle", "length"]) if (s[key] !== undefined) found[key] = compiled(s[key]);
   if (s.range) found.range = s.range.map(compiled);
   return found;
@@ -226,7 +259,8 @@ class Picture {
         return { shape: compiledShape(s), kind, parts };
       });
     for (const { parts, shape } of this.shapes) if (shape.kind === "arrow") root.append(...parts);
-    this.axes = this.space ? this.makeAxes() : [];
+    const named = facts.shapes.filter((s) => s.kind === "direction");
+    this.axes = this.space ? this.makeAxes(named.map(compiledShape)) : [];
     this.screen = this.screen.bind(this);
     this.flat = this.flat.bind(this);
     this.past = this.past.bind(this);
@@ -320,21 +354,24 @@ class Picture {
     }
   }
 
-  /* The directions of x, y and z, in the corner below on the left. */
-  makeAxes() {
-    return ["x", "y", "z"].map((name, k) => {
-      const line = svg("line", { class: "axis" });
+  /* The directions of x, y and z and others, in the corner below on the left. */
+  makeAxes(others) {
+    const own = ["x", "y", "z"].map((name, k) => ({ name, vector: () => [0, 1, 2].map((i) => Number(i === k)) }));
+    return [...own, ...others].map(({ name, vector }, k) => {
+      const line = svg("line", { class: k < 3 ? "axis" : "axis other" });
       const label = svg("text", { class: "axis-name" });
       label.textContent = name;
       this.root.append(line, label);
-      return { line, label, along: [0, 1, 2].map((i) => Number(i === k)) };
+      return { line, label, vector };
     });
   }
 
-  drawAxes() {
-    const from = [AXES + 12, this.height - AXES - 4];
-    for (const { line, label, along } of this.axes) {
-      const [x, y] = this.flat(along);
+  drawAxes(look) {
+    const from = [AXES + 12, this.height - AXES - (this.axes.length > 3 ? 14 : 4)];
+    for (const { line, label, vector } of this.axes) {
+      const way = vector(look);
+      const size = Math.hypot(...way) || 1;
+      const [x, y] = this.flat(way).map((c) => c / size);
       setLine(line, from, [from[0] + AXES * x, from[1] - AXES * y]);
       label.setAttribute("x", from[0] + (AXES + 8) * x);
       label.setAttribute("y", from[1] - (AXES + 8) * y + 4);
@@ -355,7 +392,7 @@ class Picture {
     this.arrows = [];
     const look = this.look(this.placed);
     const bodies = this.shapes.flatMap(({ shape, kind, parts }) => kind.draw(parts, shape, look, this));
-    this.drawAxes();
+    this.drawAxes(look);
     placeLabels(this.arrows, bodies, this.width, this.height);
   }
 }
