@@ -412,6 +412,22 @@ def test_a_mechanism_is_assembled_from_the_joint_coordinates_that_are_given():
     assert -cos(first["angle.C"]) == pytest.approx(between, rel=1e-12)
 
 
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_another_length_moves_what_was_only_assembled(target):
+    """With a longer rod and another crank the given angle and its rate stay; the piston is where the triangle
+    of crank and rod says."""
+    model = load(MODELS / "slider_crank_bodies.py").model
+    changed = {"A.second.x": -0.12, "B.first.x": 0.13, "C.first.x": 0.4}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # no given value moves
+        run = simulate(model, 0.001, 0.001, target=target, start_values=changed)
+    assert run["angle.A"][0] == pytest.approx(pi / 4, rel=1e-14)
+    assert run["der(angle.A)"][0] == pytest.approx(10.0, rel=1e-14)
+    across = 0.25 * sin(pi / 4)
+    reach = 0.25 * cos(pi / 4) + sqrt(0.65**2 - across**2)
+    assert run["position.D"][0] == pytest.approx(reach, rel=1e-13)
+
+
 def test_a_given_start_that_cannot_be_moves_and_is_told_with_both_numbers():
     """A rocker of 0.4 m on a crank of 0.2 m and a coupler of 0.5 m reaches angles up to a limit only."""
     parts = [Body(n, 1.0, 0.01) for n in ("crank", "coupler", "rocker")]

@@ -11,17 +11,18 @@ each that does is told with both numbers.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import sympy as sp
+from sympy.core.function import AppliedUndef
 
 from ..errors import LagfmuWarning, ModelError
 from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, name_of
 from ..model.model import Model
 from .draft import Draft
-from .given import given_values, known_names
+from .given import Beginning, given_values, known_names
 from .guess import guessed
 from .rows import TIME, Array, Rows, condition, numbers_of
 
@@ -38,8 +39,8 @@ class GivenStartWarning(LagfmuWarning):
 
 def assemble(
     draft: Draft, model: Model, parts: Sequence[Any], start: Mapping[str, Any]
-) -> dict[Expr, float]:
-    """The start of each coordinate and velocity, in SI.
+) -> tuple[dict[Expr, float], list[Expr]]:
+    """The start of each coordinate and velocity, in SI, and those of them that nothing given speaks of.
 
     Raises ModelError if a name is unknown, or the joints cannot be closed.
     """
@@ -76,10 +77,22 @@ def assemble(
     _tell(model, rates, found, float(np.abs(found).max(initial=0.0)))
     fast = float(np.abs(v / moving.scale).max(initial=0.0))
     rounding = 4 * EPS * np.concatenate([np.full(len(q), size), moving.scale * fast])
-    return {
+    begins = {
         s: float(x) if abs(x) > least else 0.0
         for s, x, least in zip(model.states, (*q, *v), rounding, strict=True)
     }
+    said = _spoken_of(model, known, given)
+    return begins, [s for s in model.states if s not in said]
+
+
+def _spoken_of(model: Model, known: Mapping[str, Beginning], given: Iterable[str]) -> set[Expr]:
+    """The coordinates of which given values are made, the velocities of which given rates are."""
+    places, found = list(model.coordinates), set()
+    for of in map(known.__getitem__, given):
+        symbols = (of.rate if of.of_velocities else of.value).atoms(AppliedUndef, sp.Derivative)
+        found |= symbols - {*places} if of.of_velocities else symbols
+    turned = (model.unwrapped[q].atoms(AppliedUndef) for q in found & model.unwrapped.keys())
+    return found.union(*turned)
 
 
 class _Moving:

@@ -89,7 +89,8 @@ def mechanism(
         parts=lines_of(bodies, parts),
         **{"picture": picture_of(draft, parts), **more},
     )
-    return replace(model, start=assemble(draft, model, parts, start or {}))
+    begins, rough = assemble(draft, model, parts, start or {})
+    return replace(model, start=begins, rough=rough)
 
 
 def _wound(parts: Sequence[Any], start: Mapping[str, Any]) -> set[str]:

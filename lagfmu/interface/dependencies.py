@@ -18,7 +18,8 @@ class Dependencies:
     """Of the variables of a form.
 
     `states`: names of the coordinates that are stepped, then of the speeds; `inputs`: names of what the
-    importer drives; `known`: both; `given`: the starts that the model gives, `starts`: those of all states.
+    importer drives; `known`: both; `given`: the states whose starts the model gives, and not roughly;
+    `starts`: those of all.
     """
 
     def __init__(self, form: Form) -> None:
@@ -31,8 +32,9 @@ class Dependencies:
             self.into = dict(zip((*eom.q, *eom.v), (*r.phi, *r.vel), strict=True)) | hidden
         self.inputs = [str(s) for s in eom.u if s not in hidden]
         self.known = {*self.states, *self.inputs}
-        self.given = eom.starts()
-        self.starts = {name: self.given.get(name, sp.S.Zero) for name in self.states}
+        starts = eom.starts()
+        self.given = starts.keys() - {str(eom.symbols[s]) for s in eom.model.rough}
+        self.starts = {name: starts.get(name, sp.S.Zero) for name in self.states}
 
     def symbols(self, *expressions: Expr) -> set[str]:
         """Names of the symbols that the expressions hold, reduced coordinates put in; of the time, `time`."""

@@ -103,6 +103,11 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
             )
     parameters = {p.symbol: p.value for p in model.parameters}
     _check_start("start", model.start, set(model.states), parameters, problems)
+    problems += [
+        f"rough holds {plain(sp.sympify(s))}, which has no start: give it one, or leave it out of rough"
+        for s in model.rough
+        if s not in model.start
+    ]
     if model.embedding is not None:
         states = {s for q in model.embedding.coordinates for s in (q, q.diff(t))}
         _check_start("embedding start", model.embedding.start, states, parameters, problems)

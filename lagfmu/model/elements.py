@@ -176,6 +176,7 @@ class ModelFields:
     parameters: Sequence[Parameter] = ()
     inputs: Sequence[Input] = ()
     start: Mapping[Expr, Expr] = field(default_factory=dict)
+    rough: Sequence[Expr] = ()
     embedding: Embedding | None = None
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)

@@ -55,7 +55,7 @@ def check_containers(model: ModelFields) -> list[str]:
     examples |= {"kinematics": "{phi: w}", "unwrapped": "{phi: atan2(y, x)}"}
     problems += _no_dicts(model, "", examples)
     lists = {"constraints": "Holonomic", "parameters": "Parameter", "inputs": "Input"}
-    lists |= {"outputs": "Output", "picture": "Line"}
+    lists |= {"outputs": "Output", "picture": "Line", "rough": "x.diff"}
     return problems + [
         f"{name} = {value!r}, expected a list, e.g. {name}=[{example}(...)]"
         for name, example in lists.items()

@@ -62,7 +62,8 @@ class Model(ModelFields, Displayed):
     Either `lagrangian` (with non-conservative `forces`) or `kinetic_energy` (with all `forces`) is given;
     `forces` maps a coordinate to its generalized force in J/[coordinate].  `coordinates` maps each
     `dynamicsymbols` coordinate to its unit, `start` coordinates and their first derivatives to numbers in
-    that unit or to expressions of parameters.  A unit may be a multiple of an SI unit (g, mm, deg): the
+    that unit or to expressions of parameters; those of them that are `rough` move onto the constraints
+    before the others, as if they were omitted.  A unit may be a multiple of an SI unit (g, mm, deg): the
     model keeps every number in SI, and in `display_units` the unit in which importers show it.
     `descriptions` may explain coordinates.  `outputs` are quantities besides those that every FMU reports,
     `picture` how it looks.  Write a `Friction` among `constraints` (it is kept in `frictions`), a `Peak`
@@ -85,7 +86,7 @@ class Model(ModelFields, Displayed):
         maps = ("coordinates", "forces", "start", "descriptions", "display_units")
         for name in (*maps, "speeds", "kinematics", "unwrapped"):
             object.__setattr__(self, name, dict(getattr(self, name)))
-        for name in ("constraints", "parameters", "inputs", "outputs", "picture", "parts"):
+        for name in ("constraints", "parameters", "inputs", "outputs", "picture", "parts", "rough"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         constraints, frictions = split(self.constraints)
         object.__setattr__(self, "constraints", constraints)

@@ -212,8 +212,12 @@ def _units(prepared: Prepared) -> Table:
 
 
 def _starts(prepared: Prepared, console: Console) -> None:
-    """Which start values miss the constraints, and where they are moved to."""
+    """Which start values miss the constraints, and where they are moved to; how a mechanism was assembled."""
     moved = prepared.structure.start.moved
+    rough = {str(prepared.form.equations.symbols[s]) for s in prepared.model.rough}
+    for v in prepared.whole.variables:
+        if v.name in rough and v.start:
+            _print(console, "  ", f"{v.name} = {v.start!r} {shown(v.unit)}: assembled")
     if not moved:
         console.print(Text("  as given: they satisfy the constraints"))
     for m in moved:
