@@ -38,6 +38,7 @@ from .fmu.read import (
 )
 from .fmu.session import RefusalError, Session
 from .fmu.target import NoCompilerWarning
+from .fmu.terminals import terminals
 from .fmu.write import as_built, write
 from .interface.rules import problems_of
 from .live import moving, wasm

@@ -67,12 +67,12 @@ def test_the_licence_of_the_runtime_is_not_the_models(tmp_path):
         path = build_fmu(model, tmp_path, target="native", check=False)
         assert read_model_description(str(path)).license == said
         with zipfile.ZipFile(path) as archive:
-            text = archive.read("documentation/licenses/lagfmu.txt").decode()
+            text = archive.read("documentation/licenses/license.txt").decode()
         assert "sources/ but for model.c" in text
         assert "MIT License" in text
     lean = build_fmu(model, tmp_path, target="native", check=False, sources=False)
     with zipfile.ZipFile(lean) as archive:
-        assert "sources/" not in archive.read("documentation/licenses/lagfmu.txt").decode()
+        assert "sources/" not in archive.read("documentation/licenses/license.txt").decode()
 
 
 def test_figures_change_nothing_but_the_page(tmp_path):

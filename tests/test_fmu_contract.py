@@ -527,7 +527,7 @@ def test_the_archive_holds_what_it_needs_and_no_more(name, path, target):
     for needed in (
         f"binaries/linux64/{name}.so",
         "documentation/index.html",
-        "documentation/licenses/lagfmu.txt",
+        "documentation/licenses/license.txt",
         "resources/lagfmu.json",
         "resources/slavemodule.txt" if target == "python" else "sources/model.c",
     ):

@@ -128,7 +128,7 @@ def test_the_archive_holds_what_it_needs_and_no_more(native_fmu):
     assert others == {
         "modelDescription.xml",
         "documentation/index.html",
-        "documentation/licenses/lagfmu.txt",
+        "documentation/licenses/license.txt",
         "resources/lagfmu.json",
         "resources/page.json",
         "resources/picture.json",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..errors import UsageError
 from .compiler import Platform
-from .target import NATIVE
+from .target import NATIVE, target_of
 
 VERSIONS = (2, 3)
 TUPLES = {  # the folders of FMI 3.0 (section 2.5.1.4) where FMI 2.0 has other names
@@ -39,12 +39,13 @@ class Face:
                 f"{' and '.join(further)}: FMI 2.0 has none: ask for FMI 3.0 (fmi = 3) too"
             )
 
-    def check_target(self, target: str) -> None:
-        """Raises UsageError where there is no FMU of the target with this interface."""
-        if self.fmi == 3 and target != NATIVE:
-            raise UsageError(
-                f"the target {target} has FMI 2.0 alone: FMI 3.0 is for --target native"
-            )
+    def target(self, asked: str | None) -> str:
+        """As target_of, where FMI 3.0 is native.  Raises UsageError for another target of it."""
+        if self.fmi == 2:
+            return target_of(asked)
+        if asked not in (None, NATIVE):
+            raise UsageError(f"the target {asked} has FMI 2.0 alone: FMI 3.0 is for native FMUs")
+        return NATIVE
 
     def folder(self, target: str) -> str:
         """Where FMUs of a target stand, one of each version beside the other."""

@@ -34,12 +34,13 @@ from .closed_forms import pack_closed_forms
 from .compiler import HOST
 from .face import FMI2, Face
 from .target import NATIVE, target_of
+from .terminals import IN_FMU, terminals
 
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
 PAGE = "documentation/index.html"
 LIVE = "documentation/play.html"  # beside it, which has a link to it
 REFERENCES = "documentation/fmi-ls-ref.txt"  # likewise, as FMI-LS-REF recommends
-LICENSE = "documentation/licenses/lagfmu.txt"
+LICENSE = "documentation/licenses/license.txt"
 
 
 def write(
@@ -60,8 +61,7 @@ def write(
     the rest see api.build_fmu.  Warns of each start value that is moved onto the constraints.  Raises
     ModelError if one in the model's `start` moves by more than 1e-6 of its coordinate's size.
     """
-    target = target_of(target)
-    face.check_target(target)
+    target = face.target(target)
     moved, missed = prepared.structure.start.moved, prepared.structure.missed
     check_given(prepared.model.name, moved, missed)
     tell(moved)
@@ -79,6 +79,8 @@ def write(
         ),
     }
     extra[LICENSE] = license_of(target, sources).encode()
+    if (found := terminals(prepared)) is not None:
+        extra[IN_FMU] = found
     if live:
         extra[LIVE] = live.encode()
     if (picture := pictures.picture_of(prepared)) is not None:
