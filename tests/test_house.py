@@ -147,7 +147,7 @@ def test_preparing_is_a_pipeline() -> None:
 
 
 def test_only_the_fmi_layer_says_fmi() -> None:
-    """Nothing outside fmu/ and runtime/fmi/ names a function, a type or a file of FMI 2.0: another version is
+    """Nothing outside fmu/ and runtime/fmi/ names a function, a type or a file of one version of FMI: each is
     theirs alone; and in runtime/fmi/ the instance knows no version."""
     sources = [p for p in ROOT.rglob("*") if p.suffix in (".py", ".c", ".h", ".js", ".j2", ".html")]
     named = {
@@ -219,7 +219,8 @@ def numbers_of(bare: str) -> set[str]:
 
 
 def test_a_name_of_the_runtime_stands_in_one_file() -> None:
-    """An FMU's all.c includes its C files one behind the other: no two of them define the same name."""
+    """An FMU's all.c includes its C files one behind the other: no two of them define the same name; but the
+    faces of two versions of FMI are never in one FMU."""
     places: dict[str, list[str]] = {}
     for path in sorted(ROOT.joinpath("runtime").rglob("*.c")):
         for name in names_of(path.read_text(encoding="utf-8")):
@@ -228,7 +229,11 @@ def test_a_name_of_the_runtime_stands_in_one_file() -> None:
         bare = TOKENS.sub("", path.read_text(encoding="utf-8"))
         for name in {*OWN_NAMES[0].findall(bare), *numbers_of(bare)}:
             places.setdefault(name, []).append(path.name)
-    assert {name: files for name, files in places.items() if len(files) > 1} == {}
+    for version in ("fmi2", "fmi3"):
+        held = {
+            name: [f for f in files if not f.startswith(version)] for name, files in places.items()
+        }
+        assert {name: files for name, files in held.items() if len(files) > 1} == {}
 
 
 DECLARED = re.compile(r"^SHARED[^;{]*;", re.MULTILINE)
@@ -272,9 +277,9 @@ def test_values_that_files_of_the_runtime_share_are_defined_so() -> None:
 def test_what_files_of_the_runtime_share_is_declared_so() -> None:
     """SHARED makes it static where one file includes all: only the functions of FMI are exported."""
     plain = re.compile(
-        r"^(?!typedef|static|return|#|SHARED|FMI2_EXPORT)[A-Za-z][\w \*]*\(", re.MULTILINE
+        r"^(?!typedef|static|return|#|SHARED|FMI[23]_)[A-Za-z][\w \*]*\(", re.MULTILINE
     )
     for path in sorted(ROOT.joinpath("runtime").rglob("*.h")):
         bare = TOKENS.sub("", path.read_text(encoding="utf-8"))
         assert plain.findall(bare) == [], path.name
-        assert "extern" not in bare or path.name in ("fmi2.h", "linkage.h"), path.name
+        assert "extern" not in bare or path.name in ("fmi2.h", "fmi3.h", "linkage.h"), path.name

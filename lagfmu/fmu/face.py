@@ -14,6 +14,7 @@ TUPLES = {  # the folders of FMI 3.0 (section 2.5.1.4) where FMI 2.0 has other n
     "win64": "x86_64-windows",
     "darwin64": "x86_64-darwin",
 }
+FILES = {2: ("fmi2",), 3: ("fmi3", "dependencies.h")}  # how those of one version begin
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ class Face:
 
     def holds(self, file: str) -> bool:
         """Whether a C file of the runtime is none of the other version's."""
-        return not any(file.startswith(f"fmi{other}") for other in VERSIONS if other != self.fmi)
+        others = tuple(start for v, start in FILES.items() if v != self.fmi)
+        return not any(file.startswith(start) for start in others)
 
 
 FMI2 = Face()

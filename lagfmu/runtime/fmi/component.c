@@ -55,6 +55,20 @@ int component_listen(Component *c, const Call *call, int on, size_t count, const
 
 /* ------------------------------------------------------------------ modes */
 
+Status component_exchanges(const char *function, Why *why) {
+    if (MODEL_SYSTEM->estimated_count > 0)
+        return fail(why,
+                    "%s: the rates of a prescribed motion are estimated from communication points, which Model "
+                    "Exchange has not: take co-simulation",
+                    function);
+    if (ERROR_BARS != NULL)
+        return fail(why,
+                    "%s: error bars come from a finer run beside the FMU's own, and in Model Exchange the importer "
+                    "integrates: take co-simulation, or an FMU without",
+                    function);
+    return OK;
+}
+
 void component_begin(Component *c, int exchange, int logging) {
     listen(c, logging ? ~0u : 0u);
     c->instance.tell = told;

@@ -20,20 +20,24 @@ typedef struct Component {
     Instance instance;
     const char *name;
     unsigned logging; /* one bit a category */
+    int meets;        /* 1: in co-simulation too the importer meets the events, in event mode */
     void (*send)(const struct Component *c, int status, int category, const char *text); /* to the importer's log */
     void *(*allocate)(size_t count, size_t size);
     void (*release)(void *block);
 } Component;
 
 /* What an importer calls a type of variables, which of ours they are (one bit a Type), and how it stores one. */
-typedef enum { AS_DOUBLE, AS_INT } Form;
+typedef enum { AS_DOUBLE, AS_INT, AS_LONG, AS_BOOL } Form;
 typedef struct {
     const char *name;
     unsigned types;
     Form form;
 } Group;
 
-/* component.c: an instance that was laid out, as new; what it hears and says. */
+/* component.c: FAILED: no importer's integrator can move this FMU's states, and why. */
+SHARED Status component_exchanges(const char *function, Why *why);
+
+/* An instance that was laid out, as new; what it hears and says. */
 SHARED void component_begin(Component *c, int exchange, int logging);
 SHARED void component_reset(Component *c);
 SHARED int component_initialize(Component *c, const Call *call, int phase); /* its end; what comes after it */

@@ -71,8 +71,10 @@ int component_save(Component *c, const Call *call, void **state) {
 }
 
 /* Is the phase that was restored one that this instance can be in?  The cause is in why if not. */
-static int in_phase(Instance *x) {
-    const int live = x->exchange ? EXCHANGE : STEPPING, all = INSTANTIATED | INITIALIZATION | live | TERMINATED;
+static int in_phase(Component *c) {
+    Instance *x = &c->instance;
+    const int stepping = c->meets ? STEPPING | EVENT : STEPPING;
+    const int live = x->exchange ? EXCHANGE : stepping, all = INSTANTIATED | INITIALIZATION | live | TERMINATED;
     const int one = x->phase > 0 && (x->phase & (x->phase - 1)) == 0 && (x->phase & all) != 0;
     if (one && x->running == ((x->phase & (live | TERMINATED)) != 0)) return 1;
     (void)fail(&x->solver.why, "the saved state is none of this FMU's: its mode is %d", x->phase);
@@ -89,7 +91,7 @@ int component_restore(Component *c, const Call *call, void *state) {
     const int exchange = c->instance.exchange;
     instance_restore(&c->instance, (const char *)state + sizeof(Head));
     const int other = c->instance.exchange != exchange;
-    if (!other && instance_restored(&c->instance) == OK && in_phase(&c->instance)) return CALL_OK;
+    if (!other && instance_restored(&c->instance) == OK && in_phase(c)) return CALL_OK;
     instance_restore(&c->instance, c->instance.backup);
     if (!other) return component_failed(c, CALL_ERROR);
     (void)fail(&text, "%s: the state was saved by an instance of the other type", call->name);

@@ -1,6 +1,8 @@
 /* component_values.c -- getting and setting variables by their value references. */
 #include <limits.h>
 #include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
 
 #include "component.h"
 
@@ -22,11 +24,18 @@ static void store_number(Form form, void *values, size_t k, double value) {
     switch (form) {
         case AS_DOUBLE: ((double *)values)[k] = value; break;
         case AS_INT: ((int *)values)[k] = (int)fmin(value, INT_MAX); break;
+        case AS_LONG: ((int64_t *)values)[k] = (int64_t)value; break;
+        case AS_BOOL: ((bool *)values)[k] = value != 0; break;
     }
 }
 
 static double number_at(Form form, const void *values, size_t k) {
-    return form == AS_DOUBLE ? ((const double *)values)[k] : ((const int *)values)[k];
+    switch (form) {
+        case AS_DOUBLE: return ((const double *)values)[k];
+        case AS_LONG: return (double)((const int64_t *)values)[k];
+        case AS_BOOL: return ((const bool *)values)[k];
+        default: return ((const int *)values)[k];
+    }
 }
 
 int component_get(Component *c, const Call *call, const Group *group, const unsigned references[], size_t count,

@@ -106,7 +106,7 @@ Status exchange_evaluate(Instance *x) {
 /* The multipliers of all rows, those too that depend on others. */
 Status exchange_multipliers(Instance *x) {
     Solver *s = &x->solver;
-    if (!s->state.now.dependent) return exchange_evaluate(x);
+    if (x->exchange && !s->state.now.dependent) return exchange_evaluate(x);
     if (instance_start(x) != OK) return FAILED;
     segment_begin(s);
     x->evaluated = 0;

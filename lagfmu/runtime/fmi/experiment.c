@@ -37,14 +37,14 @@ static int is_same(const Instance *x, const Variable *v, double value) {
 
 static Status method_exists(Why *why, const Variable *v, double value) {
     const char *comma = "";
-    const int method = (int)value;
+    const int method = value >= 0 && value < METHOD_COUNT ? (int)value : 0;
     if (method == RATTLE && !(MODEL_SYSTEM->separable && MODEL_SYSTEM->formulation == MULTIPLIERS))
         return fail(why,
                     "'%s' = 'rattle': this method needs a constant mass matrix, forces without velocities, "
                     "position constraints only and the formulation 'multipliers'; choose another",
                     v->name);
     if (method > 0 && method < METHOD_COUNT && OPTIONAL.methods[method] != NULL) return OK;
-    (void)fail(why, "'%s' = %d, expected one of ", v->name, method);
+    (void)fail(why, "'%s' = %.0f, expected one of ", v->name, value);
     for (int k = 1; k < METHOD_COUNT; k++) {
         if (OPTIONAL.methods[k] == NULL) continue;
         why_append(why, "%s%d (%s)", comma, k, METHOD_NAMES[k]);

@@ -86,14 +86,8 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation)
         return none(functions, instanceName,
                     "fmi2Instantiate: the type is neither Model Exchange nor co-simulation");
-    if (fmuType == fmi2ModelExchange && MODEL_SYSTEM->estimated_count > 0)
-        return none(functions, instanceName,
-                    "fmi2Instantiate: the rates of a prescribed motion are estimated from communication "
-                    "points, which Model Exchange has not: take co-simulation");
-    if (fmuType == fmi2ModelExchange && ERROR_BARS != NULL)
-        return none(functions, instanceName,
-                    "fmi2Instantiate: error bars come from a finer run beside the FMU's own, and in "
-                    "Model Exchange the importer integrates: take co-simulation, or an FMU without");
+    if (fmuType == fmi2ModelExchange && component_exchanges("fmi2Instantiate", &text) != OK)
+        return none(functions, instanceName, text.text);
 
     const size_t name_size = strlen(instanceName) + 1;
     memset(&draft, 0, sizeof draft);

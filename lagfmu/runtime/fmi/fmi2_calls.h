@@ -13,6 +13,7 @@
 enum {
     FMI2_CHOSEN = INSTANTIATED | INITIALIZATION | STEPPING | EVENT, /* discrete ones can be set, ... */
     FMI2_SETTABLE = FMI2_CHOSEN | CONTINUOUS,                       /* ... and continuous ones */
+    FMI2_LIVE = INITIALIZATION | STEPPING | EXCHANGE | TERMINATED,
     FMI2_STEPPED = STEPPING | TERMINATED
 };
 
@@ -38,16 +39,16 @@ enum {
     CALL(fmi2SerializedFMUstateSize, ANY_MODE, ANY_MODE)                      \
     CALL(fmi2SerializeFMUstate, ANY_MODE, ANY_MODE)                           \
     CALL(fmi2DeSerializeFMUstate, ANY_MODE, ANY_MODE)                         \
-    CALL(fmi2GetDirectionalDerivative, READABLE, READABLE)                    \
+    CALL(fmi2GetDirectionalDerivative, FMI2_LIVE, FMI2_LIVE)                  \
     CALL(fmi2EnterEventMode, EXCHANGE, 0)                                     \
     CALL(fmi2NewDiscreteStates, EVENT, 0)                                     \
     CALL(fmi2EnterContinuousTimeMode, EVENT, 0)                               \
     CALL(fmi2CompletedIntegratorStep, CONTINUOUS, 0)                          \
     CALL(fmi2SetTime, EXCHANGE, 0)                                            \
     CALL(fmi2SetContinuousStates, CONTINUOUS, 0)                              \
-    CALL(fmi2GetDerivatives, READABLE, 0)                                     \
-    CALL(fmi2GetEventIndicators, READABLE, 0)                                 \
-    CALL(fmi2GetContinuousStates, READABLE, 0)                                \
+    CALL(fmi2GetDerivatives, FMI2_LIVE, 0)                                    \
+    CALL(fmi2GetEventIndicators, FMI2_LIVE, 0)                                \
+    CALL(fmi2GetContinuousStates, FMI2_LIVE, 0)                               \
     CALL(fmi2GetNominalsOfContinuousStates, ANY_MODE, 0)                      \
     CALL(fmi2SetRealInputDerivatives, 0, INSTANTIATED | INITIALIZATION | STEPPING) \
     CALL(fmi2GetRealOutputDerivatives, 0, FMI2_STEPPED)                       \

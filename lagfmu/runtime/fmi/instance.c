@@ -37,6 +37,7 @@ void instance_layout(Instance *x, Arena *arena) {
             x->before[k] = arena_take(&scratch, (size_t)event_count_of(system, (EventKind)k), sizeof(Count));
         x->shared = arena_ints(&scratch, system->frictions);
         x->happened = arena_ints(&scratch, indicators_count(system));
+        x->indicators = arena_doubles(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
         x->places = arena_doubles(&scratch, system->lookup_count);

@@ -45,6 +45,7 @@ typedef struct Instance {
     int *shared;            /* (frictions) 1: that its normal force is not unique has been told */
     int *happened;          /* (contacts) */
     double *pull;            /* (contacts) [of f/s^2] acceleration towards each, of exchange.c */
+    double *indicators;      /* (event indicators) scratch, for one that is read */
     char *saved, *backup;   /* what must be saved; a copy from before a step */
     size_t saved_size;
     Tell tell;

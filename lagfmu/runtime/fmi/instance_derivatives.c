@@ -65,7 +65,8 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;
         case AT_OUTPUT: *change = w->down[v->index]; break;
         case AT_INPUT: *change = d.du[v->index]; break;
-        case AT_ERROR: *change = NAN; break; /* it is not known */
+        case AT_TIME: *change = d.dt; break;
+        case AT_ERROR: case AT_INDICATOR: *change = NAN; break; /* it is not known, or not asked for */
         default: break; /* discrete ones and parameters: none */
     }
     if (v->place == AT_LAMBDA && !x->seen.unique[v->index])

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "exchange.h"
 #include "peaks.h"
 #include "prescribed.h"
 
@@ -74,6 +75,7 @@ static int ready(const Solver *s, const Variable *v, double *value) {
             return 1;
         case AT_S: *value = s->state.q[v->index]; return 1;
         case AT_SDOT: *value = s->state.v[v->index]; return 1;
+        case AT_TIME: *value = s->state.now.t; return 1;
         case AT_STEPS: *value = (double)s->state.now.steps; return 1;
         case AT_CONTACT: *value = s->state.closed[v->index]; return 1;
         case AT_IMPULSE: *value = s->state.impulse[v->index]; return 1;
@@ -117,10 +119,18 @@ Status instance_value(Solver *s, const Observed *o, const Variable *v, double *v
     return OK;
 }
 
+/* An event indicator, as an importer's integrator would watch it. */
+static Status indicator(Instance *x, int i, double *value) {
+    if (instance_observe(x) != OK || exchange_indicators(x, x->indicators) != OK) return FAILED;
+    *value = x->indicators[i];
+    return isfinite(*value) ? OK : fail(&x->solver.why, "event indicator %d is not finite", i + 1);
+}
+
 Status instance_get(Instance *x, const Variable *v, double *value) {
     const int estimated = v->place == AT_INPUT && x->solver.system->estimated_count > 0;
     if (!estimated && instance_was_set(x, v, value)) return OK;
     if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
+    if (v->place == AT_INDICATOR) return indicator(x, v->index, value);
     if (solver_arrive(&x->solver) != OK) return FAILED;
     if (follow(x) != OK) return FAILED;
     if (estimated && instance_was_set(x, v, value)) return OK;

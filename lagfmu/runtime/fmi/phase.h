@@ -12,10 +12,11 @@ enum {
     EVENT = 16,
     CONTINUOUS = 32,
     TERMINATED = 64,
+    BETWEEN = 128, /* within a communication step: never saved */
     STEPPING = STEP_COMPLETE | STEP_FAILED,
     EXCHANGE = EVENT | CONTINUOUS,
-    READABLE = INITIALIZATION | STEPPING | EXCHANGE | TERMINATED, /* whatever there is */
-    ANY_MODE = INSTANTIATED | READABLE
+    READABLE = INITIALIZATION | STEPPING | EXCHANGE | TERMINATED | BETWEEN, /* whatever there is */
+    ANY_MODE = INSTANTIATED | INITIALIZATION | STEPPING | EXCHANGE | TERMINATED
 };
 
 /* A function of the interface, and the modes in which an instance allows it: one for Model Exchange, one for

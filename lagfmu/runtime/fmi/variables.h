@@ -6,7 +6,7 @@
 #include "linkage.h"
 #include "state.h"
 
-typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_ENUMERATION, TYPE_BOOLEAN } Type;
+typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_ENUMERATION, TYPE_BOOLEAN, TYPE_CLOCK } Type;
 
 /* what may set it */
 typedef enum { ROLE_PARAMETER, ROLE_START, ROLE_INPUT, ROLE_SOLVER, ROLE_OUTPUT } Role;
@@ -37,6 +37,9 @@ typedef enum {
     AT_STICKING_COUNT, AT_STICKING_TIME, AT_STICKING_Q, AT_STICKING_V,
     AT_PEAK_MAX, AT_PEAK_MIN, AT_PEAK_MAX_TIME, AT_PEAK_MIN_TIME, /* number of the quantity */
     AT_LOST, AT_LOST_RATE,                   /* energy dissipated, and its derivative by frictions */
+    AT_TIME,
+    AT_INDICATOR,      /* event indicator index */
+    AT_CLOCK,          /* of contact, or after those friction, index */
     AT_ERROR           /* error bar number `contact`, of the variable at position `index` (bars.h) */
 } Place;
 
