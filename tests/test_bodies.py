@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from math import acos, cos, hypot, pi, sin, sqrt
 from pathlib import Path
@@ -392,7 +393,8 @@ def test_a_parameter_that_two_parts_share_is_one():
 
 def test_a_mechanism_is_assembled_from_the_joint_coordinates_that_are_given():
     """A four-bar linkage, drawn as one line: the crank's angle and rate stay, the rest closes, velocities
-    too; the angle between coupler and rocker is that of the cosine law."""
+    too; the angle between coupler and rocker is that of the cosine law.  The elbow may bend the other way as
+    well: a warning says so, and what start bends it there."""
     names, lengths = ("crank", "coupler", "rocker"), (0.2, 0.5, 0.4)
     parts = [Body(n, 1.0, 0.01) for n in names]
     ends = [(b.at((-x / 2, 0)), b.at((x / 2, 0))) for b, x in zip(parts, lengths, strict=True)]
@@ -403,13 +405,22 @@ def test_a_mechanism_is_assembled_from_the_joint_coordinates_that_are_given():
         Revolute("C", b2, c1),
         Revolute("D", c2, ground.at((0.45, 0))),
     ]
-    model = plane(bodies=parts, joints=joints, start={"angle.A": 1.1, "der(angle.A)": -3.0})
+    start = {"angle.A": 1.1, "der(angle.A)": -3.0}
+    with pytest.warns(UserWarning, match="the joints close in two ways") as told:
+        model = plane(bodies=parts, joints=joints, start=start)
     first = moved(model, stop=0.001)[0]
     assert (first["angle.A"], first["der(angle.A)"]) == pytest.approx((1.1, -3.0), rel=1e-13)
     assert max(abs(first[f"residual.{j.name}.{x}"]) for j in joints for x in "xy") < 1e-15
     diagonal2 = 0.2**2 + 0.45**2 - 2 * 0.2 * 0.45 * cos(1.1)
     between = (0.5**2 + 0.4**2 - diagonal2) / (2 * 0.5 * 0.4)
     assert -cos(first["angle.C"]) == pytest.approx(between, rel=1e-12)
+    other = re.search(r"for the other start '(angle\.\w)' at (\S+)$", str(told[0].message))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        chosen = plane(bodies=parts, joints=joints, start={**start, other[1]: float(other[2])})
+    elbow = moved(chosen, stop=0.001)[0]
+    assert elbow["angle.A"] == pytest.approx(1.1, rel=1e-13)
+    assert sin(elbow["angle.C"]) == pytest.approx(-sin(first["angle.C"]), rel=1e-12)
 
 
 @pytest.mark.parametrize("target", ["native", "python"])

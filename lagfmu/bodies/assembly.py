@@ -21,6 +21,7 @@ from sympy.core.function import AppliedUndef
 from ..errors import LagfmuWarning, ModelError
 from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, name_of
 from ..model.model import Model
+from .branches import CLOSED, has_loop, tell_second_branch
 from .draft import Draft
 from .given import Beginning, given_values, known_names
 from .guess import guessed
@@ -28,7 +29,6 @@ from .rows import TIME, Array, Rows, condition, numbers_of
 
 STEPS, HALVINGS = 100, 12
 TRIES = 12  # beginnings with other omitted values, where the first leads nowhere
-CLOSED = 1e-9  # of the size of the mechanism: what a row may miss, and a given value be another
 REDUNDANT = 1e-11  # a singular value, relative to the largest: rows that say the same
 EPS = float(np.finfo(float).eps)
 
@@ -67,6 +67,14 @@ def assemble(
     if missed.max(initial=0.0) > CLOSED:
         raise ModelError(model.name, list(_open([c.name for c in closing], f.values(q), missed)))
     _tell(model, places, held.values(q), size)
+    if moving.is_determined([f, held], q) and has_loop(draft, parts):
+        measures = {n: of.values[0] for n, of in draft.relative.items() if n not in places}
+
+        def closed_from(angles: Mapping[str, float]) -> tuple[Array, Array]:
+            put = guessed(draft, model, parts, {**angles, **places})
+            return moving.newton([f, held], wanted, moving.tied(put, places))
+
+        tell_second_branch(model, measures, closed_from, rough, q)
 
     still = [f, Rows(model, [condition(model, c) for c in rolling])]
     driven = Rows(model, [known[n][:2] for n in rates])
@@ -148,14 +156,20 @@ class _Moving:
         best, least = rough, np.full(len(wanted), np.inf)
         for k in range(TRIES):
             away = draws.uniform(-0.5, 0.5, len(self.scale)) * self.scale
-            q, missed = self._newton(rows, wanted, self.moved(rough, away) if k else rough)
+            q, missed = self.newton(rows, wanted, self.moved(rough, away) if k else rough)
             if missed.max(initial=0.0) < least.max(initial=0.0):
                 best, least = q, missed
             if least.max(initial=0.0) <= CLOSED:
                 break
         return best, least
 
-    def _newton(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array]:
+    def is_determined(self, rows: Sequence[Rows], q: Array) -> bool:
+        """True if the rows leave no motion."""
+        slopes = np.vstack([r.slopes(q) for r in rows]) / self.weight
+        return bool(np.linalg.matrix_rank(slopes) == len(self.weight))
+
+    def newton(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array]:
+        """Coordinates near q at which the rows have the wanted values, and what each misses."""
         r, A, size = self._missed(rows, wanted, q)
         for _ in range(STEPS):
             step = self._least(A / size[:, None], r / size)

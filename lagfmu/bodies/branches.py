@@ -1,0 +1,80 @@
+"""A second way in which the joints of a loop close: an elbow up, or down.
+
+It is looked for from other angles of the joints, drawn at random, where nothing is left to move: where a
+motion is left, it may lead from one branch to the other.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from ..errors import LagfmuWarning
+from ..model.elements import Expr
+from ..model.model import Model
+from .draft import Draft
+from .rows import Array, Rows
+
+CLOSED = 1e-9  # of the size of the mechanism: what a row may miss, and a given value be another
+DRAWS, MOST = 8, 60  # beginnings; speeds of a mechanism beyond which it is not looked for
+NEAR, ANOTHER = (
+    2.0,
+    1e-3,
+)  # times as far as the branch that is taken; what makes another one, of its way
+
+
+class SecondBranchWarning(LagfmuWarning):
+    """A mechanism closes in two ways, and nothing says which is meant."""
+
+
+def has_loop(draft: Draft, parts: Sequence[Any]) -> bool:
+    """True if there are more ties than bodies, and not too many of them."""
+    ties = sum(hasattr(part, "relative_pose") for part in parts)
+    bodies = len(draft.motions) - 1
+    return ties > bodies and 6 * bodies <= MOST
+
+
+def tell_second_branch(
+    model: Model,
+    measures: Mapping[str, Expr],
+    closed_from: Callable[[Mapping[str, float]], tuple[Array, Array]],
+    rough: Array,
+    q: Array,
+) -> None:
+    """Warns of a branch besides q that is about as near to the rough place, by the angle or position (of
+    `measures`, which are free) that tells them apart most.  `closed_from` closes the joints from other
+    angles: coordinates, and what each row then misses."""
+    if not measures:
+        return
+    rows = Rows(model, [(e, sp.S.Zero) for e in measures.values()])
+    draws, way = np.random.default_rng(0), float(np.linalg.norm(q - rough))
+    here, nearest, apart = rows.values(q), NEAR * way, None
+    for _ in range(DRAWS):
+        angles = {n: draws.uniform(-math.pi, math.pi) for n in measures if n.startswith("angle")}
+        there, missed = closed_from(angles)
+        far = float(np.linalg.norm(there - rough))
+        difference = _turned(measures, rows.values(there) - here)
+        another = np.abs(difference).max() > ANOTHER * way
+        if missed.max(initial=0.0) <= CLOSED and another and far < nearest:
+            nearest, apart = far, difference
+    if apart is None:
+        return
+    k = int(np.argmax(np.abs(apart)))
+    name, taken, other = list(measures)[k], here[k].item(), (here + apart)[k].item()
+    warnings.warn(
+        f"model {model.name!r}: the joints close in two ways that are about as near: taken is the one with "
+        f"{name} = {taken!r}; for the other start {name!r} at {other!r}",
+        SecondBranchWarning,
+        stacklevel=6,
+    )
+
+
+def _turned(measures: Mapping[str, Expr], values: Array) -> Array:
+    """Differences of angles within half a turn."""
+    angles = [n.startswith("angle") for n in measures]
+    return np.where(angles, np.remainder(values + math.pi, 2 * math.pi) - math.pi, values)
